@@ -1,0 +1,50 @@
+"""Errors a person can act on: every problem at once, each with its place, value and remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with an input.
+
+    ``where`` names the file, row, column or key path; ``what`` says what is wrong and quotes the
+    value found; ``allowed`` says what would be accepted; ``fix`` says what to do next.
+    """
+
+    where: str
+    what: str
+    allowed: str = ""
+    fix: str = ""
+
+    def __str__(self) -> str:
+        parts = [f"{self.where}: {self.what}"]
+        if self.allowed:
+            parts.append(f"allowed: {self.allowed}")
+        if self.fix:
+            parts.append(self.fix)
+        return "; ".join(parts)
+
+
+class KinaccError(Exception):
+    """Base of every error kinacc raises on purpose."""
+
+
+class InputError(KinaccError):
+    """The input cannot be used; carries every problem found, not only the first."""
+
+    def __init__(self, problems: Iterable[Problem] | Problem, title: str = "") -> None:
+        self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
+        self.title = title
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        count = len(self.problems)
+        head = self.title or f"{count} problem{'s' if count != 1 else ''} in the input"
+        return "\n".join([head, *(f"  - {problem}" for problem in self.problems)])
+
+
+class FitError(KinaccError):
+    """A fit did not reach what was asked of it; the message carries the numbers."""

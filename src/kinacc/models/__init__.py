@@ -1,0 +1,1 @@
+"""Kinematic models: frozen records of parameters and batched pure functions over joint arrays."""
