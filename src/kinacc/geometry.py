@@ -1,0 +1,171 @@
+"""Rigid motions as arrays: rotations, frames and their logarithms; knows nothing of robots.
+
+Rotations are ``(..., 3, 3)``, vectors ``(..., 3)``; leading axes broadcast. Angles in rad,
+lengths in mm. Quaternions are ``w, x, y, z``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+_SMALL_ANGLE_RAD = 1e-4
+
+
+class Pose(NamedTuple):
+    """Frame(s): ``rotation`` (..., 3, 3) and ``position_mm`` (..., 3) in the parent frame."""
+
+    rotation: np.ndarray
+    position_mm: np.ndarray
+
+
+IDENTITY = Pose(np.eye(3), np.zeros(3))
+
+
+def compose(first: Pose, second: Pose) -> Pose:
+    """Frame of ``second`` (given in ``first``) in the parent of ``first``; broadcasts."""
+    rotation = first.rotation @ second.rotation
+    position = (first.rotation @ second.position_mm[..., None])[..., 0] + first.position_mm
+    return Pose(rotation, position)
+
+
+def invert(pose: Pose) -> Pose:
+    """Parent frame seen from ``pose``."""
+    transposed = np.swapaxes(pose.rotation, -1, -2)
+    return Pose(transposed, -(transposed @ pose.position_mm[..., None])[..., 0])
+
+
+def skew(vector: np.ndarray) -> np.ndarray:
+    """Cross-product matrix (..., 3, 3) of ``vector`` (..., 3)."""
+    vector = np.asarray(vector, dtype=float)
+    matrix = np.zeros((*vector.shape[:-1], 3, 3))
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    matrix[..., 0, 1], matrix[..., 0, 2] = -z, y
+    matrix[..., 1, 0], matrix[..., 1, 2] = z, -x
+    matrix[..., 2, 0], matrix[..., 2, 1] = -y, x
+    return matrix
+
+
+def vee(matrix: np.ndarray) -> np.ndarray:
+    """Vector (..., 3) of the skew-symmetric part of ``matrix`` (..., 3, 3)."""
+    return 0.5 * np.stack(
+        [
+            matrix[..., 2, 1] - matrix[..., 1, 2],
+            matrix[..., 0, 2] - matrix[..., 2, 0],
+            matrix[..., 1, 0] - matrix[..., 0, 1],
+        ],
+        axis=-1,
+    )
+
+
+def rotation_x(angle_rad: np.ndarray | float) -> np.ndarray:
+    """Rotation (..., 3, 3) about x by ``angle_rad`` (...)."""
+    return _axis_rotation(angle_rad, 0)
+
+
+def rotation_y(angle_rad: np.ndarray | float) -> np.ndarray:
+    """Rotation (..., 3, 3) about y by ``angle_rad`` (...)."""
+    return _axis_rotation(angle_rad, 1)
+
+
+def rotation_z(angle_rad: np.ndarray | float) -> np.ndarray:
+    """Rotation (..., 3, 3) about z by ``angle_rad`` (...)."""
+    return _axis_rotation(angle_rad, 2)
+
+
+def _axis_rotation(angle_rad: np.ndarray | float, axis: int) -> np.ndarray:
+    angle_rad = np.asarray(angle_rad, dtype=float)
+    after, last = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.zeros((*angle_rad.shape, 3, 3))
+    matrix[..., axis, axis] = 1.0
+    matrix[..., after, after] = matrix[..., last, last] = np.cos(angle_rad)
+    matrix[..., last, after] = np.sin(angle_rad)
+    matrix[..., after, last] = -matrix[..., last, after]
+    return matrix
+
+
+def exp_so3(rotation_vector_rad: np.ndarray) -> np.ndarray:
+    """Rotation (..., 3, 3) of a rotation vector (..., 3) in rad (Rodrigues)."""
+    vector = np.asarray(rotation_vector_rad, dtype=float)
+    angle_sq = np.sum(vector * vector, axis=-1)
+    angle = np.sqrt(angle_sq)
+    small = angle < _SMALL_ANGLE_RAD
+    safe = np.where(small, 1.0, angle)
+    sine = np.where(small, 1.0 - angle_sq / 6.0, np.sin(safe) / safe)
+    versine = np.where(small, 0.5 - angle_sq / 24.0, 2.0 * (np.sin(0.5 * safe) / safe) ** 2)
+    cross = skew(vector)
+    return np.eye(3) + sine[..., None, None] * cross + versine[..., None, None] * (cross @ cross)
+
+
+def log_so3(rotation: np.ndarray) -> np.ndarray:
+    """Rotation vector (..., 3) in rad, length at most pi, of a rotation (..., 3, 3)."""
+    quaternion = quaternion_from_rotation(rotation)
+    scalar, vector = quaternion[..., 0], quaternion[..., 1:]
+    length = np.linalg.norm(vector, axis=-1)
+    small = length < _SMALL_ANGLE_RAD
+    safe = np.where(small, 1.0, length)
+    # asin(x)/x near zero: the arctangent loses no digits there either, but divides by zero.
+    factor = np.where(
+        small,
+        2.0 + length * length / 3.0,
+        2.0 * np.arctan2(safe, np.where(small, 1.0, scalar)) / safe,
+    )
+    return factor[..., None] * vector
+
+
+def project_so3(matrix: np.ndarray) -> np.ndarray:
+    """Nearest rotation (polar factor) of ``matrix`` (..., 3, 3) with positive determinant.
+
+    Newton's iteration for the polar factor on cofactors; quadratic near a rotation, where the
+    first-order products of eq. 6 live.
+    """
+    result = np.array(matrix, dtype=float)
+    settled = np.zeros(result.shape[:-2], dtype=bool)
+    for _ in range(60):
+        rows = result[..., 0, :], result[..., 1, :], result[..., 2, :]
+        cofactor = np.stack(
+            [np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])],
+            axis=-2,
+        )
+        determinant = np.sum(rows[0] * cofactor[..., 0, :], axis=-1)
+        following = 0.5 * (result + cofactor / determinant[..., None, None])
+        change = np.max(np.abs(following - result), axis=(-2, -1))
+        # A settled matrix is left alone, so no result depends on what else is in the batch.
+        result = np.where(settled[..., None, None], result, following)
+        settled = settled | (change < 1e-14)
+        if settled.all():
+            break
+    return result
+
+
+def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation (..., 3, 3) of a unit quaternion ``w, x, y, z`` (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
+    """Unit quaternion ``w, x, y, z`` (..., 4) with ``w >= 0`` of a rotation (..., 3, 3)."""
+    rotation = np.asarray(rotation, dtype=float)
+    diagonal = np.diagonal(rotation, axis1=-2, axis2=-1)
+    trace = diagonal.sum(axis=-1)
+    # Four times the outer product of the quaternion with itself; its largest row is well scaled.
+    outer = np.empty((*rotation.shape[:-2], 4, 4))
+    outer[..., 0, 0] = 1.0 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        outer[..., 1 + i, 1 + i] = 1.0 - trace + 2.0 * diagonal[..., i]
+        outer[..., 0, 1 + i] = outer[..., 1 + i, 0] = rotation[..., k, j] - rotation[..., j, k]
+        outer[..., 1 + i, 1 + j] = outer[..., 1 + j, 1 + i] = (
+            rotation[..., j, i] + rotation[..., i, j]
+        )
+    largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
+    quaternion = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    return np.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)
