@@ -1,0 +1,218 @@
+"""Forward kinematics one 4x4 matrix at a time (paper eqs. 1-6), and derivatives by differences.
+
+A DH table is a sequence of rows (theta_offset_rad, d_mm, a_mm, alpha_rad, beta_rad).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import mpmath
+import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.spatial.transform import Rotation
+
+ERROR_NAMES = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
+
+MH180 = [
+    (0.0, 0.0, 325.0, -math.pi / 2, 0.0),
+    (-math.pi / 2, 0.0, 1150.0, math.pi, 0.0),
+    (0.0, 0.0, 300.0, -math.pi / 2, 0.0),
+    (-math.pi, -1225.0, 0.0, -math.pi / 2, 0.0),
+    (-math.pi, 0.0, 0.0, -math.pi / 2, 0.0),
+    (0.0, -225.0, 0.0, math.pi, 0.0),
+]
+MH180_LIMITS_DEG = [(-180, 180), (-60, 76), (-86, 90), (-360, 360), (-130, 130), (-360, 360)]
+
+UR10 = [
+    (0.0, 127.3, 0.0, math.pi / 2, 0.0),
+    (0.0, 0.0, -612.0, 0.0, 0.0),
+    (0.0, 0.0, -572.3, 0.0, 0.0),
+    (0.0, 163.941, 0.0, math.pi / 2, 0.0),
+    (0.0, 115.7, 0.0, -math.pi / 2, 0.0),
+    (0.0, 92.2, 0.0, 0.0, 0.0),
+]
+
+
+def rot_x(angle: float) -> np.ndarray:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+
+
+def rot_y(angle: float) -> np.ndarray:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1.0]])
+
+
+def rot_z(angle: float) -> np.ndarray:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+
+
+def trans(x: float, y: float, z: float) -> np.ndarray:
+    return np.array([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1.0]])
+
+
+def dh_link(row: Sequence[float], q: float) -> np.ndarray:
+    """Eq. 4 with Hayati's extra rotation: Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)."""
+    theta, d, a, alpha, beta = row
+    return rot_z(q + theta) @ trans(0, 0, d) @ trans(a, 0, 0) @ rot_x(alpha) @ rot_y(beta)
+
+
+def dh_frames(table: Sequence[Sequence[float]], q: Sequence[float]) -> list[np.ndarray]:
+    """The base frame and the frame after each joint."""
+    frames = [np.eye(4)]
+    for row, angle in zip(table, q, strict=True):
+        frames.append(frames[-1] @ dh_link(row, angle))
+    return frames
+
+
+def dh_forward(table: Sequence[Sequence[float]], q: Sequence[float]) -> np.ndarray:
+    """Eq. 3."""
+    return dh_frames(table, q)[-1]
+
+
+def error_matrix(errors: Sequence[float]) -> np.ndarray:
+    """Eq. 6 as printed; errors in the order of ERROR_NAMES."""
+    dx, dy, dz, ex, ey, ez = errors
+    return np.array([[1, -ez, ey, dx], [ez, 1, -ex, dy], [-ey, ex, 1, dz], [0, 0, 0, 1.0]])
+
+
+def vec_errors(
+    series: np.ndarray, q: float, low: float, high: float, offsets: Sequence[float], s: int
+) -> list[float]:
+    """Six errors of one joint: Chebyshev series on [low, high] -> [-1, 1], plus the backlash
+    offset of eps_z for travel direction -1 (offsets[0]) or +1 (offsets[1]); none for 0."""
+    u = (2 * q - low - high) / (high - low)
+    values = [float(chebyshev.chebval(u, list(row))) for row in series]
+    if s == -1:
+        values[5] += offsets[0]
+    elif s == +1:
+        values[5] += offsets[1]
+    return values
+
+
+def vec_forward(
+    table: Sequence[Sequence[float]],
+    series: np.ndarray,
+    low: Sequence[float],
+    high: Sequence[float],
+    offsets: np.ndarray,
+    q: Sequence[float],
+    s: Sequence[int],
+) -> np.ndarray:
+    """Eq. 5: the rotation block is a product of first-order matrices and not orthonormal."""
+    frame = np.eye(4)
+    for i, row in enumerate(table):
+        errors = vec_errors(series[i], q[i], low[i], high[i], offsets[i], int(s[i]))
+        frame = frame @ error_matrix(errors) @ dh_link(row, q[i])
+    return frame
+
+
+def nearest_rotation(matrix: np.ndarray) -> np.ndarray:
+    """Rotation closest to a 3x3 matrix in the Frobenius norm."""
+    left, _, right = np.linalg.svd(matrix)
+    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+
+
+def projected(frame: np.ndarray) -> np.ndarray:
+    result = frame.copy()
+    result[:3, :3] = nearest_rotation(frame[:3, :3])
+    return result
+
+
+def rotation_vector(matrix: np.ndarray) -> np.ndarray:
+    return Rotation.from_matrix(matrix).as_rotvec()
+
+
+def pose_matrix(x: float, y: float, z: float, wxyz: Sequence[float]) -> np.ndarray:
+    w, i, j, k = wxyz
+    result = np.eye(4)
+    result[:3, :3] = Rotation.from_quat([i, j, k, w]).as_matrix()
+    result[:3, 3] = (x, y, z)
+    return result
+
+
+def difference_jacobian(
+    pose: Callable[[np.ndarray], np.ndarray], at: np.ndarray, step: np.ndarray | float
+) -> np.ndarray:
+    """Central differences (6, n) of a 4x4-valued function: position rows, then the rotation vector
+    of R(x + h) R(x - h)^T, i.e. in the base frame. Richardson-extrapolated to fourth order."""
+    at = np.asarray(at, float)
+    steps = np.broadcast_to(np.asarray(step, float), at.shape)
+    columns = []
+    for i, h in enumerate(steps):
+        estimates = []
+        for scale in (1.0, 2.0):
+            shift = np.zeros_like(at)
+            shift[i] = h * scale
+            ahead, behind = pose(at + shift), pose(at - shift)
+            spin = rotation_vector(ahead[:3, :3] @ behind[:3, :3].T)
+            estimates.append(
+                np.concatenate([ahead[:3, 3] - behind[:3, 3], spin]) / (2 * h * scale)
+            )
+        columns.append((4 * estimates[0] - estimates[1]) / 3)
+    return np.array(columns).T
+
+
+def mp_dh_forward(table, q, digits: int = 50):
+    """Eq. 3 in multiple precision: nested loops over mpmath numbers of the given float inputs."""
+    return mp_vec_forward(table, None, None, None, None, q, None, digits)
+
+
+def mp_vec_forward(table, series, low, high, offsets, q, s, digits: int = 50):
+    """Eqs. 3 and 5 in multiple precision; series None leaves the error matrices out."""
+    with mpmath.workdps(digits):
+        m = mpmath
+        frame = m.eye(4)
+        for i, (theta, d, a, alpha, beta) in enumerate(table):
+            if series is not None:
+                lo, hi, angle = m.mpf(low[i]), m.mpf(high[i]), m.mpf(q[i])
+                u = (2 * angle - lo - hi) / (hi - lo)
+                e = [
+                    sum((m.mpf(c) * m.chebyt(n, u) for n, c in enumerate(row)), m.mpf(0))
+                    for row in np.asarray(series[i]).tolist()
+                ]
+                if s[i]:
+                    e[5] += m.mpf(offsets[i][0 if s[i] < 0 else 1])
+                dx, dy, dz, ex, ey, ez = e
+                frame = frame * m.matrix(
+                    [[1, -ez, ey, dx], [ez, 1, -ex, dy], [-ey, ex, 1, dz], [0, 0, 0, 1]]
+                )
+            t = m.mpf(q[i]) + m.mpf(theta)
+            ct, st = m.cos(t), m.sin(t)
+            ca, sa = m.cos(m.mpf(alpha)), m.sin(m.mpf(alpha))
+            cb, sb = m.cos(m.mpf(beta)), m.sin(m.mpf(beta))
+            frame = frame * m.matrix([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+            frame = frame * m.matrix([[1, 0, 0, a], [0, 1, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
+            frame = frame * m.matrix([[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
+            frame = frame * m.matrix([[cb, 0, sb, 0], [0, 1, 0, 0], [-sb, 0, cb, 0], [0, 0, 0, 1]])
+        return frame
+
+
+def pinocchio_forward(table: Sequence[Sequence[float]]) -> Callable[[Sequence[float]], np.ndarray]:
+    """Forward function of a pinocchio model built from joint placements.
+
+    Each joint turns about its own z; the constant part of the link before it and its own theta
+    offset are the joint's placement, the constant part of the last link is a frame's placement.
+    """
+    import pinocchio as pin
+
+    model = pin.Model()
+    before = pin.SE3.Identity()
+    parent = 0
+    for i, (theta, d, a, alpha, beta) in enumerate(table):
+        turn = pin.SE3(pin.AngleAxis(theta, np.array([0.0, 0.0, 1.0])).matrix(), np.zeros(3))
+        parent = model.addJoint(parent, pin.JointModelRZ(), before * turn, f"joint{i + 1}")
+        tilt = pin.AngleAxis(alpha, np.array([1.0, 0.0, 0.0])).matrix()
+        twist = pin.AngleAxis(beta, np.array([0.0, 1.0, 0.0])).matrix()
+        before = pin.SE3(tilt @ twist, np.array([a, 0.0, d]))
+    flange = model.addFrame(pin.Frame("flange", parent, before, pin.FrameType.OP_FRAME))
+    data = model.createData()
+
+    def forward(q: Sequence[float]) -> np.ndarray:
+        pin.framesForwardKinematics(model, data, np.asarray(q, float))
+        return data.oMf[flange].homogeneous.copy()
+
+    return forward
