@@ -1,0 +1,20 @@
+"""Words that tables and configuration share: model, comparison, assessor and reading names."""
+
+from __future__ import annotations
+
+MODELS = ("vec", "dh", "nominal")
+SUBSETS = ("train", "validation")
+QUANTITIES = ("position", "orientation")
+UNITS_OF_RESIDUALS = ("mm", "mrad")
+COMPARISONS = ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured")
+ESTIMATES = ("train", "cross_validated")
+ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
+ASSESSORS = ("maximum", "outlier_rejection", "model_invalidation")
+ASSESSOR_PATTERN = "[a-z][a-z0-9_]*"
+IDENTIFIER_PATTERN = "[A-Za-z][A-Za-z0-9_.-]*"
+OUTLIER_RULES = ("normal", "gamma", "iqr")
+DISTANCES = ("squared", "as_printed")
+COVARIANCES = ("r", "sqrt_r")
+SEARCHES = ("from_above", "from_below", "bisection")
+EXAMPLES = ()  # histories name their own examples
+VERDICTS = ("agrees", "differs", "not comparable")

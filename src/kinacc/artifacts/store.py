@@ -1,0 +1,249 @@
+"""Reading and writing the tables: cast to the contract, provenance, all or nothing.
+
+Tables in memory are plain dictionaries of columns. A null number is NaN, a null text is None.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from kinacc.artifacts.contract import (
+    ARTEFACTS,
+    JOINTS_MAX,
+    JOINTS_MIN,
+    PROVENANCE_KEYS,
+    Artefact,
+    Column,
+    joint_count,
+)
+from kinacc.errors import InputError, Problem
+
+_ARROW_TYPES = {
+    "float": pa.float64(),
+    "int": pa.int64(),
+    "int8": pa.int8(),
+    "text": pa.string(),
+}
+
+
+class TableToWrite(NamedTuple):
+    """One table for :func:`write_all`: where, which artefact, its columns, its provenance."""
+
+    path: Path | str
+    artefact: str
+    columns: Mapping[str, object]
+    provenance: Mapping[str, object]
+
+
+def artefact_named(name: str) -> Artefact:
+    """The contract of an artefact; InputError if there is none of that name."""
+    if name not in ARTEFACTS:
+        raise InputError(Problem(f"artefact {name!r}", "not in the contract", ", ".join(ARTEFACTS)))
+    return ARTEFACTS[name]
+
+
+def arrow_schema(artefact: str, joints: int = 0, provenance: Mapping | None = None) -> pa.Schema:
+    """Arrow schema of an artefact for an arm of ``joints`` joints, unit and meaning included."""
+    fields = [
+        pa.field(
+            column.name,
+            _ARROW_TYPES[column.kind],
+            nullable=column.nullable,
+            metadata={"unit": column.unit, "meaning": column.meaning},
+        )
+        for column in artefact_named(artefact).for_joints(joints)
+    ]
+    metadata = None if provenance is None else {k: str(provenance[k]) for k in PROVENANCE_KEYS}
+    return pa.schema(fields, metadata)
+
+
+def to_table(artefact: str, columns: Mapping[str, object], provenance: Mapping) -> pa.Table:
+    """Cast columns (each of shape (rows,)) to the artefact's Arrow table.
+
+    NaN and None become null where the contract allows null. Raises InputError naming every missing
+    or unknown column, null where none may be, number that is not finite, and value of a wrong type.
+    """
+    contract = artefact_named(artefact)
+    where = f"table {artefact}"
+    problems = _provenance_problems(where, provenance)
+    joints = joint_count(contract, columns)
+    if contract.has_joints and not JOINTS_MIN <= joints <= JOINTS_MAX:
+        problems.append(
+            Problem(where, f"speaks of {joints} joints", f"q1.. of {JOINTS_MIN} to {JOINTS_MAX}")
+        )
+    wanted = contract.for_joints(joints)
+    names = [column.name for column in wanted]
+    problems += [
+        Problem(f"{where}, column {name}", "not in the contract", ", ".join(names))
+        for name in columns
+        if name not in names
+    ]
+    arrays = []
+    for column in wanted:
+        place = f"{where}, column {column.name}"
+        if column.name not in columns:
+            problems.append(Problem(place, "missing"))
+            continue
+        array, found = _to_arrow(place, column, columns[column.name])
+        problems += found
+        arrays.append(array)
+    lengths = {c.name: len(a) for c, a in zip(wanted, arrays, strict=False) if a is not None}
+    if not problems and len(set(lengths.values())) > 1:
+        problems.append(Problem(where, f"columns of different lengths: {lengths}"))
+    if problems:
+        raise InputError(problems, f"{artefact} does not fit its contract")
+    return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance))
+
+
+def write(path: Path | str, artefact: str, columns: Mapping, provenance: Mapping) -> None:
+    """Write one table, or leave what was there untouched; see :func:`to_table` for errors."""
+    write_all([TableToWrite(path, artefact, columns, provenance)])
+
+
+def write_all(tables: Sequence[TableToWrite]) -> None:
+    """Write several tables so that either all of them appear or none.
+
+    Every table is cast and written under a temporary name before the first one is renamed.
+    """
+    cast = [to_table(table.artefact, table.columns, table.provenance) for table in tables]
+    with replacing([Path(table.path) for table in tables]) as temporary:
+        for each, place in zip(cast, temporary, strict=True):
+            pq.write_table(each, place, compression="zstd", version="2.6")
+
+
+@contextmanager
+def replacing(paths: Sequence[Path | str]) -> Iterator[list[Path]]:
+    """Temporary paths beside ``paths``; renamed to them on success, removed on any failure."""
+    targets = [Path(path) for path in paths]
+    temporary = [path.with_name(f".{path.name}.{os.getpid()}.partial") for path in targets]
+    for path in targets:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        yield temporary
+        for source, target in zip(temporary, targets, strict=True):
+            os.replace(source, target)
+    finally:
+        for source in temporary:
+            source.unlink(missing_ok=True)
+
+
+def read(path: Path | str) -> dict[str, np.ndarray]:
+    """Columns of a table: float64 and whole numbers as numpy, text as object arrays.
+
+    Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
+    Raises InputError if the file is absent or not Parquet.
+    """
+    table = _open(path, lambda: pq.read_table(path, use_threads=False, memory_map=False))
+    return {name: _to_numpy(table.schema.field(name), table[name]) for name in table.column_names}
+
+
+def read_schema(path: Path | str) -> pa.Schema:
+    """Arrow schema of a table's file; InputError if absent or not Parquet."""
+    return _open(path, lambda: pq.read_schema(path))
+
+
+def read_metadata(path: Path | str) -> dict[str, str]:
+    """Provenance of a table's file as text; InputError if absent or not Parquet."""
+    raw = read_schema(path).metadata or {}
+    return {key.decode(): value.decode() for key, value in raw.items()}
+
+
+def _open(path, opening):
+    try:
+        return opening()
+    except FileNotFoundError:
+        raise InputError(Problem(str(path), "no such file")) from None
+    except (pa.ArrowInvalid, OSError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(Problem(str(path), f"not a readable Parquet file: {reason}")) from None
+
+
+def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
+    if pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
+        return np.array(column.to_pylist(), dtype=object)
+    if pa.types.is_integer(field.type) and field.nullable:
+        column = column.cast(pa.float64())
+    return column.to_numpy()
+
+
+def _provenance_problems(where: str, provenance: Mapping) -> list[Problem]:
+    missing = [key for key in PROVENANCE_KEYS if key not in provenance]
+    unknown = [key for key in provenance if key not in PROVENANCE_KEYS]
+    allowed = "exactly " + ", ".join(PROVENANCE_KEYS)
+    return [Problem(where, f"provenance lacks {key}", allowed) for key in missing] + [
+        Problem(where, f"provenance has an unknown key {key!r}", allowed) for key in unknown
+    ]
+
+
+def _to_arrow(place: str, column: Column, values) -> tuple[pa.Array | None, list[Problem]]:
+    if column.kind == "text":
+        return _text_to_arrow(place, column, values)
+    try:
+        numbers = np.asarray(
+            [np.nan if value is None else value for value in values]
+            if not isinstance(values, np.ndarray) or values.dtype == object
+            else values
+        )
+        exact = numbers if numbers.dtype.kind in "iu" else None
+        numbers = numbers.astype(np.float64)
+    except (TypeError, ValueError):
+        return None, [Problem(place, "holds something that is not a number", column.kind)]
+    if numbers.ndim != 1:
+        return None, [Problem(place, f"has shape {numbers.shape}", "one value per row")]
+    null = np.isnan(numbers)
+    problems = []
+    if null.any() and not column.nullable:
+        problems.append(Problem(place, f"null or NaN in {_rows(null)}", "a number in every row"))
+    if np.isinf(numbers).any():
+        problems.append(Problem(place, f"infinite in {_rows(np.isinf(numbers))}", "finite numbers"))
+    if column.kind == "float":
+        return (None if problems else pa.array(numbers, pa.float64(), mask=null)), problems
+    whole = null | (numbers == np.round(numbers))
+    if not whole.all():
+        first = numbers[~whole][0]
+        problems.append(Problem(place, f"{first:g} in {_rows(~whole)}", "whole numbers"))
+    low, high = (-128, 127) if column.kind == "int8" else (-(2.0**63), 2.0**63 - 1025)
+    beyond = ~null & ((numbers < low) | (numbers > high))
+    if beyond.any() and not problems:
+        problems.append(Problem(place, f"too large for {column.kind} in {_rows(beyond)}"))
+    if problems:
+        return None, problems
+    integers = exact if exact is not None else np.where(null, 0, numbers)
+    return pa.array(integers.astype(np.int64), pa.int64(), mask=null).cast(
+        _ARROW_TYPES[column.kind]
+    ), []
+
+
+def _text_to_arrow(place: str, column: Column, values) -> tuple[pa.Array | None, list[Problem]]:
+    texts = [_as_text(value) for value in values]
+    wrong = np.array([not (value is None or isinstance(value, str)) for value in texts], dtype=bool)
+    null = np.array([value is None for value in texts], dtype=bool)
+    if wrong.any():
+        first = texts[int(np.argmax(wrong))]
+        return None, [Problem(place, f"{first!r} in {_rows(wrong)}", "text")]
+    if null.any() and not column.nullable:
+        return None, [Problem(place, f"null in {_rows(null)}", "text in every row")]
+    return pa.array(texts, pa.string()), []
+
+
+def _as_text(value):
+    """A text as str, None and NaN as None, anything else unchanged."""
+    if value is None or isinstance(value, str):
+        return None if value is None else str(value)
+    return None if isinstance(value, float) and np.isnan(value) else value
+
+
+def _rows(mask: np.ndarray) -> str:
+    """The first rows (from 0) a mask marks, in words."""
+    rows = np.flatnonzero(mask)
+    shown = ", ".join(str(row) for row in rows[:5])
+    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
+    return f"row{'s' if rows.size > 1 else ''} {shown}{more}"

@@ -1,0 +1,154 @@
+"""The tables: what is written comes back, the same bytes every time, all or nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from kinacc.artifacts import store
+from kinacc.artifacts.contract import PROVENANCE_KEYS
+from kinacc.errors import InputError
+
+PROVENANCE = {
+    "kinacc_version": "0.1.0",
+    "config_hash": "c",
+    "code_hash": "k",
+    "inputs_hash": "i",
+    "seed": 7,
+}
+
+
+def points(joints: int = 6, rows: int = 3) -> dict:
+    table = {"point": np.arange(rows)}
+    table |= {f"q{j + 1}": np.linspace(-1, 1, rows) for j in range(joints)}
+    table |= {f"s{j + 1}": np.array([-1, 0, 1])[:rows] for j in range(joints)}
+    table |= {f"e{axis}_mm": np.full(rows, 0.1) for axis in "xyz"}
+    table["true_error_mm"] = np.full(rows, 0.1 * np.sqrt(3))
+    return table
+
+
+def residuals(**changes) -> dict:
+    table = {
+        "comparison": ["dh_vs_vec", "dh_vs_vec"],
+        "subset": ["train", "train"],
+        "fold": [None, 1],
+        "quantity": ["position", "orientation"],
+        "unit": ["mm", "mrad"],
+        "n": [10, 10],
+        "mean": [0.4, 1.3],
+        "max": [0.8, 2.8],
+        "rms": [0.5, 1.5],
+        "gamma99": [0.9, np.nan],
+    }
+    return table | changes
+
+
+@pytest.mark.parametrize("joints", [4, 6, 7])
+def test_round_trip_for_any_number_of_joints(tmp_path, joints):
+    path = tmp_path / "a folder" / "assessment_points.parquet"
+    table = points(joints)
+    store.write(path, "assessment_points", table, PROVENANCE)
+    back = store.read(path)
+    assert set(back) == set(table)
+    for name, values in table.items():
+        np.testing.assert_array_equal(back[name], values)
+    assert back["s1"].dtype == np.int8
+    names = pq.read_schema(path).names
+    assert names[1 : 1 + joints] == [f"q{j + 1}" for j in range(joints)]
+
+
+def test_null_is_nan_for_numbers_and_none_for_text(tmp_path):
+    path = tmp_path / "residuals.parquet"
+    store.write(path, "residuals", residuals(), PROVENANCE)
+    raw = pq.read_table(path)
+    assert raw["fold"].to_pylist() == [None, 1]
+    assert raw["gamma99"].to_pylist() == [0.9, None]
+    back = store.read(path)
+    assert np.isnan(back["fold"][0]) and back["fold"][1] == 1
+    assert np.isnan(back["gamma99"][1])
+    assert list(back["unit"]) == ["mm", "mrad"]
+
+
+def test_metadata_is_exactly_the_provenance_and_fields_carry_units(tmp_path):
+    path = tmp_path / "residuals.parquet"
+    store.write(path, "residuals", residuals(), PROVENANCE)
+    schema = pq.read_schema(path)
+    assert sorted(schema.metadata) == sorted(key.encode() for key in PROVENANCE_KEYS)
+    assert store.read_metadata(path)["seed"] == "7"
+    for field in schema:
+        assert set(field.metadata) == {b"unit", b"meaning"} and field.metadata[b"meaning"]
+
+
+def test_same_columns_give_the_same_bytes(tmp_path):
+    contents = []
+    for number in range(2):
+        path = tmp_path / f"{number}.parquet"
+        store.write(path, "residuals", residuals(), PROVENANCE)
+        contents.append(path.read_bytes())
+    assert contents[0] == contents[1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({"mean": [0.4, np.nan]}, ["mean", "row 1"]),
+        ({"mean": [0.4, np.inf]}, ["mean", "infinite"]),
+        ({"n": [10, 2.5]}, ["column n", "2.5", "whole"]),
+        ({"unit": ["mm", None]}, ["unit", "row 1"]),
+        ({"unit": ["mm", 3]}, ["unit", "3", "text"]),
+        ({"mean": ["a", 1.0]}, ["mean", "not a number"]),
+        ({"surprise": [1, 2]}, ["surprise", "not in the contract"]),
+        ({"n": [1, 2, 3]}, ["different lengths"]),
+    ],
+)
+def test_a_column_that_does_not_fit_is_named(tmp_path, changes, names):
+    path = tmp_path / "residuals.parquet"
+    with pytest.raises(InputError) as caught:
+        store.write(path, "residuals", residuals(**changes), PROVENANCE)
+    for name in names:
+        assert name in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_problem_is_listed_at_once(tmp_path):
+    table = residuals(mean=[np.nan, 1.0])
+    del table["rms"], table["n"]
+    with pytest.raises(InputError) as caught:
+        store.write(tmp_path / "r.parquet", "residuals", table, {"seed": 1, "time": "now"})
+    text = str(caught.value)
+    for word in ("column rms", "column n", "column mean", "'time'", "code_hash"):
+        assert word in text
+
+
+def test_all_tables_or_none(tmp_path):
+    good, bad = tmp_path / "good.parquet", tmp_path / "bad.parquet"
+    good.write_bytes(b"what was there")
+    with pytest.raises(InputError):
+        store.write_all(
+            [
+                store.TableToWrite(good, "residuals", residuals(), PROVENANCE),
+                store.TableToWrite(bad, "residuals", residuals(n=[0.5, 1]), PROVENANCE),
+            ]
+        )
+    assert good.read_bytes() == b"what was there"
+    assert [path.name for path in tmp_path.iterdir()] == ["good.parquet"]
+
+
+def test_a_failure_while_writing_leaves_nothing_behind(tmp_path):
+    paths = [tmp_path / "fig1.svg", tmp_path / "fig1.pdf"]
+    with pytest.raises(RuntimeError), store.replacing(paths) as temporary:
+        temporary[0].write_text("half")
+        raise RuntimeError("power cut")
+    assert not list(tmp_path.iterdir())
+
+
+def test_unreadable_files_are_named(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        store.read(tmp_path / "absent.parquet")
+    broken = tmp_path / "broken.parquet"
+    broken.write_text("not parquet at all")
+    with pytest.raises(InputError, match="not a readable Parquet file"):
+        store.read(broken)
+    with pytest.raises(InputError, match="not in the contract"):
+        store.write(tmp_path / "x.parquet", "nonsense", {}, PROVENANCE)
