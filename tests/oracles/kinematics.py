@@ -149,9 +149,7 @@ def difference_jacobian(
             shift[i] = h * scale
             ahead, behind = pose(at + shift), pose(at - shift)
             spin = rotation_vector(ahead[:3, :3] @ behind[:3, :3].T)
-            estimates.append(
-                np.concatenate([ahead[:3, 3] - behind[:3, 3], spin]) / (2 * h * scale)
-            )
+            estimates.append(np.concatenate([ahead[:3, 3] - behind[:3, 3], spin]) / (2 * h * scale))
         columns.append((4 * estimates[0] - estimates[1]) / 3)
     return np.array(columns).T
 

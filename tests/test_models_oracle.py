@@ -1,0 +1,293 @@
+"""The models against pinocchio, a plain 4x4 loop, 50-digit arithmetic and finite differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from oracles import kinematics as oracle
+
+from kinacc import robot
+from kinacc.models import dh, vec
+
+EXACT_MM = 1e-9
+EXACT = 1e-12  # elements of rotations
+
+
+def floats(low: float, high: float, shape):
+    elements = st.floats(low, high, allow_subnormal=False)
+    return arrays(np.float64, shape, elements=elements, fill=st.nothing())
+
+
+@st.composite
+def dh_tables(draw, joints: int = 6):
+    angle, length = floats(-math.pi, math.pi, joints), floats(-1500, 1500, joints)
+    return np.column_stack([draw(angle), draw(length), draw(length), draw(angle), draw(angle)])
+
+
+@st.composite
+def vec_cases(draw):
+    """A whole VEC model of one to seven joints, a pose inside its range and travel directions.
+
+    The errors are up to ten times those of a real arm, so that second-order slips show."""
+    k, order = draw(st.integers(1, 7)), draw(st.integers(0, 7))
+    table = draw(dh_tables(k))
+    low = draw(floats(-4, 0, k))
+    high = low + draw(floats(1.5, 8, k))
+    series = np.empty((k, 6, order + 1))
+    series[:, :3] = draw(floats(-5, 5, (k, 3, order + 1)))
+    series[:, 3:] = draw(floats(-0.02, 0.02, (k, 3, order + 1)))
+    offsets = draw(floats(-0.01, 0.01, (k, 2)))
+    q = low + (high - low) * draw(floats(0, 1, k))
+    s = draw(arrays(np.int8, k, elements=st.sampled_from([-1, 0, 1])))
+    return table, series, low, high, offsets, q, s
+
+
+def dh_model(table) -> dh.DHModel:
+    return dh.DHModel(*np.asarray(table, float).T)
+
+
+def vec_model(table, series, low, high, offsets) -> vec.VECModel:
+    return vec.VECModel(
+        dh=dh_model(table),
+        q_min_rad=np.asarray(low, float),
+        q_max_rad=np.asarray(high, float),
+        coefficients=np.asarray(series, float),
+        direction_offsets_rad=np.asarray(offsets, float),
+    )
+
+
+def matrix(pose, index: int = 0) -> np.ndarray:
+    result = np.eye(4)
+    result[:3, :3] = pose.rotation[index]
+    result[:3, 3] = pose.position_mm[index]
+    return result
+
+
+def assert_same_frame(actual, expected) -> None:
+    assert np.abs(actual[:3, 3] - expected[:3, 3]).max() <= EXACT_MM
+    assert np.abs(actual[:3, :3] - expected[:3, :3]).max() <= EXACT
+
+
+def uniform_joints(limits_deg, count: int, seed: int) -> np.ndarray:
+    low, high = np.radians(limits_deg).T
+    return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
+
+
+# --- nominal arms ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "table"), [("mh180", oracle.MH180), ("ur10", oracle.UR10)], ids=["mh180", "ur10"]
+)
+def test_shipped_robot_is_the_published_table(name, table):
+    arm = robot.load(name).dh
+    shipped = np.column_stack([arm.theta_offset_rad, arm.d_mm, arm.a_mm, arm.alpha_rad])
+    np.testing.assert_allclose(shipped, np.array(table)[:, :4], rtol=0, atol=1e-15)
+    assert not arm.beta_rad.any()
+
+
+def test_mh180_limits_and_flange_at_zero():
+    arm = robot.load("mh180")
+    np.testing.assert_allclose(
+        np.degrees(np.column_stack([arm.q_min_rad, arm.q_max_rad])),
+        oracle.MH180_LIMITS_DEG,
+        rtol=0,
+        atol=1e-12,
+    )
+    flange = dh.forward(arm.dh, np.zeros((1, 6))).position_mm[0]
+    np.testing.assert_allclose(flange, [1775, 0, 1450], rtol=0, atol=EXACT_MM)
+
+
+@pytest.mark.parametrize("name", ["mh180", "ur10"])
+def test_nominal_forward_equals_pinocchio(name):
+    table = {"mh180": oracle.MH180, "ur10": oracle.UR10}[name]
+    reference = oracle.pinocchio_forward(table)
+    joints = uniform_joints(oracle.MH180_LIMITS_DEG, 500, seed=1)
+    flange = dh.forward(robot.load(name).dh, joints)
+    for i, q in enumerate(joints):
+        assert_same_frame(matrix(flange, i), reference(q))
+
+
+# --- DH, eqs. 1-4 ---------------------------------------------------------------------------------
+
+
+@settings(max_examples=60)
+@given(table=dh_tables(), q=floats(-2 * math.pi, 2 * math.pi, (3, 6)))
+def test_dh_forward_equals_pinocchio(table, q):
+    reference = oracle.pinocchio_forward(table)
+    flange = dh.forward(dh_model(table), q)
+    for i in range(3):
+        assert_same_frame(matrix(flange, i), reference(q[i]))
+
+
+@settings(max_examples=40)
+@given(table=dh_tables(5), q=floats(-2 * math.pi, 2 * math.pi, (2, 5)))
+def test_dh_chain_equals_the_plain_loop(table, q):
+    frames = dh.chain(dh_model(table), q)
+    assert frames.position_mm.shape == (2, 6, 3)
+    for i in range(2):
+        for j, expected in enumerate(oracle.dh_frames(table, q[i])):
+            assert_same_frame(
+                matrix(type(frames)(frames.rotation[i], frames.position_mm[i]), j), expected
+            )
+
+
+def test_dh_forward_agrees_with_fifty_digits():
+    joints = uniform_joints(oracle.MH180_LIMITS_DEG, 6, seed=2)
+    rng = np.random.default_rng(3)
+    for table in (np.array(oracle.MH180), rng.uniform(-2, 2, (6, 5)) * [1, 500, 500, 1, 0.1]):
+        flange = dh.forward(dh_model(table), joints)
+        for i, q in enumerate(joints):
+            exact = oracle.mp_dh_forward(table.tolist(), q.tolist())
+            assert_same_frame(matrix(flange, i), np.array(exact.tolist(), float).reshape(4, 4))
+
+
+@settings(max_examples=40)
+@given(table=dh_tables(), q=floats(-2 * math.pi, 2 * math.pi, 6))
+def test_dh_joint_jacobian_equals_differences(table, q):
+    analytic = dh.joint_jacobian(dh_model(table), q[None])[0]
+    numeric = oracle.difference_jacobian(lambda x: oracle.dh_forward(table, x), q, 1e-3)
+    np.testing.assert_allclose(analytic[:3], numeric[:3], rtol=0, atol=2e-6)
+    np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=1e-9)
+
+
+@settings(max_examples=40)
+@given(table=dh_tables(), q=floats(-2 * math.pi, 2 * math.pi, 6))
+def test_dh_parameter_jacobian_equals_differences(table, q):
+    analytic = dh.parameter_jacobian(dh_model(table), q[None])[0].reshape(6, 30)
+    numeric = oracle.difference_jacobian(
+        lambda x: oracle.dh_forward(x.reshape(6, 5), q),
+        table.ravel(),
+        np.tile([1e-3, 1.0, 1.0, 1e-3, 1e-3], 6),
+    )
+    np.testing.assert_allclose(analytic[:3], numeric[:3], rtol=0, atol=2e-6)
+    np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=1e-9)
+
+
+# --- VEC, eqs. 5-6 --------------------------------------------------------------------------------
+
+
+@settings(max_examples=60)
+@given(case=vec_cases())
+def test_vec_forward_equals_the_plain_loop(case):
+    *parameters, q, s = case
+    model = vec_model(*parameters)
+    expected = oracle.vec_forward(*case)
+    printed = matrix(vec.forward(model, q[None], s[None]))
+    assert_same_frame(printed, expected)
+    assert_same_frame(matrix(vec.pose(model, q[None], s[None])), oracle.projected(expected))
+
+
+@settings(max_examples=25)
+@given(case=vec_cases(), outside=floats(-0.3, 0.3, 7))
+def test_vec_continues_its_polynomials_outside_the_range(case, outside):
+    *parameters, q, s = case
+    q = q + outside[: len(q)]
+    printed = matrix(vec.forward(vec_model(*parameters), q[None], s[None]))
+    expected = oracle.vec_forward(*parameters, q, s)
+    scale = max(1.0, np.abs(expected).max() / 1e3)
+    assert np.abs(printed - expected).max() <= EXACT_MM * scale
+
+
+def test_vec_travel_direction_selects_one_offset_and_only_of_eps_z():
+    table = np.array(oracle.MH180)
+    series = np.zeros((6, 6, 3))
+    offsets = np.array([[1e-3 * (i + 1), -2e-3 * (i + 1)] for i in range(6)])
+    model = vec_model(table, series, [-3.0] * 6, [3.0] * 6, offsets)
+    q = np.array([[0.3, -0.2, 0.4, 0.5, -0.6, 0.7]])
+    np.testing.assert_array_equal(
+        vec.forward(model, q).position_mm, vec.forward(model, q, np.zeros((1, 6))).position_mm
+    )
+    for i in range(6):
+        for column, direction in enumerate((-1, 1)):
+            s = np.zeros((1, 6), np.int8)
+            s[0, i] = direction
+            frame = np.eye(4)
+            for j in range(6):
+                ez = offsets[i, column] if j == i else 0.0
+                frame = frame @ oracle.error_matrix([0, 0, 0, 0, 0, ez])
+                frame = frame @ oracle.dh_link(table[j], q[0, j])
+            assert_same_frame(matrix(vec.forward(model, q, s)), frame)
+
+
+def test_vec_without_errors_is_its_dh_model():
+    arm = robot.load("mh180")
+    joints = uniform_joints(oracle.MH180_LIMITS_DEG, 20, seed=4)
+    bare = vec.without_errors(arm.dh, arm.q_min_rad, arm.q_max_rad, 5)
+    flange, expected = vec.pose(bare, joints), dh.forward(arm.dh, joints)
+    for i in range(len(joints)):
+        assert_same_frame(matrix(flange, i), matrix(expected, i))
+
+
+def test_vec_forward_agrees_with_fifty_digits():
+    rng = np.random.default_rng(5)
+    low, high = np.radians(oracle.MH180_LIMITS_DEG).T
+    series = rng.normal(size=(6, 6, 7)) * [[[0.3]] * 3 + [[3e-4]] * 3] * 6
+    offsets = rng.normal(size=(6, 2)) * 1e-4
+    model = vec_model(oracle.MH180, series, low, high, offsets)
+    for q, s in zip(
+        uniform_joints(oracle.MH180_LIMITS_DEG, 4, 6), rng.integers(-1, 2, (4, 6)), strict=True
+    ):
+        exact = oracle.mp_vec_forward(
+            oracle.MH180,
+            series,
+            low.tolist(),
+            high.tolist(),
+            offsets.tolist(),
+            q.tolist(),
+            s.tolist(),
+        )
+        flange = vec.forward(model, q[None], s[None])
+        assert_same_frame(matrix(flange), np.array(exact.tolist(), float).reshape(4, 4))
+
+
+@settings(max_examples=40)
+@given(case=vec_cases())
+def test_vec_joint_jacobian_of_the_projected_pose_equals_differences(case):
+    *parameters, q, s = case
+    analytic = vec.joint_jacobian(vec_model(*parameters), q[None], s[None])[0]
+    numeric = oracle.difference_jacobian(
+        lambda x: oracle.projected(oracle.vec_forward(*parameters, x, s)), q, 2e-4
+    )
+    np.testing.assert_allclose(analytic[:3], numeric[:3], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=1e-8)
+
+
+@settings(max_examples=12)
+@given(case=vec_cases())
+def test_vec_parameter_jacobian_equals_differences(case):
+    table, series, low, high, offsets, q, s = case
+    model = vec_model(table, series, low, high, offsets)
+    analytic = vec.parameter_jacobian(model, q[None], s[None])[0]
+    vector = vec.to_vector(model)
+    assert analytic.shape == (6, vector.size)
+    size = series.size
+    np.testing.assert_array_equal(vector, np.concatenate([series.ravel(), offsets.ravel()]))
+
+    def moved(x: np.ndarray) -> np.ndarray:
+        new = x[:size].reshape(series.shape), x[size:].reshape(offsets.shape)
+        return oracle.projected(oracle.vec_forward(table, new[0], low, high, new[1], q, s))
+
+    steps = np.concatenate(
+        [np.broadcast_to([[0.5]] * 3 + [[1e-3]] * 3, series.shape).ravel(), [1e-3] * offsets.size]
+    )
+    numeric = oracle.difference_jacobian(moved, vector, steps)
+    np.testing.assert_allclose(analytic[:3], numeric[:3], rtol=0, atol=2e-6)
+    np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=1e-8)
+
+
+@settings(max_examples=20)
+@given(case=vec_cases(), seed=st.integers(0, 2**32 - 1))
+def test_vec_vector_round_trip(case, seed):
+    *parameters, _, _ = case
+    model = vec_model(*parameters)
+    vector = np.random.default_rng(seed).normal(size=vec.to_vector(model).size)
+    np.testing.assert_array_equal(vec.to_vector(vec.with_vector(model, vector)), vector)
+    np.testing.assert_array_equal(
+        vec.to_vector(vec.with_vector(model, vec.to_vector(model))), vec.to_vector(model)
+    )
