@@ -1,0 +1,141 @@
+"""A finished results folder recomputed from its Parquet files alone, as the contract says.
+
+Read with pyarrow, row by row; every pose is one chain of 4x4 matrices.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+from numpy.polynomial import chebyshev
+from scipy import stats
+
+from . import kinematics
+
+Row = dict
+
+
+def rows(folder: Path, name: str) -> list[Row]:
+    return pq.read_table(Path(folder) / f"{name}.parquet").to_pylist()
+
+
+def joints(row: Row) -> list[float]:
+    return [row[f"q{i}"] for i in range(1, 8) if f"q{i}" in row]
+
+
+def directions(row: Row) -> list[int]:
+    return [row[f"s{i}"] for i in range(1, 8) if f"s{i}" in row]
+
+
+@dataclass(frozen=True)
+class Models:
+    """Everything needed to place a target: the fitted models and the frames of each."""
+
+    dh: list[tuple[float, ...]]
+    vec: list[Row]
+    frames: dict[tuple[str, str], np.ndarray]
+
+    def flange(self, model: str, q: list[float], s: list[int]) -> np.ndarray:
+        """Flange in the robot base; the VEC's rotation projected to a true one."""
+        if model == "dh":
+            return kinematics.dh_forward(self.dh, q)
+        table = self.nominal
+        if model == "nominal":
+            return kinematics.dh_forward(table, q)
+        frame = np.eye(4)
+        for i, row in enumerate(table):
+            frame = frame @ kinematics.error_matrix(self._errors(i + 1, q[i], s[i]))
+            frame = frame @ kinematics.dh_link(row, q[i])
+        return kinematics.projected(frame)
+
+    def tool(self, model: str, q: list[float], s: list[int], frame: str = "tool") -> np.ndarray:
+        """A target in the robot base."""
+        return self.flange(model, q, s) @ self.frames[model, frame]
+
+    def measured(self, model: str, q: list[float], s: list[int], frame: str) -> np.ndarray:
+        """A target as the instrument would see it."""
+        return self.frames[model, "base"] @ self.tool(model, q, s, frame)
+
+    @property
+    def nominal(self) -> list[tuple[float, ...]]:
+        return dh_table({row["joint"]: row for row in self.vec}.values())
+
+    def _errors(self, joint: int, q: float, s: int) -> list[float]:
+        values = dict.fromkeys(kinematics.ERROR_NAMES, 0.0)
+        series: dict[tuple[str, int], dict[int, float]] = defaultdict(dict)
+        for row in self.vec:
+            if row["joint"] == joint and row["direction"] in {0, s}:
+                low, high = row["q_min_rad"], row["q_max_rad"]
+                series[row["error"], row["direction"]][row["order"]] = row["coefficient"]
+        u = (2 * q - low - high) / (high - low)
+        for (error, _), by_order in series.items():
+            coefficients = [by_order.get(n, 0.0) for n in range(max(by_order) + 1)]
+            values[error] += float(chebyshev.chebval(u, coefficients))
+        return [values[name] for name in kinematics.ERROR_NAMES]
+
+
+def dh_table(records) -> list[tuple[float, ...]]:
+    names = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad")
+    return [tuple(r[n] for n in names) for r in sorted(records, key=lambda r: r["joint"])]
+
+
+def models(folder: Path) -> Models:
+    frames = {
+        (row["model"], row["frame"]): kinematics.pose_matrix(
+            row["x_mm"], row["y_mm"], row["z_mm"], [row[f"q{c}"] for c in "wxyz"]
+        )
+        for row in rows(folder, "frames")
+    }
+    return Models(dh_table(rows(folder, "dh_model")), rows(folder, "vec_model"), frames)
+
+
+def measured_frame(row: Row) -> tuple[np.ndarray, bool]:
+    """The reading as a 4x4 frame and whether it has an orientation."""
+    if row["qw"] is None:
+        return kinematics.trans(row["x_mm"], row["y_mm"], row["z_mm"]), False
+    wxyz = [row[f"q{c}"] for c in "wxyz"]
+    return kinematics.pose_matrix(row["x_mm"], row["y_mm"], row["z_mm"], wxyz), True
+
+
+def apart(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
+    """Distance (mm) and angle (mrad) between two frames."""
+    turn = kinematics.rotation_vector(first[:3, :3].T @ second[:3, :3])
+    return (
+        float(np.linalg.norm(first[:3, 3] - second[:3, 3])),
+        float(np.linalg.norm(turn)) * 1e3,
+    )
+
+
+def magnitudes(
+    models_: Models, measurements: list[Row], comparison: str
+) -> tuple[list[float], list[float]]:
+    """Position (mm) and orientation (mrad) magnitudes of one comparison, row by row."""
+    position, orientation = [], []
+    for row in measurements:
+        q, s, target = joints(row), directions(row), row["target"]
+        left, right = comparison.split("_vs_")
+        reading, full = measured_frame(row)
+        if right == "measured":
+            gap, turn = apart(models_.measured(left, q, s, target), reading)
+        else:
+            gap, turn = apart(models_.tool(left, q, s, target), models_.tool(right, q, s, target))
+        position.append(gap)
+        if full:
+            orientation.append(turn)
+    return position, orientation
+
+
+def statistics(values: list[float]) -> dict[str, float]:
+    """Mean, max, rms and the 99 % quantile of a gamma fitted by maximum likelihood."""
+    shape, _, scale = stats.gamma.fit(np.asarray(values), floc=0)
+    return {
+        "mean": math.fsum(values) / len(values),
+        "max": max(values),
+        "rms": math.sqrt(math.fsum(v * v for v in values) / len(values)),
+        "gamma99": float(stats.gamma.ppf(0.99, shape, scale=scale)),
+    }
