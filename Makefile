@@ -1,0 +1,67 @@
+# make reproduce   the paper's study, from a bare checkout to results/
+# make test        everything a change has to pass
+# make lock        renew requirements/*.txt (needs uv)
+# make clean       remove results/; make distclean removes .venv as well
+#
+# Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
+# Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
+
+.PHONY: reproduce test lock clean distclean
+CORES = 2
+PY = .venv/bin/python
+PIP = $(PY) -m pip install --quiet --disable-pip-version-check
+
+# More BLAS threads change the last bits of a sum, and two jobs already fill two cores.
+export OPENBLAS_NUM_THREADS = 1
+export OMP_NUM_THREADS = 1
+export MKL_NUM_THREADS = 1
+
+key = $(shell { cat $(1); pwd; } | cksum | tr -d ' ')
+PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
+KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
+TOOLS := .venv/.tools-$(call key,requirements/test.txt)
+
+reproduce: $(KINACC)
+	@$(PY) -m snakemake --cores $(CORES)
+
+test: $(KINACC) $(TOOLS)
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m snakefmt --check --quiet Snakefile workflow
+	$(PY) -m snakemake --lint
+	$(PY) -m pytest -n $(CORES)
+
+# A .venv that another folder or an unsupported Python left here is made anew.
+$(PACKAGES):
+	@if ! { sh requirements/find-python $(PY) && grep -qF "$$(pwd)/.venv" .venv/bin/activate; } >/dev/null 2>&1; then \
+	  python=$$(sh requirements/find-python $(PYTHON)) || exit 1; \
+	  echo "kinacc: creating .venv with $$python"; \
+	  "$$python" -m venv --clear .venv; \
+	fi
+	@echo "kinacc: installing the packages pinned in requirements/run.txt (a minute or two)"
+	@$(PIP) --require-hashes -r requirements/run.txt
+	@touch $@
+
+$(KINACC): $(PACKAGES)
+	@echo "kinacc: installing kinacc itself and compiling its kernels"
+	@$(PIP) --no-build-isolation --no-deps --editable .
+	@$(PY) -m compileall -q src
+	@touch $@
+
+$(TOOLS): $(PACKAGES)
+	@echo "kinacc: installing the test tools pinned in requirements/test.txt"
+	@$(PIP) --require-hashes -r requirements/test.txt
+	@touch $@
+
+# One lock for every supported Python and platform: names, versions and hashes, nothing else.
+LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
+  --no-header --no-emit-index-url --no-emit-find-links
+lock:
+	$(LOCK) requirements/test.in --output-file requirements/test.txt
+	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
+
+clean:
+	rm -rf results .snakemake
+
+distclean: clean
+	rm -rf .venv

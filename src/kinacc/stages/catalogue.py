@@ -1,0 +1,166 @@
+"""Every stage of the study: what it reads, what it leaves and what it depends on.
+
+The one list the workflow, the command line and the check of a results folder share. Importing it
+costs nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+FIGURE_FOLDER = "figures"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of the study.
+
+    ``message`` says in words what it does. ``inputs`` and ``outputs`` are artefact names of the
+    data set. ``settings`` are dotted key paths of the data set's configuration, ``files`` those
+    whose values name files it reads; nothing else of the configuration reaches the stage.
+    ``optional`` inputs are used by data sets that have them. ``scattered`` stages run once per
+    part of the work; an input that is scattered arrives as one table.
+    """
+
+    name: str
+    message: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    settings: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ()
+    scattered: bool = False
+
+    @property
+    def module(self) -> str:
+        """Name of the module whose ``run`` does the work."""
+        return f"kinacc.stages.{self.name}"
+
+    @property
+    def is_figure(self) -> bool:
+        """Whether the stage draws a figure instead of making tables."""
+        return self.name.startswith("fig")
+
+
+_MODELS = ("vec_model", "dh_model", "frames")
+
+STAGES: dict[str, Stage] = {
+    stage.name: stage
+    for stage in (
+        Stage(
+            "measurements",
+            "reading or synthesising the measured poses",
+            (),
+            ("measurements",),
+            ("robot", "measurements"),
+            files=("robot", "measurements.file.path"),
+        ),
+        Stage(
+            "vec",
+            "fitting the volumetric error compensation (VEC) model to the training poses",
+            ("measurements",),
+            ("vec_model", "vec_frames", "vec_fit"),
+            (
+                "robot",
+                "calibration.rotation_weight_mm_per_rad",
+                "calibration.base_and_tool",
+                "calibration.vec",
+            ),
+            files=("robot",),
+        ),
+        Stage(
+            "dh",
+            "fitting the DH model by least squares (Table II)",
+            ("measurements", "vec_model", "vec_frames"),
+            ("dh_model", "frames", "dh_fit"),
+            (
+                "robot",
+                "calibration.rotation_weight_mm_per_rad",
+                "calibration.base_and_tool",
+                "calibration.dh",
+            ),
+            files=("robot",),
+        ),
+        Stage(
+            "residuals",
+            "comparing models and measurements, cross-validated (Tables I and III)",
+            ("measurements", *_MODELS),
+            ("residuals", "pose_errors"),
+            ("robot", "calibration"),
+            files=("robot",),
+        ),
+        Stage(
+            "accuracy_map",
+            "mapping the largest error over the slices of the evaluation space (Fig. 3)",
+            ("vec_model", "dh_model"),
+            ("accuracy_map",),
+            ("robot", "evaluation", "map"),
+            files=("robot",),
+        ),
+        Stage(
+            "assessment_points",
+            "choosing the operating points of the study and their true errors",
+            ("measurements", *_MODELS, "pose_errors"),
+            ("assessment_points",),
+            ("robot", "evaluation"),
+            files=("robot",),
+        ),
+        Stage(
+            "study_chunk",
+            "simulating the assessors under noise, part {part}",
+            ("assessment_points",),
+            ("study_chunk",),
+            ("study",),
+            scattered=True,
+        ),
+        Stage(
+            "study",
+            "gathering the simulations and summing them up (Fig. 4)",
+            ("study_chunk",),
+            ("study", "study_summary", "readings"),
+            ("study",),
+        ),
+        Stage(
+            "histories",
+            "following single model invalidations step by step (Figs. 5 and 6)",
+            ("assessment_points",),
+            ("histories",),
+            ("study", "histories"),
+        ),
+        Stage("fig1", "drawing Fig. 1, the one-dimensional example", (), ("fig1",)),
+        Stage(
+            "fig2",
+            "drawing Fig. 2, the arm over its evaluation space",
+            ("dh_model", "assessment_points"),
+            ("fig2",),
+            ("robot", "evaluation"),
+            files=("robot",),
+        ),
+        Stage("fig3", "drawing Fig. 3, the accuracy maps", ("accuracy_map",), ("fig3",)),
+        Stage(
+            "fig4",
+            "drawing Fig. 4, assessed accuracy against noise",
+            ("study_summary", "assessment_points"),
+            ("fig4",),
+        ),
+        Stage("fig5", "drawing Fig. 5, a model that is invalidated", ("histories",), ("fig5",)),
+        Stage("fig6", "drawing Fig. 6, a model that is not invalidated", ("histories",), ("fig6",)),
+        Stage(
+            "claims",
+            "holding the paper's numbers and sentences to the results",
+            (
+                "residuals",
+                "dh_model",
+                "assessment_points",
+                "study",
+                "study_summary",
+                "readings",
+                "histories",
+            ),
+            ("claims",),
+            ("study.alpha",),
+            optional=("accuracy_map", "robustness"),
+        ),
+    )
+}
