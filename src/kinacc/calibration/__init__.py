@@ -1,0 +1,1 @@
+"""Least squares on kinematic models: observations, frames, fits, folds and residual statistics."""

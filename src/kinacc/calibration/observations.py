@@ -1,0 +1,109 @@
+"""Measured points and poses as one frozen record of columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from kinacc.geometry import Pose, rotation_from_quaternion
+
+TOOL = "tool"
+
+
+@dataclass(frozen=True)
+class Observations:
+    """n measurements of targets carried by a k-joint arm; a pose may show several targets.
+
+    ``q_rad`` (n, k) DH joint angles; ``s`` (n, k) travel direction -1, 0 (unknown), +1;
+    ``position_mm`` (n, 3) and ``rotation`` (n, 3, 3) in the instrument's frame, a rotation of NaN
+    where only the position was measured; ``pose``, ``target`` (index into ``target_names``),
+    ``repeat`` and ``fold`` (n,) integers, fold -1 where no fold is assigned.
+    """
+
+    q_rad: np.ndarray
+    s: np.ndarray
+    position_mm: np.ndarray
+    rotation: np.ndarray
+    pose: np.ndarray
+    target: np.ndarray
+    repeat: np.ndarray
+    fold: np.ndarray
+    target_names: tuple[str, ...] = (TOOL,)
+
+    def __len__(self) -> int:
+        return len(self.q_rad)
+
+    @property
+    def joints(self) -> int:
+        """Number of joints k."""
+        return self.q_rad.shape[1]
+
+    @property
+    def has_rotation(self) -> np.ndarray:
+        """True (n,) where the orientation was measured."""
+        return np.isfinite(self.rotation[:, 0, 0])
+
+    @property
+    def components(self) -> int:
+        """Number of scalar residuals: three per position and three per orientation."""
+        return 3 * len(self) + 3 * int(self.has_rotation.sum())
+
+    @property
+    def measured(self) -> Pose:
+        """Measured frames (n,); rotations are NaN where none was measured."""
+        return Pose(self.rotation, self.position_mm)
+
+    def select(self, rows: np.ndarray | slice) -> Observations:
+        """The observations of ``rows`` (mask, indices or slice)."""
+        columns = {
+            field.name: getattr(self, field.name)[rows]
+            for field in fields(self)
+            if field.name != "target_names"
+        }
+        return replace(self, **columns)
+
+
+def full_poses(
+    q_rad: np.ndarray,
+    poses: Pose,
+    s: np.ndarray | None = None,
+    fold: np.ndarray | None = None,
+) -> Observations:
+    """Observations of one full-pose target at joints ``q_rad`` (n, k), one row per pose."""
+    q_rad = np.asarray(q_rad, dtype=float)
+    count = len(q_rad)
+    zeros = np.zeros(count, dtype=np.int64)
+    return Observations(
+        q_rad=q_rad,
+        s=np.zeros(q_rad.shape, np.int8) if s is None else np.asarray(s, np.int8),
+        position_mm=np.asarray(poses.position_mm, dtype=float),
+        rotation=np.asarray(poses.rotation, dtype=float),
+        pose=np.arange(count),
+        target=zeros,
+        repeat=zeros,
+        fold=np.full(count, -1) if fold is None else np.asarray(fold),
+    )
+
+
+def from_columns(columns: Mapping[str, np.ndarray], joint_map: np.ndarray) -> Observations:
+    """Observations from the columns of ``measurements``; ``joint_map`` (k, k) of the robot."""
+    joints = len(joint_map)
+    reported = np.stack([columns[f"q{i}"] for i in range(1, joints + 1)], axis=1).astype(float)
+    s = np.stack([columns[f"s{i}"] for i in range(1, joints + 1)], axis=1).astype(np.int8)
+    quaternion = np.stack([columns[name] for name in ("qw", "qx", "qy", "qz")], axis=1)
+    names = columns["target"]
+    target_names = tuple(dict.fromkeys(str(name) for name in names))
+    index = {name: number for number, name in enumerate(target_names)}
+    return Observations(
+        q_rad=reported @ np.asarray(joint_map).T,
+        s=s,
+        position_mm=np.stack([columns[name] for name in ("x_mm", "y_mm", "z_mm")], axis=1),
+        rotation=rotation_from_quaternion(quaternion.astype(float)),
+        pose=np.asarray(columns["pose"]).astype(np.int64),
+        target=np.array([index[str(name)] for name in names], dtype=np.int64),
+        repeat=np.asarray(columns["repeat"]).astype(np.int64),
+        fold=np.asarray(columns["fold"]).astype(np.int64),
+        target_names=target_names,
+    )

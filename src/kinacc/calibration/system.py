@@ -1,0 +1,142 @@
+"""Whitened residuals of a flange model seen through base and targets, with their Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.calibration.frames import FrameCoordinates, inverse_left_jacobian, left_jacobian
+from kinacc.calibration.observations import Observations
+from kinacc.geometry import Pose, exp_so3, log_so3, skew
+
+BLOCK_ROWS = 1024
+
+
+@dataclass(frozen=True)
+class FlangeModel:
+    """A kinematic model with P parameters, as functions of the vector and of the observations.
+
+    ``pose(x, q, s)``: flange poses (n, ...). ``jacobian(x, q, s)``: (n, 6, P), rows 0-2 mm per
+    parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base.
+    """
+
+    size: int
+    pose: Callable[[np.ndarray, np.ndarray, np.ndarray], Pose]
+    jacobian: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class PoseSystem:
+    """Residuals model minus measurement in the robot base, in units of ``position_std_mm``.
+
+    Per observation three position residuals and, where an orientation was measured, three of the
+    rotation vector log(R_model R_measured'), times ``rotation_weight_mm_per_rad``. Parameters: the
+    frame coordinates first, then the model's.
+    """
+
+    observations: Observations
+    model: FlangeModel
+    coordinates: FrameCoordinates
+    rotation_weight_mm_per_rad: float
+    position_std_mm: float = 1.0
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.coordinates.size + self.model.size
+
+    def cost(self, x: np.ndarray) -> float:
+        """Sum of squared whitened residuals."""
+        residual = self.residual(x)
+        return float(residual @ residual)
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """All residuals (m,), block by block as ``blocks`` orders them."""
+        parts = []
+        for rows in self._row_blocks():
+            part = self.observations.select(rows)
+            residual, keep, _ = self._residual(x, part)
+            parts.append(residual[keep])
+        return np.concatenate(parts)
+
+    def blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Residual (m,) and Jacobian (m, P) per block of observations."""
+        for rows in self._row_blocks():
+            part = self.observations.select(rows)
+            residual, keep, seen = self._residual(x, part)
+            jacobian = self._jacobian(x, part, residual, seen)
+            if keep.all():
+                yield residual.ravel(), jacobian.reshape(residual.size, self.size)
+            else:
+                yield residual[keep], jacobian[keep]
+
+    def _row_blocks(self) -> Iterator[slice]:
+        for begin in range(0, len(self.observations), BLOCK_ROWS):
+            yield slice(begin, begin + BLOCK_ROWS)
+
+    def _weights(self) -> np.ndarray:
+        weights = np.ones(6)
+        weights[3:] = self.rotation_weight_mm_per_rad
+        return weights / self.position_std_mm
+
+    def _residual(self, x, part):
+        frame_x, model_x = x[: self.coordinates.size], x[self.coordinates.size :]
+        inverse = self.coordinates.inverse_base(frame_x)
+        targets = self.coordinates.targets(frame_x)
+        flange = self.model.pose(model_x, part.q_rad, part.s)
+        centred = part.position_mm - self.coordinates.centroid_mm
+        arm = np.einsum("nij,nj->ni", flange.rotation, targets.position_mm[part.target])
+        turned = centred @ inverse.rotation.T
+        turn = part.has_rotation
+        rotation = np.zeros((len(part), 3))
+        if turn.any():
+            model_rotation = flange.rotation[turn] @ targets.rotation[part.target[turn]]
+            measured = inverse.rotation @ part.rotation[turn]
+            rotation[turn] = log_so3(model_rotation @ np.swapaxes(measured, 1, 2))
+        position = flange.position_mm + arm - turned - inverse.position_mm
+        residual = np.concatenate([position, rotation], axis=1) * self._weights()
+        keep = np.concatenate([np.ones((len(part), 3), bool), np.repeat(turn[:, None], 3, 1)], 1)
+        return residual, keep, (flange, arm, turned)
+
+    def _jacobian(self, x, part, residual, seen):
+        flange, arm, turned = seen
+        frames = self.coordinates.size
+        frame_x, model_x = x[:frames], x[frames:]
+        jacobian = np.zeros((len(part), 6, self.size))
+        if self.model.size:
+            inner = self.model.jacobian(model_x, part.q_rad, part.s)
+            jacobian[:, :, frames:] = inner
+            # A turn of the flange swings the target's arm: w x arm = -[arm] w.
+            if self._arms_matter():
+                jacobian[:, :3, frames:] -= skew(arm) @ inner[:, 3:]
+        angles = residual[:, 3:] * (self.position_std_mm / self.rotation_weight_mm_per_rad)
+        self._fill_frames(jacobian, frame_x, part, flange, turned, angles)
+        if np.any(angles):
+            jacobian[:, 3:] = inverse_left_jacobian(angles) @ jacobian[:, 3:]
+        jacobian *= self._weights()[:, None]
+        return jacobian
+
+    def _arms_matter(self) -> bool:
+        free = self.coordinates.targets_free
+        return free or bool(np.any(self.coordinates.anchor.targets.position_mm))
+
+    def _fill_frames(self, jacobian, frame_x, part, flange, turned, angles):
+        coordinates = self.coordinates
+        if coordinates.base_free:
+            turn = left_jacobian(frame_x[3:6])
+            jacobian[:, :3, :3] = -np.eye(3)
+            jacobian[:, :3, 3:6] = skew(turned) @ turn
+            # The measured side stands behind exp(r): exp(r) exp(-d) = exp(-exp(r) d) exp(r).
+            jacobian[:, 3:, 3:6] = -exp_so3(angles) @ turn
+        if not coordinates.targets_free:
+            return
+        for target in range(coordinates.turns.size):
+            rows = part.target == target
+            columns = coordinates.target_columns(target)
+            begin = columns.start
+            jacobian[rows, :3, begin : begin + 3] = flange.rotation[rows]
+            if coordinates.turns[target]:
+                turn = left_jacobian(frame_x[begin + 3 : begin + 6])
+                jacobian[rows, 3:, begin + 3 : begin + 6] = flange.rotation[rows] @ turn
