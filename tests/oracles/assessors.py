@@ -1,8 +1,8 @@
 """The three assessors for one simulation, in plain Python with scipy.stats (paper eqs. 11-24).
 
 A world is a function ``reading(j, v)`` that gives the v-th measured error vector (v = 1, 2, ...) at
-operating point j, whatever led there. Lengths are in millimetres, ``sigma`` is a standard deviation
-per axis: a number, or one number per axis.
+operating point j, whatever led there. Lengths are in millimetres; ``sigma`` is the standard
+deviation per axis, one entry per operating point: a number, or one number per axis (eq. 10).
 """
 
 from __future__ import annotations
@@ -115,14 +115,13 @@ def distance_outside(mean: Sequence[float], variances: Sequence[float], eta: flo
 def invalidation_run(
     reading: Reading,
     order: Sequence[int],
-    sigma: float | Sequence[float],
+    sigma: Sequence[float | Sequence[float]],
     eta: float,
     budget: int,
     switches: Switches = Switches(),
     axes: int = 3,
 ) -> Run:
     """One pass of the algorithm for one bound: which points it measures and whether it rejects."""
-    sigmas = [float(sigma)] * axes if np.isscalar(sigma) else [float(x) for x in sigma]
     sums: dict[int, list[float]] = {}
     counts: dict[int, int] = {}
     distances: dict[int, float] = {}
@@ -143,7 +142,8 @@ def invalidation_run(
         sums[point] = [a + b for a, b in zip(sums[point], value, strict=True)]
         mean = [x / counts[point] for x in sums[point]]
         shrink = {"r": counts[point], "sqrt_r": math.sqrt(counts[point])}[switches.covariance]
-        distances[point] = distance_outside(mean, [s * s / shrink for s in sigmas], eta)
+        variances = [s * s / shrink for s in per_axis(sigma[point], axes)]
+        distances[point] = distance_outside(mean, variances, eta)
         probability = 1.0 - math.prod(
             1.0 - point_probability(d, axes, switches.distance) for d in distances.values()
         )
@@ -154,6 +154,10 @@ def invalidation_run(
     run.points_visited = len(counts)
     run.rejected = probability > switches.alpha
     return run
+
+
+def per_axis(sigma: float | Sequence[float], axes: int) -> list[float]:
+    return [float(sigma)] * axes if np.isscalar(sigma) else [float(x) for x in sigma]
 
 
 _cache: dict[tuple[float, int, str], float] = {}
