@@ -367,7 +367,7 @@ POSE_ERRORS = Artefact(
             _real(
                 f"r{axis}_mrad",
                 "mrad",
-                f"{axis} component of the orientation error as a rotation vector, null for position only",
+                f"{axis} of the orientation error as a rotation vector, null for position only",
                 -_ERROR_MRAD,
                 _ERROR_MRAD,
                 True,

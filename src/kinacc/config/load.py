@@ -1,0 +1,140 @@
+"""Load configuration files: merge, check everything at once, complete every data set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from kinacc.config.reading import Document, KeyPath, dotted, read
+from kinacc.config.schema import Section, settings
+from kinacc.config.validate import (
+    ROBOT,
+    check_dataset_name,
+    check_robot,
+    check_section,
+    complete,
+    contradictions,
+    overlay,
+)
+from kinacc.config.values import shown
+from kinacc.errors import InputError, Problem
+
+# What makes a data set the one it is: given in two files, two different data sets share a name.
+_IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
+
+
+def load(
+    paths: Sequence[Path | str],
+    overrides: Mapping[str, Any] | None = None,
+    folder: Path | str = ".",
+) -> dict[str, dict[str, Any]]:
+    """Full settings of every data set, by name.
+
+    ``paths`` are merged in order as Snakemake merges its ``--configfile``: sections key by key, all
+    else replaced. ``overrides`` (nested, as from ``--config``) come last. Paths of data and robots
+    are relative to ``folder``. Every data set has ``robot``, ``seed`` and all sections of
+    schema.yaml, numbers in the units their names carry.
+
+    Raises InputError listing every problem in all files.
+    """
+    documents, problems = [], []
+    for path in paths:
+        document, found = read(path)
+        documents.append(document)
+        problems += found
+    if overrides:
+        documents.append(Document("command line", dict(overrides)))
+    if not documents:
+        raise InputError(Problem("configuration", "no file given", fix="give config.yaml"))
+    problems += _defined_twice(documents)
+    merged: dict[str, Any] = {}
+    for document in documents:
+        merged = overlay(merged, document.data)
+    if merged or not problems:
+        resolved, found = _resolve(merged, documents, Path(folder))
+        problems += found
+    if problems:
+        count = len(problems)
+        title = f"{count} problem{'s' if count > 1 else ''} in the configuration"
+        raise InputError(problems, title)
+    return resolved
+
+
+def _resolve(
+    merged: Mapping[str, Any], documents: Sequence[Document], folder: Path
+) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
+    def place(path: KeyPath) -> str:
+        return _place(documents, path)
+
+    names = ("datasets", *settings().names)
+    top = Section("", "", (*settings().entries, Section("datasets", "", ())))
+    shared, problems = check_section(
+        top, {name: value for name, value in merged.items() if name != "datasets"}, (), place
+    )
+    datasets = merged.get("datasets")
+    if not isinstance(datasets, Mapping) or not datasets:
+        what = "no data set is given" if not datasets else f"{shown(datasets)} is not a section"
+        where = place(("datasets",)) if "datasets" in merged else documents[0].place(())
+        fix = f"known at the top level: {', '.join(names)}"
+        problems.append(Problem(where, what, "datasets: with a section for each data set", fix))
+        return {}, problems
+    resolved = {}
+    for name, content in datasets.items():
+        problems += check_dataset_name(name, place)
+        resolved[name], found = _dataset(name, content, shared, place, folder)
+        problems += found
+    return resolved, list(dict.fromkeys(problems))
+
+
+def _dataset(name, content, shared, place, folder) -> tuple[dict[str, Any], list[Problem]]:
+    path = ("datasets", name)
+    problems: list[Problem] = []
+    known = Section("", "", (ROBOT, *settings().entries))
+    own, found = check_section(known, content, path, place)
+    robot = own.pop("robot", None)
+    if robot is not None:
+        problems += check_robot(robot, (*path, "robot"), place, folder)
+    elif content is None or (isinstance(content, Mapping) and "robot" not in content):
+        allowed = "robot: a shipped robot's name or the path of a robot file"
+        problems.append(Problem(place(path), "names no robot", allowed))
+    full = complete(shared, own)
+
+    def origin(*keys: str) -> str:
+        given = own
+        for key in keys:
+            given = given.get(key, {}) if isinstance(given, Mapping) else {}
+        return place((*path, *keys)) if given != {} else f"{place(keys)} (data set {name})"
+
+    problems += found
+    problems += contradictions(name, full, origin, folder)
+    return {"robot": robot, **full}, problems
+
+
+def _place(documents: Sequence[Document], path: KeyPath) -> str:
+    """Where a key was given last; the file that names its data set or section otherwise."""
+    for length in range(len(path), 0, -1):
+        for document in reversed(documents):
+            if path[:length] in document.lines:
+                return document.place(path)
+    last = documents[-1]
+    return last.place(path) if not last.lines and last.data else f"default, {dotted(path)}"
+
+
+def _defined_twice(documents: Sequence[Document]) -> list[Problem]:
+    problems = []
+    first: dict[KeyPath, Document] = {}
+    for document in documents:
+        datasets = document.data.get("datasets")
+        for name in datasets if isinstance(datasets, Mapping) else ():
+            for keys in _IDENTITY:
+                path = ("datasets", name, *keys)
+                if path not in document.lines:
+                    continue
+                if path in first:
+                    what = f"data set {name!r} has its measurements given in two files"
+                    allowed = f"once; first in {first[path].place(path)}"
+                    fix = "give the second data set a name of its own"
+                    problems.append(Problem(document.place(path), what, allowed, fix))
+                first.setdefault(path, document)
+    return problems

@@ -1,0 +1,245 @@
+"""Check single values against their key: type, limits, words, and units that were mixed up."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from kinacc.config.reading import KeyPath
+from kinacc.config.schema import NUMERIC, Key, Section, walk
+from kinacc.errors import Problem
+
+Place = Callable[[KeyPath], str]
+
+_ITEM = {"ints": "int", "floats": "float", "texts": "text", "pairs": "pair"}
+INVALID = object()  # what a value that cannot be used is replaced by
+
+# (unit, other unit, what one of the other unit is in the unit)
+_MIXED_UP = (
+    ("mm", "um", 1.0e-3),
+    ("mm", "m", 1.0e3),
+    ("mm", "nm", 1.0e-6),
+    ("deg", "rad", 180.0 / math.pi),
+    ("mrad", "rad", 1.0e3),
+    ("mrad", "deg", 1.0e3 * math.pi / 180.0),
+    ("mm/rad", "m/rad", 1.0e3),
+)
+_UNIT_ENDINGS = ("nm", "um", "mm", "cm", "m", "deg", "rad", "mrad", "urad", "percent")
+
+
+def check(key: Key, value: Any, path: KeyPath, place: Place) -> tuple[Any, list[Problem]]:
+    """The value in its canonical type, and what is wrong with it (then INVALID)."""
+    if value is None:
+        if key.nullable:
+            return None, []
+        return _refuse(key, path, place, "has no value")
+    if isinstance(value, str) and value in key.choices and key.kind in NUMERIC:
+        return value, []
+    return _CHECKS[key.kind](key, value, path, place)
+
+
+def shown(value: Any) -> str:
+    """A value as it stands in the file, shortened."""
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    text = repr(value) if isinstance(value, (str, dict, list)) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def nearest(word: object, known: tuple[str, ...]) -> str:
+    """The known word most like ``word``; empty if none is."""
+    text = str(word)
+    stem = _stem(text)
+    same = [each for each in known if _stem(each) == stem]
+    found = same or difflib.get_close_matches(text, known, n=1, cutoff=0.6)
+    folded = {each.lower(): each for each in known}
+    return found[0] if found else folded.get(text.lower(), "")
+
+
+def unknown_key(name: object, section: Section, top: Section) -> tuple[str, str]:
+    """What to say of a key that is not known: the fault, and what to do about it."""
+    what = f"unknown key {shown(name) if isinstance(name, str) else str(name)}"
+    close = nearest(name, section.names)
+    if close:
+        entry = section.entry(close)
+        unit = f" (in {entry.unit})" if isinstance(entry, Key) and entry.unit else ""
+        if unit and _stem(str(name)) == _stem(close) and str(name) != close:
+            return what, f"the unit is fixed: give {close}{unit}"
+        return what, f"did you mean {close}{unit}?"
+    homes = [".".join(path) for path, key in walk(top) if key.name == name]
+    homes += [
+        entry.name for entry in top.entries if isinstance(entry, Section) and entry.name == name
+    ]
+    return what, f"it belongs at {' or '.join(homes)}" if homes else ""
+
+
+def _stem(name: str) -> str:
+    head, _, ending = name.rpartition("_")
+    return head if head and ending in _UNIT_ENDINGS else name
+
+
+def _refuse(key: Key, path: KeyPath, place: Place, what: str, fix: str = ""):
+    return INVALID, [Problem(place(path), what, key.allowed, fix)]
+
+
+def _number(key: Key, value: Any, path: KeyPath, place: Place, whole: bool):
+    """One number within the key's limits, as int or float."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        fix = ""
+        if isinstance(value, str):
+            fix = _number_in_text(value)
+        return _refuse(key, path, place, f"{shown(value)} is not a number", fix)
+    if not math.isfinite(value):
+        return _refuse(key, path, place, f"{shown(value)} is not a finite number")
+    if whole and value != int(value):
+        return _refuse(key, path, place, f"{shown(value)} is not a whole number")
+    if not _within(key, value):
+        return _refuse(key, path, place, f"{shown(value)} is out of range", _other_unit(key, value))
+    return (int(value) if whole else float(value)), []
+
+
+def _number_in_text(text: str) -> str:
+    try:
+        number = float(text.replace(",", "."))
+    except ValueError:
+        words = text.split()
+        if len(words) == 2 and _is_number(words[0]):
+            return f"write the number alone, without {words[1]!r}"
+        return ""
+    return f"write {number:g}, without quotes"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _within(key: Key, value: float) -> bool:
+    if key.open_ends and value in (key.low, key.high):
+        return False
+    return not (
+        (key.low is not None and value < key.low) or (key.high is not None and value > key.high)
+    )
+
+
+def _other_unit(key: Key, value: float) -> str:
+    """The value converted, where it would be in range had it been given in another unit."""
+    for unit, other, factor in _MIXED_UP:
+        if unit == key.unit and value and _within(key, value * factor):
+            return f"the unit is {unit}; if {value:g} {other} was meant, write {value * factor:g}"
+    if key.open_ends and key.high == 1 and 1 < value < 100:
+        return f"if {value:g} % was meant, write {value / 100:g}"
+    return ""
+
+
+def _int(key, value, path, place):
+    return _number(key, value, path, place, whole=True)
+
+
+def _float(key, value, path, place):
+    return _number(key, value, path, place, whole=False)
+
+
+def _bool(key, value, path, place):
+    if isinstance(value, bool):
+        return value, []
+    return _refuse(key, path, place, f"{shown(value)} is neither true nor false")
+
+
+def _text(key, value, path, place):
+    if not isinstance(value, str):
+        fix = (
+            "put it in quotes" if isinstance(value, (bool, int, float)) and not key.choices else ""
+        )
+        return _refuse(key, path, place, f"{shown(value)} is not text", fix)
+    if key.choices and value not in key.choices:
+        close = nearest(value, key.choices)
+        fix = f"did you mean {close}?" if close else ""
+        return _refuse(key, path, place, f"{shown(value)} is not known", fix)
+    if not value:
+        return _refuse(key, path, place, "is empty text")
+    return value, []
+
+
+def _list(key, value, path, place, item):
+    """A list of allowed length whose items pass ``item``."""
+    if not isinstance(value, list):
+        what = f"{shown(value)} is not a list"
+        if isinstance(value, str) and key.choices:
+            close = nearest(value, key.choices)
+            return _refuse(key, path, place, what, f"did you mean {close}?" if close else "")
+        fix = "write it in brackets" if isinstance(value, (int, float, str)) else ""
+        return _refuse(key, path, place, what, fix)
+    fewest, most = key.length
+    if not fewest <= len(value) <= most:
+        return _refuse(key, path, place, f"has {len(value)} items")
+    single = replace(key, kind=_ITEM[key.kind], choices=key.choices if key.kind == "texts" else ())
+    items, problems = [], []
+    for number, each in enumerate(value):
+        cleaned, found = item(single, each, (*path, number), place)
+        items.append(cleaned)
+        problems += found
+    return (INVALID if problems else items), problems
+
+
+def _pair(key, value, path, place):
+    if not isinstance(value, list) or len(value) != 2:
+        return _refuse(key, path, place, f"{shown(value)} is not two numbers")
+    single = replace(key, kind="float")
+    low, problems = _float(single, value[0], (*path, 0), place)
+    high, more = _float(single, value[1], (*path, 1), place)
+    if problems or more:
+        return INVALID, problems + more
+    if not low < high:
+        return _refuse(
+            key, path, place, f"{shown(value)} is reversed or empty", "put the smaller number first"
+        )
+    return [low, high], []
+
+
+def _distinct(item):
+    def check_list(key, value, path, place):
+        items, problems = _list(key, value, path, place, item)
+        repeated = [] if problems else sorted({str(e) for e in items if items.count(e) > 1})
+        if repeated:
+            return _refuse(key, path, place, f"names {', '.join(repeated)} more than once")
+        return items, problems
+
+    return check_list
+
+
+def _names(key, value, path, place):
+    if not isinstance(value, dict):
+        return _refuse(key, path, place, f"{shown(value)} is not a mapping")
+    problems = []
+    for name, each in value.items():
+        here = place((*path, name))
+        if name not in key.choices:
+            close = nearest(name, key.choices)
+            fix = f"did you mean {close}?" if close else ""
+            problems.append(
+                Problem(here, f"unknown name {shown(name)}", ", ".join(key.choices), fix)
+            )
+        if not isinstance(each, str) or not each:
+            problems.append(Problem(here, f"{shown(each)} is not text", "name of a column"))
+    return (INVALID if problems else dict(value)), problems
+
+
+_CHECKS = {
+    "int": _int,
+    "float": _float,
+    "bool": _bool,
+    "text": _text,
+    "ints": _distinct(_int),
+    "floats": lambda key, value, path, place: _list(key, value, path, place, _float),
+    "texts": _distinct(_text),
+    "pair": _pair,
+    "pairs": lambda key, value, path, place: _list(key, value, path, place, _pair),
+    "names": _names,
+}
