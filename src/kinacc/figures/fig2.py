@@ -1,0 +1,180 @@
+"""Fig. 2: the arm, drawn from its own kinematics, over the evaluation space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+from kinacc.errors import InputError, Problem
+from kinacc.figures import style
+from kinacc.models import dh
+
+SIDES = 16  # of the prisms that stand for links and joints
+VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
+LINK, JOINT = "#f2a93b", "#5b6470"
+LIGHT = np.array([0.3, -0.6, 0.74])
+
+
+def draw(
+    model: dh.DHModel,
+    q_rad: np.ndarray,
+    *,
+    tool_mm: np.ndarray | None = None,
+    cylinder: Mapping[str, object] | None = None,
+    dataset: str | None = None,
+) -> Figure:
+    """Draw the operating points and the arm at the one nearest to their middle, in mm.
+
+    ``q_rad`` (n, k) are the DH joint angles of the points, ``tool_mm`` (3,) the tool centre point
+    in the flange frame; ``cylinder`` is the evaluation space as a sector about the axis of joint 1
+    with ``inner_radius_mm``, ``radial_span_mm``, ``bottom_mm``, ``height_mm`` and ``angle_deg``
+    (two values). Everything is in the robot base frame. Raises InputError without a point.
+    """
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    q_rad = q_rad[np.isfinite(q_rad).all(axis=1)]
+    if not len(q_rad):
+        raise InputError(Problem("assessment_points", "no point has joint angles", "at least one"))
+    tool_mm = np.zeros(3) if tool_mm is None else np.asarray(tool_mm, dtype=float)
+    flange = dh.forward(model, q_rad)
+    points_mm = flange.position_mm + flange.rotation @ tool_mm
+    with style.house():
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.2, arranged=False)
+        ax: Axes3D = figure.add_axes((-0.06, 0.03, 1.06, 1.0), projection="3d")
+        ax.computed_zorder = False
+        ax.view_init(*VIEW_DEG)
+        middle = points_mm.mean(axis=0)
+        seen = [points_mm, np.zeros((1, 3))]
+        if cylinder is not None:
+            seen.append(_sector(ax, cylinder))
+            middle = seen[-1].mean(axis=0)
+        ax.scatter(*points_mm.T, s=2.0, c=style.BLUE, lw=0, depthshade=False, zorder=2)
+        posture = q_rad[np.linalg.norm(points_mm - middle, axis=1).argmin()]
+        seen.append(_arm(ax, model, posture, tool_mm))
+        _first_axis(ax, min(part[:, 2].min() for part in seen))
+        _frame_axes(ax, np.concatenate(seen))
+        style.name_dataset(figure, dataset)
+    return figure
+
+
+def _prism(begin: np.ndarray, end: np.ndarray, radius: float, colour: str):
+    """Return faces and shaded colours of a prism from ``begin`` to ``end``."""
+    axis = end - begin
+    length = np.linalg.norm(axis)
+    if length < 1e-9:
+        return [], []
+    axis = axis / length
+    across = np.cross(axis, [1.0, 0, 0] if abs(axis[0]) < 0.9 else [0, 1.0, 0])
+    across /= np.linalg.norm(across)
+    third = np.cross(axis, across)
+    turn = np.linspace(0, 2 * np.pi, SIDES + 1)
+    normals = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * third
+    pieces = max(1, round(length / 120))  # short pieces, so that depth sorting sees them apart
+    along = np.linspace(0, 1, pieces + 1)
+    rings = [begin + length * t * axis + radius * normals for t in along]
+    faces = [
+        np.array([a[i], a[i + 1], b[i + 1], b[i]]) for a, b in pairwise(rings) for i in range(SIDES)
+    ]
+    middle = (normals[:-1] + normals[1:]) / 2
+    shades = [_shade(colour, n) for n in middle] * pieces
+    faces += [rings[0][:-1], rings[-1][:-1]]
+    return faces, [*shades, _shade(colour, -axis), _shade(colour, axis)]
+
+
+def _shade(colour: str, normal: np.ndarray) -> tuple[float, float, float]:
+    light = 0.62 + 0.38 * float(normal @ LIGHT / np.linalg.norm(LIGHT))
+    return tuple(float(c) * light for c in to_rgb(colour))
+
+
+def _arm(ax: Axes3D, model: dh.DHModel, q_rad: np.ndarray, tool_mm: np.ndarray) -> np.ndarray:
+    """Draw links (along d, then along a) and joints (about their axes); return the frames."""
+    frames = dh.chain(model, q_rad[None])
+    rotation, origin = frames.rotation[0], frames.position_mm[0]
+    reach = float(np.abs(model.a_mm).sum() + np.abs(model.d_mm).sum())
+    faces, colours = [], []
+
+    def add(begin: np.ndarray, end: np.ndarray, radius: float, colour: str) -> None:
+        more = _prism(begin, end, radius, colour)
+        faces.extend(more[0])
+        colours.extend(more[1])
+
+    for i in range(model.joints):
+        thick = reach * (0.030 - 0.016 * i / model.joints)
+        axis = rotation[i][:, 2]
+        corner = origin[i] + model.d_mm[i] * axis
+        add(origin[i], corner, thick, LINK)
+        add(corner, origin[i + 1], thick, LINK)
+        half = 1.7 * thick * axis
+        add(origin[i] - half, origin[i] + half, 1.3 * thick, JOINT)
+    tip = origin[-1] + rotation[-1] @ tool_mm
+    add(origin[-1], tip, reach * 0.008, JOINT)
+    ax.add_collection3d(
+        Poly3DCollection(faces, facecolors=colours, edgecolors=colours, lw=0.15, zorder=3)
+    )
+    return np.concatenate([origin, tip[None]])
+
+
+def _first_axis(ax: Axes3D, lowest_mm: float) -> None:
+    """Draw the axis of joint 1 from the base frame down to the level of what is lowest."""
+    ax.plot([0, 0], [0, 0], [lowest_mm, 0], color=style.MUTED, lw=0.8, ls=(0, (6, 2, 1, 2)))
+
+
+def _sector(ax: Axes3D, cylinder: Mapping[str, object]) -> np.ndarray:
+    """Draw the evaluation space, translucent with firm edges; return its corner points."""
+    inner = float(cylinder["inner_radius_mm"])
+    outer = inner + float(cylinder["radial_span_mm"])
+    low = float(cylinder["bottom_mm"])
+    high = low + float(cylinder["height_mm"])
+    turn = np.radians(np.linspace(*np.asarray(cylinder["angle_deg"], dtype=float), 31))
+
+    def arc(radius, height):
+        return np.stack(
+            [radius * np.cos(turn), radius * np.sin(turn), np.full(turn.size, height)], axis=-1
+        )
+
+    corners = {(r, h): arc(r, h) for r in (inner, outer) for h in (low, high)}
+    walls = [
+        np.concatenate([corners[r, low], corners[r, high][::-1]]) for r in (inner, outer) if r > 0
+    ]
+    walls += [np.concatenate([corners[inner, h], corners[outer, h][::-1]]) for h in (low, high)]
+    walls += [
+        np.array(
+            [
+                corners[inner, low][end],
+                corners[outer, low][end],
+                corners[outer, high][end],
+                corners[inner, high][end],
+            ]
+        )
+        for end in (0, -1)
+    ]
+    ax.add_collection3d(Poly3DCollection(walls, facecolors=style.SKY, alpha=0.14, lw=0, zorder=1))
+    edges = list(corners.values())
+    for end in (0, -1):
+        edges += [np.array([corners[r, low][end], corners[r, high][end]]) for r in (inner, outer)]
+        edges += [np.array([corners[inner, h][end], corners[outer, h][end]]) for h in (low, high)]
+    ax.add_collection3d(Line3DCollection(edges, colors=style.BLUE, linewidths=0.9, zorder=4))
+    return np.concatenate(list(corners.values()))
+
+
+def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
+    """Set equal scales around everything drawn, and name the axes."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.06 * (high - low).max()
+    low, high = low - margin, high + margin
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(high - low, zoom=1.0)
+    ax.set_xlabel("x (mm)", labelpad=-2)
+    ax.set_ylabel("y (mm)", labelpad=-2)
+    ax.set_zlabel("z (mm)", labelpad=1)
+    ax.tick_params(pad=-2, labelsize=style.SMALL_PT)
+    ax.tick_params(axis="z", pad=2)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
+        axis._axinfo["grid"].update(color="#e3e3e3", linewidth=0.5)
+        axis.get_major_locator().set_params(nbins=5, steps=[1, 2, 5, 10])

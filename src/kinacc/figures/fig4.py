@@ -1,0 +1,115 @@
+"""Fig. 4: assessed accuracy against noise, one line per assessor, with the true accuracy."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinacc.figures import style
+from kinacc.figures.columns import Table, floats, require, texts
+
+COLUMNS = ("assessor", "noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm", "repetitions")
+UM_PER_MM = 1000.0
+
+
+def draw(
+    summary: Table,
+    *,
+    true_mm: float | None = None,
+    noisy_truth: bool = False,
+    dataset: str | None = None,
+) -> Figure:
+    """Draw ``study_summary``: means joined by lines, bars from the smallest to the largest.
+
+    ``true_mm`` is the true accuracy; without it, it is taken from ``mean_mm - bias_mm``.
+    ``noisy_truth`` says that the truth contains the instrument's noise.
+    Raises InputError where a column is missing.
+    """
+    require(summary, COLUMNS, "study_summary")
+    names = texts(summary, "assessor")
+    noise_um = floats(summary, "noise_mm") * UM_PER_MM
+    if true_mm is None:
+        implied = floats(summary, "mean_mm") - floats(summary, "bias_mm")
+        true_mm = float(np.nanmedian(implied)) if np.isfinite(implied).any() else None
+    looks = style.assessor_style(list(names))
+    levels = np.unique(noise_um[np.isfinite(noise_um)])
+    step = float(np.diff(levels).min()) if levels.size > 1 else 50.0
+
+    with style.house():
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, 2.7)
+        ax = figure.subplots()
+        labels = []
+        for index, (name, (words, colour, marker)) in enumerate(looks.items()):
+            mine = names == name
+            shift = (index - (len(looks) - 1) / 2) * 0.14 * step
+            last = _assessor(ax, summary, mine, noise_um[mine] + shift, colour, marker)
+            if last is not None:
+                labels.append((last, words.replace(" ", "\n"), colour))
+        if true_mm is not None:
+            ax.axhline(true_mm, color=style.INK, lw=1, ls=(0, (4, 2)), zorder=1)
+            words = "True accuracy" if not noisy_truth else "Largest error*"
+            labels.append((true_mm, f"{words}\n{true_mm:.3f} mm", style.INK))
+        ax.set(xlabel=r"Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
+        ax.set_xticks(levels if levels.size <= 8 else levels[:: -(-levels.size // 8)])
+        margin = 0.55 * step
+        if levels.size:
+            ax.set_xlim(levels[0] - margin, levels[-1] + margin)
+        ax.margins(y=0.06)
+        ax.grid(axis="x", visible=False)
+        _label_lines(ax, labels)
+        ax.set_title(_repetitions(summary), loc="left", color=style.MUTED, fontsize=style.SMALL_PT)
+        if noisy_truth:
+            figure.supxlabel(
+                "* measured minus modelled: contains the instrument's noise",
+                fontsize=style.SMALL_PT, color=style.MUTED, x=0.01, ha="left",
+            )  # fmt: skip
+        style.name_dataset(figure, dataset)
+    return figure
+
+
+def _assessor(
+    ax: Axes, summary: Table, mine: np.ndarray, x_um: np.ndarray, colour: str, marker: str
+) -> float | None:
+    """Draw one assessor; return the height of its rightmost mean, None where it has none."""
+    mean, low, high = (floats(summary, c)[mine] for c in ("mean_mm", "min_mm", "max_mm"))
+    order = np.argsort(x_um, kind="stable")
+    order = order[np.isfinite(mean[order])]
+    if not order.size:
+        return None
+    x_um, mean, low, high = x_um[order], mean[order], low[order], high[order]
+    ax.errorbar(
+        x_um,
+        mean,
+        yerr=np.nan_to_num(np.clip([mean - low, high - mean], 0, None)),
+        color=colour,
+        marker=marker,
+        ms=4,
+        mec="white",
+        mew=0.4,
+        capsize=2,
+        elinewidth=0.9,
+        capthick=0.9,
+        lw=1.1,
+    )
+    return float(mean[-1])
+
+
+def _label_lines(ax: Axes, labels: list[tuple[float, str, str]]) -> None:
+    """Name each line at its right end, moved apart where the names would overlap."""
+    low, high = ax.get_ylim()
+    heights = [(y - low) / (high - low) for y, _, _ in labels]
+    for place, (_, words, colour) in zip(
+        style.spread(heights, 0.125, 0.05, 0.95), labels, strict=True
+    ):
+        style.outside_label(ax, place, words, colour)
+
+
+def _repetitions(summary: Table) -> str:
+    counts = floats(summary, "repetitions")
+    counts = counts[np.isfinite(counts)]
+    if not counts.size:
+        return "Mean, smallest and largest"
+    few, many = int(counts.min()), int(counts.max())
+    span = f"{many}" if few == many else f"{few} to {many}"
+    return f"Mean, smallest and largest of {span} simulation{'s' if many != 1 else ''}"

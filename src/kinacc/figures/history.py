@@ -1,0 +1,150 @@
+"""The iteration history of one simulation of model invalidation, as in Figs. 5 and 6."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from kinacc.errors import InputError, Problem
+from kinacc.figures import style
+from kinacc.figures.columns import Table, floats, require, rows, texts
+
+COLUMNS = (
+    "noise_mm",
+    "alpha",
+    "iteration",
+    "point",
+    "eta_mm",
+    "measured_mm",
+    "averaged_mm",
+    "true_mm",
+    "rejection_probability",
+)
+
+
+def draw(
+    histories: Table,
+    *,
+    example: str,
+    true_accuracy_mm: float | None = None,
+    noisy_truth: bool = False,
+    dataset: str | None = None,
+) -> Figure:
+    """Draw one example of ``histories``.
+
+    Above: magnitude of first readings, of the averages after resampling, of the true errors, with
+    the bound eta and the true accuracy (largest true error of all operating points, visited or
+    not). Below: rejection probability and its threshold alpha.
+    ``noisy_truth`` says that the truth contains the instrument's noise.
+    Raises InputError where a column is missing or there is no row.
+    """
+    values = _sorted(histories, example)
+    again = resampled(values["point"])
+    with style.house():
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.9)
+        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(1.35, 1))
+        _magnitudes(top, values, again, true_accuracy_mm, noisy_truth)
+        _probability(bottom, values, again)
+        top.set_title(verdict(values), loc="left", fontsize=style.SMALL_PT)
+        bottom.set_xlabel("Iteration k")
+        bottom.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
+        k = values["iteration"]
+        pad = max(0.02 * (k[-1] - k[0]), 0.5)
+        bottom.set_xlim(k[0] - pad, k[-1] + pad)
+        figure.align_ylabels([top, bottom])
+        style.name_dataset(figure, dataset)
+    return figure
+
+
+def _sorted(histories: Table, example: str) -> dict[str, np.ndarray]:
+    """Return the columns of one example in the order of its iterations."""
+    require(histories, ("example", *COLUMNS), "histories")
+    names = texts(histories, "example")
+    mine = rows(histories, names == example)
+    k = floats(mine, "iteration")
+    if not k.size:
+        present = ", ".join(sorted(set(names))) or "none"
+        raise InputError(
+            Problem("histories", f"no row belongs to example {example!r}", f"found: {present}")
+        )
+    order = np.argsort(k, kind="stable")
+    return {name: floats(mine, name)[order] for name in COLUMNS}
+
+
+def resampled(point: np.ndarray) -> np.ndarray:
+    """Say for each iteration whether its operating point had been measured before."""
+    again = np.ones(point.shape, dtype=bool)
+    again[np.unique(point, return_index=True)[1]] = False
+    return again
+
+
+def verdict(values: Table) -> str:
+    """State bound, noise, threshold and outcome in one line."""
+    eta, noise, alpha = (values[name][0] for name in ("eta_mm", "noise_mm", "alpha"))
+    final = values["rejection_probability"][-1]
+    outcome = "rejected" if final > alpha else "not rejected"
+    return f"η = {eta:.3f} mm, noise {noise * 1000:.0f} µm, α = {alpha * 100:.0f} %: {outcome}"
+
+
+def _magnitudes(
+    ax: Axes,
+    values: Table,
+    again: np.ndarray,
+    true_accuracy_mm: float | None,
+    noisy_truth: bool,
+) -> None:
+    k = values["iteration"]
+    truth = "true error" if not noisy_truth else "measured error (contains instrument noise)"
+    ax.step(k, values["true_mm"], where="mid", color="#9a9a9a", lw=0.6, label=truth, zorder=2)
+    ax.plot(
+        k[~again], values["measured_mm"][~again], ls="", marker="o", ms=2.4, mew=0,
+        color=style.BLUE, label="first measurement", zorder=3,
+    )  # fmt: skip
+    if again.any():
+        ax.plot(
+            k[again], values["averaged_mm"][again], ls="", marker="D", ms=2.4, mew=0,
+            color=style.ORANGE, label="average after resampling", zorder=4,
+        )  # fmt: skip
+    ax.axhline(
+        values["eta_mm"][0], color=style.VERMILION, lw=1, label="accuracy bound η", zorder=2.5
+    )
+    if true_accuracy_mm is not None and np.isfinite(true_accuracy_mm):
+        ax.axhline(
+            true_accuracy_mm, color=style.INK, lw=1, ls=(0, (4, 2)), zorder=2.5,
+            label=f"true accuracy {true_accuracy_mm:.3f} mm"
+            if not noisy_truth
+            else f"largest of these {true_accuracy_mm:.3f} mm",
+        )  # fmt: skip
+    ax.set_ylim(bottom=0)
+    ax.set_ylabel("Error magnitude (mm)")
+    ax.grid(axis="x", visible=False)
+    ax.figure.legend(
+        *ax.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=2,
+        alignment="left",
+        markerscale=1.6,
+    )
+
+
+def _probability(ax: Axes, values: Table, again: np.ndarray) -> None:
+    k, p = values["iteration"], values["rejection_probability"]
+    for mask, marker, colour, label in (
+        (~again, "o", style.PURPLE, "new operating point"),
+        (again, "D", style.ORANGE, "resampling"),
+    ):
+        if mask.any():
+            ax.plot(k[mask], p[mask], ls="", marker=marker, ms=2.4, mew=0, color=colour)
+            ax.plot([], [], ls="", marker=marker, ms=4, mew=0, color=colour, label=label)
+    alpha = values["alpha"][0]
+    ax.axhline(alpha, color=style.INK, lw=0.9, zorder=1.5)
+    ax.annotate(
+        "α", (1, alpha), xycoords=("axes fraction", "data"), xytext=(2, 0),
+        textcoords="offset points", va="center", fontsize=style.TEXT_PT,
+    )  # fmt: skip
+    ax.set_ylim(-0.03, 1.03)
+    ax.set_ylabel("Rejection probability")
+    ax.grid(axis="x", visible=False)
+    ax.legend(loc="lower right")

@@ -1,0 +1,72 @@
+"""Turn a Figure into the bytes of its files: same figure and versions, same bytes.
+
+Dates, versions and random identifiers are left out, fonts are embedded (PDF) or drawn as paths
+(SVG), and the layout is settled once so that every format shows the same picture.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from io import BytesIO
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from kinacc.errors import InputError, Problem
+from kinacc.figures import style
+
+FORMATS = ("svg", "png", "pdf")
+PNG_DPI = 200
+RASTER_DPI = 300  # of the dense meshes inside the vector formats
+
+_METADATA = {
+    "svg": {"Date": None, "Creator": None},
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "ModDate": None, "Creator": None, "Producer": None},
+}
+
+
+def render(figure: Figure, formats: Iterable[str] = FORMATS) -> dict[str, bytes]:
+    """Return the file content for each format.
+
+    Raises InputError for formats other than svg, png and pdf.
+    """
+    formats = tuple(formats)
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown:
+        raise InputError(
+            [Problem("figures.formats", f"{name!r}", ", ".join(FORMATS)) for name in unknown]
+        )
+    with style.house():
+        settle(figure)
+        return {name: _bytes(figure, name) for name in formats}
+
+
+def settle(figure: Figure) -> None:
+    """Run the layout once and freeze it, so later drawing neither repeats nor changes it."""
+    if figure.get_layout_engine() is not None:
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+
+
+def write(figure: Figure, paths: Mapping[str, Path]) -> None:
+    """Write one file per format; each appears whole, and none appears unless all rendered."""
+    contents = render(figure, paths)
+    parts = {name: Path(path).with_name(f".{Path(path).name}.part") for name, path in paths.items()}
+    try:
+        for name, part in parts.items():
+            part.parent.mkdir(parents=True, exist_ok=True)
+            part.write_bytes(contents[name])
+        for name, part in parts.items():
+            os.replace(part, paths[name])
+    finally:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
+
+
+def _bytes(figure: Figure, name: str) -> bytes:
+    buffer = BytesIO()
+    dpi = PNG_DPI if name == "png" else RASTER_DPI
+    figure.savefig(buffer, format=name, dpi=dpi, metadata=_METADATA[name])
+    return buffer.getvalue()

@@ -1,0 +1,22 @@
+"""Draw Fig. 5, the history of a simulation that invalidated the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from matplotlib.figure import Figure
+
+from kinacc.figures import fig5, truth
+
+EXAMPLE = "rejected"
+
+
+def run(inputs: Mapping, settings: Mapping) -> Figure:
+    """Return the figure of the example ``rejected`` of the ``histories``."""
+    return fig5.draw(
+        inputs["histories"],
+        example=EXAMPLE,
+        true_accuracy_mm=truth.accuracy_mm(inputs.get("assessment_points")),
+        noisy_truth=truth.is_noisy(settings),
+        dataset=settings.get("dataset"),
+    )
