@@ -8,6 +8,7 @@ from kinacc.robot import Robot
 
 _TWO_PI = 2.0 * np.pi
 _ROUND_OFF_RAD = 1e-12
+_TIE_RAD = 1e-9
 
 
 def reported_joints(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
@@ -54,6 +55,8 @@ def take_turns(
     """
     boxes = [limits_rad] if preferred_rad is None else [limits_rad, preferred_rad]
     base = q_rad - _TWO_PI * np.rint(q_rad / _TWO_PI)
+    # Half a turn is a tie that round-off must not decide: it counts as +pi.
+    base = np.where(base < -np.pi + _TIE_RAD, base + _TWO_PI, base)
     best = base
     # Two turns either way reach every turn a +-720 degree joint has.
     lowest = np.full(q_rad.shape, np.inf)
