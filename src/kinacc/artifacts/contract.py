@@ -415,11 +415,17 @@ ACCURACY_MAP = Artefact(
         ),
         _text(
             "worst_branch",
-            "inverse branch of the largest position error, null if unreachable",
+            "orientation, inverse branch of the largest position error, null if unreachable",
+            nullable=True,
+        ),
+        _text(
+            "orientation_worst_branch",
+            "orientation, inverse branch of the largest orientation error, null if unreachable",
             nullable=True,
         ),
         _whole("solutions", "orientation x branch combinations reached, 0 if unreachable"),
         _whole("wanted", "orientation x branch combinations tried", 1),
+        _whole("extrapolating", "combinations left out: reached, but outside the VEC's range"),
     ),
     ("slice_deg", "radius_mm", "height_mm"),
 )
