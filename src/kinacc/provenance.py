@@ -9,7 +9,7 @@ import hashlib
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -17,8 +17,6 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
 LIBRARIES = ("matplotlib", "numba", "numpy", "pandas", "pyarrow", "scipy")
-# How many items the work is split into changes nothing about the result.
-SPLITTING = frozenset({"chunks"})
 
 # Parsing 60 modules with `ast` takes 0.1 s, ten times as long; a test holds this scan to `ast`.
 _IMPORT = re.compile(
@@ -37,17 +35,21 @@ class SourceTree:
     data: Mapping[str, frozenset[str]]
 
 
-def code_hash(module: str, root: Path = PACKAGE) -> str:
-    """Hash of all that a module's results can depend on besides its arguments.
+def code_hash(*modules: str, alone: Iterable[str] = (), root: Path = PACKAGE) -> str:
+    """Hash of all that the results of modules can depend on besides their arguments.
 
-    The module, every module of the package it imports directly or indirectly (imports inside
+    The modules, every module of the package these import directly or indirectly (imports inside
     functions included), the package data files these name, the versions of the numerical
-    libraries they use, and the Python minor version.
+    libraries they use, and the Python minor version. ``alone`` are modules counted without what
+    they import.
     """
     tree = source_tree(root)
-    modules, libraries = closure(module, root)
-    names = set(modules)
-    for name in modules:
+    names, libraries = set(alone), set()
+    for module in modules:
+        reached, used = closure(module, root)
+        names |= reached
+        libraries |= used
+    for name in tuple(names - set(alone)):
         names |= tree.data[name]
     digest = hashlib.sha256(f"python {sys.version_info.major}.{sys.version_info.minor}\n".encode())
     for name in sorted(libraries):
@@ -57,6 +59,12 @@ def code_hash(module: str, root: Path = PACKAGE) -> str:
     return digest.hexdigest()[:16]
 
 
+def stage_code_hash(module: str) -> str:
+    """Hash of the code of a stage, of the writing of its tables and of the runner that calls it."""
+    return code_hash(module, "kinacc.artifacts.store", alone=("kinacc.stages.runner",))
+
+
+@cache
 def closure(module: str, root: Path = PACKAGE) -> tuple[frozenset[str], frozenset[str]]:
     """Names of the package's modules that a module runs, itself included, and its libraries."""
     tree = source_tree(root)
@@ -113,8 +121,8 @@ def imported_names(text: str, module: str, is_package: bool) -> frozenset[str]:
 
 
 def config_hash(settings: Mapping[str, object]) -> str:
-    """Hash of the configuration values a stage depends on, without chunk counts."""
-    text = json.dumps(_without_splitting(settings), sort_keys=True, ensure_ascii=True)
+    """Hash of the configuration values a stage depends on (which hold no core or chunk count)."""
+    text = json.dumps(settings, sort_keys=True, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -165,11 +173,3 @@ def _library_version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "absent"
-
-
-def _without_splitting(value: object) -> object:
-    if isinstance(value, Mapping):
-        return {key: _without_splitting(v) for key, v in value.items() if key not in SPLITTING}
-    if isinstance(value, (list, tuple)):
-        return [_without_splitting(item) for item in value]
-    return value

@@ -6,7 +6,6 @@ costs nothing but the standard library.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 FIGURE_FOLDER = "figures"
@@ -20,7 +19,8 @@ class Stage:
     data set. ``settings`` are dotted key paths of the data set's configuration, ``files`` those
     whose values name files it reads; nothing else of the configuration reaches the stage.
     ``optional`` inputs are used by data sets that have them. ``scattered`` stages run once per
-    part of the work; an input that is scattered arrives as one table.
+    part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
+    part of a plain run.
     """
 
     name: str
@@ -31,6 +31,7 @@ class Stage:
     files: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
     scattered: bool = False
+    on_request: bool = False
 
     @property
     def module(self) -> str:
@@ -108,7 +109,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "study_chunk",
-            "simulating the assessors under noise, part {part}",
+            "simulating the assessors under noise",
             ("assessment_points",),
             ("study_chunk",),
             ("study",),
@@ -132,20 +133,39 @@ STAGES: dict[str, Stage] = {
         Stage(
             "fig2",
             "drawing Fig. 2, the arm over its evaluation space",
-            ("dh_model", "assessment_points"),
+            ("dh_model", "frames", "assessment_points"),
             ("fig2",),
-            ("robot", "evaluation"),
+            ("dataset", "robot", "evaluation.space", "evaluation.cylinder"),
             files=("robot",),
         ),
-        Stage("fig3", "drawing Fig. 3, the accuracy maps", ("accuracy_map",), ("fig3",)),
+        Stage(
+            "fig3",
+            "drawing Fig. 3, the accuracy maps",
+            ("accuracy_map",),
+            ("fig3",),
+            ("dataset",),
+        ),
         Stage(
             "fig4",
             "drawing Fig. 4, assessed accuracy against noise",
             ("study_summary", "assessment_points"),
             ("fig4",),
+            ("dataset", "evaluation.space"),
         ),
-        Stage("fig5", "drawing Fig. 5, a model that is invalidated", ("histories",), ("fig5",)),
-        Stage("fig6", "drawing Fig. 6, a model that is not invalidated", ("histories",), ("fig6",)),
+        Stage(
+            "fig5",
+            "drawing Fig. 5, a model that is invalidated",
+            ("histories", "assessment_points"),
+            ("fig5",),
+            ("dataset", "evaluation.space"),
+        ),
+        Stage(
+            "fig6",
+            "drawing Fig. 6, a model that cannot be invalidated",
+            ("histories", "assessment_points"),
+            ("fig6",),
+            ("dataset", "evaluation.space"),
+        ),
         Stage(
             "claims",
             "holding the paper's numbers and sentences to the results",

@@ -1,0 +1,38 @@
+# configuration -> validate -> plan -> rules -> everything the data sets leave behind
+import re
+import sys
+
+from snakemake.exceptions import WorkflowError
+
+# Snakemake imports pandas (0.5 s of every start) only to compare parameters that are data frames.
+sys.modules.setdefault("pandas", None)
+
+from kinacc.errors import InputError
+from kinacc.stages.plan import planned
+
+try:
+    plan = planned(workflow.configfiles or ["config.yaml"], workflow.config_settings.config)
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+
+wildcard_constraints:
+    dataset="|".join(map(re.escape, plan.datasets)),
+
+
+scattergather:
+    **plan.parts,
+
+
+rule all:
+    input:
+        [plan.targets(dataset) for dataset in plan.datasets],
+    message:
+        "every table and figure is up to date"
+
+
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/accuracy_map.smk"
+include: "workflow/rules/study.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/claims.smk"

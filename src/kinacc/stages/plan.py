@@ -1,0 +1,166 @@
+"""Which stages a data set goes through, with which files and settings.
+
+What the workflow's rules and the command line share: both ask here for a stage's paths, values and
+hashes, so that either leaves the same bytes. Importing it costs nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from kinacc.errors import InputError, Problem
+from kinacc.provenance import stage_code_hash
+from kinacc.stages.catalogue import FIGURE_FOLDER, STAGES, Stage
+
+RESULTS = "results"
+
+
+def planned(
+    paths: Sequence[str | os.PathLike],
+    overrides: Mapping[str, object] | None = None,
+    results: str = RESULTS,
+) -> Plan:
+    """The plan for configuration files; InputError listing every problem in them."""
+    from kinacc.config.load import load
+    from kinacc.config.schema import without_execution_keys
+
+    full = load(paths, overrides)
+    formats = {name: tuple(config["figures"]["formats"]) for name, config in full.items()}
+    first = next(iter(formats.values()))
+    problems = [
+        Problem(
+            f"datasets.{name}.figures.formats",
+            f"{', '.join(own)} here, {', '.join(first)} elsewhere",
+            "the same formats for every data set",
+        )
+        for name, own in formats.items()
+        if own != first
+    ]
+    if problems:
+        raise InputError(problems)
+    return Plan(
+        {name: without_execution_keys(config) for name, config in full.items()},
+        {name: config["study"]["chunks"] for name, config in full.items()},
+        first,
+        results,
+    )
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The validated configuration of every data set, and where results go.
+
+    ``datasets`` maps a data set's name to its complete configuration (defaults filled in, without
+    values that only say how a run is carried out); ``parts`` to the number of parts its scattered
+    stages are computed in; ``formats`` are the picture formats.
+    """
+
+    datasets: Mapping[str, Mapping[str, object]]
+    parts: Mapping[str, int]
+    formats: tuple[str, ...]
+    results: str = RESULTS
+
+    def stages(self, dataset: str) -> dict[str, Stage]:
+        """The stages a data set goes through, in order."""
+        missing = self.left_out(dataset)
+        return {name: stage for name, stage in STAGES.items() if name not in missing}
+
+    def left_out(self, dataset: str) -> dict[str, str]:
+        """Stages a data set cannot go through, each with the reason."""
+        config = self.datasets[dataset]
+        space = config["evaluation"]["space"]
+        reasons = {}
+        if space != "cylinder":
+            for name in ("accuracy_map", "fig3"):
+                reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
+        if config["measurements"]["source"] != "synthetic":
+            for name in ("robustness_chunk", "robustness"):
+                reasons[name] = "no further draws of a measured arm"
+        return {name: reason for name, reason in reasons.items() if name in STAGES}
+
+    def targets(self, dataset: str) -> list[str]:
+        """Every file the data set leaves, except those made only on request."""
+        return [
+            path
+            for name, stage in self.stages(dataset).items()
+            if not stage.on_request
+            for path in self.outputs(name, dataset, part=None).values()
+            if not stage.scattered
+        ]
+
+    def inputs(self, name: str, dataset: str) -> dict[str, str | list[str]]:
+        """Files a stage reads: artefact -> path, or paths of its parts; role -> other file."""
+        stage = STAGES[name]
+        available = {made for each in self.stages(dataset).values() for made in each.outputs}
+        wanted = (*stage.inputs, *(extra for extra in stage.optional if extra in available))
+        found: dict[str, str | list[str]] = {}
+        for artefact in wanted:
+            maker = next(each for each in STAGES.values() if artefact in each.outputs)
+            if maker.scattered:
+                count = self.parts[dataset]
+                found[artefact] = [
+                    self._table(artefact, dataset, f"{number}-of-{count}")
+                    for number in range(1, count + 1)
+                ]
+            else:
+                found[artefact] = self._table(artefact, dataset)
+        return found | self._files(stage, self.datasets[dataset])
+
+    def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
+        """Files a stage leaves: artefact -> path, or picture format -> path."""
+        stage = STAGES[name]
+        if stage.is_figure:
+            folder = f"{self.results}/{dataset}/{FIGURE_FOLDER}"
+            return {kind: f"{folder}/{name}.{kind}" for kind in self.formats}
+        return {artefact: self._table(artefact, dataset, part) for artefact in stage.outputs}
+
+    def message(self, name: str) -> str:
+        """What the stage is doing, for a Snakemake rule or with the wildcards put in."""
+        part = ", part {wildcards.scatteritem}" if STAGES[name].scattered else ""
+        return f"{{wildcards.dataset}}: {STAGES[name].message}{part}"
+
+    def log(self, name: str, dataset: str, part: str | None = None) -> str:
+        """Log file of a stage."""
+        return f"{self.results}/{dataset}/logs/{name}{f'.{part}' if part else ''}.log"
+
+    def settings(self, name: str, dataset: str) -> dict[str, object]:
+        """The configuration values a stage depends on, nested as in the configuration."""
+        config, chosen = self.datasets[dataset], {}
+        for path in STAGES[name].settings:
+            _copy({**config, "dataset": dataset}, chosen, path.split("."))
+        return chosen
+
+    def code(self, name: str) -> str:
+        """Hash of all code a stage's results depend on."""
+        return stage_code_hash(STAGES[name].module)
+
+    def seed(self, dataset: str) -> int:
+        """Seed of the data set."""
+        return self.datasets[dataset]["seed"]
+
+    def _table(self, artefact: str, dataset: str, part: str | None = None) -> str:
+        folder = f"{self.results}/{dataset}"
+        return f"{folder}/{artefact}/{part}.parquet" if part else f"{folder}/{artefact}.parquet"
+
+    @staticmethod
+    def _files(stage: Stage, config: Mapping[str, object]) -> dict[str, str]:
+        found = {}
+        for path in stage.files:
+            value: object = config
+            for key in path.split("."):
+                value = value.get(key) if isinstance(value, Mapping) else None
+            if path == "robot":
+                if isinstance(value, str) and os.path.isfile(value):
+                    found["robot_file"] = value
+            elif value is not None and config["measurements"]["source"] == "file":
+                found["measurements_file"] = value
+        return found
+
+
+def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:
+    """Copy one value into a nested dictionary, with the sections around it."""
+    for key in keys[:-1]:
+        source, target = source[key], target.setdefault(key, {})
+    target[keys[-1]] = source[keys[-1]]

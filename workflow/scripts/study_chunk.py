@@ -1,0 +1,16 @@
+"""Simulating the assessors under noise."""
+
+from kinacc.stages.runner import Job, execute
+
+execute(
+    Job(
+        "kinacc.stages.study_chunk",
+        inputs=dict(snakemake.input.items()),
+        outputs=dict(snakemake.output.items()),
+        settings=snakemake.params.settings,
+        seed=snakemake.params.seed,
+        part=snakemake.params.part,
+        label=f"{snakemake.wildcards.dataset} study_chunk",
+        log=snakemake.log[0],
+    )
+)
