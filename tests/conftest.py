@@ -1,4 +1,4 @@
-"""Shared test setup: the oracles are importable from every folder, property tests are repeatable."""
+"""Shared test setup: oracles importable from every folder, property tests repeatable."""
 
 from __future__ import annotations
 
