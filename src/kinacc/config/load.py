@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.config.reading import Document, KeyPath, dotted, read
-from kinacc.config.schema import Section, settings
+from kinacc.config.schema import Section, plain, settings
 from kinacc.config.validate import (
     ROBOT,
     check_dataset_name,
@@ -44,7 +44,7 @@ def load(
         documents.append(document)
         problems += found
     if overrides:
-        documents.append(Document("command line", dict(overrides)))
+        documents.append(Document("command line", plain(overrides)))
     if not documents:
         raise InputError(Problem("configuration", "no file given", fix="give config.yaml"))
     problems += _defined_twice(documents)
@@ -112,13 +112,12 @@ def _dataset(name, content, shared, place, folder) -> tuple[dict[str, Any], list
 
 
 def _place(documents: Sequence[Document], path: KeyPath) -> str:
-    """Where a key was given last; the file that names its data set or section otherwise."""
+    """Where a key was given last, else the section it would stand in, else that it is a default."""
     for length in range(len(path), 0, -1):
         for document in reversed(documents):
-            if path[:length] in document.lines:
+            if document.gives(path[:length]):
                 return document.place(path)
-    last = documents[-1]
-    return last.place(path) if not last.lines and last.data else f"default, {dotted(path)}"
+    return f"default, {dotted(path)}"
 
 
 def _defined_twice(documents: Sequence[Document]) -> list[Problem]:
@@ -129,7 +128,7 @@ def _defined_twice(documents: Sequence[Document]) -> list[Problem]:
         for name in datasets if isinstance(datasets, Mapping) else ():
             for keys in _IDENTITY:
                 path = ("datasets", name, *keys)
-                if path not in document.lines:
+                if not document.gives(path):
                     continue
                 if path in first:
                     what = f"data set {name!r} has its measurements given in two files"

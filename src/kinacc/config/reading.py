@@ -28,6 +28,18 @@ class Document:
     data: dict[str, Any]
     lines: dict[KeyPath, int] = field(default_factory=dict)
 
+    def gives(self, path: KeyPath) -> bool:
+        """Whether the file has something at a key path."""
+        value: Any = self.data
+        for step in path:
+            if isinstance(value, dict):
+                if step not in value:
+                    return False
+            elif not (isinstance(value, list) and isinstance(step, int) and step < len(value)):
+                return False
+            value = value[step]
+        return True
+
     def place(self, path: KeyPath) -> str:
         """File, line and key path in words; the nearest known line where a key has none."""
         known = path
@@ -120,7 +132,7 @@ def _scalar(node) -> Any:
     """Value of a scalar node as YAML's safe loader would give it; anything else as its text."""
     if not isinstance(node, yaml.ScalarNode):
         return f"<{node.id}>"
-    if node.style is None and _FLOAT.fullmatch(node.value):
+    if not node.style and _FLOAT.fullmatch(node.value):
         return float(node.value)
     try:
         return _CONSTRUCTOR.construct_object(node)

@@ -146,7 +146,7 @@ def walk(section: Section, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[s
 def defaults(section: Section | None = None) -> dict[str, Any]:
     """Default values of a section (all settings if none) as nested dictionaries and lists."""
     return {
-        entry.name: defaults(entry) if isinstance(entry, Section) else _copy(entry.default)
+        entry.name: defaults(entry) if isinstance(entry, Section) else plain(entry.default)
         for entry in (section or settings()).entries
     }
 
@@ -167,7 +167,8 @@ def without_execution_keys(values: Mapping[str, Any], section: Section | None = 
     return kept
 
 
-def _copy(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copy(each) for key, each in value.items()}
-    return [_copy(each) for each in value] if isinstance(value, list) else value
+def plain(value: Any) -> Any:
+    """A copy in plain dictionaries and lists, all the way down."""
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    return [plain(each) for each in value] if isinstance(value, (list, tuple)) else value

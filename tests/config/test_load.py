@@ -1,0 +1,346 @@
+"""Loading: files merge as given, data sets are complete, and every mistake is named at once."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from kinacc.config.load import load
+from kinacc.config.schema import defaults, settings, walk, without_execution_keys
+from kinacc.errors import InputError
+
+ROOT = Path(__file__).parents[2]
+PAPER = ROOT / "config.yaml"
+UR10 = ROOT / "examples" / "ur10.yaml"
+MEASURED = ROOT.parent / "shared" / "data" / "ur10_tmac"
+
+
+@pytest.fixture
+def config(tmp_path):
+    """Write text as a configuration file and return its path."""
+
+    def write(text: str, name: str = "own.yaml") -> Path:
+        path = tmp_path / name
+        path.write_text(textwrap.dedent(text), encoding="utf-8")
+        return path
+
+    return write
+
+
+def complaints(*paths, **more) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        load(paths, **more)
+    return [str(problem) for problem in caught.value.problems]
+
+
+def the_one(found: list[str], *words: str) -> str:
+    matching = [text for text in found if all(word in text for word in words)]
+    assert len(matching) == 1, f"{words} in {len(matching)} of {found}"
+    return matching[0]
+
+
+def test_the_paper_s_study_is_the_default():
+    loaded = load([PAPER])
+    assert list(loaded) == ["mh180"]
+    paper = loaded["mh180"]
+    assert paper == {"robot": "mh180", **defaults()}
+    assert paper["study"]["noise_mm"] == [0.05, 0.1, 0.15, 0.2, 0.25, 0.3]
+    assert (paper["study"]["repetitions"], paper["study"]["measurements"]) == (100, 200)
+    assert (paper["study"]["alpha"], paper["evaluation"]["points"]) == (0.6, 200)
+    assert paper["map"] == {"slices_deg": [0.0, 15.0, 30.0, 45.0, 60.0], "grid_mm": 25.0}
+    assert paper["evaluation"]["cylinder"]["radial_span_mm"] == 900.0
+    histories = paper["histories"]
+    for name, eta_mm in (("rejected", 0.834), ("larger", 0.844), ("kept", 1.023)):
+        assert histories[f"eta_ratio_{name}"] * 0.906 == pytest.approx(eta_mm, abs=1e-6)
+
+
+def test_the_readings_consistent_with_each_other_are_the_default():
+    study = load([PAPER])["mh180"]["study"]
+    chosen = {name: study[name] for name in ("outlier_rule", "distance", "covariance", "search")}
+    assert chosen == {
+        "outlier_rule": "normal",
+        "distance": "squared",
+        "covariance": "r",
+        "search": "from_above",
+    }
+
+
+@pytest.mark.skipif(not MEASURED.is_dir(), reason="no measured data beside the repository")
+def test_the_ur10_example_adds_its_data_sets():
+    loaded = load([PAPER, UR10], folder=ROOT)
+    assert list(loaded) == ["mh180", "ur10_b", "ur10_d"]
+    for name, series in (("ur10_b", "series_B.csv"), ("ur10_d", "series_D.csv")):
+        own = loaded[name]
+        assert own["robot"] == "ur10"
+        assert own["measurements"]["file"]["path"].endswith(series)
+        assert own["measurements"]["folds"] == 5
+        assert own["calibration"]["base_and_tool"] == "estimated"
+        assert own["calibration"]["dh"]["hayati_joints"] == [2, 3]
+        assert own["calibration"]["vec"] == loaded["mh180"]["calibration"]["vec"]
+        assert own["evaluation"]["space"] == "measured"
+    assert loaded["mh180"] == load([PAPER])["mh180"]
+
+
+def test_absent_data_says_where_it_comes_from(tmp_path):
+    found = complaints(PAPER, UR10, folder=tmp_path)
+    text = the_one(found, "ur10.yaml", "datasets.ur10_b.measurements.file.path")
+    assert "does not exist" in text
+    assert "series_B.csv" in text
+    assert "github.com/christianlandgraf/ipa-robot-accuracy" in text
+
+
+def test_later_files_replace_values_and_keep_the_rest(config):
+    own = config("""
+        study: {repetitions: 7}
+        datasets:
+          mh180: {study: {alpha: 0.5}}
+          second: {robot: mh180, study: {repetitions: 3}, seed: 9}
+        """)
+    loaded = load([PAPER, own])
+    assert loaded["mh180"]["study"]["repetitions"] == 7
+    assert loaded["mh180"]["study"]["alpha"] == 0.5
+    assert loaded["mh180"]["study"]["measurements"] == 200
+    assert (loaded["second"]["study"]["repetitions"], loaded["second"]["seed"]) == (3, 9)
+    assert loaded["mh180"]["seed"] == defaults()["seed"]
+
+
+def test_values_of_the_command_line_come_last():
+    loaded = load([PAPER], overrides={"study": {"repetitions": 2}})
+    assert loaded["mh180"]["study"]["repetitions"] == 2
+    found = complaints(PAPER, overrides={"study": {"repetition": 2}})
+    assert "did you mean repetitions?" in the_one(found, "command line", "study.repetition")
+
+
+def test_whole_numbers_given_for_real_ones_are_the_same_setting(config):
+    own = config("map: {grid_mm: 30}\ncalibration: {dh: {truncation: 1e-6}}\n")
+    loaded = load([PAPER, own])["mh180"]
+    assert isinstance(loaded["map"]["grid_mm"], float)
+    assert loaded["calibration"]["dh"]["truncation"] == 1e-6
+
+
+def test_column_names_of_two_data_sets_do_not_mix(config, tmp_path):
+    (tmp_path / "data.csv").write_text("x\n")
+    own = config("""
+        measurements: {file: {path: data.csv, columns: {x: X, y: Y}}}
+        datasets:
+          a: {robot: ur10, measurements: {source: file, file: {columns: {x: east}}}}
+        """)
+    loaded = load([own], folder=tmp_path)
+    assert loaded["a"]["measurements"]["file"]["columns"] == {"x": "east"}
+
+
+BAD = {
+    "unknown key": (
+        "studdy: {alpha: 0.5}",
+        ("own.yaml:2, studdy", "unknown key 'studdy'", "did you mean study?"),
+    ),
+    "unknown key in a section": (
+        "study: {repetitons: 5}",
+        ("study.repetitons", "did you mean repetitions?"),
+    ),
+    "unknown key in a data set": (
+        "datasets: {own: {robot: mh180, map: {grid: 25}}}",
+        ("datasets.own.map.grid", "grid_mm (in mm)"),
+    ),
+    "key of another section": ("alpha: 0.5", ("own.yaml:2, alpha", "study.alpha")),
+    "wrong unit in the key": (
+        "study: {noise_um: [50]}",
+        ("study.noise_um", "the unit is fixed", "noise_mm (in mm)"),
+    ),
+    "wrong unit in the value": (
+        "study: {noise_mm: [0.05, 50]}",
+        ("study.noise_mm[1]", "50", "0.001 to 5", "write 0.05"),
+    ),
+    "radians for degrees": (
+        "evaluation: {rotation_deg: 1000}",
+        ("evaluation.rotation_deg", "1000", "in deg from 0 to 180"),
+    ),
+    "metres for millimetres": (
+        "evaluation: {cylinder: {height_mm: 0.5}}",
+        ("cylinder.height_mm", "0.5 m was meant, write 500"),
+    ),
+    "percent for a share": ("study: {alpha: 60}", ("study.alpha", "write 0.6")),
+    "alpha at its end": ("study: {alpha: 1}", ("study.alpha", "ends excluded")),
+    "NaN": ("map: {grid_mm: .nan}", ("map.grid_mm", "not a finite number")),
+    "infinite": ("map: {grid_mm: -.inf}", ("map.grid_mm", "not a finite number")),
+    "text for a number": ("study: {repetitions: many}", ("study.repetitions", "'many'")),
+    "number with unit": ("map: {grid_mm: 25 mm}", ("map.grid_mm", "without 'mm'")),
+    "quoted number": ('study: {repetitions: "100"}', ("study.repetitions", "write 100")),
+    "yes for a number": ("study: {repetitions: yes}", ("study.repetitions", "true")),
+    "part of a repetition": ("study: {repetitions: 1.5}", ("study.repetitions", "whole number")),
+    "no value": ("study: {alpha: }", ("study.alpha", "has no value")),
+    "no point": ("evaluation: {points: 0}", ("evaluation.points", "0 is out of range")),
+    "no list": ("study: {noise_mm: 0.1}", ("study.noise_mm", "in brackets")),
+    "empty list": ("study: {noise_mm: []}", ("study.noise_mm", "has 0 items")),
+    "unknown word": ("study: {distance: square}", ("study.distance", "did you mean squared?")),
+    "unknown word in a list": ("figures: {formats: [svg, jpg]}", ("figures.formats[1]", "'jpg'")),
+    "word twice": ("figures: {formats: [svg, svg]}", ("figures.formats", "more than once")),
+    "value for a section": ("study: 5", ("own.yaml:2, study", "5 is not a section")),
+    "reversed range": (
+        "evaluation: {cylinder: {angle_deg: [60, 0]}}",
+        ("angle_deg", "[60, 0]", "smaller number first"),
+    ),
+    "reversed joint range": (
+        "calibration: {vec: {joint_range: [[0, 1], [1, 0], [0, 1], [0, 1]]}}",
+        ("joint_range[1]", "smaller number first"),
+    ),
+    "joint range misspelt": (
+        "calibration: {vec: {joint_range: limit}}",
+        ("joint_range", "did you mean limits?"),
+    ),
+    "two joints of seven": (
+        "evaluation: {joint_box: {joints_deg: [[0, 1], [0, 1]]}}",
+        ("joints_deg", "has 2 items", "4 to 7"),
+    ),
+    "one fold": ("measurements: {folds: 1}", ("measurements.folds", "from 2 to 100")),
+    "fold beyond the last": (
+        "measurements: {folds: 3, validation_fold: 3}",
+        ("own.yaml:2, measurements.validation_fold", "no fold 3", "0 to 2"),
+    ),
+    "fold held out of none": (
+        "measurements: {folds: null}",
+        ("measurements.validation_fold", "there are no folds"),
+    ),
+    "noise not rising": ("study: {noise_mm: [0.2, 0.1]}", ("study.noise_mm", "not rising")),
+    "slice outside the space": ("map: {slices_deg: [0, 75]}", ("map.slices_deg", "75")),
+    "larger bound that is smaller": (
+        "histories: {eta_ratio_larger: 0.9}",
+        ("eta_ratio_larger", "not larger"),
+    ),
+    "name that leaves the folder": (
+        "datasets: {../evil: {robot: mh180}}",
+        ("'../evil'", "letters, digits, _ and -"),
+    ),
+    "name with a blank": ("datasets: {a b: {robot: mh180}}", ("'a b'", "letters, digits")),
+    "name that is a number": ("datasets: {12: {robot: mh180}}", ("12", "in quotes")),
+    "no robot": ("datasets: {own: {seed: 1}}", ("datasets.own", "names no robot")),
+    "empty data set": ("datasets: {own: }", ("datasets.own", "names no robot")),
+    "unknown robot": ("datasets: {own: {robot: mh108}}", ("datasets.own.robot", "mean mh180?")),
+    "absent robot file": ("datasets: {own: {robot: my/arm.yaml}}", ("no robot file", "my/arm")),
+    "file without path": (
+        "datasets: {own: {robot: ur10, measurements: {source: file}}}",
+        ("datasets.own.measurements.source", "measurements.file.path is not given"),
+    ),
+    "absent file, origin unknown": (
+        "datasets: {own: {robot: ur10, measurements: {source: file, file: {path: no.csv}}}}",
+        ("datasets.own.measurements.file.path", "'no.csv' does not exist", "say where"),
+    ),
+    "decimal mark is the delimiter": (
+        "datasets: {own: {robot: ur10, measurements: {source: file, "
+        "file: {path: own.yaml, decimal: ','}}}}",
+        ("file.decimal", "also the delimiter"),
+    ),
+    "name of no column": (
+        "measurements: {file: {columns: {qx1: a}}}",
+        ("columns.qx1", "unknown name"),
+    ),
+    "estimated base of a synthetic arm": (
+        "calibration: {base_and_tool: estimated}\nevaluation: {space: measured}",
+        ("calibration.base_and_tool", "fixed"),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_configuration_is_named_with_its_place(config, kind, tmp_path):
+    text, words = BAD[kind]
+    own = config("# a comment first, to move the lines\n" + text)
+    found = complaints(PAPER, own, folder=tmp_path)
+    assert len(found) == 1, found
+    the_one(found, *words)
+
+
+REPEATED = {
+    "repeated key": ("map:\n  grid_mm: 25\n  grid_mm: 30\n", ("own.yaml:3", "first in line 2")),
+    "repeated section": ("map: {grid_mm: 25}\nmap: {grid_mm: 5}\n", ("own.yaml:2, map", "twice")),
+    "repeated data set": (
+        "datasets:\n  a: {robot: ur10}\n  a: {robot: mh180}\n",
+        ("own.yaml:3, datasets.a", "data set 'a' is given twice"),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", REPEATED)
+def test_what_yaml_would_silently_overwrite_is_named(config, kind):
+    text, words = REPEATED[kind]
+    the_one(complaints(PAPER, config(text)), *words)
+
+
+def test_a_data_set_measured_in_two_files_is_named(config):
+    own = config("datasets: {mh180: {robot: ur10, measurements: {source: synthetic}}}")
+    text = the_one(complaints(PAPER, own), "two files")
+    assert "own.yaml:1, datasets.mh180.measurements.source" in text
+    assert "config.yaml" in text
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (b"# nothing\n", "is empty"),
+        (b"- a\n- b\n", "holds no keys"),
+        (b"seed: [1\n", "is not YAML"),
+        (b"study:\n\talpha: 0.5\n", "is not YAML"),
+        (b"seed: \xff\xfe\n", "not text in UTF-8"),
+        (b"seed: &a [*a]\n", "without end"),
+        (b"{a: 1}: 2\n", "unknown key"),
+    ],
+)
+def test_what_is_no_configuration_at_all(tmp_path, content, words):
+    path = tmp_path / "own.yaml"
+    path.write_bytes(content)
+    found = complaints(PAPER, path)
+    assert any(words in text and "own.yaml" in text for text in found), found
+
+
+def test_absent_files_and_folders_are_named(tmp_path):
+    found = complaints(PAPER, tmp_path / "absent.yaml", tmp_path)
+    the_one(found, "absent.yaml", "no such file")
+    the_one(found, "is a folder")
+
+
+def test_no_data_set_is_a_problem(config):
+    the_one(complaints(config("seed: 1\n")), "no data set is given", "own.yaml")
+
+
+def test_all_problems_come_in_one_message(config):
+    own = config("""
+        study: {alpha: 2, repetitions: 0, noise_mm: [.nan]}
+        typo: 1
+        datasets:
+          a/b: {robot: nobody}
+          c: {measurements: {folds: 1}}
+        """)
+    found = complaints(PAPER, own)
+    assert len(found) == 8, found
+    assert all("own.yaml:" in text for text in found)
+
+
+def test_execution_keys_stay_out_of_hashes():
+    loaded = load([PAPER])["mh180"]
+    kept = without_execution_keys(loaded)
+    assert "chunks" in loaded["study"]
+    assert "chunks" not in kept["study"]
+    assert kept["study"]["alpha"] == 0.6
+    assert without_execution_keys({"study": {"chunks": 3}}) == {"study": {}}
+
+
+def test_every_default_passes_its_own_limits(config):
+    lines = [f"{path[0]}" for path, _ in walk(settings())]
+    assert set(lines) == set(settings().names)
+    load([config("datasets: {a: {robot: mh180}}")])
+
+
+def test_loading_needs_no_numerical_library():
+    code = (
+        "import sys; from kinacc.config.load import load; load(['config.yaml']); "
+        "print([m for m in ('numpy', 'pandas', 'pyarrow', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
