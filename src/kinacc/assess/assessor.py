@@ -1,0 +1,49 @@
+"""What every assessor is: a frozen record of settings that turns a world into an assessed accuracy.
+
+To add one: a module with a frozen dataclass that has the members of :class:`Assessor`, and a line
+in the registry of :mod:`kinacc.assess`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+from typing import ClassVar, NamedTuple, Protocol, TypeVar
+
+from kinacc.assess.world import World
+
+
+class Assessment(NamedTuple):
+    """Assessed accuracy with what it took; bounds are None where the assessor states none."""
+
+    assessed_mm: float
+    measurements: int
+    points_visited: int
+    lower_mm: float | None = None
+    upper_mm: float | None = None
+
+
+class Assessor(Protocol):
+    """A method of assessment.
+
+    ``name`` is its name in tables; ``switches`` maps each field that is a reading of the paper to
+    its choices, the default first; ``measurements`` is the budget.
+    """
+
+    name: ClassVar[str]
+    switches: ClassVar[dict[str, tuple[str, ...]]]
+    measurements: int
+
+    def assess(self, world: World) -> Assessment:
+        """Assess the accuracy in one world."""
+        ...
+
+
+A = TypeVar("A", bound=Assessor)
+
+
+def every_reading(assessor: A) -> Iterator[A]:
+    """The assessor under every combination of its switches, other settings kept."""
+    for values in product(*assessor.switches.values()):
+        yield replace(assessor, **dict(zip(assessor.switches, values, strict=True)))

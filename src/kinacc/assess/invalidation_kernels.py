@@ -1,0 +1,354 @@
+"""Compiled model invalidation (eqs. 15-24): one run at one bound, and exact scans over bounds.
+
+The plain twin of :func:`run` is :func:`kinacc.assess.model_invalidation.history`. Bounds on the grid
+are integers k with eta = k / 1000 mm. ``power`` is the exponent of the number of readings in a
+point's weight, readings**power / sigma: 1/2 for Sigma / r, 1/4 for Sigma / sqrt(r).
+
+How a scan is exact without visiting every bound. For a fixed history the rejection probability
+falls as eta grows, and the point to measure again is the largest of functions that are linear in
+eta. So if both decisions agree at the two ends of an interval of bounds, every bound inside takes
+the same path. Where they do not, the interval is cut at the last grid bound that agrees with the
+end looked at first; the other piece waits and later resumes from the history it shares. Decisions
+closer than rounding could turn (``guard``, ``margin``) are left to single bounds, which are decided
+exactly as a run decides them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from kinacc.assess.streams import extend
+
+GRID_PER_MM = 1000.0
+# Columns of the state (m, 6) of a run after the sum of the readings (0 to 2, mm): how many readings
+# there are, the magnitude of their mean (mm), and the weight of the point (1/mm).
+READS, SIZE, WEIGHT = 3, 4, 5
+_ROOT_2_OVER_PI = math.sqrt(2.0 / math.pi)
+_SERIES_BELOW = 0.02
+
+
+@njit(cache=True)
+def chi2_3(x):
+    """Chi-square distribution function, three degrees of freedom (eq. 18)."""
+    if x <= 0.0:
+        return 0.0
+    if x < _SERIES_BELOW:
+        # The closed form subtracts nearly equal numbers here.
+        total, term = 1.0, 1.0
+        for n in range(1, 7):
+            term *= x / (2 * n + 3)
+            total += term
+        return _ROOT_2_OVER_PI * x * math.sqrt(x) * math.exp(-0.5 * x) * total / 3.0
+    return math.erf(math.sqrt(0.5 * x)) - _ROOT_2_OVER_PI * math.sqrt(x) * math.exp(-0.5 * x)
+
+
+@njit(cache=True)
+def _miss(size, weight, eta, squared):
+    """1 - p-hat of one point: probability that a measurement comes out larger than this one."""
+    excess = size - eta
+    if excess <= 0.0:
+        return 1.0
+    distance = excess * weight
+    return 1.0 - chi2_3(distance * distance if squared else distance)
+
+
+@njit(cache=True)
+def _add(readings, sigma, state, i, power):
+    """Average the next reading of row i in."""
+    v = int(state[i, READS])
+    state[i, READS] = v + 1.0
+    n = state[i, READS]
+    square = 0.0
+    for axis in range(3):
+        state[i, axis] += readings[i, v, axis]
+        mean = state[i, axis] / n
+        square += mean * mean
+    state[i, SIZE] = math.sqrt(square)
+    state[i, WEIGHT] = (math.sqrt(n) if power == 0.5 else math.sqrt(math.sqrt(n))) / sigma[i]
+
+
+@njit(cache=True)
+def run(world, eta, alpha, squared, power, budget):
+    """One sequential run: (rejected, measurements, points visited, rejection probability)."""
+    readings, known, sigma = world[0], world[1], world[2]
+    points = readings.shape[0]
+    state = np.zeros((points, 6))
+    miss = np.ones(points)
+    visited, taken, survival, rejected = 0, 0, 1.0, False
+    while taken < budget:
+        again = rejected
+        if again:
+            i, best = 0, -np.inf
+            for row in range(visited):
+                score = (state[row, SIZE] - eta) * state[row, WEIGHT]
+                if score > best:
+                    i, best = row, score
+        elif visited < points:
+            i = visited
+            visited += 1
+        else:
+            break
+        if state[i, READS] >= known[i]:
+            extend(world, i, int(state[i, READS]))
+        _add(readings, sigma, state, i, power)
+        miss[i] = _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
+        if again:
+            survival = 1.0
+            for row in range(visited):
+                survival *= miss[row]
+        else:
+            survival *= miss[i]
+        taken += 1
+        rejected = 1.0 - survival > alpha
+    return rejected, taken, visited, 1.0 - survival
+
+
+@njit(cache=True)
+def bisect(world, top, tolerance, alpha, squared, power, budget):
+    """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
+    low, high = 0.0, top
+    while high - low > tolerance:
+        middle = 0.5 * (low + high)
+        if run(world, middle, alpha, squared, power, budget)[0]:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@njit(cache=True)
+def _survival(k, state, active, squared, miss):
+    """Product of 1 - p-hat at bound k over the active rows, each kept in ``miss``."""
+    eta = k / GRID_PER_MM
+    survival = 1.0
+    for i in active:
+        miss[i] = _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
+        survival *= miss[i]
+    return survival
+
+
+@njit(cache=True)
+def _side(survival, alpha, guard):
+    """+1 above the threshold, -1 below it, 0 where rounding could decide."""
+    probability = 1.0 - survival
+    if probability > alpha + guard:
+        return 1
+    return -1 if probability < alpha - guard else 0
+
+
+@njit(cache=True)
+def _winner(k, state, active):
+    """Row with the largest score at bound k, the first of equals, and its lead over the next."""
+    eta = k / GRID_PER_MM
+    row, best, second = -1, -np.inf, -np.inf
+    for i in active:
+        score = (state[i, SIZE] - eta) * state[i, WEIGHT]
+        if score > best:
+            row, best, second = i, score, best
+        elif score > second:
+            second = score
+    return row, best - second
+
+
+@njit(cache=True)
+def _others(row, k, state, miss, active):
+    """Largest score at bound k and product of 1 - p-hat over the active rows other than ``row``."""
+    eta = k / GRID_PER_MM
+    best, survival = -np.inf, 1.0
+    for i in active:
+        if i != row:
+            best = max(best, (state[i, SIZE] - eta) * state[i, WEIGHT])
+            survival *= miss[i]
+    return best, survival
+
+
+@njit(cache=True)
+def _last_on_side(side, near, far, state, active, squared, alpha, guard, spare):
+    """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
+    inside, outside = near, far
+    while abs(outside - inside) > 1:
+        middle = (inside + outside) // 2
+        if _side(_survival(middle, state, active, squared, spare), alpha, guard) == side:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@njit(cache=True)
+def _last_with_winner(row, near, far, state, active, margin):
+    """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
+    inside, outside = near, far
+    while abs(outside - inside) > 1:
+        middle = (inside + outside) // 2
+        other, lead = _winner(middle, state, active)
+        if other == row and lead > margin:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@njit(cache=True)
+def _resume(world, state, path, power, low, rows):
+    """Rebuild the state after the steps of a path; returns (points visited, active rows).
+
+    A row is active if it can still exceed a bound of the interval that starts at ``low``: one whose
+    mean lies within the lowest bound has p-hat 0 throughout and is never measured again.
+    """
+    readings, sigma = world[0], world[2]
+    state[:] = 0.0
+    visited = 0
+    for i in path:
+        _add(readings, sigma, state, i, power)
+        visited = max(visited, i + 1)
+    count = 0
+    for i in range(visited):
+        if state[i, SIZE] > low / GRID_PER_MM:
+            rows[count] = i
+            count += 1
+    return visited, count
+
+
+@njit(cache=True)
+def _insist(i, near, far, world, state, at_near, at_far, active, path, steps, setting, guards):
+    """Measure row i once, and on while it is sure for every bound that it must be measured again.
+
+    Only row i changes meanwhile, so the other rows are summed up once. Returns the steps taken.
+    """
+    readings, known, sigma = world[0], world[1], world[2]
+    alpha, squared, power = setting
+    guard, margin = guards
+    near_eta, far_eta = near / GRID_PER_MM, far / GRID_PER_MM
+    near_rival, near_others = _others(i, near, state, at_near, active)
+    far_rival, far_others = _others(i, far, state, at_far, active)
+    # Smallest scores seen to keep the probability above alpha: a larger one needs no p-hat.
+    near_sure = far_sure = np.inf
+    if _side(max(near_others, far_others), alpha, guard) == 1:
+        near_sure = far_sure = -np.inf
+    while True:
+        if state[i, READS] >= known[i]:
+            extend(world, i, int(state[i, READS]))
+        _add(readings, sigma, state, i, power)
+        size, weight = state[i, SIZE], state[i, WEIGHT]
+        path[steps] = i
+        steps += 1
+        near_score, far_score = (size - near_eta) * weight, (size - far_eta) * weight
+        if steps == path.size or near_score <= near_rival + margin:
+            break
+        if far_score <= far_rival + margin:
+            break
+        if near_score < near_sure:
+            if _side(near_others * _miss(size, weight, near_eta, squared), alpha, guard) != 1:
+                break
+            near_sure = near_score
+        if far_score < far_sure:
+            if _side(far_others * _miss(size, weight, far_eta, squared), alpha, guard) != 1:
+                break
+            far_sure = far_score
+    at_near[i] = _miss(size, weight, near_eta, squared)
+    at_far[i] = _miss(size, weight, far_eta, squared)
+    return steps
+
+
+@njit(cache=True)
+def _product(miss, active):
+    survival = 1.0
+    for i in active:
+        survival *= miss[i]
+    return survival
+
+
+@njit(cache=True)
+def scan(world, bottom, top, upward, alpha, squared, power, budget):
+    """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
+
+    upward: the lowest k not rejected (top + 1 if all are); otherwise the highest k rejected
+    (bottom - 1 if none is). Returns (k, number of pieces whose path was followed to its end).
+    """
+    readings, known, sigma = world[0], world[1], world[2]
+    points = readings.shape[0]
+    state = np.zeros((points, 6))
+    at_near, at_far, spare = np.ones(points), np.ones(points), np.ones(points)
+    rows = np.empty(points, np.int64)
+    path = np.empty(budget, np.int64)
+    waiting = np.empty((top - bottom + 2, 3), np.int64)  # near end, far end, steps shared
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = (bottom, top, 0) if upward else (top, bottom, 0)
+    depth, pieces = 1, 0
+    onward = 1 if upward else -1
+    margin = 1e-12 * top / GRID_PER_MM / sigma.min() * float(budget) ** power
+    guard = 1e-9 + margin
+    while depth > 0:
+        depth -= 1
+        near, far, steps = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
+        visited, count = _resume(world, state, path[:steps], power, min(near, far), rows)
+        near_survival = _survival(near, state, rows[:count], squared, at_near)
+        far_survival = _survival(far, state, rows[:count], squared, at_far)
+        while True:
+            active = rows[:count]
+            side = _side(near_survival, alpha, guard)
+            if near != far and (side == 0 or _side(far_survival, alpha, guard) != side):
+                last = near
+                if side != 0:
+                    last = _last_on_side(
+                        side, near, far, state, active, squared, alpha, guard, spare
+                    )
+                waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + onward, far, steps
+                depth += 1
+                far = last
+                far_survival = _survival(far, state, active, squared, at_far)
+            rejected = 1.0 - near_survival > alpha
+            if steps == budget or (not rejected and visited == points):
+                break
+            if not rejected:
+                i = visited
+                visited += 1
+                _add(readings, sigma, state, i, power)
+                path[steps] = i
+                steps += 1
+                size, weight = state[i, SIZE], state[i, WEIGHT]
+                if size > min(near, far) / GRID_PER_MM:
+                    rows[count] = i
+                    count += 1
+                    at_near[i] = _miss(size, weight, near / GRID_PER_MM, squared)
+                    at_far[i] = _miss(size, weight, far / GRID_PER_MM, squared)
+                    near_survival *= at_near[i]
+                    far_survival *= at_far[i]
+            else:
+                i, lead = _winner(near, state, active)
+                if near != far:
+                    other, other_lead = _winner(far, state, active)
+                    if lead <= margin or other != i or other_lead <= margin:
+                        last = near
+                        if lead > margin:
+                            last = _last_with_winner(i, near, far, state, active, margin)
+                        waiting[depth, 0], waiting[depth, 1] = last + onward, far
+                        waiting[depth, 2] = steps
+                        depth += 1
+                        far = last
+                        far_survival = _survival(far, state, active, squared, at_far)
+                steps = _insist(
+                    i,
+                    near,
+                    far,
+                    world,
+                    state,
+                    at_near,
+                    at_far,
+                    active,
+                    path,
+                    steps,
+                    (alpha, squared, power),
+                    (guard, margin),
+                )
+                near_survival = _product(at_near, active)
+                far_survival = _product(at_far, active)
+        pieces += 1
+        if upward and not rejected:
+            return min(near, far), pieces
+        if not upward and rejected:
+            return max(near, far), pieces
+    return (top + 1 if upward else bottom - 1), pieces

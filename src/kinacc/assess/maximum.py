@@ -1,0 +1,23 @@
+"""Maximum Measurement (eqs. 11-12): the largest measured error is the accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinacc.assess.assessor import Assessment
+from kinacc.assess.world import World
+
+
+@dataclass(frozen=True)
+class Maximum:
+    """Measure each point once, up to ``measurements`` points, and take the largest magnitude."""
+
+    measurements: int = 200
+    name: ClassVar[str] = "maximum"
+    switches: ClassVar[dict[str, tuple[str, ...]]] = {}
+
+    def assess(self, world: World) -> Assessment:
+        """Eq. 11 over the first readings."""
+        magnitudes = world.magnitudes_mm(self.measurements)
+        return Assessment(float(magnitudes.max()), magnitudes.size, magnitudes.size)

@@ -1,0 +1,204 @@
+"""Model Invalidation (eqs. 15-24): the smallest bound that the measurements do not reject.
+
+At one bound eta the algorithm measures point after point; whenever the rejection probability
+exceeds alpha it measures the worst point again and averages, until the probability falls back or
+the budget is spent. The model is rejected at eta if the probability exceeds alpha after the last
+measurement; a run that has visited every point with the probability at most alpha ends there, not
+rejected. Whether eta is rejected is not monotone in eta, so "the smallest bound that did not
+reject" has three readings (``search``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from kinacc.assess.assessor import Assessment
+from kinacc.assess.world import World
+from kinacc.errors import InputError, Problem
+
+GRID_PER_MM = 1000
+SEARCHES = ("from_above", "from_below", "bisection")
+DISTANCES = ("squared", "as_printed")
+_POWERS = {"r": 0.5, "sqrt_r": 0.25}  # of the number of readings in a point's weight
+COVARIANCES = tuple(_POWERS)
+
+
+class Run(NamedTuple):
+    """Outcome of one sequential run at one bound."""
+
+    rejected: bool
+    measurements: int
+    points_visited: int
+    rejection_probability: float
+
+
+class Step(NamedTuple):
+    """One measurement of a run; magnitudes in mm, ``repeat`` counts from 1 at each point."""
+
+    row: int
+    repeat: int
+    measured_mm: float
+    averaged_mm: float
+    rejection_probability: float
+
+
+@dataclass(frozen=True)
+class ModelInvalidation:
+    """Settings of the assessor.
+
+    measurements: budget of a run; alpha: threshold on the rejection probability (eq. 22);
+    distance: ``squared`` (the squared Mahalanobis distance into the chi-square distribution) or
+    ``as_printed`` (its root, eqs. 18 and 20); covariance: ``r`` (Sigma / r) or ``sqrt_r`` (eq. 24
+    as printed); search: ``from_above`` (1 um above the highest rejected bound of the grid k x 1 um),
+    ``from_below`` (lowest bound of the grid that is not rejected) or ``bisection`` (between 0 and
+    the largest first reading, to 1 um).
+    """
+
+    measurements: int = 200
+    alpha: float = 0.6
+    distance: str = "squared"
+    covariance: str = "r"
+    search: str = "from_above"
+    name: ClassVar[str] = "model_invalidation"
+    switches: ClassVar[dict[str, tuple[str, ...]]] = {
+        "distance": DISTANCES,
+        "covariance": COVARIANCES,
+        "search": SEARCHES,
+    }
+
+    def assess(self, world: World) -> Assessment:
+        """Search the assessed accuracy; measurements and points are those of the run at it."""
+        eta = self.assessed_mm(world)
+        outcome = self.run(world, eta)
+        return Assessment(eta, outcome.measurements, outcome.points_visited)
+
+    def assessed_mm(self, world: World) -> float:
+        """The bound the search arrives at, mm."""
+        from kinacc.assess import invalidation_kernels as kernels
+
+        _check_visits(world, self.measurements)
+        largest = float(world.magnitudes_mm(self.measurements).max())
+        if self.search == "bisection":
+            return kernels.bisect(world.arrays, largest, 1.0 / GRID_PER_MM, *self._arguments)
+        upward = self.search == "from_below"
+        k, _ = kernels.scan(world.arrays, 0, self.top(world), upward, *self._arguments)
+        return (k if upward else k + 1) / GRID_PER_MM
+
+    def top(self, world: World) -> int:
+        """Grid bound at or above every first reading: no run at it can reject."""
+        return math.ceil(float(world.magnitudes_mm(self.measurements).max()) * GRID_PER_MM)
+
+    def run(self, world: World, eta_mm: float) -> Run:
+        """One sequential run at the bound eta."""
+        from kinacc.assess import invalidation_kernels as kernels
+
+        _check_visits(world, self.measurements)
+        return Run(*kernels.run(world.arrays, float(eta_mm), *self._arguments))
+
+    def history(self, world: World, eta_mm: float) -> list[Step]:
+        """Every measurement of one run at the bound eta, in order (Figs. 5 and 6)."""
+        _check_visits(world, self.measurements)
+        return history(world, eta_mm, self.alpha, self.distance, self.covariance, self.measurements)
+
+    @property
+    def _arguments(self) -> tuple[float, bool, float, int]:
+        squared = self.distance == "squared"
+        return (float(self.alpha), squared, _POWERS[self.covariance], int(self.measurements))
+
+
+def history(
+    world: World,
+    eta_mm: float,
+    alpha: float = 0.6,
+    distance: str = "squared",
+    covariance: str = "r",
+    measurements: int = 200,
+) -> list[Step]:
+    """One run in plain Python, step by step; the compiled kernel is held to it."""
+    taken: dict[int, list[np.ndarray]] = {}  # in visiting order
+    steps: list[Step] = []
+    rejection = 0.0
+    while len(steps) < measurements:
+        if rejection > alpha:
+            # p-hat grows with the distance but reaches 1 in floating point: compare distances.
+            # max() returns the first of equals, the point visited first.
+            row = max(taken, key=lambda i: _score(taken[i], world.sigma_mm[i], eta_mm, covariance))
+        elif len(taken) < world.points:
+            row = len(taken)
+            taken[row] = []
+        else:
+            break
+        reading = world.reading_mm(row, len(taken[row]))
+        taken[row].append(reading)
+        survival = 1.0
+        for i, readings in taken.items():
+            outside = max(_score(readings, world.sigma_mm[i], eta_mm, covariance), 0.0)
+            survival *= 1.0 - point_probability(outside, distance)
+        rejection = 1.0 - survival
+        average = _magnitude(sum(taken[row]) / len(taken[row]))
+        steps.append(Step(row, len(taken[row]), _magnitude(reading), average, rejection))
+    return steps
+
+
+def point_probability(distance_outside: float, distance: str = "squared") -> float:
+    """p-hat of one point (eq. 18) from its Mahalanobis distance to the candidate error (1)."""
+    if distance_outside <= 0.0:
+        return 0.0
+    x = distance_outside**2 if distance == "squared" else distance_outside
+    return chi_square_3(x)
+
+
+def chi_square_3(x: float) -> float:
+    """Chi-square distribution function with three degrees of freedom, in closed form."""
+    if x < 0.02:
+        total = term = 1.0
+        for n in range(1, 7):
+            term *= x / (2 * n + 3)
+            total += term
+        return math.sqrt(2.0 / math.pi) * x**1.5 * math.exp(-x / 2.0) * total / 3.0
+    return math.erf(math.sqrt(x / 2.0)) - math.sqrt(2.0 * x / math.pi) * math.exp(-x / 2.0)
+
+
+def _score(readings: list[np.ndarray], sigma: float, eta: float, covariance: str) -> float:
+    """Signed Mahalanobis distance of the averaged measurement beyond the ball of radius eta.
+
+    With equal noise in the three axes the candidate of eq. 21 is the nearest point of the ball in
+    every metric, so the distance of eq. 20 is (|e| - eta) / (standard deviation of the average).
+    """
+    count = len(readings)
+    return (_magnitude(sum(readings) / count) - eta) * count ** _POWERS[covariance] / sigma
+
+
+def _magnitude(vector: np.ndarray) -> float:
+    return math.sqrt(sum(float(x) ** 2 for x in vector))
+
+
+def problems_of(assessor: ModelInvalidation, where: str = "study") -> list[Problem]:
+    """Everything wrong with the settings, for a message that lists all problems at once."""
+    found = []
+    if not 0.0 < assessor.alpha < 1.0:
+        found.append(Problem(f"{where}.alpha", f"{assessor.alpha}", "above 0 and below 1"))
+    if assessor.measurements < 1:
+        found.append(Problem(f"{where}.measurements", f"{assessor.measurements}", "at least 1"))
+    for name, choices in assessor.switches.items():
+        if getattr(assessor, name) not in choices:
+            found.append(
+                Problem(f"{where}.{name}", f"{getattr(assessor, name)!r}", ", ".join(choices))
+            )
+    return found
+
+
+def _check_visits(world: World, measurements: int) -> None:
+    if world.visits < measurements:
+        raise InputError(
+            Problem(
+                "repeats",
+                f"{world.visits} readings a point for {measurements} measurements",
+                f"{measurements} readings a point, for all may fall on one",
+                "give more repeats or a smaller budget",
+            )
+        )
