@@ -30,13 +30,14 @@ _CELLS_PER_BLOCK = 256
 class ModelPair(NamedTuple):
     """The true arm (``vec``), the model under assessment (``dh``), and what they carry.
 
-    ``tool`` is the tool centre point in the flange frame of both; ``travel`` (k,) the travel
-    direction of every joint, or None for unknown.
+    ``vec_tool`` and ``dh_tool`` are the tool centre point in the flange frame of each; ``travel``
+    (k,) is the travel direction of every joint, or None for unknown.
     """
 
     vec: VECModel
     dh: DHModel
-    tool: Pose = IDENTITY
+    vec_tool: Pose = IDENTITY
+    dh_tool: Pose = IDENTITY
     travel: np.ndarray | None = None
 
 
@@ -59,8 +60,8 @@ def errors_at(pair: ModelPair, q_rad: np.ndarray) -> np.ndarray:
     orientation.
     """
     travel = None if pair.travel is None else np.broadcast_to(pair.travel, q_rad.shape)
-    true = compose(_vec.pose(pair.vec, q_rad, travel), pair.tool)
-    modelled = compose(_dh.forward(pair.dh, q_rad), pair.tool)
+    true = compose(_vec.pose(pair.vec, q_rad, travel), pair.vec_tool)
+    modelled = compose(_dh.forward(pair.dh, q_rad), pair.dh_tool)
     return pose_error(true, modelled)
 
 
@@ -73,10 +74,12 @@ def joints_of(
 ) -> inverse.Solutions:
     """Joints of tool poses (n, ...) per branch, from the ``dh``, ``vec`` or ``nominal`` model.
 
-    A solution outside the joint range the VEC model was fitted over is Status.OUTSIDE_RANGE.
+    The nominal model carries the tool of the DH model. A solution outside the joint range the VEC
+    model was fitted over is Status.OUTSIDE_RANGE.
     """
     models = {"dh": pair.dh, "vec": pair.vec, "nominal": robot.dh}
-    flange = tool if pair.tool is IDENTITY else compose(tool, invert(pair.tool))
+    carried = pair.vec_tool if invert_with == "vec" else pair.dh_tool
+    flange = compose(tool, invert(carried))
     fitted = pair.vec.q_min_rad, pair.vec.q_max_rad
     return inverse.solve(robot, models[invert_with], flange, branches, pair.travel, fitted)
 

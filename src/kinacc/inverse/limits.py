@@ -22,12 +22,18 @@ def dh_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Limits (k,), (k,) of the DH joint angles; infinite where a joint is coupled to others."""
     joints = len(robot.joint_map)
     lower, upper = np.full(joints, -np.inf), np.full(joints, np.inf)
-    for joint, row in enumerate(robot.joint_map):
-        alone = np.flatnonzero(row).tolist() == [joint]
-        if alone and np.flatnonzero(robot.joint_map[:, joint]).tolist() == [joint]:
-            ends = row[joint] * robot.q_min_rad[joint], row[joint] * robot.q_max_rad[joint]
-            lower[joint], upper[joint] = min(ends), max(ends)
+    for joint in np.flatnonzero(uncoupled(robot)):
+        sign = robot.joint_map[joint, joint]
+        ends = sign * robot.q_min_rad[joint], sign * robot.q_max_rad[joint]
+        lower[joint], upper[joint] = min(ends), max(ends)
     return lower, upper
+
+
+def uncoupled(robot: Robot) -> np.ndarray:
+    """Whether a reported joint (k,) turns its own DH joint and no other, and is alone in that."""
+    present = robot.joint_map != 0.0
+    own = np.diagonal(present)
+    return own & (present.sum(axis=0) == 1) & (present.sum(axis=1) == 1)
 
 
 def within_limits(robot: Robot, q_rad: np.ndarray) -> np.ndarray:

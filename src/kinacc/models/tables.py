@@ -1,0 +1,63 @@
+"""Models from the columns of their tables (``vec_model``, ``dh_model``, ``frames``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose, rotation_from_quaternion
+from kinacc.models.dh import PARAMETERS, DHModel
+from kinacc.models.vec import ERRORS, VECModel
+
+Columns = Mapping[str, np.ndarray]
+
+
+def dh_model(columns: Columns) -> DHModel:
+    """DH model of a ``dh_model`` table."""
+    order = np.argsort(columns["joint"], kind="stable")
+    return DHModel(*(np.asarray(columns[name], dtype=float)[order] for name in PARAMETERS))
+
+
+def vec_model(columns: Columns) -> VECModel:
+    """VEC model of a ``vec_model`` table; coefficients it does not list are zero."""
+    joint = np.asarray(columns["joint"]).astype(int) - 1
+    order = np.asarray(columns["order"]).astype(int)
+    direction = np.asarray(columns["direction"]).astype(int)
+    error = np.array([ERRORS.index(name) for name in columns["error"]])
+    value = np.asarray(columns["coefficient"], dtype=float)
+    joints = joint.max() + 1
+    first = [np.flatnonzero(joint == number)[0] for number in range(joints)]
+
+    def per_joint(name: str) -> np.ndarray:
+        return np.asarray(columns[name], dtype=float)[first]
+
+    both = direction == 0
+    coefficients = np.zeros((joints, len(ERRORS), order.max() + 1))
+    coefficients[joint[both], error[both], order[both]] = value[both]
+    offsets = np.zeros((joints, 2))
+    offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
+    return VECModel(
+        DHModel(*(per_joint(name) for name in PARAMETERS)),
+        per_joint("q_min_rad"),
+        per_joint("q_max_rad"),
+        coefficients,
+        offsets,
+    )
+
+
+def frame(columns: Columns, model: str, name: str) -> Pose:
+    """One frame of a ``frames`` table: ``base``, ``tool`` or a target of ``model``.
+
+    Raises InputError naming the frames there are.
+    """
+    models, names = np.asarray(columns["model"]), np.asarray(columns["frame"])
+    rows = np.flatnonzero((models == model) & (names == name))
+    if len(rows) == 0:
+        known = ", ".join(str(other) for other in names[models == model]) or "none"
+        raise InputError(Problem("table frames", f"has no frame {name!r} of model {model}", known))
+    row = rows[0]
+    quaternion = np.array([columns[part][row] for part in ("qw", "qx", "qy", "qz")], dtype=float)
+    position = np.array([columns[part][row] for part in ("x_mm", "y_mm", "z_mm")], dtype=float)
+    return Pose(rotation_from_quaternion(quaternion), position)

@@ -1,0 +1,61 @@
+"""What the map and the assessment points share: settings and tables as records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc import region
+from kinacc.accuracy_map import ModelPair
+from kinacc.geometry import IDENTITY, Pose
+from kinacc.models import tables
+from kinacc.region import Cylinder
+
+
+def cylinder(evaluation: Mapping) -> Cylinder:
+    """The cylinder of the ``evaluation`` settings."""
+    section = evaluation["cylinder"]
+    first, last = np.deg2rad(section["angle_deg"])
+    return Cylinder(
+        float(section["inner_radius_mm"]),
+        float(section["radial_span_mm"]),
+        float(section["bottom_mm"]),
+        float(section["height_mm"]),
+        float(first),
+        float(last),
+    )
+
+
+def reference(evaluation: Mapping) -> np.ndarray:
+    """Reference flange orientation (3, 3) in the slice's frame."""
+    return region.reference_rotation(np.deg2rad(evaluation["reference_orientation_deg"]))
+
+
+def orientations(evaluation: Mapping) -> region.Orientations:
+    """Flange rotations about the reference orientation."""
+    return region.orientations(np.deg2rad(evaluation["rotation_deg"]), evaluation["rotations"])
+
+
+def models(inputs: Mapping, evaluation: Mapping) -> ModelPair:
+    """VEC and DH model with their tools, joints travelling as the settings say."""
+    vec = tables.vec_model(inputs["vec_model"])
+    direction = int(evaluation["travel_direction"])
+    return ModelPair(
+        vec,
+        tables.dh_model(inputs["dh_model"]),
+        _tool(inputs, evaluation, "vec"),
+        _tool(inputs, evaluation, "dh"),
+        np.full(vec.joints, direction) if direction else None,
+    )
+
+
+def _tool(inputs: Mapping, evaluation: Mapping, model: str) -> Pose:
+    """The tool fitted with a model; the configured one where none was fitted."""
+    if "frames" in inputs:
+        names = np.asarray(inputs["frames"]["frame"])
+        if (names == "tool").any():
+            fitted = tables.frame(inputs["frames"], model, "tool")
+            if any(np.abs(a - b).max() > 0.0 for a, b in zip(fitted, IDENTITY, strict=True)):
+                return fitted
+    return Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float))
