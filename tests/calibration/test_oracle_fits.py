@@ -86,20 +86,20 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati)
 
 def test_vec_fit_is_where_the_gradient_with_its_prior_vanishes():
     rng = np.random.default_rng(5)
-    table, order, count = np.array(oracle.MH180), 2, 24
-    shape = (6, 6, order + 1)
+    arm, low, high, order, count = np.array(oracle.MH180)[:4], LOW[:4], HIGH[:4], 2, 16
+    shape = (4, 6, order + 1)
     unit = np.broadcast_to(np.array([[1.0]] * 3 + [[1e-3]] * 3), shape)
     series = rng.normal(size=shape) * unit * 0.4
-    offsets = rng.normal(size=(6, 2)) * 2e-4
-    q, s = joints(count, 6), rng.choice([-1, 1], (count, 6))
+    offsets = rng.normal(size=(4, 2)) * 2e-4
+    q, s = joints(count, 6)[:, :4], rng.choice([-1, 1], (count, 4))
     measured = []
     for row, way in zip(q, s, strict=True):
-        frame = oracle.projected(oracle.vec_forward(table, series, LOW, HIGH, offsets, row, way))
+        frame = oracle.projected(oracle.vec_forward(arm, series, low, high, offsets, row, way))
         frame[:3, :3] = geometry.exp_so3(rng.normal(size=3) * 5e-5) @ frame[:3, :3]
         frame[:3, 3] += rng.normal(size=3) * 0.03
         measured.append(frame)
     prior = vec_fit.Prior(delta_mm=0.7, eps_rad=0.9e-3, decay=0.6, offset_rad=3e-4)
-    empty = vec.without_errors(dh.DHModel(*table.T), LOW, HIGH, order)
+    empty = vec.without_errors(dh.DHModel(*arm.T), low, high, order)
     fit = vec_fit.fit(
         full_poses(q, stack(measured), s),
         empty,
@@ -113,15 +113,15 @@ def test_vec_fit_is_where_the_gradient_with_its_prior_vanishes():
     size = series.size
 
     def function(x):
-        new, away = x[:size].reshape(shape), x[size:].reshape(6, 2)
+        new, away = x[:size].reshape(shape), x[size:].reshape(4, 2)
 
         def forward(i):
-            return oracle.projected(oracle.vec_forward(table, new, LOW, HIGH, away, q[i], s[i]))
+            return oracle.projected(oracle.vec_forward(arm, new, low, high, away, q[i], s[i]))
 
         return fits.residual(forward, measured, WEIGHT) / 0.05
 
     spread = np.array([0.7] * 3 + [0.9e-3] * 3)[:, None] * np.array([1.0, 1.0, 0.6])
-    prior_std = np.concatenate([np.broadcast_to(spread, shape).ravel(), np.full(12, 3e-4)])
+    prior_std = np.concatenate([np.broadcast_to(spread, shape).ravel(), np.full(8, 3e-4)])
     np.testing.assert_allclose(fit.prior_std, prior_std, rtol=1e-12)
     jacobian = fits.slopes(function, x, prior_std * 0.05)
     information = jacobian.T @ jacobian + np.diag(prior_std**-2)

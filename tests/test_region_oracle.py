@@ -1,0 +1,97 @@
+"""Evaluation space and point sequences against scipy's quasi-random engines and rotations."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import qmc
+
+from kinacc import region
+
+CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
+
+
+@pytest.mark.parametrize("dimensions", [1, 3, 6, 8])
+def test_sequences_are_those_of_scipy(dimensions):
+    sobol = qmc.Sobol(dimensions, scramble=False, bits=30).random(256)
+    np.testing.assert_allclose(region.points("sobol", 255, dimensions), sobol[1:], atol=1e-12)
+    halton = qmc.Halton(dimensions, scramble=False).random(300)
+    np.testing.assert_allclose(region.points("halton", 299, dimensions), halton[1:], atol=1e-12)
+    np.testing.assert_allclose(
+        region.points("halton", 20, dimensions, first=7), halton[7:27], atol=1e-12
+    )
+
+
+def test_orientations_are_flange_rotations_about_x_then_y_then_z():
+    angle = math.radians(45)
+    both = region.orientations(angle)
+    signs = list(itertools.product((-1, 1), repeat=3))
+    expected = [Rotation.from_euler("XYZ", np.array(s) * angle).as_matrix() for s in signs]
+    expected.append(np.eye(3))
+    assert both.rotation.shape == (9, 3, 3)
+    for matrix in expected:
+        assert min(np.abs(matrix - other).max() for other in both.rotation) < 1e-14
+    every = region.orientations(angle, "all_27")
+    assert every.rotation.shape == (27, 3, 3)
+    for s in itertools.product((-1, 0, 1), repeat=3):
+        matrix = Rotation.from_euler("XYZ", np.array(s) * angle).as_matrix()
+        assert min(np.abs(matrix - other).max() for other in every.rotation) < 1e-14
+
+
+def test_grid_covers_every_slice_edges_included_and_no_wider_than_asked():
+    slices = np.radians([0, 15, 30, 45, 60])
+    cells = region.grid(CYLINDER, slices, 25.0)
+    assert len(cells.radius_mm) == 5 * 37 * 21
+    for angle in slices:
+        here = np.isclose(cells.angle_rad, angle)
+        radii = np.unique(cells.radius_mm[here].round(9))
+        heights = np.unique(cells.height_mm[here].round(9))
+        assert (radii[0], radii[-1]) == (1200, 2100)
+        assert (heights[0], heights[-1]) == (0, 500)
+        assert np.diff(radii).max() <= 25 + 1e-9
+        assert np.diff(heights).max() <= 25 + 1e-9
+    odd = region.grid(CYLINDER, slices[:1], 70.0)
+    assert np.diff(np.unique(odd.radius_mm)).max() <= 70 + 1e-9
+    assert odd.radius_mm.max() == 2100
+
+
+def test_points_fill_the_volume_evenly():
+    cells = region.fill(CYLINDER, region.points("sobol", 4096, 3))
+    # Even in volume: the share inside a radius grows with its square.
+    for radius in (1400, 1650, 1900):
+        share = (radius**2 - 1200**2) / (2100**2 - 1200**2)
+        assert np.mean(cells.radius_mm <= radius) == pytest.approx(share, abs=0.01)
+    assert np.mean(cells.angle_rad) == pytest.approx(math.radians(30), rel=0.01)
+    assert np.mean(cells.height_mm) == pytest.approx(250, rel=0.01)
+    flat = np.column_stack(
+        [
+            cells.radius_mm * np.cos(cells.angle_rad),
+            cells.radius_mm * np.sin(cells.angle_rad),
+            cells.height_mm,
+        ]
+    )
+    assert region.contains(CYLINDER, flat).all()
+
+
+def test_tool_poses_turn_with_the_slice():
+    cells = region.Cells(np.array([0.0, 0.7]), np.array([1500.0, 1800.0]), np.array([10.0, 400.0]))
+    reference = Rotation.from_euler("XYZ", [180, 20, 5], degrees=True)
+    relative = Rotation.from_euler("XYZ", [45, -45, 45], degrees=True)
+    poses = region.tool_poses(cells, reference.as_matrix(), relative.as_matrix())
+    for i in range(2):
+        turn = Rotation.from_euler("z", cells.angle_rad[i])
+        np.testing.assert_allclose(
+            poses.rotation[i], (turn * reference * relative).as_matrix(), atol=1e-14
+        )
+        np.testing.assert_allclose(
+            poses.position_mm[i],
+            turn.apply([cells.radius_mm[i], 0, cells.height_mm[i]]),
+            atol=1e-10,
+        )
+    np.testing.assert_allclose(
+        region.reference_rotation(np.radians([180, 20, 5])), reference.as_matrix(), atol=1e-14
+    )
