@@ -10,7 +10,7 @@ execute(
         settings=snakemake.params.settings,
         seed=snakemake.params.seed,
         part=snakemake.params.part,
-        label=f"{snakemake.wildcards.dataset} study_chunk",
+        label=f"{snakemake.wildcards.dataset} study_chunk {snakemake.params.part}",
         log=snakemake.log[0],
     )
 )

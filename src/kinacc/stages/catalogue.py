@@ -184,3 +184,8 @@ STAGES: dict[str, Stage] = {
         ),
     )
 }
+
+
+def maker_of(artefact: str) -> Stage:
+    """The stage that leaves an artefact."""
+    return next(stage for stage in STAGES.values() if artefact in stage.outputs)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from kinacc.errors import InputError, Problem
 from kinacc.provenance import stage_code_hash
-from kinacc.stages.catalogue import FIGURE_FOLDER, STAGES, Stage
+from kinacc.stages.catalogue import FIGURE_FOLDER, STAGES, Stage, maker_of
 
 RESULTS = "results"
 
@@ -22,11 +22,14 @@ def planned(
     overrides: Mapping[str, object] | None = None,
     results: str = RESULTS,
 ) -> Plan:
-    """The plan for configuration files; InputError listing every problem in them."""
+    """The plan for configuration files and values given on the command line.
+
+    Raises InputError listing every problem in them.
+    """
     from kinacc.config.load import load
     from kinacc.config.schema import without_execution_keys
 
-    full = load(paths, overrides)
+    full = load(paths, _read_words(overrides or {}))
     formats = {name: tuple(config["figures"]["formats"]) for name, config in full.items()}
     first = next(iter(formats.values()))
     problems = [
@@ -97,15 +100,12 @@ class Plan:
         wanted = (*stage.inputs, *(extra for extra in stage.optional if extra in available))
         found: dict[str, str | list[str]] = {}
         for artefact in wanted:
-            maker = next(each for each in STAGES.values() if artefact in each.outputs)
-            if maker.scattered:
-                count = self.parts[dataset]
-                found[artefact] = [
-                    self._table(artefact, dataset, f"{number}-of-{count}")
-                    for number in range(1, count + 1)
-                ]
-            else:
-                found[artefact] = self._table(artefact, dataset)
+            maker = maker_of(artefact)
+            paths = [
+                self._table(artefact, dataset, part)
+                for part in self.part_names(maker.name, dataset)
+            ]
+            found[artefact] = paths if maker.scattered else paths[0]
         return found | self._files(stage, self.datasets[dataset])
 
     def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
@@ -115,6 +115,13 @@ class Plan:
             folder = f"{self.results}/{dataset}/{FIGURE_FOLDER}"
             return {kind: f"{folder}/{name}.{kind}" for kind in self.formats}
         return {artefact: self._table(artefact, dataset, part) for artefact in stage.outputs}
+
+    def part_names(self, name: str, dataset: str) -> list[str | None]:
+        """Names of the parts a stage is computed in: 1-of-2, 2-of-2; None where it is whole."""
+        if not STAGES[name].scattered:
+            return [None]
+        count = self.parts[dataset]
+        return [f"{number}-of-{count}" for number in range(1, count + 1)]
 
     def message(self, name: str) -> str:
         """What the stage is doing, for a Snakemake rule or with the wildcards put in."""
@@ -157,6 +164,17 @@ class Plan:
             elif value is not None and config["measurements"]["source"] == "file":
                 found["measurements_file"] = value
         return found
+
+
+def _read_words(values: object) -> object:
+    """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
+    import yaml
+
+    if isinstance(values, Mapping):
+        return {key: _read_words(value) for key, value in values.items()}
+    if isinstance(values, (list, tuple)):
+        return [_read_words(value) for value in values]
+    return yaml.safe_load(values) if isinstance(values, str) else values
 
 
 def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:

@@ -30,7 +30,7 @@ class Job:
 
     ``inputs`` maps a role to a file, or to the files of a scattered artefact. ``outputs`` maps an
     artefact to its file, or a picture format to its file. ``settings`` are the configuration values
-    of the stage, ``part`` which part of how many a scattered stage computes (1-based).
+    of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2").
     """
 
     module: str
@@ -38,7 +38,7 @@ class Job:
     outputs: Mapping[str, str]
     settings: Mapping[str, object]
     seed: int
-    part: tuple[int, int] | None = None
+    part: str | None = None
     label: str = ""
     log: str | None = None
 
@@ -66,7 +66,8 @@ def perform(job: Job, progress: object = None) -> None:
     stage = import_module(job.module)
     settings = dict(job.settings)
     if job.part is not None:
-        settings["part"] = {"number": job.part[0], "of": job.part[1]}
+        number, _, count = job.part.partition("-of-")
+        settings["part"] = {"number": int(number), "of": int(count)}
     wants_progress = "progress" in inspect.signature(stage.run).parameters
     result = stage.run(tables, settings, **({"progress": progress} if wants_progress else {}))
     if isinstance(result, Mapping):
