@@ -26,8 +26,8 @@ class GammaFit(NamedTuple):
 def fit(magnitudes: ArrayLike) -> GammaFit:
     """Fit a gamma distribution with location 0 to positive magnitudes by maximum likelihood.
 
-    magnitudes: (n,), n >= 1, any unit. Solves log k - digamma(k) = log mean(x) - mean(log x) for the
-    shape k by Newton's method in 1/k; the scale is mean / k.
+    magnitudes: (n,), n >= 1, any unit. Solves log k - digamma(k) = log mean(x) - mean(log x) for
+    the shape k by Newton steps in 1/k; the scale is mean / k.
     Raises InputError for an empty sample and for values that are not finite or not positive.
     """
     x = np.asarray(magnitudes, dtype=np.float64).ravel()

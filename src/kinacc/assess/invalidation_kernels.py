@@ -1,7 +1,7 @@
 """Compiled model invalidation (eqs. 15-24): one run at one bound, and exact scans over bounds.
 
-The plain twin of :func:`run` is :func:`kinacc.assess.model_invalidation.history`. Bounds on the grid
-are integers k with eta = k / 1000 mm. ``power`` is the exponent of the number of readings in a
+The plain twin of :func:`run` is :func:`kinacc.assess.model_invalidation.history`. Bounds on the
+grid are integers k with eta = k / 1000 mm. ``power`` is the exponent of the number of readings in a
 point's weight, readings**power / sigma: 1/2 for Sigma / r, 1/4 for Sigma / sqrt(r).
 
 How a scan is exact without visiting every bound. For a fixed history the rejection probability
@@ -269,7 +269,7 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
     upward: the lowest k not rejected (top + 1 if all are); otherwise the highest k rejected
     (bottom - 1 if none is). Returns (k, number of pieces whose path was followed to its end).
     """
-    readings, known, sigma = world[0], world[1], world[2]
+    readings, sigma = world[0], world[2]
     points = readings.shape[0]
     state = np.zeros((points, 6))
     at_near, at_far, spare = np.ones(points), np.ones(points), np.ones(points)

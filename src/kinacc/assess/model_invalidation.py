@@ -53,7 +53,7 @@ class ModelInvalidation:
     measurements: budget of a run; alpha: threshold on the rejection probability (eq. 22);
     distance: ``squared`` (the squared Mahalanobis distance into the chi-square distribution) or
     ``as_printed`` (its root, eqs. 18 and 20); covariance: ``r`` (Sigma / r) or ``sqrt_r`` (eq. 24
-    as printed); search: ``from_above`` (1 um above the highest rejected bound of the grid k x 1 um),
+    as printed); search: ``from_above`` (1 um above the highest rejected bound of the 1 um grid),
     ``from_below`` (lowest bound of the grid that is not rejected) or ``bisection`` (between 0 and
     the largest first reading, to 1 um).
     """

@@ -86,7 +86,7 @@ def measured_world(first_mm: ArrayLike, repeats_mm: ArrayLike, sigma_mm: ArrayLi
                 "repeats",
                 f"shape {repeats.shape}",
                 f"({first.shape[0]}, any, 3)",
-                "one row a point",
+                "a row each",
             )
         )
     elif not np.all(np.isfinite(repeats)):

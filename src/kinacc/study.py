@@ -1,0 +1,256 @@
+"""The Monte Carlo study of the assessors over noise and repetitions (section IV-C, Fig. 4).
+
+Every simulation is one world, and every assessor sees that same world. Its readings are addressed
+by (seed, noise in nm, repetition, point, visit): a key from
+``numpy.random.SeedSequence([seed, noise_nm, repetition])`` and a counter (visit, point). So a
+simulation does not depend on which others run, in which part, in which order or on how many cores;
+the first reading of a point is the same number for all assessors, and its v-th repeat is the same
+whatever led there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinacc.assess import ASSESSORS, Assessor, Maximum, ModelInvalidation, OutlierRejection
+from kinacc.assess.assessor import Assessment, every_reading
+from kinacc.assess.world import World, draw
+from kinacc.errors import InputError, Problem
+
+Columns = dict[str, np.ndarray]
+
+NM_PER_MM = 1_000_000
+VISITING_ORDERS = ("sequence", "shuffled")
+SWITCHES = ("outlier_rule", "distance", "covariance", "search")
+_SHUFFLE = 1  # keeps the key of the order apart from the key of the readings
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """The ``study`` section of the configuration.
+
+    noise_mm: standard deviations per axis, mm; repetitions: simulations per noise; measurements:
+    budget of every method; alpha, outlier_rule, distance, covariance, search: the default reading
+    (see :mod:`kinacc.assess`); visiting_order: ``sequence`` (points in the order given) or
+    ``shuffled`` (an order of its own for every simulation).
+    """
+
+    noise_mm: tuple[float, ...] = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
+    repetitions: int = 100
+    measurements: int = 200
+    alpha: float = 0.6
+    outlier_rule: str = "normal"
+    distance: str = "squared"
+    covariance: str = "r"
+    search: str = "from_above"
+    visiting_order: str = "sequence"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "noise_mm", tuple(float(noise) for noise in self.noise_mm))
+        if found := list(self._problems()):
+            raise InputError(found, "the study cannot run with these settings")
+
+    @classmethod
+    def of(cls, section: Mapping[str, object]) -> StudySettings:
+        """Settings from a configuration section; keys that are not the study's are left out."""
+        names = {field.name for field in fields(cls)}
+        return cls(**{name: value for name, value in section.items() if name in names})
+
+    def assessors(self) -> list[Assessor]:
+        """The assessors under the default reading, in the order of the registry."""
+        own = vars(self)
+        return [
+            cls(**{field.name: own[field.name] for field in fields(cls)})
+            for cls in ASSESSORS.values()
+        ]
+
+    def _problems(self) -> Iterator[Problem]:
+        nm = [_nanometres(noise) if np.isfinite(noise) else 0 for noise in self.noise_mm]
+        if not nm or min(nm) < 1 or len(set(nm)) < len(nm):
+            allowed = "one or more different numbers of at least 1e-6 mm"
+            yield Problem("study.noise_mm", f"{list(self.noise_mm)}", allowed)
+        for name in ("repetitions", "measurements"):
+            if getattr(self, name) < 1:
+                yield Problem(f"study.{name}", f"{getattr(self, name)}", "at least 1")
+        if not 0.0 < self.alpha < 1.0:
+            yield Problem("study.alpha", f"{self.alpha}", "above 0 and below 1")
+        choices = {"visiting_order": VISITING_ORDERS}
+        for each in (Maximum, OutlierRejection, ModelInvalidation):
+            choices |= each.switches
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                found = f"{getattr(self, name)!r}"
+                yield Problem(f"study.{name}", found, ", ".join(allowed))
+
+
+def part_of(repetitions: int, number: int, of: int) -> range:
+    """Repetitions of part ``number`` (1-based) of ``of``: every of-th, so that parts take alike."""
+    if not 1 <= number <= of:
+        raise InputError(Problem("part", f"{number} of {of}", "1 up to the number of parts"))
+    return range(number - 1, repetitions, of)
+
+
+def world_of(
+    error_mm: np.ndarray,
+    noise_mm: float,
+    repetition: int,
+    settings: StudySettings,
+    seed: int,
+    memory: np.ndarray | None = None,
+) -> World:
+    """The world of one simulation: true errors (m, 3), robot base frame, mm, plus its noise.
+
+    Holds the points the budget can reach, in visiting order. ``memory`` (points, measurements, 3)
+    is reused for the readings if given; the world drawn there before is lost.
+    """
+    from kinacc.assess.streams import key_of
+
+    entropy = (seed, _nanometres(noise_mm), repetition)
+    order = np.arange(error_mm.shape[0])
+    if settings.visiting_order == "shuffled":
+        order = np.random.default_rng([*entropy, _SHUFFLE]).permutation(order)
+    order = order[: settings.measurements]
+    sigma = np.full(order.size, float(noise_mm))
+    return draw(error_mm[order], sigma, key_of(*entropy), settings.measurements, order, memory)
+
+
+def simulate(
+    error_mm: ArrayLike,
+    noise_mm: Sequence[float],
+    repetitions: Iterable[int],
+    settings: StudySettings,
+    seed: int,
+    progress=None,
+) -> Columns:
+    """Run every assessor under every reading on the given repetitions of each noise.
+
+    error_mm: (m, 3) true errors at the operating points, robot base frame, mm. noise_mm: standard
+    deviations per axis, mm. ``progress(iterable, what, total)`` reports on the simulations.
+    Returns the columns of ``study_chunk``, one row per noise, repetition, assessor and reading.
+    Raises InputError for errors of the wrong shape or not finite.
+    """
+    errors = checked_errors(error_mm)
+    readings = [each for assessor in settings.assessors() for each in every_reading(assessor)]
+    jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
+    reachable = min(errors.shape[0], settings.measurements)
+    memory = np.empty((reachable, settings.measurements, 3))
+    rows = []
+    for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
+        world = world_of(errors, noise, repetition, settings, seed, memory)
+        rows += [(noise, repetition, each, each.assess(world)) for each in readings]
+    return ordered(_chunk_columns(rows))
+
+
+def ordered(rows: Columns) -> Columns:
+    """Rows by noise, repetition, assessor (as in the registry) and switches (alphabetically)."""
+    ranks = {name: rank for rank, name in enumerate(ASSESSORS)}
+    keys = [np.array([ranks[name] for name in rows["assessor"]], np.int64)]
+    for switch in SWITCHES:
+        keys.append(np.array(["" if value is None else value for value in rows[switch]], str))
+    keys = [rows["noise_mm"], rows["repetition"], *keys]
+    order = np.lexsort(keys[::-1])
+    return {name: np.asarray(column)[order] for name, column in rows.items()}
+
+
+def default_reading(rows: Columns, settings: StudySettings) -> Columns:
+    """The rows of the default reading: the columns of ``study``."""
+    keep = np.ones(rows["noise_mm"].size, bool)
+    for switch in SWITCHES:
+        chosen = getattr(settings, switch)
+        keep &= np.array([value in (None, chosen) for value in rows[switch]], bool)
+    return {name: column[keep] for name, column in rows.items() if name not in SWITCHES}
+
+
+def summary(study: Columns, true_mm: float) -> Columns:
+    """Columns of ``study_summary``: each assessor and noise against the true accuracy (mm)."""
+    table = _statistics(study, ("assessor", "noise_mm"), true_mm)
+    return _registry_order(table)
+
+
+def readings(rows: Columns, true_mm: float) -> Columns:
+    """Columns of ``readings``: every reading of the assessors that have more than one."""
+    keep = np.array([bool(ASSESSORS[name].switches) for name in rows["assessor"]], bool)
+    kept = {name: column[keep] for name, column in rows.items()}
+    table = _statistics(kept, ("assessor", *SWITCHES, "noise_mm"), true_mm)
+    wanted = ("assessor", *SWITCHES, "noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm")
+    return _registry_order({name: table[name] for name in wanted})
+
+
+def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
+    """True accuracy of a set of points (eq. 7): the largest magnitude of their true errors."""
+    values = np.asarray(true_error_mm, dtype=np.float64)
+    if values.size == 0 or not np.all(np.isfinite(values)):
+        raise InputError(
+            Problem("true_error_mm", "no values, or values that are not finite", "numbers in mm")
+        )
+    return float(values.max())
+
+
+def checked_errors(error_mm: ArrayLike) -> np.ndarray:
+    """True errors as (m, 3) float64; InputError where they cannot be used."""
+    errors = np.ascontiguousarray(error_mm, dtype=np.float64)
+    if errors.ndim != 2 or errors.shape[1] != 3 or errors.shape[0] == 0:
+        raise InputError(
+            Problem("true errors", f"shape {errors.shape}", "(m, 3) with m at least 1, in mm")
+        )
+    bad = np.flatnonzero(~np.isfinite(errors).all(axis=1))
+    if bad.size:
+        raise InputError(
+            Problem("true errors", f"points {bad[:5].tolist()} are not finite", "numbers in mm")
+        )
+    return errors
+
+
+def _nanometres(noise_mm: float) -> int:
+    return round(float(noise_mm) * NM_PER_MM)
+
+
+def _chunk_columns(rows: list[tuple[float, int, Assessor, Assessment]]) -> Columns:
+    switches = {
+        switch: np.array([getattr(each, switch, None) for _, _, each, _ in rows], object)
+        for switch in SWITCHES
+    }
+    return {
+        "noise_mm": np.array([noise for noise, _, _, _ in rows], float),
+        "repetition": np.array([repetition for _, repetition, _, _ in rows], np.int64),
+        "assessor": np.array([each.name for _, _, each, _ in rows], object),
+        **switches,
+        "assessed_mm": np.array([found.assessed_mm for _, _, _, found in rows], float),
+        "measurements": np.array([found.measurements for _, _, _, found in rows], np.int64),
+        "points_visited": np.array([found.points_visited for _, _, _, found in rows], np.int64),
+        "lower_mm": np.array([found.lower_mm for _, _, _, found in rows], float),
+        "upper_mm": np.array([found.upper_mm for _, _, _, found in rows], float),
+    }
+
+
+def _statistics(rows: Columns, keys: Sequence[str], true_mm: float) -> Columns:
+    """Statistics of ``assessed_mm`` over the rows that agree in the key columns, sorted by them."""
+    groups: dict[tuple, list[int]] = {}
+    for place, key in enumerate(zip(*(rows[name] for name in keys), strict=True)):
+        groups.setdefault(key, []).append(place)
+    found = sorted(groups, key=lambda key: ["" if part is None else part for part in key])
+    samples = [rows["assessed_mm"][groups[key]] for key in found]
+    table = {
+        name: np.array([key[place] for key in found], float if name == "noise_mm" else object)
+        for place, name in enumerate(keys)
+    }
+    table["mean_mm"] = np.array([sample.mean() for sample in samples], float)
+    table["min_mm"] = np.array([sample.min() for sample in samples], float)
+    table["max_mm"] = np.array([sample.max() for sample in samples], float)
+    table["bias_mm"] = table["mean_mm"] - true_mm
+    table["rmse_mm"] = np.array(
+        [np.sqrt(np.mean((sample - true_mm) ** 2)) for sample in samples], float
+    )
+    table["repetitions"] = np.array([sample.size for sample in samples], np.int64)
+    return table
+
+
+def _registry_order(table: Columns) -> Columns:
+    """Rows by assessor as in the registry, otherwise as they are."""
+    ranks = {name: rank for rank, name in enumerate(ASSESSORS)}
+    order = np.argsort([ranks[name] for name in table["assessor"]], kind="stable")
+    return {name: column[order] for name, column in table.items()}
