@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D
+from matplotlib.transforms import Bbox
+from mpl_toolkits.mplot3d import Axes3D, proj3d
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from kinacc.errors import InputError, Problem
@@ -47,6 +48,7 @@ def draw(
         figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.2, arranged=False)
         ax: Axes3D = figure.add_axes((-0.06, 0.03, 1.06, 1.0), projection="3d")
         ax.computed_zorder = False
+        ax.set_autoscale_on(False)
         ax.view_init(*VIEW_DEG)
         middle = points_mm.mean(axis=0)
         seen = [points_mm, np.zeros((1, 3))]
@@ -58,6 +60,7 @@ def draw(
         seen.append(_arm(ax, model, posture, tool_mm))
         _first_axis(ax, min(part[:, 2].min() for part in seen))
         _frame_axes(ax, np.concatenate(seen))
+        _fill(figure, ax, top_in=0.2 if dataset else 0.04)
         style.name_dataset(figure, dataset)
     return figure
 
@@ -178,3 +181,30 @@ def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
         axis._axinfo["grid"].update(color="#e3e3e3", linewidth=0.5)
         axis.get_major_locator().set_params(nbins=5, steps=[1, 2, 5, 10])
+
+
+def _fill(figure: Figure, ax: Axes3D, top_in: float, margin_in: float = 0.04) -> None:
+    """Scale and move the axes until what they draw just fills the figure.
+
+    Text keeps its size while the axes grow, so one step does not suffice; two do.
+    """
+    size = np.array(figure.get_size_inches())
+    low, high = np.full(2, margin_in) / size, 1 - np.array([margin_in, top_in]) / size
+    for _ in range(2):
+        figure.draw_without_rendering()
+        drawn = _drawn(figure, ax)
+        place = ax.get_position(original=True)
+        scale = float(min((high - low) / np.array([drawn.width, drawn.height])))
+        shift = (low + high) / 2 - scale * np.array([drawn.x0 + drawn.x1, drawn.y0 + drawn.y1]) / 2
+        x, y = scale * np.array([place.x0, place.y0]) + shift
+        ax.set_position((x, y, scale * place.width, scale * place.height))
+
+
+def _drawn(figure: Figure, ax: Axes3D) -> Bbox:
+    """Return what the box of the axes and its words cover, in figure fractions."""
+    corners = np.array(list(product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim())))
+    flat = np.array(proj3d.proj_transform(*corners.T, ax.get_proj())[:2]).T
+    box = Bbox.null()
+    box.update_from_data_xy(ax.transData.transform(flat))
+    words = [axis.get_tightbbox() for axis in (ax.xaxis, ax.yaxis, ax.zaxis)]
+    return Bbox.union([box, *words]).transformed(figure.transFigure.inverted())

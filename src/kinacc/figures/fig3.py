@@ -134,7 +134,9 @@ def _norm(values: np.ndarray) -> Normalize:
     if not finite.size:
         return Normalize(0, 1)
     low, high = float(finite.min()), float(finite.max())
-    return Normalize(low, high if high > low else low + 1e-3)
+    if high - low < 1e-3 * abs(high):
+        low, high = 0.9 * low, 1.1 * high + 1e-3
+    return Normalize(low, high)
 
 
 def _panel(ax: Axes, r_edges: np.ndarray, h_edges: np.ndarray, grid: np.ndarray, norm: Normalize):

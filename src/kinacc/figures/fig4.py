@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.figures import style
+from kinacc.figures import style, truth
 from kinacc.figures.columns import Table, floats, require, texts
 
 COLUMNS = ("assessor", "noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm", "repetitions")
@@ -45,10 +47,10 @@ def draw(
             shift = (index - (len(looks) - 1) / 2) * 0.14 * step
             last = _assessor(ax, summary, mine, noise_um[mine] + shift, colour, marker)
             if last is not None:
-                labels.append((last, words.replace(" ", "\n"), colour))
+                labels.append((last, fill(words, 13), colour))
         if true_mm is not None:
             ax.axhline(true_mm, color=style.INK, lw=1, ls=(0, (4, 2)), zorder=1)
-            words = "True accuracy" if not noisy_truth else "Largest error*"
+            words = "“True” accuracy*" if noisy_truth else "True accuracy"
             labels.append((true_mm, f"{words}\n{true_mm:.3f} mm", style.INK))
         ax.set(xlabel=r"Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
         ax.set_xticks(levels if levels.size <= 8 else levels[:: -(-levels.size // 8)])
@@ -61,7 +63,7 @@ def draw(
         ax.set_title(_repetitions(summary), loc="left", color=style.MUTED, fontsize=style.SMALL_PT)
         if noisy_truth:
             figure.supxlabel(
-                "* measured minus modelled: contains the instrument's noise",
+                truth.FOOTNOTE,
                 fontsize=style.SMALL_PT, color=style.MUTED, x=0.01, ha="left",
             )  # fmt: skip
         style.name_dataset(figure, dataset)
@@ -99,9 +101,9 @@ def _label_lines(ax: Axes, labels: list[tuple[float, str, str]]) -> None:
     """Name each line at its right end, moved apart where the names would overlap."""
     low, high = ax.get_ylim()
     heights = [(y - low) / (high - low) for y, _, _ in labels]
-    for place, (_, words, colour) in zip(
-        style.spread(heights, 0.125, 0.05, 0.95), labels, strict=True
-    ):
+    lines = max((words.count("\n") + 1 for _, words, _ in labels), default=1)
+    places = style.spread(heights, 0.02 + 0.052 * lines, 0.05, 0.95)
+    for place, (_, words, colour) in zip(places, labels, strict=True):
         style.outside_label(ax, place, words, colour)
 
 

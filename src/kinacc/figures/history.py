@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from kinacc.errors import InputError, Problem
-from kinacc.figures import style
+from kinacc.figures import style, truth
 from kinacc.figures.columns import Table, floats, require, rows, texts
 
 COLUMNS = (
@@ -96,8 +96,9 @@ def _magnitudes(
     noisy_truth: bool,
 ) -> None:
     k = values["iteration"]
-    truth = "true error" if not noisy_truth else "measured error (contains instrument noise)"
-    ax.step(k, values["true_mm"], where="mid", color="#9a9a9a", lw=0.6, label=truth, zorder=2)
+    label = "“true” error*" if noisy_truth else "true error"
+    accuracy = "“true” accuracy*" if noisy_truth else "true accuracy"
+    ax.step(k, values["true_mm"], where="mid", color="#9a9a9a", lw=0.6, label=label, zorder=2)
     ax.plot(
         k[~again], values["measured_mm"][~again], ls="", marker="o", ms=2.4, mew=0,
         color=style.BLUE, label="first measurement", zorder=3,
@@ -113,9 +114,7 @@ def _magnitudes(
     if true_accuracy_mm is not None and np.isfinite(true_accuracy_mm):
         ax.axhline(
             true_accuracy_mm, color=style.INK, lw=1, ls=(0, (4, 2)), zorder=2.5,
-            label=f"true accuracy {true_accuracy_mm:.3f} mm"
-            if not noisy_truth
-            else f"largest of these {true_accuracy_mm:.3f} mm",
+            label=f"{accuracy} {true_accuracy_mm:.3f} mm",
         )  # fmt: skip
     ax.set_ylim(bottom=0)
     ax.set_ylabel("Error magnitude (mm)")
@@ -126,6 +125,8 @@ def _magnitudes(
         ncols=2,
         alignment="left",
         markerscale=1.6,
+        title=truth.FOOTNOTE if noisy_truth else None,
+        title_fontproperties={"size": style.SMALL_PT},
     )
 
 

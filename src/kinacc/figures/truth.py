@@ -8,6 +8,8 @@ import numpy as np
 
 from kinacc.figures.columns import Table, floats
 
+FOOTNOTE = "* measured minus modelled: contains the instrument's noise"
+
 
 def accuracy_mm(points: Table | None) -> float | None:
     """Return the largest true error of ``assessment_points`` (eq. 7), None without any."""

@@ -31,7 +31,9 @@ def study_summary(noise_mm=NOISE_MM, assessors=None) -> dict[str, np.ndarray]:
     }
 
 
-def history(eta_mm=0.834, seed=1, points=200, iterations=200, noise_mm=0.3, alpha=0.6):
+def history(
+    eta_mm=0.834, seed=1, points=200, iterations=200, noise_mm=0.3, alpha=0.6, example="rejected"
+):
     """Return one simulation of model invalidation, by the plain rules (isotropic noise)."""
     rng = np.random.default_rng(seed)
     error = rng.normal(size=(points, 3))
@@ -63,7 +65,7 @@ def history(eta_mm=0.834, seed=1, points=200, iterations=200, noise_mm=0.3, alph
     table = dict(zip((*names, "rejection_probability"), map(np.array, columns), strict=True))
     n = len(rows)
     return table | {
-        "example": np.full(n, "rejected", dtype=object),
+        "example": np.full(n, example, dtype=object),
         "noise_mm": np.full(n, noise_mm),
         "alpha": np.full(n, alpha),
         "distance": np.full(n, "squared", dtype=object),
@@ -103,5 +105,5 @@ def accuracy_map(slices=(0, 15, 30, 45, 60), step_mm=25.0, inner_mm=1100.0):
 def joint_angles(count=200, seed=3):
     """Return (count, 6) joint angles in rad that put the MH180's flange low before the base."""
     rng = np.random.default_rng(seed)
-    low, high = np.array([[0, 25, -70, -40, -70, -90], [60, 55, -45, 40, -30, 90]])
+    low, high = np.array([[0, 30, -40, -40, -70, -90], [60, 60, -10, 40, -30, 90]])
     return np.radians(rng.uniform(low, high, size=(count, 6)))

@@ -1,0 +1,78 @@
+"""The figure stages: tables as the runner hands them over, one Figure back."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import figure_tables as tables
+import numpy as np
+import pytest
+from figure_words import CYLINDER, problems, said
+from matplotlib.figure import Figure
+
+from kinacc import robot
+from kinacc.models.dh import PARAMETERS
+
+
+def points(q_rad: np.ndarray) -> dict[str, np.ndarray]:
+    columns = {f"q{i + 1}": q_rad[:, i] for i in range(q_rad.shape[1])}
+    return columns | {"true_error_mm": np.linspace(0.1, 1.111, len(q_rad))}
+
+
+def dh_model() -> dict[str, np.ndarray]:
+    model = robot.load("mh180").dh
+    mixed = np.array([3, 0, 5, 1, 2, 4])
+    columns = {name: getattr(model, name)[mixed] for name in PARAMETERS}
+    return columns | {"joint": mixed + 1}
+
+
+INPUTS = {
+    "fig1": {},
+    "fig2": {"dh_model": dh_model(), "assessment_points": points(tables.joint_angles())},
+    "fig3": {"accuracy_map": tables.accuracy_map()},
+    "fig4": {
+        "study_summary": tables.study_summary(),
+        "assessment_points": points(tables.joint_angles()),
+    },
+    "fig5": {
+        "histories": tables.history(0.834, seed=0),
+        "assessment_points": points(tables.joint_angles()),
+    },
+    "fig6": {
+        "histories": tables.history(1.023, seed=5, example="not_rejected"),
+        "assessment_points": points(tables.joint_angles()),
+    },
+}
+CYLINDER_SPACE = {
+    "dataset": "mh180",
+    "robot": "mh180",
+    "evaluation": {"space": "cylinder", "cylinder": CYLINDER},
+}
+
+
+@pytest.mark.parametrize("name", INPUTS)
+@pytest.mark.parametrize("space", ["cylinder", "joint_box", "measured"])
+def test_stage_returns_a_clean_figure(name, space):
+    settings = {**CYLINDER_SPACE, "evaluation": {**CYLINDER_SPACE["evaluation"], "space": space}}
+    figure = import_module(f"kinacc.stages.{name}").run(INPUTS[name], settings)
+    assert isinstance(figure, Figure)
+    assert problems(figure) == []
+
+
+@pytest.mark.parametrize("name", ["fig4", "fig5", "fig6"])
+def test_true_accuracy_is_that_of_all_points_visited_or_not(name):
+    figure = import_module(f"kinacc.stages.{name}").run(INPUTS[name], CYLINDER_SPACE)
+    assert "1.111 mm" in said(figure)
+
+
+def test_fig2_draws_to_the_tool_of_the_dh_model():
+    frames = {
+        "model": np.array(["vec", "dh", "dh"], dtype=object),
+        "frame": np.array(["tool", "base", "tool"], dtype=object),
+        "x_mm": np.array([1.0, 2.0, 3.0]),
+        "y_mm": np.array([0.0, 0.0, 4.0]),
+        "z_mm": np.array([0.0, 0.0, 250.0]),
+    }
+    fig2 = import_module("kinacc.stages.fig2")
+    assert list(fig2._tool_mm(frames)) == [3.0, 4.0, 250.0]
+    assert problems(fig2.run({**INPUTS["fig2"], "frames": frames}, CYLINDER_SPACE)) == []
