@@ -1,0 +1,248 @@
+"""The Monte Carlo study recomputed row by row from the seed, and its summaries in plain Python."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from oracles import assessors as oracle
+from oracles import worlds
+
+from kinacc import study
+from kinacc.histories import HistorySettings, histories
+
+NOISE = (0.01, 0.03)
+SMALL = {
+    "noise_mm": NOISE,
+    "repetitions": 3,
+    "measurements": 12,
+    "alpha": 0.6,
+}
+
+
+def small_errors(points: int = 9) -> np.ndarray:
+    return np.random.default_rng(31).normal(size=(points, 3)) * 0.02
+
+
+def text(table, name, i):
+    value = table[name][i]
+    return None if value is None or value != value else str(value)
+
+
+def expected_row(table, i, error, seed, settings, order=None):
+    """Assessed accuracy, measurements and points of one row, from its address alone."""
+    noise, repetition = float(table["noise_mm"][i]), int(table["repetition"][i])
+    reading = worlds.simulation(error.tolist(), noise, repetition, seed)
+    order = list(range(len(error)) if order is None else order)
+    budget = settings.measurements
+    sizes = [oracle.norm(reading(j, 1)) for j in order[:budget]]
+    assessor = text(table, "assessor", i)
+    if assessor == "maximum":
+        return oracle.maximum(sizes), len(sizes), len(sizes)
+    if assessor == "outlier_rejection":
+        rule = text(table, "outlier_rule", i)
+        return oracle.outlier_rejection(sizes, rule), len(sizes), len(sizes)
+    switches = oracle.Switches(
+        text(table, "distance", i), text(table, "covariance", i), settings.alpha
+    )
+
+    def run(eta):
+        return oracle.invalidation_run(reading, order, [noise] * len(error), eta, budget, switches)
+
+    top = max(sizes)
+    search = text(table, "search", i)
+    if search == "bisection":
+        assessed = oracle.bisection(lambda eta: run(eta).rejected, top)
+    else:
+        flags = oracle.decisions(lambda eta: run(eta).rejected, top)
+        pick = {"from_above": oracle.from_above, "from_below": oracle.from_below}[search]
+        assessed = pick(flags) / 1000
+    at = run(assessed)
+    return assessed, at.measurements, at.points_visited
+
+
+@pytest.fixture(scope="module")
+def rows():
+    settings = study.StudySettings(**SMALL)
+    return study.simulate(small_errors(), NOISE, range(3), settings, seed=99)
+
+
+def test_every_row_of_a_small_study_equals_the_oracle(rows):
+    settings, error = study.StudySettings(**SMALL), small_errors()
+    count = len(rows["assessed_mm"])
+    # One row of the maximum, three of outlier rejection, twelve of model invalidation.
+    assert count == 2 * 3 * 16
+    for i in range(count):
+        assessed, measurements, points = expected_row(rows, i, error, 99, settings)
+        assert rows["assessed_mm"][i] == pytest.approx(assessed, rel=1e-9, abs=1e-12)
+        assert (rows["measurements"][i], rows["points_visited"][i]) == (measurements, points)
+
+
+def test_parts_of_the_study_join_to_the_whole(rows):
+    settings = study.StudySettings(**SMALL)
+    parts = [
+        study.simulate(small_errors(), NOISE[::-1], study.part_of(3, n, 2), settings, seed=99)
+        for n in (2, 1)
+    ]
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    joined, whole = study.ordered(joined), study.ordered(rows)
+    for name in whole:
+        assert [str(x) for x in joined[name]] == [str(x) for x in whole[name]]
+
+
+def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
+    settings = study.StudySettings(**{**SMALL, "visiting_order": "shuffled"})
+    shuffled = study.simulate(small_errors(), NOISE[:1], range(1), settings, seed=99)
+    order = np.random.default_rng([99, 10000, 0, 1]).permutation(9)
+    for i in range(len(shuffled["assessed_mm"])):
+        assessed, measurements, points = expected_row(
+            shuffled, i, small_errors(), 99, settings, order
+        )
+        assert shuffled["assessed_mm"][i] == pytest.approx(assessed, rel=1e-9, abs=1e-12)
+        assert (shuffled["measurements"][i], shuffled["points_visited"][i]) == (
+            measurements,
+            points,
+        )
+
+
+def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):
+    settings = study.StudySettings(**SMALL)
+    default = study.default_reading(rows, settings)
+    assert len(default["assessed_mm"]) == 2 * 3 * 3
+    summary = study.summary(default, 0.07)
+    assert len(summary["assessor"]) == 6
+    for i, (assessor, noise) in enumerate(
+        zip(summary["assessor"], summary["noise_mm"], strict=True)
+    ):
+        values = [
+            float(rows["assessed_mm"][j])
+            for j in range(len(rows["assessed_mm"]))
+            if rows["assessor"][j] == assessor
+            and rows["noise_mm"][j] == noise
+            and text(rows, "outlier_rule", j) in {None, "normal"}
+            and text(rows, "distance", j) in {None, "squared"}
+            and text(rows, "covariance", j) in {None, "r"}
+            and text(rows, "search", j) in {None, "from_above"}
+        ]
+        assert len(values) == summary["repetitions"][i] == 3
+        mean = math.fsum(values) / 3
+        assert summary["mean_mm"][i] == pytest.approx(mean, rel=1e-13)
+        assert (summary["min_mm"][i], summary["max_mm"][i]) == (min(values), max(values))
+        assert summary["bias_mm"][i] == pytest.approx(mean - 0.07, abs=1e-14)
+        rmse = math.sqrt(math.fsum((v - 0.07) ** 2 for v in values) / 3)
+        assert summary["rmse_mm"][i] == pytest.approx(rmse, rel=1e-12)
+    ablation = study.readings(rows, 0.07)
+    # Three readings of outlier rejection and twelve of model invalidation per noise.
+    assert len(ablation["assessor"]) == 2 * 15
+    for i in range(30):
+        values = [
+            float(rows["assessed_mm"][j])
+            for j in range(len(rows["assessed_mm"]))
+            if rows["noise_mm"][j] == ablation["noise_mm"][i]
+            and all(
+                text(rows, name, j) == text(ablation, name, i)
+                for name in ("assessor", "outlier_rule", "distance", "covariance", "search")
+            )
+        ]
+        assert len(values) == 3
+        assert ablation["mean_mm"][i] == pytest.approx(math.fsum(values) / 3, rel=1e-13)
+        assert ablation["bias_mm"][i] == pytest.approx(math.fsum(values) / 3 - 0.07, abs=1e-14)
+
+
+def test_a_full_size_simulation_stands_just_above_its_highest_rejected_bound():
+    rng = np.random.default_rng(6)
+    error = rng.normal(size=(200, 3)) * 0.23
+    error *= 0.906 / np.linalg.norm(error, axis=1).max()
+    settings = study.StudySettings(noise_mm=(0.3,), repetitions=2)
+    table = study.simulate(error, (0.3,), [1], settings, seed=7)
+    reading = worlds.simulation(error.tolist(), 0.3, 1, 7)
+    top = max(oracle.norm(reading(j, 1)) for j in range(200))
+    for i in range(len(table["assessed_mm"])):
+        if text(table, "search", i) != "from_above":
+            continue
+        switches = oracle.Switches(text(table, "distance", i), text(table, "covariance", i))
+
+        def rejects(k, switches=switches):
+            run = oracle.invalidation_run(reading, range(200), [0.3] * 200, k / 1000, 200, switches)
+            return run.rejected
+
+        k = round(table["assessed_mm"][i] * 1000)
+        assert table["assessed_mm"][i] == pytest.approx(k / 1000, abs=1e-12)
+        assert rejects(k - 1)
+        above = [k, k + 1, k + 2, *range(k + 3, math.ceil(top * 1000), 17)]
+        assert not any(rejects(bound) for bound in above)
+
+
+HISTORY_RATIOS = {
+    "rejected": 0.834 / 0.906,
+    "rejected_larger_eta": 0.844 / 0.906,
+    "not_rejected": 1.023 / 0.906,
+}
+
+
+def history_runs(error, seed, repetition):
+    """Runs of one simulation at the three bounds of Figs. 5 and 6."""
+    reading = worlds.simulation(error.tolist(), 0.3, repetition, seed)
+    top = max(oracle.norm(row) for row in error.tolist())
+    count = len(error)
+    return {
+        name: oracle.invalidation_run(
+            reading, range(count), [0.3] * count, top * ratio, count, oracle.Switches()
+        )
+        for name, ratio in HISTORY_RATIOS.items()
+    }
+
+
+def first_simulations(error, seed, searched):
+    """First simulation of each figure's rule: rejected at eta, not at the slightly larger one, and
+    ending with another measurement of the worst point; not rejected, though some point was
+    measured again."""
+    worst = int(np.argmax([oracle.norm(row) for row in error.tolist()]))
+    found: dict[str, int] = {}
+    for repetition in range(searched):
+        runs = history_runs(error, seed, repetition)
+        low, larger, kept = (runs[name] for name in HISTORY_RATIOS)
+        last = low.steps[-1]
+        if low.rejected and not larger.rejected and last.point == worst and last.repeat > 1:
+            found.setdefault("rejected", repetition)
+        if not kept.rejected and any(step.repeat > 1 for step in kept.steps):
+            found.setdefault("not_rejected", repetition)
+        if len(found) == 2:
+            break
+    return found
+
+
+def test_histories_are_the_first_runs_of_the_studys_worlds_that_satisfy_the_rules():
+    # Most errors well inside and one at the limit, as on the paper's arm.
+    rng = np.random.default_rng(14)
+    error = rng.normal(size=(60, 3)) * 0.2
+    error *= 0.75 / np.linalg.norm(error, axis=1).max()
+    error[41] *= 0.906 / np.linalg.norm(error[41])
+    true = [oracle.norm(row) for row in error.tolist()]
+    found = first_simulations(error, 3, 200)
+    assert len(found) == 2
+    found["rejected_larger_eta"] = found["rejected"]
+    table = histories(
+        error,
+        HistorySettings(simulations_searched=200),
+        study.StudySettings(measurements=60),
+        seed=3,
+        point=np.arange(60) + 500,
+    )
+    assert {str(x) for x in table["example"]} == set(HISTORY_RATIOS)
+    for name, ratio in HISTORY_RATIOS.items():
+        where = [i for i, x in enumerate(table["example"]) if str(x) == name]
+        run = history_runs(error, 3, found[name])[name]
+        assert run.rejected == (name == "rejected")
+        assert len(run.steps) == len(where)
+        for i, step in zip(where, run.steps, strict=True):
+            assert table["eta_mm"][i] == pytest.approx(0.906 * ratio, rel=1e-12)
+            assert (table["noise_mm"][i], table["alpha"][i]) == (0.3, 0.6)
+            assert table["iteration"][i] == step.iteration
+            assert table["point"][i] == step.point + 500
+            assert table["repeat"][i] == step.repeat
+            assert table["measured_mm"][i] == pytest.approx(step.measured, abs=1e-12)
+            assert table["averaged_mm"][i] == pytest.approx(step.averaged, abs=1e-12)
+            assert table["true_mm"][i] == pytest.approx(true[step.point], abs=1e-12)
+            assert table["rejection_probability"][i] == pytest.approx(step.probability, abs=1e-11)
