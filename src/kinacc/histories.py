@@ -151,8 +151,10 @@ def examples(
     def search(name: str, bound: float, wanted: Callable, less: Callable) -> Example:
         second = None
         simulations = range(settings.simulations_searched)
+        memory = None
         for simulation in progress(simulations, "simulations") if progress else simulations:
-            world = world_of(error_mm, settings.noise_mm, simulation, study, seed)
+            world = world_of(error_mm, settings.noise_mm, simulation, study, seed, memory)
+            memory = world.readings_mm
             if wanted(world):
                 return Example(name, simulation, bound, RULES[name], True)
             if second is None and less(world):

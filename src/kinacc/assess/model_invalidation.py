@@ -119,29 +119,45 @@ def history(
     measurements: int = 200,
 ) -> list[Step]:
     """One run in plain Python, step by step; the compiled kernel is held to it."""
-    taken: dict[int, list[np.ndarray]] = {}  # in visiting order
+    sums: dict[int, np.ndarray] = {}  # the points visited, in visiting order
+    counts: dict[int, int] = {}
+    scores: dict[int, float] = {}
+    misses: dict[int, float] = {}
     steps: list[Step] = []
     rejection = 0.0
     while len(steps) < measurements:
         if rejection > alpha:
             # p-hat grows with the distance but reaches 1 in floating point: compare distances.
             # max() returns the first of equals, the point visited first.
-            row = max(taken, key=lambda i: _score(taken[i], world.sigma_mm[i], eta_mm, covariance))
-        elif len(taken) < world.points:
-            row = len(taken)
-            taken[row] = []
+            row = max(scores, key=scores.__getitem__)
+        elif len(sums) < world.points:
+            row = len(sums)
+            sums[row], counts[row] = np.zeros(3), 0
         else:
             break
-        reading = world.reading_mm(row, len(taken[row]))
-        taken[row].append(reading)
-        survival = 1.0
-        for i, readings in taken.items():
-            outside = max(_score(readings, world.sigma_mm[i], eta_mm, covariance), 0.0)
-            survival *= 1.0 - point_probability(outside, distance)
-        rejection = 1.0 - survival
-        average = _magnitude(sum(taken[row]) / len(taken[row]))
-        steps.append(Step(row, len(taken[row]), _magnitude(reading), average, rejection))
+        reading = world.reading_mm(row, counts[row])
+        sums[row] = sums[row] + reading
+        counts[row] += 1
+        average_mm = _magnitude(sums[row] / counts[row])
+        scores[row] = mahalanobis_excess(
+            average_mm, eta_mm, world.sigma_mm[row], counts[row], covariance
+        )
+        misses[row] = 1.0 - point_probability(scores[row], distance)
+        rejection = 1.0 - math.prod(misses.values())
+        steps.append(Step(row, counts[row], _magnitude(reading), average_mm, rejection))
     return steps
+
+
+def mahalanobis_excess(
+    average_mm: float, eta_mm: float, sigma_mm: float, count: int, covariance: str = "r"
+) -> float:
+    """Mahalanobis distance of an averaged measurement beyond the bound, negative inside it.
+
+    average_mm: its magnitude; sigma_mm: noise of one reading per axis; count: readings averaged.
+    With equal noise in the three axes the candidate of eq. 21 is the nearest point of the ball in
+    every metric, so the distance of eq. 20 is (|e| - eta) / (standard deviation of the average).
+    """
+    return (average_mm - eta_mm) * count ** _POWERS[covariance] / float(sigma_mm)
 
 
 def point_probability(distance_outside: float, distance: str = "squared") -> float:
@@ -161,16 +177,6 @@ def chi_square_3(x: float) -> float:
             total += term
         return math.sqrt(2.0 / math.pi) * x**1.5 * math.exp(-x / 2.0) * total / 3.0
     return math.erf(math.sqrt(x / 2.0)) - math.sqrt(2.0 * x / math.pi) * math.exp(-x / 2.0)
-
-
-def _score(readings: list[np.ndarray], sigma: float, eta: float, covariance: str) -> float:
-    """Signed Mahalanobis distance of the averaged measurement beyond the ball of radius eta.
-
-    With equal noise in the three axes the candidate of eq. 21 is the nearest point of the ball in
-    every metric, so the distance of eq. 20 is (|e| - eta) / (standard deviation of the average).
-    """
-    count = len(readings)
-    return (_magnitude(sum(readings) / count) - eta) * count ** _POWERS[covariance] / sigma
 
 
 def _magnitude(vector: np.ndarray) -> float:

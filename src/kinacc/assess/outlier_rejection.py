@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.assessor import Assessment
-from kinacc.assess.gamma import gamma99
 from kinacc.assess.world import World
+from kinacc.gamma import gamma99
 
 
 def normal_limit(magnitudes: np.ndarray) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,7 +62,11 @@ class World:
 
     def magnitudes_mm(self, measurements: int) -> np.ndarray:
         """Magnitudes of the first readings that fit the budget, in visiting order."""
-        return np.sqrt(np.sum(self.readings_mm[:measurements, 0] ** 2, axis=1))
+        return self._first_magnitudes_mm[:measurements]
+
+    @cached_property
+    def _first_magnitudes_mm(self) -> np.ndarray:
+        return np.sqrt(np.sum(self.readings_mm[:, 0] ** 2, axis=1))
 
     def complete(self) -> World:
         """The same world with every reading computed."""
