@@ -9,7 +9,7 @@
 .PHONY: reproduce test lock clean distclean
 CORES = 2
 PY = .venv/bin/python
-PIP = $(PY) -m pip install --quiet --disable-pip-version-check
+PIP = $(PY) -m pip install -qq --disable-pip-version-check
 
 # More BLAS threads change the last bits of a sum, and two jobs already fill two cores.
 export OPENBLAS_NUM_THREADS = 1

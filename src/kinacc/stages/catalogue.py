@@ -54,7 +54,7 @@ STAGES: dict[str, Stage] = {
             "reading or synthesising the measured poses",
             (),
             ("measurements",),
-            ("robot", "measurements"),
+            ("seed", "robot", "measurements"),
             files=("robot", "measurements.file.path"),
         ),
         Stage(
@@ -94,7 +94,7 @@ STAGES: dict[str, Stage] = {
         Stage(
             "accuracy_map",
             "mapping the largest error over the slices of the evaluation space (Fig. 3)",
-            ("vec_model", "dh_model"),
+            _MODELS,
             ("accuracy_map",),
             ("robot", "evaluation", "map"),
             files=("robot",),
@@ -112,13 +112,13 @@ STAGES: dict[str, Stage] = {
             "simulating the assessors under noise",
             ("assessment_points",),
             ("study_chunk",),
-            ("study",),
+            ("seed", "study"),
             scattered=True,
         ),
         Stage(
             "study",
             "gathering the simulations and summing them up (Fig. 4)",
-            ("study_chunk",),
+            ("study_chunk", "assessment_points"),
             ("study", "study_summary", "readings"),
             ("study",),
         ),
@@ -127,7 +127,7 @@ STAGES: dict[str, Stage] = {
             "following single model invalidations step by step (Figs. 5 and 6)",
             ("assessment_points",),
             ("histories",),
-            ("study", "histories"),
+            ("seed", "study", "histories"),
         ),
         Stage("fig1", "drawing Fig. 1, the one-dimensional example", (), ("fig1",)),
         Stage(
@@ -179,7 +179,7 @@ STAGES: dict[str, Stage] = {
                 "histories",
             ),
             ("claims",),
-            ("study.alpha",),
+            ("robot",),
             optional=("accuracy_map", "robustness"),
         ),
     )
