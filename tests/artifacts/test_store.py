@@ -65,7 +65,8 @@ def test_null_is_nan_for_numbers_and_none_for_text(tmp_path):
     assert raw["fold"].to_pylist() == [None, 1]
     assert raw["gamma99"].to_pylist() == [0.9, None]
     back = store.read(path)
-    assert np.isnan(back["fold"][0]) and back["fold"][1] == 1
+    assert np.isnan(back["fold"][0])
+    assert back["fold"][1] == 1
     assert np.isnan(back["gamma99"][1])
     assert list(back["unit"]) == ["mm", "mrad"]
 
@@ -77,7 +78,8 @@ def test_metadata_is_exactly_the_provenance_and_fields_carry_units(tmp_path):
     assert sorted(schema.metadata) == sorted(key.encode() for key in PROVENANCE_KEYS)
     assert store.read_metadata(path)["seed"] == "7"
     for field in schema:
-        assert set(field.metadata) == {b"unit", b"meaning"} and field.metadata[b"meaning"]
+        assert set(field.metadata) == {b"unit", b"meaning"}
+        assert field.metadata[b"meaning"]
 
 
 def test_same_columns_give_the_same_bytes(tmp_path):
@@ -137,9 +139,14 @@ def test_all_tables_or_none(tmp_path):
 
 def test_a_failure_while_writing_leaves_nothing_behind(tmp_path):
     paths = [tmp_path / "fig1.svg", tmp_path / "fig1.pdf"]
-    with pytest.raises(RuntimeError), store.replacing(paths) as temporary:
-        temporary[0].write_text("half")
-        raise RuntimeError("power cut")
+
+    def stopped_half_way():
+        with store.replacing(paths) as temporary:
+            temporary[0].write_text("half")
+            raise RuntimeError("power cut")
+
+    with pytest.raises(RuntimeError, match="power cut"):
+        stopped_half_way()
     assert not list(tmp_path.iterdir())
 
 

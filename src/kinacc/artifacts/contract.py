@@ -10,8 +10,6 @@ A value that does not apply is null, never zero.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
 
 from kinacc.artifacts.allowed import (
     ASSESSOR_PATTERN,
@@ -30,135 +28,18 @@ from kinacc.artifacts.allowed import (
     UNITS_OF_RESIDUALS,
     VERDICTS,
 )
+from kinacc.artifacts.columns import Artefact, Column, real, text, whole
 
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed")
 JOINTS_MIN, JOINTS_MAX = 4, 7
 
 
-@dataclass(frozen=True)
-class Column:
-    """One column of a table.
-
-    ``kind`` is float, int, int8 or text. ``unit`` is empty for text and names, "1" for pure
-    numbers. ``low`` and ``high`` bound what is physically possible, both included; ``choices`` or
-    ``pattern`` bound what a text may say.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    meaning: str
-    nullable: bool = False
-    low: float | None = None
-    high: float | None = None
-    choices: tuple[str | int, ...] = ()
-    pattern: str = ""
-
-    @property
-    def per_joint(self) -> bool:
-        """Whether the column stands for one column per joint."""
-        return self.name.endswith("*")
-
-    def numbered(self, joint: int) -> Column:
-        """The column of one joint (1-based)."""
-        meaning = self.meaning.replace("each joint", f"joint {joint}")
-        return Column(
-            self.name[:-1] + str(joint),
-            self.kind,
-            self.unit,
-            meaning,
-            self.nullable,
-            self.low,
-            self.high,
-            self.choices,
-            self.pattern,
-        )
-
-    @property
-    def limits(self) -> str:
-        """What the column may hold, in words."""
-        parts = []
-        if self.choices:
-            parts.append(", ".join(str(choice) for choice in self.choices))
-        if self.pattern:
-            parts.append(f"text like {self.pattern}")
-        if self.low is not None and self.high is not None:
-            parts.append(f"{self.low:g} to {self.high:g}")
-        elif self.low is not None:
-            parts.append(f"at least {self.low:g}")
-        elif self.high is not None:
-            parts.append(f"at most {self.high:g}")
-        if self.nullable:
-            parts.append("or null")
-        return " ".join(parts)
-
-
-@dataclass(frozen=True)
-class Artefact:
-    """One table: its columns in order, and the columns that together name a row only once."""
-
-    name: str
-    meaning: str
-    columns: tuple[Column, ...]
-    key: tuple[str, ...]
-
-    @property
-    def file_name(self) -> str:
-        """Name of the table's file inside a data set's folder."""
-        return f"{self.name}.parquet"
-
-    def for_joints(self, joints: int) -> tuple[Column, ...]:
-        """The columns of an arm with this many joints, in file order."""
-        expanded: list[Column] = []
-        block: list[Column] = []
-        for column in (*self.columns, None):
-            if column is not None and column.per_joint:
-                block.append(column)
-                continue
-            expanded += [each.numbered(j + 1) for each in block for j in range(joints)]
-            block = []
-            if column is not None:
-                expanded.append(column)
-        return tuple(expanded)
-
-    @property
-    def has_joints(self) -> bool:
-        """Whether the number of columns depends on the arm."""
-        return any(column.per_joint for column in self.columns)
-
-
-def joint_count(artefact: Artefact, names: Iterable[str]) -> int:
-    """Number of joints a table's column names speak of; 0 where the table has no joint columns.
-
-    Counts the first per-joint column (``q1``, ``q2``, ...) up to the first gap.
-    """
-    starred = next((column for column in artefact.columns if column.per_joint), None)
-    if starred is None:
-        return 0
-    present, joints = set(names), 0
-    while f"{starred.name[:-1]}{joints + 1}" in present:
-        joints += 1
-    return joints
-
-
-def _real(name: str, unit: str, meaning: str, low=None, high=None, nullable=False) -> Column:
-    return Column(name, "float", unit, meaning, nullable, low, high)
-
-
-def _whole(name: str, meaning: str, low=0, high=None, nullable=False, choices=()) -> Column:
-    return Column(name, "int", "1", meaning, nullable, low, high, choices)
-
-
-def _text(name: str, meaning: str, choices=(), pattern="", nullable=False) -> Column:
-    return Column(name, "text", "", meaning, nullable, None, None, tuple(choices), pattern)
-
-
 def _length(name: str, meaning: str, limit: float, nullable=False) -> Column:
-    return _real(name, "mm", meaning, -limit, limit, nullable)
+    return real(name, "mm", meaning, -limit, limit, nullable)
 
 
 def _magnitude(name: str, unit: str, meaning: str, high: float, nullable=False) -> Column:
-    return _real(name, unit, meaning, 0.0, high, nullable)
+    return real(name, unit, meaning, 0.0, high, nullable)
 
 
 _REACH_MM = 1.0e5  # no laser tracker sees further than 100 m
@@ -167,7 +48,7 @@ _ERROR_MRAD = 4.0e3  # beyond half a turn, pi rad, an orientation error has no m
 _TURN_RAD = 4.0 * math.pi
 
 _JOINTS = (
-    _real("q*", "rad", "reported position of each joint", -_TURN_RAD, _TURN_RAD),
+    real("q*", "rad", "reported position of each joint", -_TURN_RAD, _TURN_RAD),
     Column(
         "s*",
         "int8",
@@ -186,7 +67,7 @@ def _position(of: str, nullable: bool = False) -> tuple[Column, ...]:
 
 def _quaternion(of: str, nullable: bool = False) -> tuple[Column, ...]:
     return tuple(
-        _real(f"q{part}", "1", f"{part} of the unit quaternion of {of}, w >= 0", -1, 1, nullable)
+        real(f"q{part}", "1", f"{part} of the unit quaternion of {of}, w >= 0", -1, 1, nullable)
         for part in "wxyz"
     )
 
@@ -206,11 +87,11 @@ _DH_PARAMETERS = (
     ("beta_rad", "rad", "Hayati twist beta about y, 0 where the joint has none", _TURN_RAD),
 )
 _DH = tuple(
-    _real(name, unit, f"{meaning} (nominal)", -limit, limit)
+    real(name, unit, f"{meaning} (nominal)", -limit, limit)
     for name, unit, meaning, limit in _DH_PARAMETERS
 )
 _DH_FITTED = tuple(
-    _real(name, unit, meaning, -limit, limit) for name, unit, meaning, limit in _DH_PARAMETERS
+    real(name, unit, meaning, -limit, limit) for name, unit, meaning, limit in _DH_PARAMETERS
 )
 _DH_STD = tuple(
     _magnitude(
@@ -220,8 +101,8 @@ _DH_STD = tuple(
 )
 
 _FRAME_COLUMNS = (
-    _text("model", "model the frame belongs to", MODELS),
-    _text(
+    text("model", "model the frame belongs to", MODELS),
+    text(
         "frame",
         "base (robot base in the instrument's frame), tool (tool centre point in the flange frame) "
         "or the name of a target (in the flange frame)",
@@ -231,48 +112,48 @@ _FRAME_COLUMNS = (
 )
 
 _FIT_COLUMNS = (
-    _text("quantity", "what the row states, e.g. rank, singular_value", pattern=IDENTIFIER_PATTERN),
-    _whole(
+    text("quantity", "what the row states, e.g. rank, singular_value", pattern=IDENTIFIER_PATTERN),
+    whole(
         "number",
         "running number within the quantity, from 1; null for a single value",
         1,
         None,
         True,
     ),
-    _text("parameter", "parameter the row speaks of; null where none", nullable=True),
-    _real("value", "see unit", "the value", nullable=True),
-    _text("unit", "unit of the value; 1 for a pure number"),
+    text("parameter", "parameter the row speaks of; null where none", nullable=True),
+    real("value", "see unit", "the value", nullable=True),
+    text("unit", "unit of the value; 1 for a pure number"),
 )
 
 _SWITCHES = (
-    _text(
+    text(
         "outlier_rule",
         "rule for the cut c of eq. 14; null where it does not apply",
         OUTLIER_RULES,
         nullable=True,
     ),
-    _text(
+    text(
         "distance",
         "what eq. 18 integrates up to; null where it does not apply",
         DISTANCES,
         nullable=True,
     ),
-    _text(
+    text(
         "covariance", "divisor of eq. 24; null where it does not apply", COVARIANCES, nullable=True
     ),
-    _text(
+    text(
         "search",
         "how the smallest bound not rejected is searched; null where it does not apply",
         SEARCHES,
         nullable=True,
     ),
 )
-_ASSESSOR = _text("assessor", "method of assessment", pattern=ASSESSOR_PATTERN)
+_ASSESSOR = text("assessor", "method of assessment", pattern=ASSESSOR_PATTERN)
 _NOISE = _magnitude("noise_mm", "mm", "standard deviation of the noise per axis", 10.0)
 _ASSESSMENT = (
     _magnitude("assessed_mm", "mm", "assessed accuracy", _ERROR_MM),
-    _whole("measurements", "measurements spent", 1),
-    _whole("points_visited", "distinct operating points measured", 1),
+    whole("measurements", "measurements spent", 1),
+    whole("points_visited", "distinct operating points measured", 1),
     _magnitude("lower_mm", "mm", "lower bound the assessor states", _ERROR_MM, True),
     _magnitude("upper_mm", "mm", "upper bound the assessor states", _ERROR_MM, True),
 )
@@ -287,14 +168,14 @@ MEASUREMENTS = Artefact(
     "measurements",
     "Measured poses, one row per reading of one target.",
     (
-        _whole("pose", "number of the joint configuration"),
+        whole("pose", "number of the joint configuration"),
         *_JOINTS,
-        _text("target", "name of the measured target"),
+        text("target", "name of the measured target"),
         *_position("the target in the instrument's frame"),
         *_quaternion("the target in the instrument's frame, null for position only", True),
-        _whole("repeat", "number of the reading at this configuration and target"),
-        _text("subset", "train (used by the delivered fits) or validation (held out)", SUBSETS),
-        _whole("fold", "fold in which the row is held out; null without folds", nullable=True),
+        whole("repeat", "number of the reading at this configuration and target"),
+        text("subset", "train (used by the delivered fits) or validation (held out)", SUBSETS),
+        whole("fold", "fold in which the row is held out; null without folds", nullable=True),
     ),
     ("pose", "target", "repeat"),
 )
@@ -302,24 +183,24 @@ VEC_MODEL = Artefact(
     "vec_model",
     "Volumetric error compensation model: Chebyshev coefficients over the nominal DH.",
     (
-        _whole("joint", "joint number, from 1", 1, JOINTS_MAX),
-        _text("error", "element of the error matrix of eq. 6", ERRORS),
-        _whole(
+        whole("joint", "joint number, from 1", 1, JOINTS_MAX),
+        text("error", "element of the error matrix of eq. 6", ERRORS),
+        whole(
             "direction",
             "0 = both directions; -1 or +1 = offset added when the joint travels that way",
             None,
             None,
             choices=(-1, 0, 1),
         ),
-        _whole("order", "order of the Chebyshev polynomial, first kind", 0, 40),
-        _real(
+        whole("order", "order of the Chebyshev polynomial, first kind", 0, 40),
+        real(
             "coefficient", "mm for delta, rad for eps", "coefficient of the polynomial", -1e3, 1e3
         ),
         _magnitude(
             "std", "mm for delta, rad for eps", "standard deviation of the coefficient", 1e4, True
         ),
-        _real("q_min_rad", "rad", "joint position mapped to -1", -_TURN_RAD, _TURN_RAD),
-        _real("q_max_rad", "rad", "joint position mapped to +1", -_TURN_RAD, _TURN_RAD),
+        real("q_min_rad", "rad", "joint position mapped to -1", -_TURN_RAD, _TURN_RAD),
+        real("q_max_rad", "rad", "joint position mapped to +1", -_TURN_RAD, _TURN_RAD),
         *_DH,
     ),
     ("joint", "error", "direction", "order"),
@@ -327,7 +208,7 @@ VEC_MODEL = Artefact(
 DH_MODEL = Artefact(
     "dh_model",
     "Fitted DH model, T = Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint.",
-    (_whole("joint", "joint number, from 1", 1, JOINTS_MAX), *_DH_FITTED, *_DH_STD),
+    (whole("joint", "joint number, from 1", 1, JOINTS_MAX), *_DH_FITTED, *_DH_STD),
     ("joint",),
 )
 VEC_FRAMES = Artefact(
@@ -350,21 +231,21 @@ POSE_ERRORS = Artefact(
     "pose_errors",
     "Error vectors pose by pose, of the delivered models and of the cross-validated ones.",
     (
-        _text("comparison", "what is compared with what", COMPARISONS),
-        _text(
+        text("comparison", "what is compared with what", COMPARISONS),
+        text(
             "estimate",
             "train (delivered models) or cross_validated (the row was held out)",
             ESTIMATES,
         ),
-        _whole("row", "row of measurements.parquet, from 0"),
-        _whole("pose", "number of the joint configuration"),
-        _text("target", "name of the measured target"),
-        _whole("repeat", "number of the reading"),
-        _text("subset", "train or validation, as in measurements", SUBSETS),
-        _whole("fold", "fold in which the row is held out; null without folds", nullable=True),
+        whole("row", "row of measurements.parquet, from 0"),
+        whole("pose", "number of the joint configuration"),
+        text("target", "name of the measured target"),
+        whole("repeat", "number of the reading"),
+        text("subset", "train or validation, as in measurements", SUBSETS),
+        whole("fold", "fold in which the row is held out; null without folds", nullable=True),
         *_error_vector("the position error"),
         *(
-            _real(
+            real(
                 f"r{axis}_mrad",
                 "mrad",
                 f"{axis} of the orientation error as a rotation vector, null for position only",
@@ -381,12 +262,12 @@ RESIDUALS = Artefact(
     "residuals",
     "Residual statistics: Table I (vec_vs_measured), Table III (dh_vs_vec) and the like.",
     (
-        _text("comparison", "what is compared with what", COMPARISONS),
-        _text("subset", "train or validation", SUBSETS),
-        _whole("fold", "held-out fold; null = pooled over folds, or no folds", nullable=True),
-        _text("quantity", "position or orientation", QUANTITIES),
-        _text("unit", "unit of the statistics", UNITS_OF_RESIDUALS),
-        _whole("n", "number of target points", 1),
+        text("comparison", "what is compared with what", COMPARISONS),
+        text("subset", "train or validation", SUBSETS),
+        whole("fold", "held-out fold; null = pooled over folds, or no folds", nullable=True),
+        text("quantity", "position or orientation", QUANTITIES),
+        text("unit", "unit of the statistics", UNITS_OF_RESIDUALS),
+        whole("n", "number of target points", 1),
         _magnitude("mean", "see unit", "mean magnitude", 1e4),
         _magnitude("max", "see unit", "largest magnitude", 1e4),
         _magnitude("rms", "see unit", "root mean square of the magnitude", 1e4),
@@ -400,7 +281,7 @@ ACCURACY_MAP = Artefact(
     "accuracy_map",
     "Largest error per cell of the evaluation space over orientations and branches (Fig. 3).",
     (
-        _real("slice_deg", "deg", "angle of the radial slice", -360, 360),
+        real("slice_deg", "deg", "angle of the radial slice", -360, 360),
         _magnitude("radius_mm", "mm", "distance from the robot's first axis", 2.0e4),
         _length("height_mm", "height in the robot base frame", 2.0e4),
         _magnitude(
@@ -413,19 +294,19 @@ ACCURACY_MAP = Artefact(
             _ERROR_MRAD,
             True,
         ),
-        _text(
+        text(
             "worst_branch",
             "orientation, inverse branch of the largest position error, null if unreachable",
             nullable=True,
         ),
-        _text(
+        text(
             "orientation_worst_branch",
             "orientation, inverse branch of the largest orientation error, null if unreachable",
             nullable=True,
         ),
-        _whole("solutions", "orientation x branch combinations reached, 0 if unreachable"),
-        _whole("wanted", "orientation x branch combinations tried", 1),
-        _whole("extrapolating", "combinations left out: reached, but outside the VEC's range"),
+        whole("solutions", "orientation x branch combinations reached, 0 if unreachable"),
+        whole("wanted", "orientation x branch combinations tried", 1),
+        whole("extrapolating", "combinations left out: reached, but outside the VEC's range"),
     ),
     ("slice_deg", "radius_mm", "height_mm"),
 )
@@ -433,7 +314,7 @@ ASSESSMENT_POINTS = Artefact(
     "assessment_points",
     "Operating points of the study with their true errors.",
     (
-        _whole("point", "number of the operating point, from 0"),
+        whole("point", "number of the operating point, from 0"),
         *_JOINTS,
         *_error_vector("VEC minus DH position of the tool (measured minus DH on measured data)"),
         _magnitude("true_error_mm", "mm", "magnitude of the error vector", _ERROR_MM),
@@ -445,7 +326,7 @@ STUDY_CHUNK = Artefact(
     "One part of the Monte Carlo study: every assessor under every reading.",
     (
         _NOISE,
-        _whole("repetition", "number of the simulation, from 0"),
+        whole("repetition", "number of the simulation, from 0"),
         _ASSESSOR,
         *_SWITCHES,
         *_ASSESSMENT,
@@ -457,7 +338,7 @@ STUDY = Artefact(
     "Monte Carlo study of the assessors, default reading.",
     (
         _NOISE,
-        _whole("repetition", "number of the simulation, from 0"),
+        whole("repetition", "number of the simulation, from 0"),
         _ASSESSOR,
         *_ASSESSMENT,
     ),
@@ -471,7 +352,7 @@ STUDY_SUMMARY = Artefact(
         _NOISE,
         *_SUMMARY,
         _magnitude("rmse_mm", "mm", "root mean square of assessed minus true accuracy", _ERROR_MM),
-        _whole("repetitions", "number of simulations", 1),
+        whole("repetitions", "number of simulations", 1),
     ),
     ("assessor", "noise_mm"),
 )
@@ -485,14 +366,17 @@ HISTORIES = Artefact(
     "histories",
     "Model invalidation, iteration by iteration (Figs. 5 and 6).",
     (
-        _text("example", "which history: rejected (Fig. 5), not_rejected (Fig. 6), ...", EXAMPLES),
+        text("example", "which history: rejected (Fig. 5), not_rejected (Fig. 6), ...", EXAMPLES),
+        whole("simulation", "number of the simulation shown, the repetition of the study"),
+        text("rule", "what the simulation was chosen by"),
+        whole("rule_met", "1 if the example's rule is met, 0 if the nearest thing is shown", 0, 1),
         _NOISE,
         _magnitude("alpha", "1", "threshold on the rejection probability", 1.0),
-        _text("distance", "what eq. 18 integrates up to", DISTANCES),
-        _text("covariance", "divisor of eq. 24", COVARIANCES),
-        _whole("iteration", "number of the measurement, from 1", 1),
-        _whole("point", "operating point measured, as in assessment_points"),
-        _whole("repeat", "number of the measurement at this point, from 1", 1),
+        text("distance", "what eq. 18 integrates up to", DISTANCES),
+        text("covariance", "divisor of eq. 24", COVARIANCES),
+        whole("iteration", "number of the measurement, from 1", 1),
+        whole("point", "operating point measured, as in assessment_points"),
+        whole("repeat", "number of the measurement at this point, from 1", 1),
         _magnitude("eta_mm", "mm", "accuracy bound under test", _ERROR_MM),
         _magnitude("measured_mm", "mm", "magnitude of the single measured error", _ERROR_MM),
         _magnitude(
@@ -509,29 +393,29 @@ CLAIMS = Artefact(
     "claims",
     "The paper's numbers and sentences, each recomputed.",
     (
-        _text("claim", "identifier of the claim", pattern=IDENTIFIER_PATTERN),
-        _text("statement", "what the paper says"),
-        _text("statistic", "what was computed, in words"),
-        _text("evidence", "artefact it is computed from"),
-        _real(
+        text("claim", "identifier of the claim", pattern=IDENTIFIER_PATTERN),
+        text("statement", "what the paper says"),
+        text("statistic", "what was computed, in words"),
+        text("evidence", "artefact it is computed from"),
+        real(
             "paper",
             "see statement",
             "the paper's number, null where a sentence has none",
             nullable=True,
         ),
-        _real(
+        real(
             "reproduced",
             "see statement",
             "the reproduced number, null where there is none",
             nullable=True,
         ),
-        _real(
+        real(
             "tolerance",
             "see statement",
             "largest difference that agrees, null where there is none",
             nullable=True,
         ),
-        _text("verdict", "agrees, differs or not comparable", VERDICTS),
+        text("verdict", "agrees, differs or not comparable", VERDICTS),
         _magnitude(
             "share", "1", "share of further accepted draws of the arm for which it holds", 1.0, True
         ),
@@ -542,15 +426,15 @@ ROBUSTNESS = Artefact(
     "robustness",
     "Every claim on further accepted draws of the synthetic arm.",
     (
-        _whole("draw", "number of the accepted draw"),
-        _text("claim", "identifier of the claim", pattern=IDENTIFIER_PATTERN),
-        _real(
+        whole("draw", "number of the accepted draw"),
+        text("claim", "identifier of the claim", pattern=IDENTIFIER_PATTERN),
+        real(
             "reproduced",
             "see claims",
             "the reproduced number, null where there is none",
             nullable=True,
         ),
-        _text("verdict", "agrees, differs or not comparable", VERDICTS),
+        text("verdict", "agrees, differs or not comparable", VERDICTS),
     ),
     ("draw", "claim"),
 )

@@ -15,15 +15,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kinacc.artifacts.contract import (
-    ARTEFACTS,
-    JOINTS_MAX,
-    JOINTS_MIN,
-    PROVENANCE_KEYS,
-    Artefact,
-    Column,
-    joint_count,
-)
+from kinacc.artifacts.columns import Artefact, Column, joint_count
+from kinacc.artifacts.contract import ARTEFACTS, JOINTS_MAX, JOINTS_MIN, PROVENANCE_KEYS
 from kinacc.errors import InputError, Problem
 
 _ARROW_TYPES = {
@@ -201,19 +194,19 @@ def _to_arrow(place: str, column: Column, values) -> tuple[pa.Array | None, list
     null = np.isnan(numbers)
     problems = []
     if null.any() and not column.nullable:
-        problems.append(Problem(place, f"null or NaN in {_rows(null)}", "a number in every row"))
+        problems.append(Problem(place, f"null or NaN in {rows(null)}", "a number in every row"))
     if np.isinf(numbers).any():
-        problems.append(Problem(place, f"infinite in {_rows(np.isinf(numbers))}", "finite numbers"))
+        problems.append(Problem(place, f"infinite in {rows(np.isinf(numbers))}", "finite numbers"))
     if column.kind == "float":
         return (None if problems else pa.array(numbers, pa.float64(), mask=null)), problems
     whole = null | (numbers == np.round(numbers))
     if not whole.all():
         first = numbers[~whole][0]
-        problems.append(Problem(place, f"{first:g} in {_rows(~whole)}", "whole numbers"))
+        problems.append(Problem(place, f"{first:g} in {rows(~whole)}", "whole numbers"))
     low, high = (-128, 127) if column.kind == "int8" else (-(2.0**63), 2.0**63 - 1025)
     beyond = ~null & ((numbers < low) | (numbers > high))
     if beyond.any() and not problems:
-        problems.append(Problem(place, f"too large for {column.kind} in {_rows(beyond)}"))
+        problems.append(Problem(place, f"too large for {column.kind} in {rows(beyond)}"))
     if problems:
         return None, problems
     integers = exact if exact is not None else np.where(null, 0, numbers)
@@ -228,9 +221,9 @@ def _text_to_arrow(place: str, column: Column, values) -> tuple[pa.Array | None,
     null = np.array([value is None for value in texts], dtype=bool)
     if wrong.any():
         first = texts[int(np.argmax(wrong))]
-        return None, [Problem(place, f"{first!r} in {_rows(wrong)}", "text")]
+        return None, [Problem(place, f"{first!r} in {rows(wrong)}", "text")]
     if null.any() and not column.nullable:
-        return None, [Problem(place, f"null in {_rows(null)}", "text in every row")]
+        return None, [Problem(place, f"null in {rows(null)}", "text in every row")]
     return pa.array(texts, pa.string()), []
 
 
@@ -241,7 +234,7 @@ def _as_text(value):
     return None if isinstance(value, float) and np.isnan(value) else value
 
 
-def _rows(mask: np.ndarray) -> str:
+def rows(mask: np.ndarray) -> str:
     """The first rows (from 0) a mask marks, in words."""
     rows = np.flatnonzero(mask)
     shown = ", ".join(str(row) for row in rows[:5])

@@ -1,0 +1,114 @@
+"""What a column and a table are, and short ways to state columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    ``kind`` is float, int, int8 or text. ``unit`` is empty for text and names, "1" for pure
+    numbers. ``low`` and ``high`` bound what is physically possible, both included; ``choices`` or
+    ``pattern`` bound what a text may say.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    meaning: str
+    nullable: bool = False
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str | int, ...] = ()
+    pattern: str = ""
+
+    @property
+    def per_joint(self) -> bool:
+        """Whether the column stands for one column per joint."""
+        return self.name.endswith("*")
+
+    def numbered(self, joint: int) -> Column:
+        """The column of one joint (1-based)."""
+        meaning = self.meaning.replace("each joint", f"joint {joint}")
+        return replace(self, name=self.name[:-1] + str(joint), meaning=meaning)
+
+    @property
+    def limits(self) -> str:
+        """What the column may hold, in words."""
+        parts = []
+        if self.choices:
+            parts.append(", ".join(str(choice) for choice in self.choices))
+        if self.pattern:
+            parts.append(f"text like {self.pattern}")
+        if self.low is not None and self.high is not None:
+            parts.append(f"{self.low:g} to {self.high:g}")
+        elif self.low is not None:
+            parts.append(f"at least {self.low:g}")
+        elif self.high is not None:
+            parts.append(f"at most {self.high:g}")
+        if self.nullable:
+            parts.append("or null")
+        return " ".join(parts)
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """One table: its columns in order, and the columns that together name a row only once."""
+
+    name: str
+    meaning: str
+    columns: tuple[Column, ...]
+    key: tuple[str, ...]
+
+    @property
+    def file_name(self) -> str:
+        """Name of the table's file inside a data set's folder."""
+        return f"{self.name}.parquet"
+
+    def for_joints(self, joints: int) -> tuple[Column, ...]:
+        """The columns of an arm with this many joints, in file order."""
+        expanded: list[Column] = []
+        block: list[Column] = []
+        for column in (*self.columns, None):
+            if column is not None and column.per_joint:
+                block.append(column)
+                continue
+            expanded += [each.numbered(j + 1) for each in block for j in range(joints)]
+            block = []
+            if column is not None:
+                expanded.append(column)
+        return tuple(expanded)
+
+    @property
+    def has_joints(self) -> bool:
+        """Whether the number of columns depends on the arm."""
+        return any(column.per_joint for column in self.columns)
+
+
+def joint_count(artefact: Artefact, names: Iterable[str]) -> int:
+    """Number of joints a table's column names speak of; 0 where the table has no joint columns.
+
+    Counts the first per-joint column (``q1``, ``q2``, ...) up to the first gap.
+    """
+    starred = next((column for column in artefact.columns if column.per_joint), None)
+    if starred is None:
+        return 0
+    present, joints = set(names), 0
+    while f"{starred.name[:-1]}{joints + 1}" in present:
+        joints += 1
+    return joints
+
+
+def real(name: str, unit: str, meaning: str, low=None, high=None, nullable=False) -> Column:
+    return Column(name, "float", unit, meaning, nullable, low, high)
+
+
+def whole(name: str, meaning: str, low=0, high=None, nullable=False, choices=()) -> Column:
+    return Column(name, "int", "1", meaning, nullable, low, high, choices)
+
+
+def text(name: str, meaning: str, choices=(), pattern="", nullable=False) -> Column:
+    return Column(name, "text", "", meaning, nullable, None, None, tuple(choices), pattern)

@@ -1,0 +1,299 @@
+"""A small, complete and consistent results folder to plant faults in."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinacc import provenance
+from kinacc.artifacts import allowed, store
+from kinacc.stages.catalogue import STAGES
+from kinacc.stages.runner import Job, stage_provenance
+
+SEED = 7
+NOISE_MM = (0.05, 0.3)
+REPETITIONS = 3
+PICTURES = {
+    "svg": b"<?xml version='1.0'?>\n<svg></svg>\n",
+    "png": b"\x89PNG\r\n\x1a\n" + b"\x00" * 8 + b"IEND\xaeB`\x82",
+    "pdf": b"%PDF-1.4\n%%EOF\n",
+}
+
+
+class SmallResults:
+    """One data set's folder; ``tables`` are what is written, ``save`` writes one again."""
+
+    def __init__(self, folder: Path):
+        self.root, self.folder = folder, folder / "mh180"
+        self.tables = small_tables()
+        for name, stage in STAGES.items():
+            if stage.is_figure:
+                for kind, content in PICTURES.items():
+                    path = self.folder / "figures" / f"{name}.{kind}"
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(content)
+            elif not stage.on_request and all(each in self.tables for each in stage.outputs):
+                self.save(name)
+
+    def path(self, artefact: str) -> Path:
+        return self.folder / f"{artefact}.parquet"
+
+    def parts(self) -> list[Path]:
+        return [self.folder / "study_chunk" / f"{k}-of-2.parquet" for k in (1, 2)]
+
+    def marks(self, stage_name: str, without: tuple[str, ...] = ()) -> dict:
+        stage = STAGES[stage_name]
+        inputs = {}
+        for name in (*stage.inputs, *stage.optional):
+            if name == "study_chunk":
+                inputs[name] = [str(path) for path in self.parts()]
+            elif name not in without and self.path(name).exists():
+                inputs[name] = str(self.path(name))
+        return stage_provenance(Job(stage.module, inputs, {}, {}, SEED))
+
+    def save(self, stage_name: str, without: tuple[str, ...] = ()) -> None:
+        """Write the tables of a stage, made from what is there now."""
+        marks = self.marks(stage_name, without)
+        for name in STAGES[stage_name].outputs:
+            if name == "study_chunk":
+                for path in self.parts():
+                    store.write(path, name, self.tables[name], marks)
+            else:
+                store.write(self.path(name), name, self.tables[name], marks)
+
+    def change(self, stage_name: str, artefact: str, **columns) -> None:
+        """Change columns of one table and make everything that follows from it again."""
+        self.tables[artefact] = self.tables[artefact] | columns
+        names = [name for name, stage in STAGES.items() if not stage.is_figure]
+        for name in names[names.index(stage_name) :]:
+            if not STAGES[name].on_request:
+                self.save(name)
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch) -> SmallResults:
+    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "code")
+    return SmallResults(tmp_path / "results")
+
+
+def small_tables() -> dict[str, dict]:
+    tables = {**_measured(), **_models(), **_residuals(), **_map(), **_study()}
+    tables["claims"] = {
+        "claim": ["table_1.mean", "spread_even"],
+        "statement": ["The mean is 0.705 mm.", "The spread is even about the mean."],
+        "statistic": ["mean of the residuals", "ratio of both sides"],
+        "evidence": ["residuals.parquet", "study.parquet, study_summary.parquet"],
+        "paper": [0.705, np.nan],
+        "reproduced": [0.71, 1.2],
+        "tolerance": [0.07, np.nan],
+        "verdict": ["agrees", "differs"],
+        "share": [1.0, np.nan],
+    }
+    return tables
+
+
+def _quaternions(count: int) -> dict:
+    half = np.linspace(0.0, 1.0, count)
+    return {"qw": np.cos(half), "qx": np.sin(half), "qy": np.zeros(count), "qz": np.zeros(count)}
+
+
+def _joints(count: int) -> dict:
+    joints = {f"q{j}": np.linspace(-1.0, 1.0, count) / j for j in range(1, 7)}
+    return joints | {f"s{j}": np.zeros(count, dtype=int) for j in range(1, 7)}
+
+
+def _measured() -> dict:
+    count = 4
+    measurements = {
+        "pose": np.arange(count),
+        **_joints(count),
+        "target": ["tool"] * count,
+        **{f"{axis}_mm": np.arange(count) * 10.0 for axis in "xyz"},
+        **_quaternions(count),
+        "repeat": np.zeros(count),
+        "subset": ["validation", "train", "train", "train"],
+        "fold": [0, 1, 1, 1],
+    }
+    return {"measurements": measurements}
+
+
+def _dh(count: int) -> dict:
+    names = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad")
+    return {name: np.zeros(count) for name in names}
+
+
+def _frame_table(models: tuple[str, ...]) -> dict:
+    pairs = list(product(models, ("base", "tool")))
+    return {
+        "model": [model for model, _ in pairs],
+        "frame": [frame for _, frame in pairs],
+        **{f"{axis}_mm": np.zeros(len(pairs)) for axis in "xyz"},
+        "qw": np.ones(len(pairs)),
+        **{f"q{axis}": np.zeros(len(pairs)) for axis in "xyz"},
+    }
+
+
+def _models() -> dict:
+    terms = list(product(range(1, 7), allowed.ERRORS))
+    joints = np.arange(1, 7)
+    fit = {
+        "quantity": ["rank", "singular_value", "singular_value"],
+        "number": [None, 1, 2],
+        "parameter": [None, None, None],
+        "value": [2.0, 1.0, 0.5],
+        "unit": ["1", "1", "1"],
+    }
+    return {
+        "vec_model": {
+            "joint": [joint for joint, _ in terms],
+            "error": [error for _, error in terms],
+            "direction": np.zeros(len(terms)),
+            "order": np.zeros(len(terms)),
+            "coefficient": np.full(len(terms), 0.01),
+            "std": np.full(len(terms), 0.001),
+            "q_min_rad": np.full(len(terms), -1.0),
+            "q_max_rad": np.full(len(terms), 1.0),
+            **_dh(len(terms)),
+        },
+        "vec_frames": _frame_table(("vec",)),
+        "vec_fit": fit,
+        "dh_model": {
+            "joint": joints,
+            **_dh(6),
+            **{f"std_{name}": np.full(6, np.nan) for name in _dh(6)},
+        },
+        "frames": _frame_table(("vec", "dh", "nominal")),
+        "dh_fit": fit,
+    }
+
+
+def _residuals() -> dict:
+    kinds = list(product(allowed.COMPARISONS, allowed.SUBSETS, allowed.QUANTITIES))
+    residuals = {
+        "comparison": [kind[0] for kind in kinds],
+        "subset": [kind[1] for kind in kinds],
+        "fold": [None] * len(kinds),
+        "quantity": [kind[2] for kind in kinds],
+        "unit": ["mm" if kind[2] == "position" else "mrad" for kind in kinds],
+        "n": [3] * len(kinds),
+        **{name: np.full(len(kinds), value) for name, value in (("mean", 0.4), ("max", 0.8))},
+        **{name: np.full(len(kinds), value) for name, value in (("rms", 0.5), ("gamma99", 0.9))},
+    }
+    errors = {
+        "comparison": ["dh_vs_vec"] * 4,
+        "estimate": ["train"] * 4,
+        "row": np.arange(4),
+        "pose": np.arange(4),
+        "target": ["tool"] * 4,
+        "repeat": np.zeros(4),
+        "subset": ["validation", "train", "train", "train"],
+        "fold": [0, 1, 1, 1],
+        **{f"e{axis}_mm": np.full(4, 0.1) for axis in "xyz"},
+        **{f"r{axis}_mrad": np.full(4, np.nan) for axis in "xyz"},
+    }
+    return {"residuals": residuals, "pose_errors": errors}
+
+
+def _map() -> dict:
+    return {
+        "accuracy_map": {
+            "slice_deg": [0.0, 0.0],
+            "radius_mm": [1200.0, 1225.0],
+            "height_mm": [0.0, 0.0],
+            "position_max_mm": [0.5, None],
+            "orientation_max_mrad": [1.5, None],
+            "worst_branch": ["X+ Y- Z0, front-up-flip", None],
+            "orientation_worst_branch": ["X+ Y- Z0, front-up-flip", None],
+            "solutions": [18, 0],
+            "wanted": [18, 18],
+            "extrapolating": [0, 0],
+        }
+    }
+
+
+def _study() -> dict:
+    error = np.array([0.1, 0.2, 0.3])
+    points = {
+        "point": np.arange(3),
+        **_joints(3),
+        "ex_mm": error,
+        "ey_mm": np.zeros(3),
+        "ez_mm": np.zeros(3),
+        "true_error_mm": error,
+    }
+    runs = list(product(NOISE_MM, range(REPETITIONS), allowed.ASSESSORS))
+    study = {
+        "noise_mm": [run[0] for run in runs],
+        "repetition": [run[1] for run in runs],
+        "assessor": [run[2] for run in runs],
+        "assessed_mm": 0.3 + 0.01 * np.arange(len(runs)),
+        "measurements": [3] * len(runs),
+        "points_visited": [3] * len(runs),
+        "lower_mm": [None] * len(runs),
+        "upper_mm": [None] * len(runs),
+    }
+    switches = {name: [None] * len(runs) for name in _SWITCHES}
+    cells = list(product(allowed.ASSESSORS, NOISE_MM))
+    values = [
+        study["assessed_mm"][[run[2] == assessor and run[0] == noise for run in runs]]
+        for assessor, noise in cells
+    ]
+    summary = {
+        "assessor": [cell[0] for cell in cells],
+        "noise_mm": [cell[1] for cell in cells],
+        "mean_mm": [each.mean() for each in values],
+        "min_mm": [each.min() for each in values],
+        "max_mm": [each.max() for each in values],
+        "bias_mm": [each.mean() - 0.3 for each in values],
+        "rmse_mm": [np.sqrt(np.mean((each - 0.3) ** 2)) for each in values],
+        "repetitions": [REPETITIONS] * len(cells),
+    }
+    return {
+        "assessment_points": points,
+        "study_chunk": study | switches,
+        "study": study,
+        "study_summary": summary,
+        "readings": _readings(),
+        "histories": _histories(),
+    }
+
+
+_SWITCHES = ("outlier_rule", "distance", "covariance", "search")
+
+
+def _readings() -> dict:
+    rows = [("outlier_rejection", rule, None, None, None) for rule in allowed.OUTLIER_RULES]
+    rows += [
+        ("model_invalidation", None, *switches)
+        for switches in product(allowed.DISTANCES, allowed.COVARIANCES, allowed.SEARCHES)
+    ]
+    rows = [(*row, noise) for noise in NOISE_MM for row in rows]
+    names = ("assessor", *_SWITCHES, "noise_mm")
+    table = {name: [row[i] for row in rows] for i, name in enumerate(names)}
+    numbers = {"mean_mm": 0.3, "min_mm": 0.2, "max_mm": 0.4, "bias_mm": 0.0}
+    return table | {name: np.full(len(rows), value) for name, value in numbers.items()}
+
+
+def _histories() -> dict:
+    steps = [(0, 1), (1, 1), (1, 2)]
+    rows = [(example, i, *step) for example in ("a", "b") for i, step in enumerate(steps)]
+    error = np.array([0.1, 0.2])
+    count = len(rows)
+    return {
+        "example": [row[0] for row in rows],
+        "noise_mm": np.full(count, 0.3),
+        "alpha": np.full(count, 0.6),
+        "distance": ["squared"] * count,
+        "covariance": ["r"] * count,
+        "iteration": [row[1] + 1 for row in rows],
+        "point": [row[2] for row in rows],
+        "repeat": [row[3] for row in rows],
+        "eta_mm": np.full(count, 0.25),
+        "measured_mm": np.full(count, 0.4),
+        "averaged_mm": np.full(count, 0.4),
+        "true_mm": [error[row[2]] for row in rows],
+        "rejection_probability": np.full(count, 0.5),
+    }

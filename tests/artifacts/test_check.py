@@ -1,0 +1,301 @@
+"""The check of a results folder: silent on a good one, and every planted fault found and named."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from kinacc.artifacts import check
+from kinacc.artifacts.contract import ARTEFACTS
+
+
+def problems(results) -> list[str]:
+    report = check.check_results(results.root)
+    assert report.ok == (report.exit_code == 0)
+    assert report.ok == (not any(each.problems for each in report.datasets))
+    return [str(problem) for each in report.datasets for problem in each.problems]
+
+
+def the_one(found: list[str], *words: str) -> None:
+    matching = [text for text in found if all(word in text for word in words)]
+    assert len(matching) == 1, f"{words} in {len(matching)} of {found}"
+
+
+def rewrite(path, change) -> None:
+    """Write a table's file again with another Arrow table, past the contract."""
+    pq.write_table(change(pq.read_table(path)), path)
+
+
+def put(results, artefact, column, row, value):
+    """One table's column with one value changed."""
+    values = list(results.tables[artefact][column])
+    values[row] = value
+    return {column: values}
+
+
+def test_a_good_folder_has_no_problem(results):
+    report = check.check_results(results.root)
+    assert report.ok, str(report)
+    assert report.datasets[0].notes == ()
+    tables = sum(name in str(report.datasets[0].checked) for name in ARTEFACTS)
+    assert tables == len(ARTEFACTS) - 1  # robustness is made on request
+
+
+def test_the_report_is_readable_by_people_and_machines(results, capsys):
+    (results.folder / "figures" / "fig4.png").unlink()
+    assert check.main(str(results.root), as_json=True) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["ok"] is False
+    assert told["datasets"][0]["name"] == "mh180"
+    assert told["datasets"][0]["problems"][0]["where"].endswith("fig4.png")
+    assert check.main(str(results.root)) == 1
+    assert "fig4.png: no such file" in capsys.readouterr().out
+
+
+def test_a_folder_that_is_none(tmp_path):
+    assert "no such folder" in str(check.check_results(tmp_path / "absent"))
+    assert "holds no data set" in str(check.check_results(tmp_path))
+    assert not check.check_results(tmp_path).ok
+
+
+@pytest.mark.parametrize(
+    "artefact", [name for name in ARTEFACTS if name not in ("robustness", "study_chunk")]
+)
+def test_an_absent_table_is_named(results, artefact):
+    results.path(artefact).unlink()
+    the_one(problems(results), f"{artefact}.parquet: missing")
+
+
+def test_a_map_may_be_left_out_where_the_claims_were_made_without_it(results):
+    results.path("accuracy_map").unlink()
+    results.save("claims")
+    for kind in check.FORMATS:
+        (results.folder / "figures" / f"fig3.{kind}").unlink()
+    report = check.check_results(results.root)
+    assert report.ok, str(report)
+    assert any("accuracy_map left out" in note for note in report.datasets[0].notes)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"", "is empty"), (b"GIF89a", "is not a png file"), (b"\x89PNG\r\n\x1a\n12", "is cut off")],
+)
+def test_a_picture_that_is_none(results, content, words):
+    (results.folder / "figures" / "fig1.png").write_bytes(content)
+    the_one(problems(results), "fig1.png", words)
+
+
+def test_a_file_that_is_no_parquet(results):
+    results.path("study").write_bytes(b"half a table")
+    the_one(problems(results), "study.parquet", "not a readable Parquet file")
+
+
+def test_a_missing_column(results):
+    rewrite(results.path("claims"), lambda table: table.drop_columns(["share"]))
+    the_one(problems(results), "claims.parquet, column share", "missing")
+
+
+def test_an_unknown_column(results):
+    rewrite(
+        results.path("claims"),
+        lambda table: table.append_column("mood", pa.array(["good"] * len(table))),
+    )
+    the_one(problems(results), "claims.parquet, column mood", "not in the contract")
+
+
+def test_a_wrong_type(results):
+    def change(table):
+        index = table.schema.get_field_index("share")
+        field = table.schema.field("share")
+        return table.set_column(
+            index,
+            pa.field("share", pa.float32(), True, field.metadata),
+            table["share"].cast("float32"),
+        )
+
+    rewrite(results.path("claims"), change)
+    the_one(problems(results), "claims.parquet, column share", "float", "double")
+
+
+@pytest.mark.parametrize(
+    ("metadata", "words"),
+    [
+        ({b"unit": b"um"}, "unit is 'um'"),
+        (None, "unit is nothing"),
+    ],
+)
+def test_a_wrong_or_absent_unit(results, metadata, words):
+    def change(table):
+        index = table.schema.get_field_index("noise_mm")
+        field = table.schema.field("noise_mm")
+        kept = None if metadata is None else field.metadata | metadata
+        schema = table.schema.set(index, field.with_metadata(kept))
+        return table.cast(schema)
+
+    rewrite(results.path("readings"), change)
+    the_one(problems(results), "readings.parquet, column noise_mm", words)
+
+
+@pytest.mark.parametrize(
+    "key", ["kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed"]
+)
+def test_a_missing_provenance_key(results, key):
+    def change(table):
+        kept = {name: each for name, each in table.schema.metadata.items() if name != key.encode()}
+        return table.replace_schema_metadata(kept)
+
+    rewrite(results.path("claims"), change)
+    the_one(problems(results), "claims.parquet", f"lacks {key}")
+
+
+def test_provenance_with_more_than_its_keys(results):
+    rewrite(
+        results.path("claims"),
+        lambda table: table.replace_schema_metadata(table.schema.metadata | {b"time": b"now"}),
+    )
+    the_one(problems(results), "claims.parquet", "schema metadata has 'time'")
+
+
+LIMITS = [
+    ("measurements", "measurements", "q2", 1, 100.0, "column q2"),
+    ("measurements", "measurements", "s1", 1, 2, "column s1"),
+    ("measurements", "measurements", "x_mm", 1, 1e9, "1e+09 mm in row 1"),
+    ("vec", "vec_model", "error", 0, "delta_w", "'delta_w' in row 0"),
+    ("residuals", "residuals", "mean", 0, -0.1, "-0.1 see unit in row 0"),
+    ("study_chunk", "study_chunk", "noise_mm", 0, 300.0, "300 mm in row 0"),
+    ("histories", "histories", "rejection_probability", 2, 1.5, "1.5 in row 2"),
+    ("claims", "claims", "verdict", 0, "maybe", "'maybe' in row 0"),
+    ("claims", "claims", "claim", 0, "a claim!", "'a claim!' in row 0"),
+    ("claims", "claims", "statement", 0, " ", "column statement"),
+    ("claims", "claims", "share", 0, 1.2, "1.2 in row 0"),
+]
+
+
+@pytest.mark.parametrize(("stage", "artefact", "column", "row", "value", "words"), LIMITS)
+def test_values_out_of_their_limits(results, stage, artefact, column, row, value, words):
+    results.change(stage, artefact, **put(results, artefact, column, row, value))
+    found = problems(results)
+    assert any(f"{artefact}" in text and words in text for text in found), found
+
+
+def test_a_key_used_twice(results):
+    results.change("claims", "claims", claim=["twice", "twice"])
+    the_one(problems(results), "claims.parquet", "claim twice in rows 0, 1", "one row per claim")
+
+
+def test_a_table_without_rows(results):
+    rewrite(results.path("histories"), lambda table: table.slice(0, 0))
+    the_one(problems(results), "histories.parquet", "has no rows")
+
+
+RULES = [
+    ("measurements", "measurements", "qw", 0, 0.9, "quaternion not of length 1 in row 0"),
+    ("measurements", "measurements", "qx", 1, None, "quaternion null in part in row 1"),
+    ("measurements", "measurements", "pose", 1, 0, "pose at other joints in row 1"),
+    ("vec", "vec_model", "direction", 0, 1, "travel direction in row 0"),
+    ("vec", "vec_model", "q_max_rad", 0, -2.0, "empty joint range in row 0"),
+    ("vec", "vec_model", "d_mm", 1, 3.0, "another d_mm in row 1"),
+    ("dh", "frames", "model", 2, "vec", "no base of model dh"),
+    ("dh", "frames", "x_mm", 0, 3.0, "frame base of model vec differs"),
+    ("dh", "dh_model", "joint", 5, 7, "joints 1, 2, 3, 4, 5, 7"),
+    ("residuals", "residuals", "fold", 0, 1, "0 pooled rows of vec_vs_measured, train, position"),
+    ("residuals", "residuals", "rms", 2, 0.9, "mean, rms and max out of order in row 2"),
+    ("residuals", "residuals", "unit", 0, "mrad", "unit in row 0"),
+    ("accuracy_map", "accuracy_map", "worst_branch", 1, "front", "worst_branch null in row 1"),
+    ("accuracy_map", "accuracy_map", "position_max_mm", 1, 0.0, "position_max_mm null in row 1"),
+    ("accuracy_map", "accuracy_map", "solutions", 0, 19, "more combinations than tried in row 0"),
+    ("assessment_points", "assessment_points", "true_error_mm", 1, 0.5, "true_error_mm in row 1"),
+    ("assessment_points", "assessment_points", "point", 2, 5, "point out of sequence"),
+    ("study", "study", "points_visited", 1, 4, "more points than measurements in row 1"),
+    ("study", "study", "assessor", 0, "maximal", "no rows of maximal at 0.05 mm"),
+    ("study", "study_summary", "mean_mm", 0, 0.31, "mean_mm 0.31 of maximum at 0.05 mm"),
+    ("study", "study_summary", "repetitions", 1, 4, "repetitions 4"),
+    ("study", "readings", "search", 3, None, "12 rows of model_invalidation at 0.05 mm"),
+    ("study", "readings", "mean_mm", 0, 0.5, "mean_mm outside its range in row 0"),
+    ("histories", "histories", "true_mm", 0, 0.9, "true_mm in row 0"),
+    ("histories", "histories", "repeat", 2, 1, "repeat in row 2"),
+    ("histories", "histories", "eta_mm", 0, 0.9, "eta_mm of a varies"),
+    ("histories", "histories", "iteration", 2, 9, "iterations of a"),
+    ("claims", "claims", "verdict", 0, "differs", "verdict in row 0"),
+    ("claims", "claims", "evidence", 0, "hearsay", "evidence 'hearsay'"),
+    ("claims", "claims", "statistic", 1, "x", "statistic of less than two words in row 1"),
+]
+
+
+@pytest.mark.parametrize(("stage", "artefact", "column", "row", "value", "words"), RULES)
+def test_rows_and_tables_that_contradict_each_other(
+    results, stage, artefact, column, row, value, words
+):
+    results.change(stage, artefact, **put(results, artefact, column, row, value))
+    found = problems(results)
+    assert any(words in text for text in found), found
+
+
+def test_a_second_pooled_row(results):
+    table = results.tables["residuals"]
+    doubled = {name: [*values, values[0]] for name, values in table.items()}
+    results.change("residuals", "residuals", **doubled)
+    the_one(problems(results), "2 pooled rows of vec_vs_measured, train, position")
+
+
+def test_a_reading_left_out(results):
+    table = results.tables["readings"]
+    results.change(
+        "study", "readings", **{name: list(values)[1:] for name, values in table.items()}
+    )
+    the_one(problems(results), "2 rows of outlier_rejection at 0.05 mm", "3, one per reading")
+
+
+def test_an_input_changed_after_it_was_used(results):
+    results.tables["measurements"]["x_mm"] = np.array([1.0, 2.0, 3.0, 4.0])
+    results.save("measurements")
+    found = problems(results)
+    for name in ("vec_model", "dh_model", "residuals", "assessment_points"):
+        the_one(found, f"{name}.parquet: inputs_hash")
+    assert len(found) == 4, found
+
+
+def test_parts_of_the_study_of_another_run(results):
+    results.tables["assessment_points"]["s1"] = np.ones(3)
+    results.save("assessment_points")
+    results.save("study_chunk")
+    found = problems(results)
+    the_one(found, "study.parquet: inputs_hash")
+    the_one(found, "histories.parquet: inputs_hash")
+
+
+def test_tables_of_one_stage_from_two_runs(results):
+    rewrite(
+        results.path("dh_fit"),
+        lambda table: table.replace_schema_metadata(table.schema.metadata | {b"code_hash": b"x"}),
+    )
+    the_one(problems(results), "dh_fit.parquet: code_hash x differs from code of dh_model")
+
+
+@pytest.mark.parametrize("key", ["kinacc_version", "seed"])
+def test_tables_of_two_versions_or_seeds(results, key):
+    rewrite(
+        results.path("claims"),
+        lambda table: table.replace_schema_metadata(table.schema.metadata | {key.encode(): b"9"}),
+    )
+    the_one(problems(results), f"{key} ", "9 in claims")
+
+
+def test_other_code_than_that_installed_is_a_note(results, monkeypatch):
+    from kinacc import provenance
+
+    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "newer")
+    report = check.check_results(results.root)
+    assert report.ok
+    assert any("made with other code" in note for note in report.datasets[0].notes)
+
+
+def test_what_a_stopped_run_left_is_a_note(results):
+    (results.folder / ".study.parquet.12.partial").write_bytes(b"x")
+    report = check.check_results(results.root)
+    assert report.ok
+    assert any("left over" in note for note in report.datasets[0].notes)
