@@ -45,16 +45,19 @@ def run() -> None:
 
 
 @main.command("check-results")
-@click.argument("folder", type=click.Path())
+@click.argument("folder", type=click.Path(), default="results")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
-def check_results(folder: str, as_json: bool) -> None:
-    """Check every artefact in FOLDER: present, as the contract says, consistent.
+@click.option("--config", multiple=True, help="Configuration the results should come from.")
+def check_results(folder: str, as_json: bool, config: tuple[str, ...]) -> None:
+    """Check every artefact in FOLDER: there, as the contract says, made from one another.
 
-    Exit code 0 if all is well, 1 if anything is not.
+    With --config also that every data set of the configuration is there and was made with these
+    values. Exit code 0 if all is well, 1 if anything is not.
     """
     from kinacc.artifacts import check
+    from kinacc.stages.plan import planned
 
-    sys.exit(check.main(folder, as_json))
+    sys.exit(check.main(folder, as_json, planned(config) if config else None))
 
 
 def _stage_command(stage: Stage) -> click.Command:
