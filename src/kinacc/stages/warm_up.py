@@ -1,0 +1,30 @@
+"""Compile the sequential kernels once, so that no run of the study has to wait for it.
+
+    python -m kinacc.stages.warm_up
+"""
+
+from __future__ import annotations
+
+
+def main() -> None:
+    """Run the stages that use compiled kernels on a tiny problem."""
+    import numpy as np
+
+    from kinacc.config.schema import defaults
+    from kinacc.stages import histories, study_chunk
+
+    settings = defaults()
+    settings["study"] |= {"repetitions": 1, "measurements": 20, "noise_mm": [0.1]}
+    settings["histories"]["simulations_searched"] = 1
+    error_mm = np.linspace(0.1, 0.9, 30).reshape(10, 3)
+    points = {
+        "point": np.arange(10),
+        **{f"e{axis}_mm": error_mm[:, i] for i, axis in enumerate("xyz")},
+        "true_error_mm": np.linalg.norm(error_mm, axis=1),
+    }
+    study_chunk.run({"assessment_points": points}, settings)
+    histories.run({"assessment_points": points}, settings)
+
+
+if __name__ == "__main__":
+    main()
