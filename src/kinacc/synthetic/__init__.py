@@ -1,0 +1,77 @@
+"""A synthetic physical arm in place of the paper's, for which there is no public data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import quaternion_from_rotation
+from kinacc.robot import Robot
+from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
+from kinacc.synthetic.draw import TABLE_II, physical_robot
+from kinacc.synthetic.tracker import calibration_run, measured
+
+# How far a nominal arm may be from Table II and still be the arm the draws were made for.
+_SAME_ARM_MM, _SAME_ARM_RAD = 5.0, 0.02
+
+
+def measure(robot: Robot, settings: Mapping) -> dict[str, np.ndarray]:
+    """Columns of ``measurements``, but for fold and subset, of an accepted draw of the arm.
+
+    ``settings``: ``draw``, ``poses`` and ``tracker_noise_mm`` of ``measurements.synthetic``. All
+    chance belongs to the draw. Raises InputError for an unknown draw and for another arm.
+    """
+    _require_the_arm(robot)
+    return columns(
+        robot,
+        accepted_draw(int(settings["draw"])),
+        int(settings["poses"]),
+        float(settings["tracker_noise_mm"]),
+    )
+
+
+def columns(
+    robot: Robot, draw: AcceptedDraw, poses: int, tracker_noise_mm: float
+) -> dict[str, np.ndarray]:
+    """Columns of the calibration run of ``poses`` poses on the arm of ``draw``."""
+    run = calibration_run(robot, poses, draw.seed)
+    arm = physical_robot(draw.seed, draw.scales, draw.geometry)
+    seen = measured(arm, run, tracker_noise_mm)
+    quaternion = quaternion_from_rotation(seen.rotation)
+    joints = range(robot.dh.joints)
+    return {
+        "pose": np.arange(poses),
+        **{f"q{j + 1}": run.visits.q_rad[:, j] for j in joints},
+        **{f"s{j + 1}": run.visits.s[:, j] for j in joints},
+        "target": np.full(poses, "tool", dtype=object),
+        **{f"{axis}_mm": seen.position_mm[:, i] for i, axis in enumerate("xyz")},
+        **{f"q{part}": quaternion[:, i] for i, part in enumerate("wxyz")},
+        "repeat": np.zeros(poses, dtype=int),
+    }
+
+
+def _require_the_arm(robot: Robot) -> None:
+    same = robot.dh.joints == TABLE_II.joints and np.array_equal(robot.joint_map, np.eye(6))
+    if same:
+        turn = np.pi * 2.0
+        angles = np.stack(
+            [
+                robot.dh.theta_offset_rad - TABLE_II.theta_offset_rad,
+                robot.dh.alpha_rad - TABLE_II.alpha_rad,
+                robot.dh.beta_rad,
+            ]
+        )
+        lengths = np.stack([robot.dh.d_mm - TABLE_II.d_mm, robot.dh.a_mm - TABLE_II.a_mm])
+        same = np.abs(angles - turn * np.rint(angles / turn)).max() < _SAME_ARM_RAD
+        same &= np.abs(lengths).max() < _SAME_ARM_MM
+    if not same:
+        raise InputError(
+            Problem(
+                "measurements.source",
+                f"is synthetic, but robot {robot.name} is not the arm that was synthesised",
+                "robot: mh180",
+                "give the measurements of this robot in a file (measurements.source: file)",
+            )
+        )

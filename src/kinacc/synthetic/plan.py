@@ -1,0 +1,63 @@
+"""The calibration run: which poses the arm is driven to, in which order, and how it arrives.
+
+One plan for every synthetic arm, as a cell has one measuring programme. The poses enclose the
+evaluation space: a sector of a cylinder larger than the space on every side, the flange pointing
+down and turned about its own axes beyond +-45 degrees, both wrist configurations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
+from kinacc.inverse import closed_form
+from kinacc.region import Cylinder, fill, tool_poses
+from kinacc.robot import Robot
+
+SPACE = Cylinder(1150.0, 1000.0, -50.0, 600.0, np.deg2rad(-5.0), np.deg2rad(65.0))
+TURN_DEG = 50.0
+# Half of the poses stand at the corners of the turns, where the evaluation space has its poses.
+CORNER_SHARE = 0.5
+CORNER_DEG = (43.0, TURN_DEG)
+BRANCHES = ("front-up-noflip", "front-up-flip")
+RUN_H = 6.0
+_PLAN_SEED = 180
+_BLOCK = 256
+
+
+def configurations(robot: Robot, poses: int) -> np.ndarray:
+    """Joints (poses, 6) in measuring order, rad, inside the limits of ``robot``.
+
+    A longer plan begins with the shorter one.
+    """
+    rng = np.random.default_rng(_PLAN_SEED)
+    arm = closed_form.recognise(robot.dh)
+    found = np.empty((0, 6))
+    while len(found) < poses:
+        q_rad, reached = closed_form.solve(arm, _poses(rng), BRANCHES)
+        rows, branch = np.arange(_BLOCK), rng.integers(0, len(BRANCHES), _BLOCK)
+        chosen, good = q_rad[rows, branch], reached[rows, branch]
+        good &= np.all((chosen >= robot.q_min_rad) & (chosen <= robot.q_max_rad), axis=1)
+        found = np.vstack([found, chosen[good]])
+    return found[:poses]
+
+
+def directions(q_rad: np.ndarray) -> np.ndarray:
+    """Travel directions (n, 6), -1 or +1, of visiting joints (n, 6) in order from the zero pose."""
+    before = np.vstack([np.zeros(q_rad.shape[1]), q_rad[:-1]])
+    return np.where(q_rad < before, -1, 1).astype(np.int8)
+
+
+def time_h(poses: int) -> np.ndarray:
+    """Time (n,) of each visit since the cold start."""
+    return RUN_H * (np.arange(poses) + 0.5) / poses
+
+
+def _poses(rng: np.random.Generator) -> Pose:
+    cells = fill(SPACE, rng.random((_BLOCK, 3)))
+    inside = rng.uniform(-TURN_DEG, TURN_DEG, (_BLOCK, 3))
+    corner = rng.uniform(*CORNER_DEG, (_BLOCK, 3)) * rng.choice([-1.0, 1.0], (_BLOCK, 3))
+    at_corner = rng.random(_BLOCK) < CORNER_SHARE
+    x, y, z = np.deg2rad(np.where(at_corner[:, None], corner, inside)).T
+    turned = rotation_x(x) @ rotation_y(y) @ rotation_z(z)
+    return tool_poses(cells, rotation_x(np.pi), turned)
