@@ -221,10 +221,19 @@ def test_history_draws_each_measurement_once_as_first_or_as_average():
     table = tables.history(0.834, seed=0)
     lines = {line.get_label(): line.get_xydata() for line in draw(table).axes[0].lines}
     again = history.resampled(table["point"])
-    first, average = lines["first measurement"], lines["average after resampling"]
+    first, average = lines["first measurement"], lines["after resampling (average)"]
     assert np.array_equal(first[:, 1], table["measured_mm"][~again])
     assert np.array_equal(average[:, 1], table["averaged_mm"][again])
     assert len(first) + len(average) == table["iteration"].size
+
+
+def test_history_marks_where_the_largest_true_error_is_first_measured():
+    table = tables.history(0.834, seed=0)
+    first = table["iteration"][np.argmax(table["true_mm"])]
+    figure = draw(table, true_accuracy_mm=tables.TRUE_MM)
+    assert f"first measured at k = {first} (dotted)" in said(figure)
+    figure = draw(table, true_accuracy_mm=tables.TRUE_MM + 0.01)
+    assert "largest true error not measured" in said(figure)
 
 
 def test_history_sorts_by_iteration():

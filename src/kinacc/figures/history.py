@@ -36,7 +36,8 @@ def draw(
 
     Above: magnitude of first readings, of the averages after resampling, of the true errors, with
     the bound eta and the true accuracy (largest true error of all operating points, visited or
-    not). Below: rejection probability and its threshold alpha.
+    not); a dotted line where the largest is first measured. Below: rejection
+    probability and its threshold alpha.
     ``noisy_truth`` says that the truth contains the instrument's noise.
     Raises InputError where a column is missing or there is no row.
     """
@@ -47,7 +48,11 @@ def draw(
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(1.35, 1))
         _magnitudes(top, values, again, true_accuracy_mm, noisy_truth)
         _probability(bottom, values, again)
-        top.set_title(verdict(values), loc="left", fontsize=style.SMALL_PT)
+        _legend(figure, top, bottom, noisy_truth)
+        title = verdict(values)
+        if true_accuracy_mm is not None:
+            title += "\n" + _mark_largest((top, bottom), values, true_accuracy_mm, noisy_truth)
+        top.set_title(title, loc="left", fontsize=style.SMALL_PT, linespacing=1.3)
         bottom.set_xlabel("Iteration k")
         bottom.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
         k = values["iteration"]
@@ -106,7 +111,7 @@ def _magnitudes(
     if again.any():
         ax.plot(
             k[again], values["averaged_mm"][again], ls="", marker="D", ms=2.4, mew=0,
-            color=style.ORANGE, label="average after resampling", zorder=4,
+            color=style.ORANGE, label="after resampling (average)", zorder=4,
         )  # fmt: skip
     ax.axhline(
         values["eta_mm"][0], color=style.VERMILION, lw=1, label="accuracy bound η", zorder=2.5
@@ -119,8 +124,19 @@ def _magnitudes(
     ax.set_ylim(bottom=0)
     ax.set_ylabel("Error magnitude (mm)")
     ax.grid(axis="x", visible=False)
-    ax.figure.legend(
-        *ax.get_legend_handles_labels(),
+
+
+def _legend(figure: Figure, top: Axes, bottom: Axes, noisy_truth: bool) -> None:
+    """Name what both panels show below them, where it covers no point."""
+    handles, names = (
+        above + below
+        for above, below in zip(
+            top.get_legend_handles_labels(), bottom.get_legend_handles_labels(), strict=True
+        )
+    )
+    figure.legend(
+        handles,
+        names,
         loc="outside lower center",
         ncols=2,
         alignment="left",
@@ -130,15 +146,26 @@ def _magnitudes(
     )
 
 
+def _mark_largest(
+    axes: tuple[Axes, Axes], values: Table, true_accuracy_mm: float, noisy_truth: bool
+) -> str:
+    """Mark the iteration that first measures the point with the largest true error, in words."""
+    words = "largest “true” error*" if noisy_truth else "largest true error"
+    k = values["iteration"][np.isclose(values["true_mm"], true_accuracy_mm, rtol=0, atol=1e-9)]
+    if not k.size:
+        return f"{words} not measured"
+    for ax in axes:
+        ax.axvline(k[0], color=style.INK, lw=0.8, ls=(0, (1, 1.5)), zorder=1.5)
+    return f"{words} first measured at k = {k[0]:.0f} (dotted)"
+
+
 def _probability(ax: Axes, values: Table, again: np.ndarray) -> None:
     k, p = values["iteration"], values["rejection_probability"]
     for mask, marker, colour, label in (
-        (~again, "o", style.PURPLE, "new operating point"),
-        (again, "D", style.ORANGE, "resampling"),
+        (~again, "o", style.PURPLE, "probability at new point"),
+        (again, "D", style.ORANGE, "_after resampling, as above"),
     ):
-        if mask.any():
-            ax.plot(k[mask], p[mask], ls="", marker=marker, ms=2.4, mew=0, color=colour)
-            ax.plot([], [], ls="", marker=marker, ms=4, mew=0, color=colour, label=label)
+        ax.plot(k[mask], p[mask], ls="", marker=marker, ms=2.4, mew=0, color=colour, label=label)
     alpha = values["alpha"][0]
     ax.axhline(alpha, color=style.INK, lw=0.9, zorder=1.5)
     ax.annotate(
@@ -148,4 +175,3 @@ def _probability(ax: Axes, values: Table, again: np.ndarray) -> None:
     ax.set_ylim(-0.03, 1.03)
     ax.set_ylabel("Rejection probability")
     ax.grid(axis="x", visible=False)
-    ax.legend(loc="lower right")
