@@ -1,6 +1,6 @@
 """Compile the sequential kernels once, so that no run of the study has to wait for it.
 
-    python -m kinacc.stages.warm_up
+python -m kinacc.stages.warm_up
 """
 
 from __future__ import annotations
