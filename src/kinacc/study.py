@@ -11,12 +11,12 @@ whatever led there.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinacc.assess import ASSESSORS, Assessor, Maximum, ModelInvalidation, OutlierRejection
+from kinacc.assess import ASSESSORS, Assessor
 from kinacc.assess.assessor import Assessment, every_reading
 from kinacc.assess.world import World, draw
 from kinacc.errors import InputError, Problem
@@ -62,29 +62,30 @@ class StudySettings:
 
     def assessors(self) -> list[Assessor]:
         """The assessors under the default reading, in the order of the registry."""
-        own = vars(self)
-        return [
-            cls(**{field.name: own[field.name] for field in fields(cls)})
-            for cls in ASSESSORS.values()
-        ]
+        return [self._assessor(cls) for cls in ASSESSORS.values()]
+
+    def _assessor(self, cls: type[Assessor]) -> Assessor:
+        return cls(**{field.name: getattr(self, field.name) for field in fields(cls)})
 
     def _problems(self) -> Iterator[Problem]:
         nm = [_nanometres(noise) if np.isfinite(noise) else 0 for noise in self.noise_mm]
         if not nm or min(nm) < 1 or len(set(nm)) < len(nm):
             allowed = "one or more different numbers of at least 1e-6 mm"
             yield Problem("study.noise_mm", f"{list(self.noise_mm)}", allowed)
-        for name in ("repetitions", "measurements"):
-            if getattr(self, name) < 1:
-                yield Problem(f"study.{name}", f"{getattr(self, name)}", "at least 1")
-        if not 0.0 < self.alpha < 1.0:
-            yield Problem("study.alpha", f"{self.alpha}", "above 0 and below 1")
-        choices = {"visiting_order": VISITING_ORDERS}
-        for each in (Maximum, OutlierRejection, ModelInvalidation):
-            choices |= each.switches
-        for name, allowed in choices.items():
-            if getattr(self, name) not in allowed:
-                found = f"{getattr(self, name)!r}"
-                yield Problem(f"study.{name}", found, ", ".join(allowed))
+        if self.repetitions < 1:
+            yield Problem("study.repetitions", f"{self.repetitions}", "at least 1")
+        if self.visiting_order not in VISITING_ORDERS:
+            found = f"{self.visiting_order!r}"
+            yield Problem("study.visiting_order", found, ", ".join(VISITING_ORDERS))
+        told = set()
+        for cls in ASSESSORS.values():
+            try:
+                self._assessor(cls)
+            except InputError as error:
+                for problem in error.problems:
+                    if problem.where not in told:
+                        told.add(problem.where)
+                        yield replace(problem, where=f"study.{problem.where}")
 
 
 def part_of(repetitions: int, number: int, of: int) -> range:

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
+from numbers import Integral
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from kinacc.assess.world import World
+from kinacc.errors import InputError, Problem
 
 
 class Assessment(NamedTuple):
@@ -38,6 +40,20 @@ class Assessor(Protocol):
     def assess(self, world: World) -> Assessment:
         """Assess the accuracy in one world."""
         ...
+
+
+def check(assessor: Assessor, more: list[Problem] | None = None) -> None:
+    """Raise InputError with everything wrong with the settings, ``more`` included."""
+    problems = list(more or [])
+    budget = assessor.measurements
+    if not isinstance(budget, Integral) or budget < 1:
+        problems.append(Problem("measurements", f"{budget!r}", "a whole number, at least 1"))
+    for switch, choices in assessor.switches.items():
+        if getattr(assessor, switch) not in choices:
+            found = f"{getattr(assessor, switch)!r}"
+            problems.append(Problem(switch, found, ", ".join(choices)))
+    if problems:
+        raise InputError(problems, f"{assessor.name} cannot work with these settings")
 
 
 A = TypeVar("A", bound=Assessor)

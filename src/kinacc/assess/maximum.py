@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from kinacc.assess.assessor import Assessment
+from kinacc.assess.assessor import Assessment, check
 from kinacc.assess.world import World
 
 
@@ -16,6 +16,9 @@ class Maximum:
     measurements: int = 200
     name: ClassVar[str] = "maximum"
     switches: ClassVar[dict[str, tuple[str, ...]]] = {}
+
+    def __post_init__(self) -> None:
+        check(self)
 
     def assess(self, world: World) -> Assessment:
         """Eq. 11 over the first readings."""

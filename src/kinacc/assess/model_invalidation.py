@@ -16,7 +16,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment
+from kinacc.assess.assessor import Assessment, check
 from kinacc.assess.world import World
 from kinacc.errors import InputError, Problem
 
@@ -69,6 +69,12 @@ class ModelInvalidation:
         "covariance": COVARIANCES,
         "search": SEARCHES,
     }
+
+    def __post_init__(self) -> None:
+        wrong = []
+        if not 0.0 < self.alpha < 1.0:
+            wrong.append(Problem("alpha", f"{self.alpha}", "above 0 and below 1"))
+        check(self, wrong)
 
     def assess(self, world: World) -> Assessment:
         """Search the assessed accuracy; measurements and points are those of the run at it."""
@@ -181,21 +187,6 @@ def chi_square_3(x: float) -> float:
 
 def _magnitude(vector: np.ndarray) -> float:
     return math.sqrt(sum(float(x) ** 2 for x in vector))
-
-
-def problems_of(assessor: ModelInvalidation, where: str = "study") -> list[Problem]:
-    """Everything wrong with the settings, for a message that lists all problems at once."""
-    found = []
-    if not 0.0 < assessor.alpha < 1.0:
-        found.append(Problem(f"{where}.alpha", f"{assessor.alpha}", "above 0 and below 1"))
-    if assessor.measurements < 1:
-        found.append(Problem(f"{where}.measurements", f"{assessor.measurements}", "at least 1"))
-    for name, choices in assessor.switches.items():
-        if getattr(assessor, name) not in choices:
-            found.append(
-                Problem(f"{where}.{name}", f"{getattr(assessor, name)!r}", ", ".join(choices))
-            )
-    return found
 
 
 def _check_visits(world: World, measurements: int) -> None:

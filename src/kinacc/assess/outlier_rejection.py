@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment
+from kinacc.assess.assessor import Assessment, check
 from kinacc.assess.world import World
 from kinacc.gamma import gamma99
 
@@ -46,6 +46,9 @@ class OutlierRejection:
     outlier_rule: str = "normal"
     name: ClassVar[str] = "outlier_rejection"
     switches: ClassVar[dict[str, tuple[str, ...]]] = {"outlier_rule": tuple(LIMITS)}
+
+    def __post_init__(self) -> None:
+        check(self)
 
     def assess(self, world: World) -> Assessment:
         """Eq. 13 over the first readings."""
