@@ -18,10 +18,7 @@ except InputError as error:
 
 wildcard_constraints:
     dataset="|".join(map(re.escape, plan.datasets)),
-
-
-scattergather:
-    **plan.parts,
+    part=r"\d+-of-\d+",
 
 
 rule all:

@@ -22,13 +22,13 @@ rule study_chunk:
     input:
         unpack(lambda w: plan.inputs("study_chunk", w.dataset)),
     output:
-        **plan.outputs("study_chunk", "{dataset}", "{scatteritem}"),
+        **plan.outputs("study_chunk", "{dataset}", "{part}"),
     log:
-        plan.log("study_chunk", "{dataset}", "{scatteritem}"),
+        plan.log("study_chunk", "{dataset}", "{part}"),
     cache: True
     params:
         code=plan.code("study_chunk"),
-        part="{scatteritem}",
+        part="{part}",
         seed=lambda w: plan.seed(w.dataset),
         settings=lambda w: plan.settings("study_chunk", w.dataset),
     message:

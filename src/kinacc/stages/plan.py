@@ -120,12 +120,18 @@ class Plan:
         """Names of the parts a stage is computed in: 1-of-2, 2-of-2; None where it is whole."""
         if not STAGES[name].scattered:
             return [None]
-        count = self.parts[dataset]
+        config = self.datasets[dataset]
+        items = (
+            config["robustness"]["draws"]
+            if "robustness" in name
+            else config["study"]["repetitions"]
+        )
+        count = min(self.parts[dataset], items)
         return [f"{number}-of-{count}" for number in range(1, count + 1)]
 
     def message(self, name: str) -> str:
         """What the stage is doing, for a Snakemake rule or with the wildcards put in."""
-        part = ", part {wildcards.scatteritem}" if STAGES[name].scattered else ""
+        part = ", part {wildcards.part}" if STAGES[name].scattered else ""
         return f"{{wildcards.dataset}}: {STAGES[name].message}{part}"
 
     def log(self, name: str, dataset: str, part: str | None = None) -> str:
