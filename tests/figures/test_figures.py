@@ -236,6 +236,17 @@ def test_history_marks_where_the_largest_true_error_is_first_measured():
     assert "largest true error not measured" in said(figure)
 
 
+@pytest.mark.parametrize("met", [0, 1])
+def test_history_says_where_the_rule_of_the_example_was_not_met(met):
+    table = tables.history(0.834, seed=0)
+    count = table["iteration"].size
+    rule = "first simulation; none searched rejects at eta"
+    table |= {"rule": np.full(count, rule, dtype=object), "rule_met": np.full(count, met)}
+    figure = draw(table, true_accuracy_mm=tables.TRUE_MM)
+    assert (rule in said(figure)) == (met == 0)
+    assert problems(figure) == []
+
+
 def test_history_sorts_by_iteration():
     table = tables.history(0.834, seed=0)
     mixed = {name: column[::-1] for name, column in table.items()}

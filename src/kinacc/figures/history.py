@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -52,6 +54,7 @@ def draw(
         title = verdict(values)
         if true_accuracy_mm is not None:
             title += "\n" + _mark_largest((top, bottom), values, true_accuracy_mm, noisy_truth)
+        title += _unmet(histories, example)
         top.set_title(title, loc="left", fontsize=style.SMALL_PT, linespacing=1.3)
         bottom.set_xlabel("Iteration k")
         bottom.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
@@ -157,6 +160,16 @@ def _mark_largest(
     for ax in axes:
         ax.axvline(k[0], color=style.INK, lw=0.8, ls=(0, (1, 1.5)), zorder=1.5)
     return f"{words} first measured at k = {k[0]:.0f} (dotted)"
+
+
+def _unmet(histories: Table, example: str) -> str:
+    """Say by which lesser rule the simulation was chosen, where the rule itself was not met."""
+    if "rule" not in histories or "rule_met" not in histories:
+        return ""
+    mine = np.flatnonzero(texts(histories, "example") == example)[0]
+    if floats(histories, "rule_met")[mine]:
+        return ""
+    return "\n" + fill(f"shown: {texts(histories, 'rule')[mine]}", 56)
 
 
 def _probability(ax: Axes, values: Table, again: np.ndarray) -> None:
