@@ -279,13 +279,20 @@ def _readings() -> dict:
 
 def _histories() -> dict:
     steps = [(0, 1), (1, 1), (1, 2)]
-    rows = [(example, i, *step) for example in ("a", "b") for i, step in enumerate(steps)]
+    rows = [
+        (example, i, *step)
+        for example in ("rejected", "not_rejected")
+        for i, step in enumerate(steps)
+    ]
     error = np.array([0.1, 0.2])
     count = len(rows)
     return {
         "example": [row[0] for row in rows],
         "noise_mm": np.full(count, 0.3),
         "alpha": np.full(count, 0.6),
+        "simulation": np.zeros(count),
+        "rule": ["first simulation"] * count,
+        "rule_met": np.ones(count),
         "distance": ["squared"] * count,
         "covariance": ["r"] * count,
         "iteration": [row[1] + 1 for row in rows],

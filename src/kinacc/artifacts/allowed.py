@@ -16,5 +16,5 @@ OUTLIER_RULES = ("normal", "gamma", "iqr")
 DISTANCES = ("squared", "as_printed")
 COVARIANCES = ("r", "sqrt_r")
 SEARCHES = ("from_above", "from_below", "bisection")
-EXAMPLES = ()  # histories name their own examples
+EXAMPLES = ("rejected", "rejected_larger_eta", "not_rejected")
 VERDICTS = ("agrees", "differs", "not comparable")

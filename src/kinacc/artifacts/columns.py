@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+
+JOINTS_MIN, JOINTS_MAX = 4, 7
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,8 @@ class Column:
         elif self.high is not None:
             parts.append(f"at most {self.high:g}")
         if self.nullable:
-            parts.append("or null")
-        return " ".join(parts)
+            parts.append("null")
+        return " or ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -112,3 +115,35 @@ def whole(name: str, meaning: str, low=0, high=None, nullable=False, choices=())
 
 def text(name: str, meaning: str, choices=(), pattern="", nullable=False) -> Column:
     return Column(name, "text", "", meaning, nullable, None, None, tuple(choices), pattern)
+
+
+def length(name: str, meaning: str, limit: float, nullable=False) -> Column:
+    return real(name, "mm", meaning, -limit, limit, nullable)
+
+
+def magnitude(name: str, unit: str, meaning: str, high: float, nullable=False) -> Column:
+    return real(name, unit, meaning, 0.0, high, nullable)
+
+
+REACH_MM = 1.0e5  # no laser tracker sees further than 100 m
+ERROR_MM = 1.0e3
+ERROR_MRAD = 4.0e3  # beyond half a turn, pi rad, an orientation error has no meaning
+TURN_RAD = 4.0 * math.pi
+
+JOINTS = (
+    real("q*", "rad", "reported position of each joint", -TURN_RAD, TURN_RAD),
+    Column(
+        "s*",
+        "int8",
+        "1",
+        "travel direction of each joint on arrival: -1, +1, or 0 where unknown",
+        choices=(-1, 0, 1),
+    ),
+)
+
+
+def error_vector(of: str) -> tuple[Column, ...]:
+    return tuple(
+        length(f"e{axis}_mm", f"{axis} component of {of}, robot base frame", ERROR_MM)
+        for axis in "xyz"
+    )

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts import store
-from kinacc.artifacts.columns import Artefact, Column, joint_count
-from kinacc.artifacts.contract import JOINTS_MAX, JOINTS_MIN, PROVENANCE_KEYS
+from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, joint_count
+from kinacc.artifacts.contract import PROVENANCE_KEYS
 from kinacc.errors import InputError, Problem
 
 Columns = Mapping[str, np.ndarray]

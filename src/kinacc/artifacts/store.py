@@ -15,8 +15,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kinacc.artifacts.columns import Artefact, Column, joint_count
-from kinacc.artifacts.contract import ARTEFACTS, JOINTS_MAX, JOINTS_MIN, PROVENANCE_KEYS
+from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, joint_count
+from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
 from kinacc.errors import InputError, Problem
 
 _ARROW_TYPES = {

@@ -1,0 +1,196 @@
+"""Contract of the tables from measured poses to residuals."""
+
+from __future__ import annotations
+
+from kinacc.artifacts.allowed import (
+    COMPARISONS,
+    ERRORS,
+    ESTIMATES,
+    IDENTIFIER_PATTERN,
+    MODELS,
+    QUANTITIES,
+    SUBSETS,
+    UNITS_OF_RESIDUALS,
+)
+from kinacc.artifacts.columns import (
+    ERROR_MRAD,
+    JOINTS,
+    JOINTS_MAX,
+    REACH_MM,
+    TURN_RAD,
+    Artefact,
+    Column,
+    error_vector,
+    length,
+    magnitude,
+    real,
+    text,
+    whole,
+)
+
+
+def _position(of: str, nullable: bool = False) -> tuple[Column, ...]:
+    return tuple(
+        length(f"{axis}_mm", f"{axis} coordinate of {of}", REACH_MM, nullable) for axis in "xyz"
+    )
+
+
+def _quaternion(of: str, nullable: bool = False) -> tuple[Column, ...]:
+    return tuple(
+        real(f"q{part}", "1", f"{part} of the unit quaternion of {of}, w >= 0", -1, 1, nullable)
+        for part in "wxyz"
+    )
+
+
+_DH_PARAMETERS = (
+    ("theta_offset_rad", "rad", "joint angle offset theta", TURN_RAD),
+    ("d_mm", "mm", "offset d along the joint axis", 2.0e4),
+    ("a_mm", "mm", "length a along the common normal", 2.0e4),
+    ("alpha_rad", "rad", "twist alpha about the common normal", TURN_RAD),
+    ("beta_rad", "rad", "Hayati twist beta about y, 0 where the joint has none", TURN_RAD),
+)
+_DH = tuple(
+    real(name, unit, f"{meaning} (nominal)", -limit, limit)
+    for name, unit, meaning, limit in _DH_PARAMETERS
+)
+_DH_FITTED = tuple(
+    real(name, unit, meaning, -limit, limit) for name, unit, meaning, limit in _DH_PARAMETERS
+)
+_DH_STD = tuple(
+    magnitude(f"std_{name}", unit, f"standard deviation of {name}, null if undetermined", 1e4, True)
+    for name, unit, _, _ in _DH_PARAMETERS
+)
+_FRAME_COLUMNS = (
+    text("model", "model the frame belongs to", MODELS),
+    text(
+        "frame",
+        "base (robot base in the instrument's frame), tool (tool centre point in the flange frame) "
+        "or the name of a target (in the flange frame)",
+    ),
+    *_position("the frame's origin"),
+    *_quaternion("the frame's orientation"),
+)
+_FIT_COLUMNS = (
+    text("quantity", "what the row states, e.g. rank, singular_value", pattern=IDENTIFIER_PATTERN),
+    whole(
+        "number",
+        "running number within the quantity, from 1; null for a single value",
+        1,
+        None,
+        True,
+    ),
+    text("parameter", "parameter the row speaks of; null where none", nullable=True),
+    real("value", "see unit", "the value", nullable=True),
+    text("unit", "unit of the value; 1 for a pure number"),
+)
+MEASUREMENTS = Artefact(
+    "measurements",
+    "Measured poses, one row per reading of one target.",
+    (
+        whole("pose", "number of the joint configuration"),
+        *JOINTS,
+        text("target", "name of the measured target"),
+        *_position("the target in the instrument's frame"),
+        *_quaternion("the target in the instrument's frame, null for position only", True),
+        whole("repeat", "number of the reading at this configuration and target"),
+        text("subset", "train (used by the delivered fits) or validation (held out)", SUBSETS),
+        whole("fold", "fold in which the row is held out; null without folds", nullable=True),
+    ),
+    ("pose", "target", "repeat"),
+)
+VEC_MODEL = Artefact(
+    "vec_model",
+    "Volumetric error compensation model: Chebyshev coefficients over the nominal DH.",
+    (
+        whole("joint", "joint number, from 1", 1, JOINTS_MAX),
+        text("error", "element of the error matrix of eq. 6", ERRORS),
+        whole(
+            "direction",
+            "0 = both directions; -1 or +1 = offset added when the joint travels that way",
+            None,
+            None,
+            choices=(-1, 0, 1),
+        ),
+        whole("order", "order of the Chebyshev polynomial, first kind", 0, 40),
+        real(
+            "coefficient", "mm for delta, rad for eps", "coefficient of the polynomial", -1e3, 1e3
+        ),
+        magnitude(
+            "std", "mm for delta, rad for eps", "standard deviation of the coefficient", 1e4, True
+        ),
+        real("q_min_rad", "rad", "joint position mapped to -1", -TURN_RAD, TURN_RAD),
+        real("q_max_rad", "rad", "joint position mapped to +1", -TURN_RAD, TURN_RAD),
+        *_DH,
+    ),
+    ("joint", "error", "direction", "order"),
+)
+DH_MODEL = Artefact(
+    "dh_model",
+    "Fitted DH model, T = Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint.",
+    (whole("joint", "joint number, from 1", 1, JOINTS_MAX), *_DH_FITTED, *_DH_STD),
+    ("joint",),
+)
+VEC_FRAMES = Artefact(
+    "vec_frames", "Frames estimated with the VEC model.", _FRAME_COLUMNS, ("model", "frame")
+)
+FRAMES = Artefact("frames", "Frames of every model.", _FRAME_COLUMNS, ("model", "frame"))
+VEC_FIT = Artefact(
+    "vec_fit",
+    "How the VEC fit went: rank, singular values, prior, iterations, parameters.",
+    _FIT_COLUMNS,
+    ("quantity", "number", "parameter"),
+)
+DH_FIT = Artefact(
+    "dh_fit",
+    "How the DH fit went: rank, singular values, truncation, iterations, parameters.",
+    _FIT_COLUMNS,
+    ("quantity", "number", "parameter"),
+)
+POSE_ERRORS = Artefact(
+    "pose_errors",
+    "Error vectors pose by pose, of the delivered models and of the cross-validated ones.",
+    (
+        text("comparison", "what is compared with what", COMPARISONS),
+        text(
+            "estimate",
+            "train (delivered models) or cross_validated (the row was held out)",
+            ESTIMATES,
+        ),
+        whole("row", "row of measurements.parquet, from 0"),
+        whole("pose", "number of the joint configuration"),
+        text("target", "name of the measured target"),
+        whole("repeat", "number of the reading"),
+        text("subset", "train or validation, as in measurements", SUBSETS),
+        whole("fold", "fold in which the row is held out; null without folds", nullable=True),
+        *error_vector("the position error"),
+        *(
+            real(
+                f"r{axis}_mrad",
+                "mrad",
+                f"{axis} of the orientation error as a rotation vector, null for position only",
+                -ERROR_MRAD,
+                ERROR_MRAD,
+                True,
+            )
+            for axis in "xyz"
+        ),
+    ),
+    ("comparison", "estimate", "row"),
+)
+RESIDUALS = Artefact(
+    "residuals",
+    "Residual statistics: Table I (vec_vs_measured), Table III (dh_vs_vec) and the like.",
+    (
+        text("comparison", "what is compared with what", COMPARISONS),
+        text("subset", "train or validation", SUBSETS),
+        whole("fold", "held-out fold; null = pooled over folds, or no folds", nullable=True),
+        text("quantity", "position or orientation", QUANTITIES),
+        text("unit", "unit of the statistics", UNITS_OF_RESIDUALS),
+        whole("n", "number of target points", 1),
+        magnitude("mean", "see unit", "mean magnitude", 1e4),
+        magnitude("max", "see unit", "largest magnitude", 1e4),
+        magnitude("rms", "see unit", "root mean square of the magnitude", 1e4),
+        magnitude("gamma99", "see unit", "99 % quantile of a fitted gamma distribution", 1e5, True),
+    ),
+    ("comparison", "subset", "fold", "quantity"),
+)

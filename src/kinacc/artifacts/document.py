@@ -1,0 +1,78 @@
+"""Write docs/artifacts.md from the contract: ``python -m kinacc.artifacts.document``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kinacc.artifacts.columns import Artefact, Column
+from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
+from kinacc.stages.catalogue import STAGES
+
+_HEAD = """\
+# Artefacts
+
+What a run leaves in `results/<dataset>/`, one folder per data set. Tables are Parquet, long and
+tidy. Lengths are in mm, angles of joints and frames in rad, orientation errors in mrad, noise is
+the standard deviation per axis. A value that does not apply is null, never zero.
+
+Unit and meaning of a column stand in its field metadata. The schema metadata holds exactly
+{keys}:
+the version of the package, hashes of the configuration values the stage depends on, of the code it
+runs and of the artefacts it read, and the seed. There is no time stamp: equal inputs and versions
+give equal bytes. A table appears under its name only when it is whole.
+
+`q*` stands for `q1`, `q2`, ... for every joint of the arm, `s*` likewise. Rows are unique in the
+columns named as key. `figures/fig1` to `fig6` are pictures (.svg, .png, .pdf).
+
+`kinacc check-results results/` holds a folder to all of this.
+
+Written from the contract by `python -m kinacc.artifacts.document`.
+"""
+
+
+def artifacts_markdown() -> str:
+    """The text of docs/artifacts.md: one table per artefact."""
+    keys = ", ".join(f"`{key}`" for key in PROVENANCE_KEYS)
+    return "\n".join([_HEAD.format(keys=keys), *map(_section, ARTEFACTS.values())])
+
+
+def _section(artefact: Artefact) -> str:
+    makers = [stage for stage in STAGES.values() if artefact.name in stage.outputs]
+    made = f" Made by stage `{makers[0].name}`." if makers else ""
+    if makers and makers[0].scattered:
+        made += f" One file per part, `{artefact.name}/<part>-of-<parts>.parquet`."
+    if makers and makers[0].on_request:
+        made += " Made on request."
+    lines = [
+        f"## {artefact.file_name}",
+        "",
+        f"{artefact.meaning}{made} Key: {', '.join(f'`{name}`' for name in artefact.key)}.",
+        "",
+        "| column | type | unit | allowed | meaning |",
+        "|---|---|---|---|---|",
+        *map(_row, artefact.columns),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _row(column: Column) -> str:
+    cells = (
+        f"`{column.name}`",
+        column.kind,
+        column.unit or "-",
+        column.limits or "any",
+        column.meaning,
+    )
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def main() -> None:
+    """Rewrite docs/artifacts.md of the repository the package lies in."""
+    path = Path(__file__).parents[3] / "docs" / "artifacts.md"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(artifacts_markdown(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
