@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import figure_tables as tables
 import numpy as np
 import pytest
 from figure_words import CYLINDER, boxes, figures, problems, said, words
+from scipy.special import gammainc
 
 from kinacc import robot
 from kinacc.errors import InputError
@@ -44,9 +43,9 @@ def test_a_name_with_dollar_signs_is_written_as_it_is():
 
 
 @pytest.mark.parametrize("measured_mm", [1.0, 1.05, 1.3, 2.4, -1.7])
-def test_fig1_probability_is_the_two_sided_tail_of_the_normal_distribution(measured_mm):
+def test_fig1_probability_is_the_chi_square_tail_of_the_paper(measured_mm):
     case = fig1.judge(measured_mm, eta_mm=1.0, sigma_mm=0.25)
-    assert case.probability == pytest.approx(math.erfc(case.distance / math.sqrt(2)), abs=1e-12)
+    assert case.probability == pytest.approx(1 - gammainc(0.5, case.distance**2 / 2), abs=1e-12)
     assert abs(case.candidate_mm) == pytest.approx(1.0)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.special import gammainc
 
 from kinacc.figures import style
 
@@ -41,11 +41,11 @@ def judge(measured_mm: float, eta_mm: float, sigma_mm: float) -> Case:
     """Judge one measurement against the bound: n = 1, one operating point, one measurement.
 
     The squared Mahalanobis distance goes into the chi-square distribution of one degree of
-    freedom (the consistent reading of eqs. 18 and 20).
+    freedom (the consistent reading of eqs. 18 and 20), which beyond R^2 holds erfc(R / sqrt 2).
     """
     candidate = float(np.clip(measured_mm, -eta_mm, eta_mm))
     distance = abs(measured_mm - candidate) / sigma_mm
-    return Case(measured_mm, candidate, distance, 1.0 - float(gammainc(0.5, distance**2 / 2)))
+    return Case(measured_mm, candidate, distance, math.erfc(distance / math.sqrt(2)))
 
 
 def draw(example: Example | None = None, dataset: str | None = None) -> Figure:
