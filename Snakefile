@@ -3,6 +3,7 @@ import re
 import sys
 
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
 
 # Snakemake imports pandas (0.5 s of every start) only to compare parameters that are data frames.
 sys.modules.setdefault("pandas", None)
@@ -14,6 +15,9 @@ try:
     plan = planned(workflow.configfiles or ["config.yaml"], workflow.config_settings.config)
 except InputError as error:
     raise WorkflowError(str(error)) from None
+for dataset in plan.datasets:
+    for stage, reason in plan.left_out(dataset).items():
+        logger.info(f"{dataset}: {stage} is left out, {reason}")
 
 
 wildcard_constraints:

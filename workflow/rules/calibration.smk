@@ -1,15 +1,18 @@
 # From measured poses to the VEC and DH models and their residuals.
 
 
+# `update` keeps the earlier table when a file cannot be read; the file's content is a parameter, so
+# that the next run still sees that this table is not made from it.
 rule measurements:
     input:
         unpack(lambda w: plan.inputs("measurements", w.dataset)),
     output:
-        **plan.outputs("measurements", "{dataset}"),
+        measurements=update(plan.outputs("measurements", "{dataset}")["measurements"]),
     log:
         plan.log("measurements", "{dataset}"),
     params:
         code=plan.code("measurements"),
+        contents=lambda w: plan.contents("measurements", w.dataset),
         seed=lambda w: plan.seed(w.dataset),
         settings=lambda w: plan.settings("measurements", w.dataset),
     message:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kinacc.errors import InputError, Problem
-from kinacc.provenance import stage_code_hash
+from kinacc.provenance import file_hash, stage_code_hash
 from kinacc.stages.catalogue import FIGURE_FOLDER, STAGES, Stage, maker_of
 
 RESULTS = "results"
@@ -107,6 +107,13 @@ class Plan:
             ]
             found[artefact] = paths if maker.scattered else paths[0]
         return found | self._files(stage, self.datasets[dataset])
+
+    def contents(self, name: str, dataset: str) -> dict[str, str]:
+        """Content hashes of the files from outside that a stage reads."""
+        return {
+            role: file_hash(path)
+            for role, path in self._files(STAGES[name], self.datasets[dataset]).items()
+        }
 
     def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
         """Files a stage leaves: artefact -> path, or picture format -> path."""
