@@ -23,6 +23,7 @@ __all__ = ["BRANCHES", "Solutions", "Status", "closed_form_of", "solve"]
 
 _SAME_POSTURE_RAD = 1e-6
 _CHEAP_STEPS = 12
+_NEAR_RAD = 0.2  # a refinement moves joints less than this, but for joints 4 and 6 when aligned
 
 
 class Status(IntEnum):
@@ -96,13 +97,13 @@ def solve(
     q_rad[rows[converged], columns[converged]] = found[converged]
     status = np.full(reached.shape, Status.OUT_OF_REACH, dtype=np.int8)
     status[rows[converged], columns[converged]] = Status.FOUND
-    missed = np.unique(rows[~converged])
+    _mark_duplicates(q_rad, status)
+    missed = np.flatnonzero((reached & (status != Status.FOUND)).any(axis=1))
     if len(missed):
         part = Pose(pose.rotation[missed], pose.position_mm[missed])
         again = q_rad[missed], status[missed]
-        _rescue(arm, functions, part, names, turns, *again)
+        _rescue(arm, functions, part, names, turns, box, *again)
         q_rad[missed], status[missed] = again
-    _mark_duplicates(q_rad, status)
     good = status == Status.FOUND
     if fitted_range_rad is not None:
         status[good & ~limits.within(q_rad, *fitted_range_rad)] = Status.OUTSIDE_RANGE
@@ -175,15 +176,18 @@ def _rescue(
     pose: Pose,
     names: tuple[str, ...],
     turns: Callable[[np.ndarray], np.ndarray],
+    box: tuple[np.ndarray, np.ndarray],
     q_rad: np.ndarray,
     status: np.ndarray,
 ) -> None:
     """Fill the branches still missing at poses (m, ...) from second starts, in place."""
-    missing = status != Status.FOUND
+    lower, upper = box
     for number, (start, tried) in enumerate(rescue.starts(arm, pose, names)):
         if number == 0:
-            status[missing & tried] = Status.NOT_CONVERGED
-        rows, columns = np.nonzero(tried & (status == Status.NOT_CONVERGED))
+            status[tried & (status == Status.OUT_OF_REACH)] = Status.NOT_CONVERGED
+        # Second starts are worth it only for joints somebody could use.
+        usable = limits.within(turns(start), lower - _NEAR_RAD, upper + _NEAR_RAD)
+        rows, columns = np.nonzero(tried & usable & (status != Status.FOUND))
         if len(rows) == 0:
             continue
         goal = Pose(pose.rotation[rows], pose.position_mm[rows])
