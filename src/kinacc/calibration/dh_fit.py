@@ -33,7 +33,7 @@ class DHFit:
 
 
 def free_parameters(joints: int, hayati_joints: tuple[int, ...] = ()) -> np.ndarray:
-    """Mask (k, 5): the four DH parameters of each joint, and beta on ``hayati_joints`` (1-based)."""
+    """Mask (k, 5): four DH parameters per joint, and beta on ``hayati_joints`` (1-based)."""
     free = np.ones((joints, 5), dtype=bool)
     free[:, 4] = False
     for joint in hayati_joints:
@@ -54,7 +54,8 @@ def fit(
     """DH model of the ``free`` (k, 5) parameters closest to ``observations``.
 
     ``frames`` given: base and targets are known. None: both are estimated, from a closed form.
-    Directions of singular value below ``threshold`` times the largest stay nominal. Raises FitError.
+    Directions of singular value below ``threshold`` times the largest stay nominal.
+    Raises FitError.
     """
     start = start or nominal
     held = dh.to_vector(nominal)
@@ -72,7 +73,7 @@ def fit(
         nominal=np.concatenate([zeros, held[mask]]),
         scale=scale,
         threshold=threshold,
-        free=coords.size,
+        frames=coords.size,
         name="DH fit",
     )
     vector, std = held.copy(), np.full(held.size, np.nan)

@@ -201,14 +201,15 @@ def _translations(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Base position, target points (linear once the base is turned) and the squared misfit."""
     count, targets = len(observations), len(observations.target_names)
-    design = np.zeros((count, 3, 3 + 3 * targets))
-    design[:, :, :3] = np.eye(3)
+    design = np.zeros((count, 3, 3 * targets))
     for target in range(targets):
         rows = observations.target == target
-        columns = slice(3 + 3 * target, 6 + 3 * target)
-        design[rows, :, columns] = base_rotation @ flange.rotation[rows]
-    design = design.reshape(3 * count, -1)
-    goal = (observations.position_mm - flange.position_mm @ base_rotation.T).ravel()
-    solution = np.linalg.lstsq(design, goal, rcond=_START_RCOND)[0]
-    misfit = float(np.sum((goal - design @ solution) ** 2))
-    return solution[:3], solution[3:].reshape(targets, 3), misfit
+        design[rows, :, 3 * target : 3 * target + 3] = base_rotation @ flange.rotation[rows]
+    goal = observations.position_mm - flange.position_mm @ base_rotation.T
+    # Centred, so that what the turns cannot show of a target is left at zero, not shared with base.
+    centred = (design - design.mean(axis=0)).reshape(3 * count, -1)
+    solution = np.linalg.lstsq(centred, (goal - goal.mean(axis=0)).ravel(), rcond=_START_RCOND)[0]
+    rest = goal - design @ solution
+    base_position = rest.mean(axis=0)
+    misfit = float(np.sum((rest - base_position) ** 2))
+    return base_position, solution.reshape(targets, 3), misfit

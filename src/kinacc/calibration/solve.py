@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
@@ -19,6 +19,10 @@ from kinacc.errors import FitError
 STEP_TOLERANCE = 1e-6  # in units of `scale`: mm and mrad
 MAX_ITERATIONS = 60
 MAX_HALVINGS = 12
+MAX_VARIANCE_STEPS = 20
+VARIANCE_TOLERANCE = 1e-9
+LEAST_VARIANCE = 1e-14  # mm^2: noise-free data must not divide by zero
+FRAME_THRESHOLD = 1e-6  # frames have no nominal value to keep: only exact ambiguities are cut
 TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
 
 
@@ -39,10 +43,11 @@ class Solution:
     """Outcome of a fit of P parameters to m residuals.
 
     ``std`` (P,) and ``covariance`` (P, P) in the parameters' own units, scaled by the residual
-    variance ``cost / degrees_of_freedom``; NaN where undetermined. ``singular_values`` are of the
+    ``variance``; NaN where undetermined. ``singular_values`` are of the
     whitened Jacobian in units of ``scale`` (after the frame columns are projected out), falling;
     ``rank`` of them exceed ``threshold`` times the largest; ``gap`` is the ratio across that cut
-    (inf at full rank). ``last_step`` is the largest last change in units of ``scale``.
+    (inf at full rank); ``frame_rank`` of the frame coordinates are kept.
+    ``last_step`` is the largest last change in units of ``scale``.
     """
 
     x: np.ndarray
@@ -51,6 +56,7 @@ class Solution:
     singular_values: np.ndarray
     rank: int
     gap: float
+    frame_rank: int
     threshold: float
     cost: float
     count: int
@@ -58,6 +64,7 @@ class Solution:
     iterations: int
     last_step: float
     converged: bool
+    variance: float
 
 
 def triangle(system: System, x: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, int]:
@@ -82,44 +89,46 @@ def minimise_truncated(
     nominal: np.ndarray,
     scale: np.ndarray,
     threshold: float,
-    free: int = 0,
+    frames: int = 0,
     name: str = "fit",
 ) -> Solution:
     """Gauss-Newton with truncated SVD, from ``start`` (P,), leaning on ``nominal`` (P,).
 
-    The first ``free`` parameters (base and targets) are never truncated: what they can express is
-    projected out first. Of the others, directions whose singular value is below ``threshold``
-    times the largest keep their nominal value; ``scale`` (P,) is the unit in which displacement is
-    measured (mm, and rad of one mrad). Raises FitError where it does not converge.
+    Two blocks are judged one after the other: the first ``frames`` parameters (base and targets),
+    then the others after what the frames can express is projected out of them. In each, directions
+    whose singular value is below a share of the block's largest (``FRAME_THRESHOLD``, then
+    ``threshold``) keep their nominal value; ``scale`` (P,) is the unit in which displacement is
+    measured (mm, and rad of one mrad).
+    Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
-    cost, rank, iterations, last = system.cost(x), None, 0, np.inf
-    for iterations in range(1, MAX_ITERATIONS + 1):
+    cost, ranks, last = system.cost(x), None, np.inf
+    iterations = 0
+    while last > STEP_TOLERANCE and iterations < MAX_ITERATIONS:
+        iterations += 1
         factor, count = triangle(system, x, scale)
-        split = _Split.of(factor, free)
-        found = int(np.sum(split.values > threshold * split.values[0])) if split.values.size else 0
         # A rank that has been lost is not taken back, so the iteration cannot swing between two.
-        rank = found if rank is None or iterations <= 3 else min(rank, found)
-        step = scale * split.step((x - nominal) / scale, rank)
+        split = _Split.of(factor, frames, threshold, ranks if iterations > 3 else None)
+        ranks = split.ranks
+        step = scale * split.step((x - nominal) / scale)
         x, cost, last = _advance(system, x, step, cost, scale, name)
-        if last <= STEP_TOLERANCE:
-            break
-    factor, count = triangle(system, x, scale)
-    split = _Split.of(factor, free)
-    cost = float(factor[-1, -1] ** 2 + np.sum(factor[:-1, -1] ** 2))
-    freedom = count - free - rank
     _require(last <= STEP_TOLERANCE, name, iterations, last, cost, count)
+    factor, count = triangle(system, x, scale)
+    split = _Split.of(factor, frames, threshold, ranks)
+    cost = float(np.sum(factor[:, -1] ** 2))
+    freedom = count - sum(split.ranks)
     variance = cost / freedom if freedom > 0 else np.nan
-    covariance = variance * split.inverse_gram(rank) * np.outer(scale, scale)
-    undetermined = split.touched(rank)
+    covariance = variance * split.inverse_gram() * np.outer(scale, scale)
+    undetermined = split.touched()
     covariance[undetermined, :] = covariance[:, undetermined] = np.nan
     return Solution(
         x=x,
         std=np.sqrt(np.diag(covariance)),
         covariance=covariance,
-        singular_values=split.values,
-        rank=rank,
-        gap=_gap(split.values, rank),
+        singular_values=split.others.values,
+        rank=split.others.rank,
+        gap=split.others.gap,
+        frame_rank=split.frames.rank,
         threshold=threshold,
         cost=cost,
         count=count,
@@ -127,58 +136,88 @@ def minimise_truncated(
         iterations=iterations,
         last_step=last,
         converged=True,
+        variance=variance,
     )
 
 
 @dataclass(frozen=True)
-class _Split:
-    """Triangular factor cut into free columns and the SVD of what is left of the others."""
+class _Truncated:
+    """SVD ``left values right`` of a block of columns of which ``rank`` directions are kept."""
 
-    free_factor: np.ndarray
-    coupling: np.ndarray
-    free_rhs: np.ndarray
-    left_rhs: np.ndarray
+    left: np.ndarray
     values: np.ndarray
     right: np.ndarray
+    rank: int
 
     @classmethod
-    def of(cls, factor: np.ndarray, free: int) -> _Split:
-        size = factor.shape[1] - 1
-        left, values, right = np.linalg.svd(factor[free:, free:size], full_matrices=False)
-        return cls(
-            free_factor=factor[:free, :free],
-            coupling=factor[:free, free:size],
-            free_rhs=factor[:free, size],
-            left_rhs=left.T @ factor[free:, size],
-            values=values,
-            right=right,
-        )
+    def of(cls, block: np.ndarray, threshold: float, most: int | None) -> _Truncated:
+        left, values, right = np.linalg.svd(block)
+        values = np.concatenate([values, np.zeros(len(right) - values.size)])
+        rank = int(np.sum(values > threshold * values[0])) if values.size else 0
+        return cls(left, values, right, rank if most is None else min(rank, most))
 
-    def step(self, displacement: np.ndarray, rank: int) -> np.ndarray:
-        """Step (P,): least squares in the kept directions, back to nominal in the others."""
-        free = len(self.free_rhs)
-        kept, lost = self.right[:rank], self.right[rank:]
-        others = -kept.T @ (self.left_rhs[:rank] / self.values[:rank])
-        others -= lost.T @ (lost @ displacement[free:])
-        if not free:
-            return others
-        goal = -(self.free_rhs + self.coupling @ others)
-        return np.concatenate([np.linalg.lstsq(self.free_factor, goal, rcond=1e-12)[0], others])
+    @property
+    def gap(self) -> float:
+        return _gap(self.values, self.rank)
 
-    def inverse_gram(self, rank: int) -> np.ndarray:
+    @property
+    def root(self) -> np.ndarray:
+        """Matrix (P, rank) whose product with its transpose inverts the block's Gram matrix."""
+        return self.right[: self.rank].T / self.values[: self.rank]
+
+    def step(self, rhs: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+        """Least squares in the kept directions, back to nominal in the others."""
+        lost = self.right[self.rank :]
+        kept = self.root @ (self.left[:, : self.rank].T @ rhs)
+        return -kept - lost.T @ (lost @ displacement)
+
+    def touched(self) -> np.ndarray:
+        return np.sum(self.right[self.rank :] ** 2, axis=0) > TOUCH_SQUARED
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Triangular factor cut into the frames' columns and what is left of the others."""
+
+    frames: _Truncated
+    others: _Truncated
+    coupling: np.ndarray
+    frames_rhs: np.ndarray
+    others_rhs: np.ndarray
+
+    @classmethod
+    def of(
+        cls, factor: np.ndarray, count: int, threshold: float, most: tuple[int, int] | None
+    ) -> _Split:
+        upper, lower = factor[:count], factor[count:]
+        frames = _Truncated.of(upper[:, :count], FRAME_THRESHOLD, most and most[0])
+        # Rows of truncated frame directions are equations the frames do not take up.
+        unused = frames.left[:, frames.rank :].T @ upper
+        rows = np.concatenate([lower, unused])
+        others = _Truncated.of(rows[:, count:-1], threshold, most and most[1])
+        return cls(frames, others, upper[:, count:-1], upper[:, -1], rows[:, -1])
+
+    @property
+    def ranks(self) -> tuple[int, int]:
+        return self.frames.rank, self.others.rank
+
+    def step(self, displacement: np.ndarray) -> np.ndarray:
+        count = len(self.frames_rhs)
+        others = self.others.step(self.others_rhs, displacement[count:])
+        frames = self.frames.step(self.frames_rhs + self.coupling @ others, displacement[:count])
+        return np.concatenate([frames, others])
+
+    def inverse_gram(self) -> np.ndarray:
         """Inverse (P, P) of J'J on the kept directions."""
-        free = len(self.free_rhs)
-        root = self.right[:rank].T / self.values[:rank]
-        if not free:
-            return root @ root.T
-        back = np.linalg.pinv(self.free_factor, rcond=1e-12)
-        full = np.block([[back, -back @ self.coupling @ root], [np.zeros((len(root), free)), root]])
+        kept = self.frames.left[:, : self.frames.rank]
+        seen = -self.frames.root @ (kept.T @ self.coupling @ self.others.root)
+        blank = np.zeros((len(self.others.right), self.frames.rank))
+        full = np.block([[self.frames.root, seen], [blank, self.others.root]])
         return full @ full.T
 
-    def touched(self, rank: int) -> np.ndarray:
+    def touched(self) -> np.ndarray:
         """True (P,) where a truncated direction reaches a parameter."""
-        share = np.sum(self.right[rank:] ** 2, axis=0) > TOUCH_SQUARED
-        return np.concatenate([np.zeros(len(self.free_rhs), dtype=bool), share])
+        return np.concatenate([self.frames.touched(), self.others.touched()])
 
 
 def minimise_with_prior(
@@ -188,38 +227,39 @@ def minimise_with_prior(
     prior_std: np.ndarray,
     scale: np.ndarray,
     threshold: float,
-    free: int = 0,
+    frames: int = 0,
     name: str = "fit",
 ) -> Solution:
-    """Gauss-Newton on residuals plus ``((x - prior_mean) / prior_std)^2``; inf = no prior.
+    """Gauss-Newton on ``r'r / variance`` plus ``((x - prior_mean) / prior_std)^2``; inf = no prior.
 
-    ``std`` is the posterior one with whitened residuals taken at their word (variance 1).
-    ``rank``, ``singular_values`` and ``gap`` describe the data alone, without the prior.
+    The variance of the residuals is estimated along with ``x``: what they leave over the number of
+    residuals less the effective number of parameters (the trace of the hat matrix), so the balance
+    against the prior follows the data. ``std`` is the posterior one. ``rank``,
+    ``singular_values`` and ``gap`` describe the data alone, without the prior.
     Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
-    weight = scale / prior_std
+    weight_sq = (scale / prior_std) ** 2
+    last, iterations, variance = np.inf, 0, np.inf
+    while last > STEP_TOLERANCE and iterations < MAX_ITERATIONS:
+        iterations += 1
+        normal = _normal_equations(system, x, scale)
+        displacement = (x - prior_mean) / scale
+        step, variance = _step_with_prior(normal, weight_sq, displacement, variance, name)
 
-    def total(at: np.ndarray) -> float:
-        return system.cost(at) + float(np.sum(((at - prior_mean) / prior_std) ** 2))
+        def total(at: np.ndarray, variance: float = variance) -> float:
+            return system.cost(at) + variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
 
-    cost, iterations, last = total(x), 0, np.inf
-    for iterations in range(1, MAX_ITERATIONS + 1):
-        gram, gradient, count = _normal_equations(system, x, scale)
-        gram[np.diag_indices_from(gram)] += weight**2
-        gradient += weight**2 * (x - prior_mean) / scale
-        chol = _cholesky(gram, name)
-        step = -scale * cho_solve(chol, gradient)
-        x, cost, last = _advance(system, x, step, cost, scale, name, total)
-        if last <= STEP_TOLERANCE:
-            break
+        x, _, last = _advance(system, x, scale * step, total(x), scale, name, total)
+    cost, count = system.cost(x), normal.count
     _require(last <= STEP_TOLERANCE, name, iterations, last, cost, count)
     factor, count = triangle(system, x, scale)
-    values = np.linalg.svd(factor[free:, free:-1], compute_uv=False)
-    rank = int(np.sum(values > threshold * values[0]))
-    with_prior = np.linalg.qr(np.concatenate([factor[:, :-1], np.diag(weight)]), mode="r")
-    root = solve_triangular(with_prior, np.eye(len(with_prior))) * 1.0
-    covariance = (root @ root.T) * np.outer(scale, scale)
+    values = np.linalg.svd(factor[frames:, frames:-1], compute_uv=False)
+    rank = int(np.sum(values > threshold * values[0])) if values.size else 0
+    weight = np.diag(np.sqrt(variance * weight_sq))
+    with_prior = np.linalg.qr(np.concatenate([factor[:, :-1], weight]), mode="r")
+    root = solve_triangular(with_prior, np.eye(len(with_prior)))
+    covariance = variance * (root @ root.T) * np.outer(scale, scale)
     return Solution(
         x=x,
         std=np.sqrt(np.diag(covariance)),
@@ -227,26 +267,62 @@ def minimise_with_prior(
         singular_values=values,
         rank=rank,
         gap=_gap(values, rank),
+        frame_rank=frames,
         threshold=threshold,
-        cost=system.cost(x),
+        cost=cost,
         count=count,
-        degrees_of_freedom=count - free - rank,
+        degrees_of_freedom=count - frames - rank,
         iterations=iterations,
         last_step=last,
         converged=True,
+        variance=variance,
     )
 
 
-def _normal_equations(
-    system: System, x: np.ndarray, scale: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, int]:
+class _Normal(NamedTuple):
+    """``gram`` = J'J and ``gradient`` = J'r in scaled parameters, r'r and the residual count."""
+
+    gram: np.ndarray
+    gradient: np.ndarray
+    cost: float
+    count: int
+
+
+def _step_with_prior(
+    normal: _Normal,
+    weight_sq: np.ndarray,
+    displacement: np.ndarray,
+    variance: float,
+    name: str,
+) -> tuple[np.ndarray, float]:
+    """Scaled step and residual variance that agree with each other on the linearised residuals."""
+    if not np.isfinite(variance):
+        variance = normal.cost / normal.count
+    for _ in range(MAX_VARIANCE_STEPS):
+        floored = max(variance, LEAST_VARIANCE)
+        gram = normal.gram.copy()
+        gram[np.diag_indices_from(gram)] += floored * weight_sq
+        chol = _cholesky(gram, name)
+        step = -cho_solve(chol, normal.gradient + floored * weight_sq * displacement)
+        cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
+        inverse_diagonal = np.diag(cho_solve(chol, np.eye(len(step))))
+        effective = len(step) - floored * float(weight_sq @ inverse_diagonal)
+        found = max(cost, 0.0) / max(normal.count - effective, 1.0)
+        if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
+            return step, floored
+        variance = found
+    return step, max(variance, LEAST_VARIANCE)
+
+
+def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
     gram = np.zeros((system.size, system.size))
-    gradient, count = np.zeros(system.size), 0
+    gradient, cost, count = np.zeros(system.size), 0.0, 0
     for residual, jacobian in system.blocks(x):
         gram += jacobian.T @ jacobian
         gradient += jacobian.T @ residual
+        cost += float(residual @ residual)
         count += len(residual)
-    return gram * np.outer(scale, scale), gradient * scale, count
+    return _Normal(gram * np.outer(scale, scale), gradient * scale, cost, count)
 
 
 def _cholesky(gram: np.ndarray, name: str) -> tuple[np.ndarray, bool]:

@@ -29,7 +29,7 @@ class FlangeModel:
 
 @dataclass(frozen=True)
 class PoseSystem:
-    """Residuals model minus measurement in the robot base, in units of ``position_std_mm``.
+    """Residuals model minus measurement in the robot base, in mm.
 
     Per observation three position residuals and, where an orientation was measured, three of the
     rotation vector log(R_model R_measured'), times ``rotation_weight_mm_per_rad``. Parameters: the
@@ -40,7 +40,6 @@ class PoseSystem:
     model: FlangeModel
     coordinates: FrameCoordinates
     rotation_weight_mm_per_rad: float
-    position_std_mm: float = 1.0
 
     @property
     def size(self) -> int:
@@ -79,7 +78,7 @@ class PoseSystem:
     def _weights(self) -> np.ndarray:
         weights = np.ones(6)
         weights[3:] = self.rotation_weight_mm_per_rad
-        return weights / self.position_std_mm
+        return weights
 
     def _residual(self, x, part):
         frame_x, model_x = x[: self.coordinates.size], x[self.coordinates.size :]
@@ -111,7 +110,7 @@ class PoseSystem:
             # A turn of the flange swings the target's arm: w x arm = -[arm] w.
             if self._arms_matter():
                 jacobian[:, :3, frames:] -= skew(arm) @ inner[:, 3:]
-        angles = residual[:, 3:] * (self.position_std_mm / self.rotation_weight_mm_per_rad)
+        angles = residual[:, 3:] / self.rotation_weight_mm_per_rad
         self._fill_frames(jacobian, frame_x, part, flange, turned, angles)
         if np.any(angles):
             jacobian[:, 3:] = inverse_left_jacobian(angles) @ jacobian[:, 3:]

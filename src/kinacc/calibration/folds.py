@@ -1,0 +1,57 @@
+"""Cross-validation folds by configuration: what belongs together is held out together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def configurations(pose: np.ndarray, q_rad: np.ndarray, tolerance_rad: float) -> np.ndarray:
+    """Configuration number (n,) of every row, counted in order of first appearance.
+
+    Rows of one ``pose`` (n,) share a configuration (its targets and repeats), and so do poses whose
+    joints (n, k) agree within ``tolerance_rad`` in every joint, full turns apart (revisits). The
+    relation is closed under chaining: no two configurations hold rows within the tolerance.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    turn = 2.0 * np.pi
+    wrapped = np.mod(q_rad, turn)
+    wrapped[wrapped >= turn] = 0.0
+    pairs = cKDTree(wrapped, boxsize=turn).query_pairs(
+        tolerance_rad, p=np.inf, output_type="ndarray"
+    )
+    first_of_pose = np.unique(pose, return_index=True)[1]
+    same_pose = np.stack([np.arange(len(pose)), first_of_pose[_ranks(pose)]], axis=1)
+    links = np.concatenate([pairs.reshape(-1, 2), same_pose])
+    graph = coo_matrix((np.ones(len(links)), links.T), shape=(len(pose), len(pose)))
+    return _by_appearance(connected_components(graph, directed=False)[1])
+
+
+def assign(configuration: np.ndarray, folds: int, seed: int) -> np.ndarray:
+    """Fold (n,) in which each row is held out: whole configurations, sizes as even as they allow.
+
+    Configurations are shuffled by ``seed``, then dealt largest first to the smallest fold. With
+    fewer configurations than ``folds`` some folds stay empty.
+    """
+    labels, inverse, sizes = np.unique(configuration, return_inverse=True, return_counts=True)
+    order = np.random.default_rng(seed).permutation(len(labels))
+    order = order[np.argsort(-sizes[order], kind="stable")]
+    filled = np.zeros(folds, dtype=np.int64)
+    fold_of = np.empty(len(labels), dtype=np.int64)
+    for label in order:
+        fold_of[label] = int(np.argmin(filled))
+        filled[fold_of[label]] += sizes[label]
+    return fold_of[inverse]
+
+
+def _ranks(values: np.ndarray) -> np.ndarray:
+    return np.unique(values, return_inverse=True)[1]
+
+
+def _by_appearance(labels: np.ndarray) -> np.ndarray:
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[inverse]

@@ -1,0 +1,126 @@
+"""VEC coefficients, base and targets fitted to poses under a stated Gaussian prior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
+from kinacc.calibration.frames import Frames, coordinates
+from kinacc.calibration.observations import Observations
+from kinacc.calibration.solve import Solution, minimise_with_prior
+from kinacc.calibration.system import FlangeModel, PoseSystem
+from kinacc.models import vec
+from kinacc.models.vec import ERRORS, VECModel
+
+FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames; holds what no pose shows
+RANK_THRESHOLD = 1e-10  # an exact null direction of the data, whatever the prior
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Zero-mean Gaussian prior of a Chebyshev coefficient of order n.
+
+    Standard deviation ``delta_mm`` or ``eps_rad`` at order 0 and 1, times ``decay ** (n - 1)``
+    above: a smooth error has a falling spectrum. ``offset_rad`` is that of a direction offset.
+    """
+
+    delta_mm: float
+    eps_rad: float
+    decay: float
+    offset_rad: float
+
+    def std(self, model: VECModel) -> np.ndarray:
+        """Standard deviations (P,) ordered as ``vec.to_vector``."""
+        falling = self.decay ** np.maximum(np.arange(model.order + 1) - 1, 0)
+        per_error = np.where(np.arange(len(ERRORS)) < 3, self.delta_mm, self.eps_rad)
+        one = np.outer(per_error, falling).ravel()
+        offsets = np.full(model.direction_offsets_rad.size, self.offset_rad)
+        return np.concatenate([np.tile(one, model.joints), offsets])
+
+
+@dataclass(frozen=True)
+class VECFit:
+    """Fitted ``model`` and ``frames``; ``std`` (P,) as ``vec.to_vector``; ``prior_std`` (P,).
+
+    ``solution`` has the figures of the fit over the frame coordinates and the free coefficients.
+    """
+
+    model: VECModel
+    frames: Frames
+    std: np.ndarray
+    prior_std: np.ndarray
+    solution: Solution
+
+
+def fit(
+    observations: Observations,
+    empty: VECModel,
+    *,
+    prior: Prior,
+    rotation_weight_mm_per_rad: float,
+    frames: Frames,
+    frames_free: bool,
+) -> VECFit:
+    """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
+
+    Base and targets are ``frames``, or start there if ``frames_free``. Direction offsets that no
+    observation shows are left at zero, std NaN. Raises FitError.
+    """
+    coords = coordinates(observations, frames, base_free=frames_free, targets_free=frames_free)
+    free = _informed(observations, empty)
+    flange = _flange_model(empty, free)
+    system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
+    prior_std = prior.std(empty)
+    frame_std = FRAME_PRIOR_UNITS * _units(coords.is_angle())
+    start = np.zeros(system.size)
+    solution = minimise_with_prior(
+        system,
+        start=start,
+        prior_mean=start,
+        prior_std=np.concatenate([frame_std, prior_std[free]]),
+        scale=np.concatenate([_units(coords.is_angle()), _units(_is_angle(empty)[free])]),
+        threshold=RANK_THRESHOLD,
+        frames=coords.size,
+        name="VEC fit",
+    )
+    vector, std = np.zeros(free.size), np.full(free.size, np.nan)
+    vector[free] = solution.x[coords.size :]
+    std[free] = solution.std[coords.size :]
+    return VECFit(
+        model=vec.with_vector(empty, vector),
+        frames=coords.frames(solution.x[: coords.size]),
+        std=std,
+        prior_std=prior_std,
+        solution=solution,
+    )
+
+
+def _informed(observations: Observations, empty: VECModel) -> np.ndarray:
+    """Mask (P,): every coefficient, and the offsets of directions that occur in the data."""
+    directions = np.array([-1, 1])
+    seen = (observations.s[:, :, None] == directions).any(axis=0)
+    return np.concatenate([np.ones(empty.coefficients.size, dtype=bool), seen.ravel()])
+
+
+def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
+    def model(x: np.ndarray) -> VECModel:
+        vector = np.zeros(free.size)
+        vector[free] = x
+        return vec.with_vector(empty, vector)
+
+    def jacobian(x: np.ndarray, q_rad: np.ndarray, s: np.ndarray) -> np.ndarray:
+        return vec.parameter_jacobian(model(x), q_rad, s)[:, :, free]
+
+    return FlangeModel(int(free.sum()), lambda x, q, s: vec.pose(model(x), q, s), jacobian)
+
+
+def _is_angle(model: VECModel) -> np.ndarray:
+    one = np.repeat(np.arange(len(ERRORS)) >= 3, model.order + 1)
+    offsets = np.ones(model.direction_offsets_rad.size, dtype=bool)
+    return np.concatenate([np.tile(one, model.joints), offsets])
+
+
+def _units(is_angle: np.ndarray) -> np.ndarray:
+    return np.where(is_angle, ANGLE_UNIT_RAD, 1.0)
