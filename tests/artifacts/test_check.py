@@ -3,14 +3,32 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from small_results import SmallResults
 
-from kinacc.artifacts import check
-from kinacc.artifacts.contract import ARTEFACTS
+from kinacc import provenance
+from kinacc.artifacts import check, store
+from kinacc.stages.catalogue import STAGES
+from kinacc.stages.plan import planned
+
+ROOT = Path(__file__).parents[2]
+ON_EVERY_RUN = [
+    name
+    for stage in STAGES.values()
+    if not (stage.is_figure or stage.scattered or stage.on_request)
+    for name in stage.outputs
+]
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch) -> SmallResults:
+    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "code")
+    return SmallResults(tmp_path / "results")
 
 
 def problems(results) -> list[str]:
@@ -41,8 +59,10 @@ def test_a_good_folder_has_no_problem(results):
     report = check.check_results(results.root)
     assert report.ok, str(report)
     assert report.datasets[0].notes == ()
-    tables = sum(name in str(report.datasets[0].checked) for name in ARTEFACTS)
-    assert tables == len(ARTEFACTS) - 1  # robustness is made on request
+    paths = [Path(path) for path in report.datasets[0].checked if path.endswith(".parquet")]
+    tables = {path.stem for path in paths if path.parent == results.folder}
+    assert tables == set(ON_EVERY_RUN)
+    assert {path.parent.name for path in paths} == {"mh180", "study_chunk"}
 
 
 def test_the_report_is_readable_by_people_and_machines(results, capsys):
@@ -62,9 +82,7 @@ def test_a_folder_that_is_none(tmp_path):
     assert not check.check_results(tmp_path).ok
 
 
-@pytest.mark.parametrize(
-    "artefact", [name for name in ARTEFACTS if name not in ("robustness", "study_chunk")]
-)
+@pytest.mark.parametrize("artefact", ON_EVERY_RUN)
 def test_an_absent_table_is_named(results, artefact):
     results.path(artefact).unlink()
     the_one(problems(results), f"{artefact}.parquet: missing")
@@ -286,8 +304,6 @@ def test_tables_of_two_versions_or_seeds(results, key):
 
 
 def test_other_code_than_that_installed_is_a_note(results, monkeypatch):
-    from kinacc import provenance
-
     monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "newer")
     report = check.check_results(results.root)
     assert report.ok
@@ -299,3 +315,47 @@ def test_what_a_stopped_run_left_is_a_note(results):
     report = check.check_results(results.root)
     assert report.ok
     assert any("left over" in note for note in report.datasets[0].notes)
+
+
+def test_robustness_of_claims_that_are_none(results):
+    table = {"draw": [1], "claim": ["hearsay"], "reproduced": [None], "verdict": ["agrees"]}
+    store.write(results.path("robustness"), "robustness", table, results.marks("claims"))
+    assert any("unknown claim in row 0" in text for text in problems(results))
+
+
+@pytest.fixture
+def plan():
+    return planned([ROOT / "config.yaml"])
+
+
+@pytest.fixture
+def planned_results(tmp_path, monkeypatch, plan):
+    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "code")
+    return SmallResults(tmp_path / "results", plan)
+
+
+def test_a_good_folder_fits_its_configuration(planned_results, plan):
+    report = check.check_results(planned_results.root, plan)
+    assert report.ok, str(report)
+
+
+def test_results_of_another_configuration(planned_results):
+    other = planned([ROOT / "config.yaml"], {"study": {"alpha": 0.5}})
+    report = check.check_results(planned_results.root, other)
+    found = [str(problem) for problem in report.datasets[0].problems]
+    the_one(found, "study.parquet: config_hash", "another configuration")
+    assert not any("vec_model" in text for text in found)
+
+
+def test_results_of_another_seed(planned_results):
+    other = planned([ROOT / "config.yaml"], {"seed": 1})
+    report = check.check_results(planned_results.root, other)
+    assert any("seed 20240" in str(problem) for problem in report.datasets[0].problems)
+
+
+def test_a_data_set_that_was_not_run(planned_results, tmp_path):
+    own = tmp_path / "own.yaml"
+    own.write_text("datasets: {second: {robot: mh180}}\n")
+    report = check.check_results(planned_results.root, planned([ROOT / "config.yaml", own]))
+    assert not report.ok
+    assert "second: no such folder" in str(report)

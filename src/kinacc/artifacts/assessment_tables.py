@@ -206,19 +206,18 @@ CLAIMS = Artefact(
     ),
     ("claim",),
 )
+_DRAWS = (
+    whole("draw", "number of the accepted draw"),
+    text("claim", "identifier of the claim", pattern=IDENTIFIER_PATTERN),
+    real("reproduced", "see claims", "the reproduced number, null without one", nullable=True),
+    text("verdict", "agrees, differs or not comparable", VERDICTS),
+)
+ROBUSTNESS_CHUNK = Artefact(
+    "robustness_chunk", "Every claim on some of the further draws.", _DRAWS, ("draw", "claim")
+)
 ROBUSTNESS = Artefact(
     "robustness",
     "Every claim on further accepted draws of the synthetic arm.",
-    (
-        whole("draw", "number of the accepted draw"),
-        text("claim", "identifier of the claim", pattern=IDENTIFIER_PATTERN),
-        real(
-            "reproduced",
-            "see claims",
-            "the reproduced number, null where there is none",
-            nullable=True,
-        ),
-        text("verdict", "agrees, differs or not comparable", VERDICTS),
-    ),
+    _DRAWS,
     ("draw", "claim"),
 )

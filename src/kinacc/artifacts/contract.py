@@ -35,6 +35,7 @@ ARTEFACTS: dict[str, Artefact] = {
         assessment_tables.READINGS,
         assessment_tables.HISTORIES,
         assessment_tables.CLAIMS,
+        assessment_tables.ROBUSTNESS_CHUNK,
         assessment_tables.ROBUSTNESS,
     )
 }

@@ -6,11 +6,10 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from kinacc import provenance
 from kinacc.artifacts import allowed, store
 from kinacc.stages.catalogue import STAGES
+from kinacc.stages.plan import Plan
 from kinacc.stages.runner import Job, stage_provenance
 
 SEED = 7
@@ -26,7 +25,8 @@ PICTURES = {
 class SmallResults:
     """One data set's folder; ``tables`` are what is written, ``save`` writes one again."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, plan: Plan | None = None):
+        self.plan = plan
         self.root, self.folder = folder, folder / "mh180"
         self.tables = small_tables()
         for name, stage in STAGES.items():
@@ -52,7 +52,10 @@ class SmallResults:
                 inputs[name] = [str(path) for path in self.parts()]
             elif name not in without and self.path(name).exists():
                 inputs[name] = str(self.path(name))
-        return stage_provenance(Job(stage.module, inputs, {}, {}, SEED))
+        if self.plan is None:
+            return stage_provenance(Job(stage.module, inputs, {}, {}, SEED))
+        settings = self.plan.settings(stage_name, "mh180")
+        return stage_provenance(Job(stage.module, inputs, {}, settings, self.plan.seed("mh180")))
 
     def save(self, stage_name: str, without: tuple[str, ...] = ()) -> None:
         """Write the tables of a stage, made from what is there now."""
@@ -71,12 +74,6 @@ class SmallResults:
         for name in names[names.index(stage_name) :]:
             if not STAGES[name].on_request:
                 self.save(name)
-
-
-@pytest.fixture
-def results(tmp_path, monkeypatch) -> SmallResults:
-    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "code")
-    return SmallResults(tmp_path / "results")
 
 
 def small_tables() -> dict[str, dict]:
