@@ -1,0 +1,127 @@
+"""A user changes one thing and runs again: what depends on it is remade, and nothing else."""
+
+import pytest
+
+FIGURES = {f"fig{number}" for number in range(1, 7)}
+AFTER_POINTS = {"study_chunk", "study", "histories", "fig2", "fig4", "fig5", "fig6", "claims"}
+AFTER_DH = {"residuals", "accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS
+ALL = {"measurements", "vec", "dh", "fig1"} | AFTER_DH
+WITHOUT_MAP = {"accuracy_map", "fig3"}
+
+
+def test_nothing_changed(project):
+    assert project.to_do() == {}
+
+
+def test_a_comment_in_the_readme(project):
+    project.append("README.md", "<!-- a comment -->")
+    assert project.to_do() == {}
+
+
+def test_a_comment_in_the_configuration(project):
+    project.append("small.yaml", "# a comment")
+    assert project.to_do() == {}
+
+
+@pytest.mark.parametrize(
+    ("change", "reruns"),
+    [
+        ("map: {grid_mm: 200}", {"mh180": {"accuracy_map", "fig3", "claims"}}),
+        (
+            "study: {noise_mm: [0.1, 0.2]}",
+            {"mh180": AFTER_POINTS - {"fig2"}, "own": AFTER_POINTS - {"fig2"}},
+        ),
+        (
+            "histories: {noise_mm: 0.2}",
+            {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")},
+        ),
+        (
+            "datasets: {mh180: {calibration: {vec: {order: 3}}}}",
+            {"mh180": ALL - {"measurements", "fig1"}},
+        ),
+        (
+            "datasets: {mh180: {calibration: {dh: {truncation: 0.001}}}}",
+            {"mh180": {"dh"} | AFTER_DH},
+        ),
+        (
+            "datasets: {mh180: {measurements: {synthetic: {tracker_noise_mm: 0.03}}}}",
+            {"mh180": ALL - {"fig1"}},
+        ),
+        (
+            "datasets: {own: {evaluation: {points: 11}}}",
+            {"own": AFTER_POINTS | {"assessment_points"}},
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_one_value_of_the_configuration(project, change, reruns):
+    project.configure(change)
+    assert project.to_do() == reruns
+
+
+@pytest.mark.parametrize(
+    ("module", "reruns"),
+    [
+        ("accuracy_map", {"mh180": {"accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS}),
+        ("figures/fig4", {"mh180": {"fig4"}, "own": {"fig4"}}),
+        ("claims/numbers", {"mh180": {"claims"}, "own": {"claims"}}),
+        ("histories", {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")}),
+        ("calibration/vec_fit", None),
+        ("geometry", None),
+    ],
+)
+def test_one_module_of_the_package(project, module, reruns):
+    project.append(f"src/kinacc/{module}.py", "# changed")
+    found = project.to_do()
+    if module == "accuracy_map":
+        found = {"mh180": found["mh180"]}
+    if module == "calibration/vec_fit":
+        assert {"vec", "dh", "residuals"} <= found["mh180"]
+        assert "measurements" not in found["own"]
+        assert "fig1" not in found["mh180"]
+        return
+    if module == "geometry":
+        assert found["mh180"] >= ALL - {"fig1"}
+        return
+    assert found == reruns
+
+
+def test_the_cli_and_the_check_are_no_part_of_any_result(project):
+    project.append("src/kinacc/cli.py", "# changed")
+    project.append("src/kinacc/artifacts/check.py", "# changed")
+    assert project.to_do() == {}
+
+
+def test_one_row_of_a_file_of_measurements(project):
+    path = project.folder / "own data" / "poses.csv"
+    lines = path.read_text().splitlines()
+    fields = lines[7].split(",")
+    fields[6] = f"{float(fields[6]) + 0.01:.9f}"
+    lines[7] = ",".join(fields)
+    path.write_text("\n".join(lines) + "\n")
+    assert project.to_do() == {"own": ALL - WITHOUT_MAP - {"fig1"}}
+
+
+def test_a_file_of_measurements_saved_again_unchanged(project):
+    path = project.folder / "own data" / "poses.csv"
+    path.write_bytes(path.read_bytes())
+    assert project.to_do() == {}
+
+
+def test_a_robot_file(project):
+    project.append("src/kinacc/robots/mh180.yaml", "# changed")
+    assert project.to_do()["mh180"] >= {"measurements", "vec", "dh", "accuracy_map"}
+
+
+def test_a_deleted_artefact_alone_is_remade(project):
+    (project.folder / "results" / "mh180" / "claims.parquet").unlink()
+    assert project.to_do() == {"mh180": {"claims"}}
+
+
+def test_one_artefact_asked_for_by_name(project):
+    project.configure("study: {alpha: 0.5}")
+    project.configure("map: {grid_mm: 200}")
+    before = project.digests()
+    project.snakemake("results/mh180/accuracy_map.parquet")
+    after = project.digests()
+    assert {name for name in after if after[name] != before[name]} == {"mh180/accuracy_map.parquet"}

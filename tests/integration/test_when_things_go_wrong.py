@@ -1,0 +1,73 @@
+"""Bad input and failing stages: a reason a person can act on, and nothing half done."""
+
+import pytest
+
+CSV = "own data/poses.csv"
+
+
+def no_half_written(project):
+    results = project.folder / "results"
+    return not [path for path in results.rglob(".*") if path.is_file()]
+
+
+def test_a_stage_that_fails(project):
+    before = project.digests()
+    project.configure("histories: {noise_mm: 0.2}")
+    project.append(
+        "src/kinacc/stages/histories.py",
+        "def run(inputs, settings):\n    raise ArithmeticError('the world ended')",
+    )
+    text = project.snakemake("results/mh180/histories.parquet", ok=False)
+    log = (project.folder / "results/mh180/logs/histories.log").read_text()
+    for place in (text, log):
+        assert "mh180 histories failed" in place
+        assert "ArithmeticError: the world ended" in place
+    after = project.digests()
+    assert "mh180/histories.parquet" not in after
+    assert {name: before[name] for name in after} == after
+    assert no_half_written(project)
+
+
+def test_a_configuration_with_several_mistakes(project):
+    before = project.digests()
+    project.configure("study: {alhpa: 0.5, repetitions: many}")
+    project.configure("datasets: {'../mh180': {robot: mh180}}")
+    text = project.snakemake(ok=False)
+    for part in ("alhpa", "alpha", "many", "../mh180", "small.yaml"):
+        assert part in text
+    assert "Traceback" not in text
+    assert project.digests() == before
+
+
+def test_a_data_file_that_is_not_there(project):
+    before = project.digests()
+    (project.folder / CSV).rename(project.folder / "own data" / "moved.csv")
+    text = project.snakemake(ok=False)
+    assert CSV in text
+    assert "Traceback" not in text
+    assert project.digests() == before
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "value", "said"),
+    [(3, 6, "nan", "x_mm"), (5, 9, "0.2", "quaternion"), (9, 1, "500", "q2")],
+)
+def test_a_row_that_cannot_be_right(project, row, column, value, said):
+    before = project.digests()
+    path = project.folder / CSV
+    good = path.read_text()
+    lines = good.splitlines()
+    fields = lines[row].split(",")
+    fields[column] = value
+    lines[row] = ",".join(fields)
+    path.write_text("\n".join(lines) + "\n")
+    for _ in range(2):  # the second run must not take the earlier table for this file's
+        text = project.snakemake(ok=False)
+        assert said in text
+        assert "poses.csv" in text
+        assert "Traceback" not in text
+        assert project.digests() == before
+        assert said in (project.folder / "results/own/logs/measurements.log").read_text()
+    path.write_text(good)
+    project.snakemake("results/own/measurements.parquet")
+    assert project.digests() == before
