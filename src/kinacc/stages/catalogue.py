@@ -135,7 +135,13 @@ STAGES: dict[str, Stage] = {
             "drawing Fig. 2, the arm over its evaluation space",
             ("dh_model", "frames", "assessment_points"),
             ("fig2",),
-            ("dataset", "robot", "evaluation.space", "evaluation.cylinder"),
+            (
+                "dataset",
+                "robot",
+                "evaluation.space",
+                "evaluation.cylinder",
+                "evaluation.tool_mm",
+            ),
             files=("robot",),
         ),
         Stage(
@@ -181,6 +187,33 @@ STAGES: dict[str, Stage] = {
             ("claims",),
             ("robot",),
             optional=("accuracy_map", "robustness"),
+        ),
+        Stage(
+            "robustness_chunk",
+            "going through fits, study and claims with further draws of the arm",
+            (),
+            ("robustness_chunk",),
+            (
+                "seed",
+                "robot",
+                "measurements",
+                "calibration",
+                "evaluation",
+                "map",
+                "study",
+                "histories",
+                "robustness",
+            ),
+            files=("robot",),
+            scattered=True,
+            on_request=True,
+        ),
+        Stage(
+            "robustness_table",
+            "gathering the claims on further draws of the arm",
+            ("robustness_chunk",),
+            ("robustness",),
+            on_request=True,
         ),
     )
 }
