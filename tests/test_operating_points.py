@@ -1,0 +1,114 @@
+"""Operating points: where they lie, in which order, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_accuracy_map import ARM, DOWN, NINE, RANGE, SPACE, TABLE_II, wavy
+
+from kinacc import operating_points, region
+from kinacc.accuracy_map import ModelPair
+from kinacc.errors import InputError
+from kinacc.inverse import limits
+from kinacc.models import dh, vec
+from kinacc.operating_points import PosesWanted
+
+PAIR = ModelPair(wavy(), TABLE_II)
+WANTED = PosesWanted(SPACE, DOWN, NINE)
+
+
+@pytest.mark.parametrize("sequence", region.SEQUENCES)
+def test_points_in_space_lie_in_it_with_the_orientations_of_the_set(sequence):
+    q = operating_points.in_space(ARM, PAIR, WANTED, sequence, 200)
+    assert q.shape == (200, 6)
+    pose = dh.forward(TABLE_II, q)
+    grown = replace(SPACE, inner_radius_mm=1199.999, radial_span_mm=900.002)
+    assert region.contains(grown, pose.position_mm).all()
+    angle = np.arctan2(pose.position_mm[:, 1], pose.position_mm[:, 0])
+    cells = region.Cells(angle, np.ones(200), np.ones(200))
+    allowed = np.stack(
+        [region.tool_poses(cells, DOWN, turn).rotation for turn in NINE.rotation], axis=1
+    )
+    distance = np.abs(allowed - pose.rotation[:, None]).max(axis=(2, 3)).min(axis=1)
+    assert distance.max() < 1e-8
+    assert 80 < np.sum(q[:, 4] > 0) < 120  # both wrists, evenly
+    assert limits.within_limits(ARM, q).all()
+    assert limits.within(q, *RANGE).all()
+
+
+def test_a_longer_set_begins_with_the_shorter_one():
+    short = operating_points.in_space(ARM, PAIR, WANTED, "sobol", 64)
+    long = operating_points.in_space(ARM, PAIR, WANTED, "sobol", 128)
+    assert np.abs(long[:64] - short).max() < 1e-9
+
+
+def test_errors_are_vec_minus_dh_of_each_ones_tool():
+    q = operating_points.in_space(ARM, PAIR, WANTED, "halton", 20)
+    tool = np.array([10.0, 20.0, 30.0])
+    travel = np.array([1, -1, 0, 1, -1, 1])
+    pair = ModelPair(
+        PAIR.vec,
+        PAIR.dh,
+        vec_tool=PAIR.vec_tool._replace(position_mm=tool),
+        dh_tool=PAIR.vec_tool._replace(position_mm=2 * tool),
+        travel=travel,
+    )
+    points = operating_points.with_errors(pair, q)
+    true = vec.pose(PAIR.vec, q, np.tile(travel, (20, 1)))
+    modelled = dh.forward(TABLE_II, q)
+    expected = true.position_mm + true.rotation @ tool
+    expected -= modelled.position_mm + modelled.rotation @ (2 * tool)
+    assert np.allclose(points.error_mm, expected, atol=1e-9)
+    assert (points.travel == travel).all()
+
+
+def test_points_in_joints_lie_in_the_box_and_in_the_cylinder():
+    everything = ARM.q_min_rad, ARM.q_max_rad
+    q = operating_points.in_joints(ARM, PAIR, everything, "sobol", 100, SPACE)
+    assert region.contains(SPACE, dh.forward(TABLE_II, q).position_mm).all()
+    assert limits.within(q, *RANGE).all()
+    box = np.deg2rad([-10.0] * 6), np.deg2rad([10.0] * 6)
+    q = operating_points.in_joints(ARM, PAIR, box, "halton", 50)
+    assert limits.within(q, *box).all()
+
+
+def test_a_box_of_coupled_joints_is_in_reported_angles():
+    coupling = np.diag([1.0, 1, 1, -1, 1, 1])
+    coupling[2, 1] = -1.0
+    arm = replace(ARM, joint_map=coupling)
+    box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([10.0, 40, 0, 20, 10, 10])
+    q = operating_points.in_joints(arm, PAIR, box, "sobol", 60)
+    assert limits.within(limits.reported_joints(arm, q), *box).all()
+    assert limits.within(q, *RANGE).all()
+    assert (q[:, 3] < 0).all()
+
+
+def test_boxes_without_anything_to_assess_name_every_joint():
+    box = np.deg2rad([100.0, -10, -10, -10, -10, 200]), np.deg2rad([110.0, 10, 10, 10, 10, 210])
+    with pytest.raises(InputError) as refusal:
+        operating_points.in_joints(ARM, PAIR, box, "sobol", 10)
+    assert [problem.where for problem in refusal.value.problems] == ["joint 1", "joint 6"]
+
+
+def test_a_space_out_of_reach_is_refused_with_the_reasons_counted():
+    far = WANTED._replace(cylinder=replace(SPACE, inner_radius_mm=4000.0))
+    with pytest.raises(InputError, match="out of reach"):
+        operating_points.in_space(ARM, PAIR, far, "sobol", 2)
+
+
+def test_rows_are_spread_over_the_measured_ones_each_once():
+    assert sorted(operating_points.spread_rows(39, 39)) == list(range(39))
+    assert sorted(operating_points.spread_rows(1, 5)) == [0]
+    rows = operating_points.spread_rows(632, 200)
+    assert len(set(rows.tolist())) == 200
+    assert np.diff(np.sort(rows)).max() <= 8
+    assert np.array_equal(rows[:50], operating_points.spread_rows(632, 50))
+
+
+def test_readings_are_grouped_by_configuration_and_target():
+    pose = np.array([0, 0, 1, 0, 1])
+    target = np.array(["a", "b", "a", "a", "a"], dtype=object)
+    groups = operating_points.readings_of(pose, target)
+    assert [group.tolist() for group in groups] == [[0, 3], [1], [2, 4]]
