@@ -1,0 +1,141 @@
+"""Histories: each example obeys its rule, is the first to do so, and says when none does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc.assess import ModelInvalidation
+from kinacc.errors import InputError
+from kinacc.histories import (
+    FALLBACKS,
+    KEPT,
+    LARGER,
+    REJECTED,
+    RULES,
+    HistorySettings,
+    examples,
+    histories,
+)
+from kinacc.stages import histories as stage
+from kinacc.study import StudySettings, world_of
+
+SEED = 3
+STUDY = StudySettings()
+
+
+def field() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    error = rng.normal(size=(200, 3))
+    error *= (rng.gamma(5.36, 1.0, 200) / np.linalg.norm(error, axis=1))[:, None]
+    return error * 0.906 / np.linalg.norm(error, axis=1).max()
+
+
+ERROR = field()
+SIZES = np.linalg.norm(ERROR, axis=1)
+
+
+def of(table: dict, example: str) -> dict:
+    keep = table["example"] == example
+    return {name: column[keep] for name, column in table.items()}
+
+
+@pytest.fixture(scope="module")
+def table() -> dict:
+    return histories(ERROR, HistorySettings(), STUDY, SEED, point=np.arange(200) + 1000)
+
+
+def test_bounds_stand_to_the_truth_as_the_papers_do(table):
+    for example, ratio in ((REJECTED, 0.834), (LARGER, 0.844), (KEPT, 1.023)):
+        rows = of(table, example)
+        np.testing.assert_allclose(rows["eta_mm"], ratio / 0.906 * SIZES.max(), rtol=1e-12)
+
+
+def test_examples_obey_their_rules(table):
+    rejected, larger, kept = (of(table, name) for name in (REJECTED, LARGER, KEPT))
+    assert all(rows["rule_met"].all() for rows in (rejected, larger, kept))
+    assert rejected["rule"][0] == RULES[REJECTED]
+    assert rejected["rejection_probability"][-1] > rejected["alpha"][-1]
+    assert rejected["repeat"][-1] > 1
+    assert rejected["true_mm"][-1] == SIZES.max()
+    assert rejected["iteration"][-1] == STUDY.measurements
+    assert larger["simulation"][0] == rejected["simulation"][0]
+    assert larger["rejection_probability"][-1] <= larger["alpha"][-1]
+    assert kept["rejection_probability"][-1] <= kept["alpha"][-1]
+    assert kept["repeat"].max() > 1
+
+
+def test_no_earlier_simulation_obeys_the_rules(table):
+    assessor = ModelInvalidation()
+    first = {name: int(of(table, name)["simulation"][0]) for name in (REJECTED, KEPT)}
+    eta = {name: float(of(table, name)["eta_mm"][0]) for name in (REJECTED, LARGER, KEPT)}
+    for simulation in range(first[REJECTED]):
+        world = world_of(ERROR, 0.3, simulation, STUDY, SEED)
+        if assessor.run(world, eta[REJECTED]).rejected:
+            last = assessor.history(world, eta[REJECTED])[-1]
+            ends_at_worst = last.repeat > 1 and last.row == SIZES.argmax()
+            assert assessor.run(world, eta[LARGER]).rejected or not ends_at_worst
+    for simulation in range(first[KEPT]):
+        steps = assessor.history(world_of(ERROR, 0.3, simulation, STUDY, SEED), eta[KEPT])
+        assert steps[-1].rejection_probability > 0.6 or max(step.repeat for step in steps) == 1
+
+
+def test_a_history_is_consistent_with_itself(table):
+    for example in (REJECTED, LARGER, KEPT):
+        rows = of(table, example)
+        np.testing.assert_array_equal(rows["iteration"], np.arange(1, rows["iteration"].size + 1))
+        np.testing.assert_allclose(rows["true_mm"], SIZES[rows["point"] - 1000], rtol=1e-12)
+        once = rows["repeat"] == 1
+        np.testing.assert_array_equal(rows["measured_mm"][once], rows["averaged_mm"][once])
+        # After a probability at most alpha a new point is measured, else one already measured.
+        np.testing.assert_array_equal(
+            rows["repeat"][1:] > 1, rows["rejection_probability"][:-1] > rows["alpha"][:-1]
+        )
+        for point in np.unique(rows["point"]):
+            repeats = rows["repeat"][rows["point"] == point]
+            np.testing.assert_array_equal(repeats, np.arange(1, repeats.size + 1))
+
+
+def test_where_no_simulation_obeys_the_rule_the_nearest_is_shown_and_says_so():
+    settings = HistorySettings(eta_ratio_rejected=3.0, eta_ratio_kept=0.05, simulations_searched=4)
+    table = histories(ERROR, settings, STUDY, SEED)
+    for example in (REJECTED, KEPT):
+        rows = of(table, example)
+        assert not rows["rule_met"].any()
+        assert rows["rule"][0] == FALLBACKS[example][1]
+        assert rows["simulation"][0] == 0
+    # Rejected at eta, but at the larger bound too.
+    settings = HistorySettings(
+        eta_ratio_rejected=0.05, eta_ratio_larger=0.06, simulations_searched=4
+    )
+    found = examples(ERROR, settings, STUDY, SEED)[0]
+    assert (found.simulation, found.rule, found.rule_met) == (0, FALLBACKS[REJECTED][0], False)
+
+
+@pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 20), (8, 3), (8, 30)])
+def test_any_number_of_points_and_any_budget(points, budget):
+    study = StudySettings(measurements=budget, visiting_order="shuffled")
+    settings = HistorySettings(simulations_searched=20)
+    table = histories(ERROR[:points], settings, study, SEED)
+    for example in (REJECTED, LARGER, KEPT):
+        assert 1 <= of(table, example)["iteration"].size <= budget
+
+
+def test_stage_passes_configuration_and_point_numbers_on(table):
+    points = {"point": np.arange(200) + 1000, "true_error_mm": SIZES}
+    points |= {f"e{axis}_mm": ERROR[:, i] for i, axis in enumerate("xyz")}
+    settings = {"seed": SEED, "study": {"chunks": 2}, "histories": {"simulations_searched": 1000}}
+    made = stage.run({"assessment_points": points}, settings)["histories"]
+    for name, column in made.items():
+        np.testing.assert_array_equal(column, table[name])
+
+
+def test_settings_are_refused_together():
+    with pytest.raises(InputError) as caught:
+        HistorySettings(noise_mm=0.0, eta_ratio_kept=float("nan"), simulations_searched=0)
+    where = {problem.where for problem in caught.value.problems}
+    assert where == {
+        "histories.noise_mm",
+        "histories.eta_ratio_kept",
+        "histories.simulations_searched",
+    }

@@ -1,0 +1,198 @@
+"""The Monte Carlo study: tables as promised, the same whatever the order, parts or neighbours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc.errors import InputError
+from kinacc.stages import study as study_stage
+from kinacc.stages import study_chunk as chunk_stage
+from kinacc.study import (
+    StudySettings,
+    default_reading,
+    part_of,
+    readings,
+    simulate,
+    summary,
+    true_accuracy_mm,
+)
+
+ERROR = np.random.default_rng(11).normal(size=(40, 3)) * 0.3
+TRUE = float(np.linalg.norm(ERROR, axis=1).max())
+SMALL = StudySettings(noise_mm=(0.1, 0.3), repetitions=4, measurements=40)
+POINTS = {
+    "point": np.arange(40),
+    "ex_mm": ERROR[:, 0],
+    "ey_mm": ERROR[:, 1],
+    "ez_mm": ERROR[:, 2],
+    "true_error_mm": np.linalg.norm(ERROR, axis=1),
+}
+
+
+def configured(**study) -> dict:
+    section = {"noise_mm": [0.1, 0.3], "repetitions": 4, "measurements": 40, "chunks": 2}
+    return {"seed": 3, "study": section | study}
+
+
+def equal(one: dict, other: dict) -> bool:
+    assert list(one) == list(other)
+    return all(
+        one[name].tobytes() == other[name].tobytes()
+        if one[name].dtype != object
+        else one[name].tolist() == other[name].tolist()
+        for name in one
+    )
+
+
+@pytest.fixture(scope="module")
+def rows() -> dict:
+    return simulate(ERROR, SMALL.noise_mm, range(4), SMALL, 3)
+
+
+def test_every_noise_repetition_assessor_and_reading_has_one_row(rows):
+    names = ("noise_mm", "repetition", "assessor", "outlier_rule", "distance", "covariance")
+    keys = list(zip(*(rows[name].tolist() for name in (*names, "search")), strict=True))
+    assert len(keys) == len(set(keys)) == 2 * 4 * 16
+
+
+def test_parts_joined_in_any_order_give_the_same_bytes(rows):
+    for of in (1, 2, 3, 4):
+        parts = [
+            chunk_stage.run(
+                {"assessment_points": POINTS}, configured() | {"part": {"number": i, "of": of}}
+            )["study_chunk"]
+            for i in range(of, 0, -1)
+        ]
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        inputs = {"assessment_points": POINTS, "study_chunk": joined}
+        made = study_stage.run(inputs, configured())
+        assert equal(made["study"], default_reading(rows, SMALL))
+        assert equal(made["study_summary"], summary(default_reading(rows, SMALL), TRUE))
+        assert equal(made["readings"], readings(rows, TRUE))
+
+
+def test_a_simulation_does_not_know_its_neighbours(rows):
+    alone = simulate(ERROR, [0.3], [2], SMALL, 3)
+    mine = (rows["noise_mm"] == 0.3) & (rows["repetition"] == 2)
+    assert equal(alone, {name: column[mine] for name, column in rows.items()})
+    other = simulate(ERROR, [0.3], [2], SMALL, 4)
+    assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
+
+
+def test_all_conventional_assessors_see_the_same_first_readings():
+    settings = StudySettings(noise_mm=(0.2,), measurements=40, outlier_rule="iqr")
+    table = simulate(np.full((40, 3), 0.5), [0.2], range(20), settings, 1)
+    study = default_reading(table, settings)
+    largest = study["assessed_mm"][study["assessor"] == "maximum"]
+    kept = study["assessed_mm"][study["assessor"] == "outlier_rejection"]
+    # Where nothing is an outlier the two agree to the last bit; else rejection is smaller.
+    assert np.all(kept <= largest)
+    assert np.any(kept == largest)
+
+
+def test_shapes_of_the_tables(rows):
+    assert default_reading(rows, SMALL)["noise_mm"].size == 2 * 4 * 3
+    assert summary(default_reading(rows, SMALL), TRUE)["assessor"].tolist() == [
+        *["maximum"] * 2,
+        *["outlier_rejection"] * 2,
+        *["model_invalidation"] * 2,
+    ]
+    table = readings(rows, TRUE)
+    assert table["assessor"].tolist() == ["outlier_rejection"] * 6 + ["model_invalidation"] * 24
+    outlier = table["assessor"] == "outlier_rejection"
+    assert all(value is None for value in table["distance"][outlier])
+    assert all(value is None for value in table["outlier_rule"][~outlier])
+
+
+@pytest.mark.parametrize("switch", ["outlier_rule", "distance", "covariance", "search"])
+def test_the_default_reading_follows_the_configuration(rows, switch):
+    values = sorted({value for value in rows[switch] if value is not None})
+    means = set()
+    for value in values:
+        study = default_reading(rows, StudySettings.of({switch: value}))
+        assert study["noise_mm"].size == 2 * 4 * 3
+        means.add(float(study["assessed_mm"].mean()))
+    assert len(means) == len(values)
+
+
+def test_summary_against_the_truth(rows):
+    study = default_reading(rows, SMALL)
+    table = summary(study, TRUE)
+    mine = (study["assessor"] == "maximum") & (study["noise_mm"] == 0.3)
+    sample = study["assessed_mm"][mine]
+    row = {name: column[1] for name, column in table.items()}
+    assert row["mean_mm"] == pytest.approx(np.mean(sample), rel=1e-15)
+    assert (row["min_mm"], row["max_mm"]) == (sample.min(), sample.max())
+    assert row["bias_mm"] == pytest.approx(sample.mean() - TRUE, abs=1e-15)
+    assert row["rmse_mm"] ** 2 == pytest.approx(sample.var() + row["bias_mm"] ** 2, rel=1e-12)
+    assert row["repetitions"] == 4
+
+
+@pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 30), (40, 1), (40, 15), (15, 40)])
+@pytest.mark.parametrize("order", ["sequence", "shuffled"])
+def test_any_number_of_points_and_any_budget(points, budget, order):
+    settings = StudySettings(
+        noise_mm=(0.2,), repetitions=2, measurements=budget, visiting_order=order
+    )
+    table = simulate(ERROR[:points], [0.2], range(2), settings, 1)
+    assert np.all(table["measurements"] <= budget)
+    assert np.all(table["points_visited"] <= min(points, budget))
+    assert np.all(np.isfinite(table["assessed_mm"]))
+
+
+def test_order_of_points_changes_only_what_depends_on_it():
+    shuffled = StudySettings(measurements=40, visiting_order="shuffled")
+    plain = simulate(ERROR, [0.3], range(3), StudySettings(measurements=40), 1)
+    other = simulate(ERROR, [0.3], range(3), shuffled, 1)
+    once = plain["assessor"] != "model_invalidation"
+    np.testing.assert_allclose(
+        plain["assessed_mm"][once], other["assessed_mm"][once], rtol=1e-12, atol=0
+    )
+    assert not np.array_equal(plain["assessed_mm"][~once], other["assessed_mm"][~once])
+
+
+def test_progress_counts_simulations():
+    seen = []
+
+    def progress(items, what, total):
+        seen.append((what, total))
+        return items
+
+    simulate(ERROR, [0.1, 0.3], range(2), SMALL, 1, progress)
+    assert seen == [("simulations", 4)]
+
+
+def test_parts_share_out_every_repetition_once():
+    for of in (1, 3, 7):
+        shared = [r for number in range(1, of + 1) for r in part_of(10, number, of)]
+        assert sorted(shared) == list(range(10))
+    for number, of in ((0, 3), (4, 3)):
+        with pytest.raises(InputError):
+            part_of(10, number, of)
+
+
+def test_settings_are_refused_together():
+    with pytest.raises(InputError) as caught:
+        StudySettings((0.1, 0.1), 0, 0, 1.5, "x", "y", "z", "w", "v")
+    where = {problem.where for problem in caught.value.problems}
+    names = "noise_mm repetitions measurements alpha outlier_rule distance covariance search"
+    assert where == {f"study.{name}" for name in [*names.split(), "visiting_order"]}
+
+
+@pytest.mark.parametrize("noise", [[], [0.0], [-0.1], [np.nan], [1e-8]])
+def test_noise_that_means_nothing_is_refused(noise):
+    with pytest.raises(InputError, match=r"study\.noise_mm"):
+        StudySettings(noise_mm=noise)
+
+
+@pytest.mark.parametrize("error", [np.zeros((0, 3)), np.zeros(3), np.full((2, 3), np.nan)])
+def test_errors_that_cannot_be_used_are_refused(error):
+    with pytest.raises(InputError, match="true errors"):
+        simulate(error, [0.1], range(1), SMALL, 1)
+
+
+def test_true_accuracy_is_the_largest_error():
+    assert true_accuracy_mm(POINTS["true_error_mm"]) == TRUE
+    with pytest.raises(InputError):
+        true_accuracy_mm([])
