@@ -79,24 +79,31 @@ class Plan:
             for name in ("accuracy_map", "fig3"):
                 reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
         if config["measurements"]["source"] != "synthetic":
-            for name in ("robustness_chunk", "robustness"):
+            for name in ("robustness_chunk", "robustness_table"):
                 reasons[name] = "no further draws of a measured arm"
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
-    def targets(self, dataset: str) -> list[str]:
-        """Every file the data set leaves, except those made only on request."""
+    def targets(self, dataset: str, on_request: bool = False) -> list[str]:
+        """Every file the data set leaves in a plain run, or those made only on request."""
         return [
             path
             for name, stage in self.stages(dataset).items()
-            if not stage.on_request
-            for path in self.outputs(name, dataset, part=None).values()
-            if not stage.scattered
+            if stage.on_request == on_request and not stage.scattered
+            for path in self.outputs(name, dataset).values()
         ]
 
     def inputs(self, name: str, dataset: str) -> dict[str, str | list[str]]:
-        """Files a stage reads: artefact -> path, or paths of its parts; role -> other file."""
+        """Files a stage reads: artefact -> path, or paths of its parts; role -> other file.
+
+        An optional artefact counts if the data set has it; one made on request, once it is there.
+        """
         stage = STAGES[name]
-        available = {made for each in self.stages(dataset).values() for made in each.outputs}
+        available = {
+            made
+            for each in self.stages(dataset).values()
+            for made in each.outputs
+            if not each.on_request or os.path.exists(self._table(made, dataset))
+        }
         wanted = (*stage.inputs, *(extra for extra in stage.optional if extra in available))
         found: dict[str, str | list[str]] = {}
         for artefact in wanted:
