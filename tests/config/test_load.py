@@ -229,6 +229,23 @@ BAD = {
         "datasets: {own: {robot: ur10, measurements: {source: file, file: {path: no.csv}}}}",
         ("datasets.own.measurements.file.path", "'no.csv' does not exist", "say where"),
     ),
+    "another arm that is not synthesised": (
+        "datasets: {own: {robot: ur10}}",
+        ("measurements.source", "no synthetic ur10"),
+    ),
+    "slices not rising": ("map: {slices_deg: [30, 0]}", ("map.slices_deg", "not rising")),
+    "Hayati joint beyond the arm": (
+        "calibration: {dh: {hayati_joints: [2, 7]}}",
+        ("hayati_joints", "mh180 has no joint 7", "1 to 6"),
+    ),
+    "joint range of another arm": (
+        "calibration: {vec: {joint_range: [[0, 1], [0, 1], [0, 1], [0, 1]]}}",
+        ("joint_range", "4 pairs for the 6 joints of mh180"),
+    ),
+    "box beyond the joint limits": (
+        "evaluation: {joint_box: {joints_deg: [[0, 1], [0, 90], [0, 1], [0, 1], [0, 1], [0, 1]]}}",
+        ("joints_deg", "limits of joint 2", "-60 to 76 deg"),
+    ),
     "decimal mark is the delimiter": (
         "datasets: {own: {robot: ur10, measurements: {source: file, "
         "file: {path: own.yaml, decimal: ','}}}}",
@@ -312,12 +329,20 @@ def test_all_problems_come_in_one_message(config):
         study: {alpha: 2, repetitions: 0, noise_mm: [.nan]}
         typo: 1
         datasets:
-          a/b: {robot: nobody}
+          a/b: {robot: nobody, seed: 1}
           c: {measurements: {folds: 1}}
         """)
     found = complaints(PAPER, own)
     assert len(found) == 8, found
-    assert all("own.yaml:" in text for text in found)
+    lines = [int(text.split("own.yaml:")[1].split(",")[0]) for text in found]
+    assert lines == sorted(lines)
+
+
+@pytest.mark.parametrize("text", ["", "limits_deg: [a, b]", "limits_deg: [[1], 2]", "dh: ["])
+def test_faults_of_a_robot_file_are_left_to_its_reader(config, text):
+    robot = config(text, "arm.yaml")
+    own = config(f"datasets: {{own: {{robot: {robot}}}}}")
+    assert load([PAPER, own])["own"]["robot"] == str(robot)
 
 
 def test_execution_keys_stay_out_of_hashes():

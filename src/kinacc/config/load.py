@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from kinacc.config.contradictions import contradictions
 from kinacc.config.reading import Document, KeyPath, dotted, read
 from kinacc.config.schema import Section, plain, settings
 from kinacc.config.validate import (
@@ -14,7 +16,6 @@ from kinacc.config.validate import (
     check_robot,
     check_section,
     complete,
-    contradictions,
     overlay,
 )
 from kinacc.config.values import shown
@@ -55,10 +56,24 @@ def load(
         resolved, found = _resolve(merged, documents, Path(folder))
         problems += found
     if problems:
+        problems.sort(key=_reading_order([document.name for document in documents]))
         count = len(problems)
         title = f"{count} problem{'s' if count > 1 else ''} in the configuration"
         raise InputError(problems, title)
     return resolved
+
+
+def _reading_order(names: Sequence[str]) -> Callable[[Problem], tuple[int, int]]:
+    """Sort key of problems: file by file as given, then line by line."""
+
+    def key(problem: Problem) -> tuple[int, int]:
+        for number, name in enumerate(names):
+            found = re.match(re.escape(name) + r"(?::(\d+))?(?:, |$)", problem.where)
+            if found:
+                return number, int(found.group(1) or 0)
+        return len(names), 0
+
+    return key
 
 
 def _resolve(
@@ -93,8 +108,11 @@ def _dataset(name, content, shared, place, folder) -> tuple[dict[str, Any], list
     known = Section("", "", (ROBOT, *settings().entries))
     own, found = check_section(known, content, path, place)
     robot = own.pop("robot", None)
+    known_robot = None
     if robot is not None:
-        problems += check_robot(robot, (*path, "robot"), place, folder)
+        unknown = check_robot(robot, (*path, "robot"), place, folder)
+        known_robot = None if unknown else robot
+        problems += unknown
     elif content is None or (isinstance(content, Mapping) and "robot" not in content):
         allowed = "robot: a shipped robot's name or the path of a robot file"
         problems.append(Problem(place(path), "names no robot", allowed))
@@ -107,7 +125,7 @@ def _dataset(name, content, shared, place, folder) -> tuple[dict[str, Any], list
         return place((*path, *keys)) if given != {} else f"{place(keys)} (data set {name})"
 
     problems += found
-    problems += contradictions(name, full, origin, folder)
+    problems += contradictions(name, known_robot, full, origin, folder)
     return {"robot": robot, **full}, problems
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -85,104 +85,3 @@ def complete(shared: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any
     if columns is not None:  # a mapping of names is one value, not a section
         full["measurements"]["file"]["columns"] = dict(columns)
     return full
-
-
-def contradictions(name: str, full: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:
-    """Settings of one data set that are each fine and cannot be together.
-
-    ``place(*keys)`` words where a setting of this data set comes from.
-    """
-    measurements, evaluation = full["measurements"], full["evaluation"]
-    calibration, histories = full["calibration"], full["histories"]
-    yield from _folds(measurements, place)
-    if measurements["source"] == "file":
-        yield from _file(name, measurements["file"], place, folder)
-    if calibration["base_and_tool"] == "estimated" and measurements["source"] == "synthetic":
-        yield Problem(
-            place("calibration", "base_and_tool"),
-            "estimated, but the synthetic arm is measured in its own base frame",
-            "fixed where measurements.source is synthetic",
-        )
-    if evaluation["space"] == "cylinder" and calibration["base_and_tool"] == "estimated":
-        yield Problem(
-            place("evaluation", "space"),
-            "cylinder, but base and tool are estimated",
-            "measured or joint_box where calibration.base_and_tool is estimated",
-        )
-    span = evaluation["cylinder"]["angle_deg"]
-    if evaluation["space"] == "cylinder":
-        outside = [each for each in full["map"]["slices_deg"] if not span[0] <= each <= span[1]]
-        if outside:
-            yield Problem(
-                place("map", "slices_deg"),
-                f"slices at {', '.join(f'{each:g}' for each in outside)} deg lie outside the space",
-                f"angles from {span[0]:g} to {span[1]:g} deg (evaluation.cylinder.angle_deg)",
-            )
-    noise = full["study"]["noise_mm"]
-    if sorted(set(noise)) != list(noise):
-        yield Problem(
-            place("study", "noise_mm"), f"{shown(noise)} is not rising", "each value once, rising"
-        )
-    if histories["eta_ratio_larger"] <= histories["eta_ratio_rejected"]:
-        yield Problem(
-            place("histories", "eta_ratio_larger"),
-            f"{histories['eta_ratio_larger']:g} is not larger than eta_ratio_rejected",
-            f"above {histories['eta_ratio_rejected']:g}",
-        )
-
-
-def _folds(measurements: Mapping[str, Any], place) -> Iterator[Problem]:
-    folds, held_out = measurements["folds"], measurements["validation_fold"]
-    if held_out is None:
-        return
-    if folds is None:
-        yield Problem(
-            place("measurements", "validation_fold"),
-            f"fold {held_out} is held out, but there are no folds",
-            "null where measurements.folds is null",
-        )
-    elif held_out >= folds:
-        yield Problem(
-            place("measurements", "validation_fold"),
-            f"there is no fold {held_out} among {folds}, counted from 0",
-            f"0 to {folds - 1}, or null",
-        )
-
-
-def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:
-    if file["path"] is None:
-        yield Problem(
-            place("measurements", "source"),
-            f"data set {name} reads a file, but measurements.file.path is not given",
-            "path of a CSV or Parquet file",
-        )
-    elif not (folder / file["path"]).is_file():
-        is_folder = (folder / file["path"]).is_dir()
-        origin = file["source"]
-        yield Problem(
-            place("measurements", "file", "path"),
-            f"{shown(file['path'])} {'is a folder' if is_folder else 'does not exist'}",
-            "an existing CSV or Parquet file, relative to the folder the run starts in",
-            f"the data comes from: {' '.join(origin.split())}"
-            if origin
-            else "say where the data comes from with measurements.file.source",
-        )
-    if file["delimiter"] == file["decimal"]:
-        yield Problem(
-            place("measurements", "file", "decimal"),
-            f"{shown(file['decimal'])} is also the delimiter",
-            "a decimal mark that differs from the delimiter",
-        )
-    taken = sorted(
-        {
-            each
-            for each in file["columns"].values()
-            if list(file["columns"].values()).count(each) > 1
-        }
-    )
-    if taken:
-        yield Problem(
-            place("measurements", "file", "columns"),
-            f"column {', '.join(taken)} stands for more than one name",
-            "every column once",
-        )

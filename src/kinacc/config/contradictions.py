@@ -1,0 +1,178 @@
+"""Settings of one data set that are each fine and cannot be together.
+
+Every rule yields problems; ``place(*keys)`` words where a setting of the data set comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from kinacc.config.reading import read
+from kinacc.config.validate import ROBOTS
+from kinacc.config.values import shown
+from kinacc.errors import Problem
+
+Place = Callable[..., str]
+_SYNTHESISED = "mh180"
+
+
+def contradictions(
+    name: str, robot: str | None, full: Mapping[str, Any], place: Place, folder: Path
+) -> Iterator[Problem]:
+    """All contradictions in the full settings of data set ``name``.
+
+    Paths are relative to ``folder``; ``robot`` is None where it is itself in question.
+    """
+    measurements = full["measurements"]
+    yield from _folds(measurements, place)
+    if measurements["source"] == "file":
+        yield from _file(name, measurements["file"], place, folder)
+    else:
+        yield from _synthetic(robot, full["calibration"], place)
+    yield from _space(full, place)
+    yield from _study(full, place)
+    if robot is not None:
+        yield from _arm(robot, full, place, folder)
+
+
+def _synthetic(robot: str | None, calibration: Mapping[str, Any], place: Place):
+    if calibration["base_and_tool"] == "estimated":
+        yield Problem(
+            place("calibration", "base_and_tool"),
+            "estimated, but the synthetic arm is measured in its own base frame",
+            "fixed where measurements.source is synthetic",
+        )
+    shipped = [item.stem for item in ROBOTS.glob("*.yaml")]
+    if robot in shipped and robot != _SYNTHESISED:
+        yield Problem(
+            place("measurements", "source"),
+            f"synthetic, but there is no synthetic {robot}",
+            f"robot: {_SYNTHESISED}, or measurements of this robot in a file",
+        )
+
+
+def _space(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
+    evaluation = full["evaluation"]
+    if evaluation["space"] != "cylinder":
+        return
+    if full["calibration"]["base_and_tool"] == "estimated":
+        yield Problem(
+            place("evaluation", "space"),
+            "cylinder, but base and tool are estimated",
+            "measured or joint_box where calibration.base_and_tool is estimated",
+        )
+    low, high = evaluation["cylinder"]["angle_deg"]
+    outside = [f"{each:g}" for each in full["map"]["slices_deg"] if not low <= each <= high]
+    if outside:
+        yield Problem(
+            place("map", "slices_deg"),
+            f"slices at {', '.join(outside)} deg lie outside the space",
+            f"angles from {low:g} to {high:g} deg (evaluation.cylinder.angle_deg)",
+        )
+
+
+def _study(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
+    for section, key in (("study", "noise_mm"), ("map", "slices_deg")):
+        values = full[section][key]
+        if sorted(set(values)) != list(values):
+            what = f"{shown(values)} is not rising"
+            yield Problem(place(section, key), what, "each value once, rising")
+    histories = full["histories"]
+    if histories["eta_ratio_larger"] <= histories["eta_ratio_rejected"]:
+        yield Problem(
+            place("histories", "eta_ratio_larger"),
+            f"{histories['eta_ratio_larger']:g} is not larger than eta_ratio_rejected",
+            f"above {histories['eta_ratio_rejected']:g}",
+        )
+
+
+def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Iterator[Problem]:
+    """Settings that speak of joints the robot has not; faults of a robot file are its reader's."""
+    path = ROBOTS / f"{robot}.yaml"
+    described, problems = read(path if path.is_file() else folder / robot)
+    limits = described.data.get("limits_deg")
+    if problems or not isinstance(limits, list) or not all(map(_is_pair, limits)):
+        return
+    joints = len(limits)
+    beyond = [each for each in full["calibration"]["dh"]["hayati_joints"] if each > joints]
+    if beyond:
+        what = f"{robot} has no joint {', '.join(map(str, beyond))}"
+        yield Problem(place("calibration", "dh", "hayati_joints"), what, f"1 to {joints}")
+    for keys in (("calibration", "vec", "joint_range"), ("evaluation", "joint_box", "joints_deg")):
+        pairs = full[keys[0]][keys[1]][keys[2]]
+        if isinstance(pairs, list) and len(pairs) != joints:
+            what = f"{len(pairs)} pairs for the {joints} joints of {robot}"
+            yield Problem(place(*keys), what, "one pair per joint")
+    box = full["evaluation"]["joint_box"]["joints_deg"]
+    for number, (pair, limit) in enumerate(zip(box or (), limits, strict=False), 1):
+        if not limit[0] <= pair[0] < pair[1] <= limit[1]:
+            what = f"{shown(pair)} reaches beyond the limits of joint {number} of {robot}"
+            allowed = f"{limit[0]:g} to {limit[1]:g} deg"
+            yield Problem(place("evaluation", "joint_box", "joints_deg"), what, allowed)
+
+
+def _is_pair(limit: Any) -> bool:
+    return (
+        isinstance(limit, list)
+        and len(limit) == 2
+        and all(isinstance(each, (int, float)) for each in limit)
+    )
+
+
+def _folds(measurements: Mapping[str, Any], place) -> Iterator[Problem]:
+    folds, held_out = measurements["folds"], measurements["validation_fold"]
+    if held_out is None:
+        return
+    if folds is None:
+        yield Problem(
+            place("measurements", "validation_fold"),
+            f"fold {held_out} is held out, but there are no folds",
+            "null where measurements.folds is null",
+        )
+    elif held_out >= folds:
+        yield Problem(
+            place("measurements", "validation_fold"),
+            f"there is no fold {held_out} among {folds}, counted from 0",
+            f"0 to {folds - 1}, or null",
+        )
+
+
+def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:
+    if file["path"] is None:
+        yield Problem(
+            place("measurements", "source"),
+            f"data set {name} reads a file, but measurements.file.path is not given",
+            "path of a CSV or Parquet file",
+        )
+    elif not (folder / file["path"]).is_file():
+        is_folder = (folder / file["path"]).is_dir()
+        origin = file["source"]
+        yield Problem(
+            place("measurements", "file", "path"),
+            f"{shown(file['path'])} {'is a folder' if is_folder else 'does not exist'}",
+            "an existing CSV or Parquet file, relative to the folder the run starts in",
+            f"the data comes from: {' '.join(origin.split())}"
+            if origin
+            else "say where the data comes from with measurements.file.source",
+        )
+    if file["delimiter"] == file["decimal"]:
+        yield Problem(
+            place("measurements", "file", "decimal"),
+            f"{shown(file['decimal'])} is also the delimiter",
+            "a decimal mark that differs from the delimiter",
+        )
+    taken = sorted(
+        {
+            each
+            for each in file["columns"].values()
+            if list(file["columns"].values()).count(each) > 1
+        }
+    )
+    if taken:
+        yield Problem(
+            place("measurements", "file", "columns"),
+            f"column {', '.join(taken)} stands for more than one name",
+            "every column once",
+        )
