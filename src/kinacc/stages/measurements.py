@@ -1,0 +1,48 @@
+"""Read or synthesise the measured poses and deal them into folds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc import robot
+from kinacc.calibration import folds
+
+Columns = dict[str, np.ndarray]
+SAME_CONFIGURATION_DEG = 0.1  # joints this close are one configuration visited again
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+    """``measurements`` of the configured source, with fold and subset."""
+    arm, section = robot.load(settings["robot"]), settings["measurements"]
+    if section["source"] == "synthetic":
+        from kinacc import synthetic
+
+        seen = synthetic.measure(arm, section["synthetic"])
+    else:
+        from kinacc.data import read
+
+        seen = read.measurements(section["file"], arm)
+    return {"measurements": split(seen, settings)}
+
+
+def split(columns: Mapping, settings: Mapping) -> Columns:
+    """The columns with ``fold`` and ``subset``: whole configurations held out together.
+
+    ``settings``: seed and the ``measurements`` section. Fold null without folds; the rows of the
+    validation fold are the validation subset.
+    """
+    section = settings["measurements"]
+    count = len(columns["pose"])
+    fold = np.full(count, np.nan)
+    if section["folds"] is not None:
+        names = [name for name in columns if name[:1] == "q" and name[1:].isdigit()]
+        q_rad = np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
+        same = folds.configurations(
+            np.asarray(columns["pose"]), q_rad, np.deg2rad(SAME_CONFIGURATION_DEG)
+        )
+        fold = folds.assign(same, int(section["folds"]), int(settings["seed"])).astype(float)
+    held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])
+    subset = np.where(held_out, "validation", "train").astype(object)
+    return {**columns, "subset": subset, "fold": fold}
