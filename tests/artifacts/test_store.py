@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kinacc.artifacts import store
 from kinacc.artifacts.contract import PROVENANCE_KEYS
@@ -159,3 +166,65 @@ def test_unreadable_files_are_named(tmp_path):
         store.read(broken)
     with pytest.raises(InputError, match="not in the contract"):
         store.write(tmp_path / "x.parquet", "nonsense", {}, PROVENANCE)
+
+
+NUMBERS = st.lists(
+    st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False)), min_size=1, max_size=40
+)
+TEXTS = st.lists(st.one_of(st.none(), st.text()), min_size=1, max_size=40)
+
+
+@settings(max_examples=60, deadline=None)
+@given(NUMBERS, TEXTS, st.data())
+def test_any_numbers_and_texts_come_back(numbers, texts, data):
+    count = min(len(numbers), len(texts))
+    whole = data.draw(
+        st.lists(st.one_of(st.none(), st.integers(1, 2**53)), min_size=count, max_size=count)
+    )
+    table = {
+        "quantity": ["q"] * count,
+        "number": whole,
+        "parameter": texts[:count],
+        "value": numbers[:count],
+        "unit": ["mm"] * count,
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "vec_fit.parquet"
+        store.write(path, "vec_fit", table, PROVENANCE)
+        plain, back = pq.read_table(path), store.read(path)
+    for name, values in table.items():
+        assert plain[name].to_pylist() == values
+        found = [None if each is None or each != each else each for each in back[name]]
+        assert found == values
+
+
+def test_tables_without_rows_keep_their_types(tmp_path):
+    path = tmp_path / "residuals.parquet"
+    store.write(path, "residuals", {name: [] for name in residuals()}, PROVENANCE)
+    back = store.read(path)
+    assert {name: len(values) for name, values in back.items()} == dict.fromkeys(residuals(), 0)
+    assert (back["n"].dtype, back["mean"].dtype, back["fold"].dtype) == ("i8", "f8", "f8")
+
+
+def test_a_table_of_many_row_groups_comes_back(tmp_path):
+    path = tmp_path / "points.parquet"
+    table = points(rows=3)
+    store.write(path, "assessment_points", table, PROVENANCE)
+    pq.write_table(pq.read_table(path), path, row_group_size=1)
+    back = store.read(path)
+    for name, values in table.items():
+        np.testing.assert_array_equal(back[name], values)
+
+
+def test_reading_and_writing_leave_pandas_alone(tmp_path):
+    code = (
+        "import sys, numpy as np; from kinacc.artifacts import store; "
+        "store.write('f.parquet', 'vec_fit', {'quantity': ['rank'], 'number': [None], "
+        "'parameter': [None], 'value': [np.nan], 'unit': ['1']}, "
+        "dict.fromkeys(('kinacc_version', 'config_hash', 'code_hash', 'inputs_hash', 'seed'), 1)); "
+        "store.read('f.parquet'); store.read_metadata('f.parquet'); print('pandas' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "False"
