@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,10 @@ class DHFit:
     std: np.ndarray
     free: np.ndarray
     solution: Solution
+
+    def with_frames(self, frames: Frames) -> DHFit:
+        """The same arm seen through other frames."""
+        return replace(self, frames=frames)
 
 
 def free_parameters(joints: int, hayati_joints: tuple[int, ...] = ()) -> np.ndarray:
@@ -89,9 +93,13 @@ def fit(
 
 
 def fit_frames(
-    observations: Observations, model: DHModel, *, rotation_weight_mm_per_rad: float
+    observations: Observations,
+    model: DHModel,
+    *,
+    rotation_weight_mm_per_rad: float,
+    frames: Frames | None = None,
 ) -> DHFit:
-    """Base and targets alone, the arm held at ``model``. Raises FitError."""
+    """Base and targets alone (as in ``fit``), the arm held at ``model``. Raises FitError."""
     nothing = np.zeros((model.joints, 5), dtype=bool)
     return fit(
         observations,
@@ -99,6 +107,7 @@ def fit_frames(
         free=nothing,
         rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
         threshold=0.0,
+        frames=frames,
     )
 
 

@@ -64,6 +64,15 @@ class Observations:
         }
         return replace(self, **columns)
 
+    def without_directions(self) -> Observations:
+        """The same observations with every travel direction unknown."""
+        return replace(self, s=np.zeros_like(self.s))
+
+    def with_targets_of(self, other: Observations) -> Observations:
+        """These measurements labelled as those of ``other``, row by row."""
+        names = ("s", "pose", "target", "repeat", "fold", "target_names")
+        return replace(self, **{name: getattr(other, name) for name in names})
+
 
 def full_poses(
     q_rad: np.ndarray,
@@ -104,6 +113,6 @@ def from_columns(columns: Mapping[str, np.ndarray], joint_map: np.ndarray) -> Ob
         pose=np.asarray(columns["pose"]).astype(np.int64),
         target=np.array([index[str(name)] for name in names], dtype=np.int64),
         repeat=np.asarray(columns["repeat"]).astype(np.int64),
-        fold=np.asarray(columns["fold"]).astype(np.int64),
+        fold=np.nan_to_num(np.asarray(columns["fold"], dtype=float), nan=-1.0).astype(np.int64),
         target_names=target_names,
     )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, qr
 
 from kinacc.errors import FitError
 
@@ -20,7 +20,7 @@ STEP_TOLERANCE = 1e-6  # in units of `scale`: mm and mrad
 MAX_ITERATIONS = 60
 MAX_HALVINGS = 12
 MAX_VARIANCE_STEPS = 20
-VARIANCE_TOLERANCE = 1e-9
+VARIANCE_TOLERANCE = 1e-5
 LEAST_VARIANCE = 1e-14  # mm^2: noise-free data must not divide by zero
 FRAME_THRESHOLD = 1e-6  # frames have no nominal value to keep: only exact ambiguities are cut
 TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
@@ -39,32 +39,59 @@ class System(Protocol):
 
 
 @dataclass(frozen=True)
-class Solution:
-    """Outcome of a fit of P parameters to m residuals.
+class Spectrum:
+    """What data can tell of a block of parameters.
 
-    ``std`` (P,) and ``covariance`` (P, P) in the parameters' own units, scaled by the residual
-    ``variance``; NaN where undetermined. ``singular_values`` are of the
-    whitened Jacobian in units of ``scale`` (after the frame columns are projected out), falling;
-    ``rank`` of them exceed ``threshold`` times the largest; ``gap`` is the ratio across that cut
-    (inf at full rank); ``frame_rank`` of the frame coordinates are kept.
-    ``last_step`` is the largest last change in units of ``scale``.
+    ``values``: singular values of the Jacobian in units of ``scale``, falling, after the frame
+    columns are projected out. ``rank`` of them exceed ``threshold`` times the largest; ``gap`` is
+    the ratio across that cut, inf at full rank.
+    """
+
+    values: np.ndarray
+    threshold: float
+    rank: int
+    gap: float
+
+    @classmethod
+    def of(cls, values: np.ndarray, threshold: float, most: int | None = None) -> Spectrum:
+        """Spectrum of falling ``values``; no rank above ``most``."""
+        rank = int(np.sum(values > threshold * values[0])) if values.size else 0
+        rank = rank if most is None else min(rank, most)
+        past = values[rank] if rank < values.size else 0.0
+        gap = float(values[rank - 1] / past) if rank and past > 0.0 else float("inf")
+        return cls(values, threshold, rank, gap)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Outcome of a fit of P parameters to ``count`` residuals; only converged fits are returned.
+
+    ``std`` (P,) and ``covariance`` (P, P) in the parameters' own units for residuals of
+    ``variance``; NaN where undetermined. ``cost`` is the sum of squared residuals,
+    ``degrees_of_freedom`` their number less the (effective) number of fitted parameters,
+    ``last_step`` the largest last change in units of ``scale``. ``spectrum`` is None where a prior
+    made it needless; see ``spectrum``.
     """
 
     x: np.ndarray
     std: np.ndarray
     covariance: np.ndarray
-    singular_values: np.ndarray
-    rank: int
-    gap: float
-    frame_rank: int
-    threshold: float
     cost: float
     count: int
-    degrees_of_freedom: int
+    degrees_of_freedom: float
+    variance: float
     iterations: int
     last_step: float
     converged: bool
-    variance: float
+    spectrum: Spectrum | None = None
+
+
+def spectrum(
+    system: System, x: np.ndarray, scale: np.ndarray, frames: int, threshold: float
+) -> Spectrum:
+    """Spectrum of all but the first ``frames`` parameters of ``system`` linearised at ``x``."""
+    factor, _ = triangle(system, x, scale)
+    return Spectrum.of(np.linalg.svd(factor[frames:, frames:-1], compute_uv=False), threshold)
 
 
 def triangle(system: System, x: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, int]:
@@ -76,7 +103,8 @@ def triangle(system: System, x: np.ndarray, scale: np.ndarray) -> tuple[np.ndarr
     factor, count = np.zeros((0, size)), 0
     for residual, jacobian in system.blocks(x):
         stacked = np.concatenate([jacobian * scale, residual[:, None]], axis=1)
-        factor = np.linalg.qr(np.concatenate([factor, stacked]), mode="r")
+        stacked = np.concatenate([factor, stacked])
+        factor = qr(stacked, overwrite_a=True, mode="r", check_finite=False)[0][:size]
         count += len(residual)
     if len(factor) < size:
         factor = np.concatenate([factor, np.zeros((size - len(factor), size))])
@@ -125,18 +153,14 @@ def minimise_truncated(
         x=x,
         std=np.sqrt(np.diag(covariance)),
         covariance=covariance,
-        singular_values=split.others.values,
-        rank=split.others.rank,
-        gap=split.others.gap,
-        frame_rank=split.frames.rank,
-        threshold=threshold,
         cost=cost,
         count=count,
         degrees_of_freedom=freedom,
+        variance=variance,
         iterations=iterations,
         last_step=last,
         converged=True,
-        variance=variance,
+        spectrum=split.others.spectrum,
     )
 
 
@@ -145,25 +169,23 @@ class _Truncated:
     """SVD ``left values right`` of a block of columns of which ``rank`` directions are kept."""
 
     left: np.ndarray
-    values: np.ndarray
     right: np.ndarray
-    rank: int
+    spectrum: Spectrum
 
     @classmethod
     def of(cls, block: np.ndarray, threshold: float, most: int | None) -> _Truncated:
         left, values, right = np.linalg.svd(block)
         values = np.concatenate([values, np.zeros(len(right) - values.size)])
-        rank = int(np.sum(values > threshold * values[0])) if values.size else 0
-        return cls(left, values, right, rank if most is None else min(rank, most))
+        return cls(left, right, Spectrum.of(values, threshold, most))
 
     @property
-    def gap(self) -> float:
-        return _gap(self.values, self.rank)
+    def rank(self) -> int:
+        return self.spectrum.rank
 
     @property
     def root(self) -> np.ndarray:
         """Matrix (P, rank) whose product with its transpose inverts the block's Gram matrix."""
-        return self.right[: self.rank].T / self.values[: self.rank]
+        return self.right[: self.rank].T / self.spectrum.values[: self.rank]
 
     def step(self, rhs: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Least squares in the kept directions, back to nominal in the others."""
@@ -226,56 +248,41 @@ def minimise_with_prior(
     prior_mean: np.ndarray,
     prior_std: np.ndarray,
     scale: np.ndarray,
-    threshold: float,
-    frames: int = 0,
     name: str = "fit",
 ) -> Solution:
     """Gauss-Newton on ``r'r / variance`` plus ``((x - prior_mean) / prior_std)^2``; inf = no prior.
 
     The variance of the residuals is estimated along with ``x``: what they leave over the number of
     residuals less the effective number of parameters (the trace of the hat matrix), so the balance
-    against the prior follows the data. ``std`` is the posterior one. ``rank``,
-    ``singular_values`` and ``gap`` describe the data alone, without the prior.
+    against the prior follows the data. ``std`` is the posterior one.
     Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
     weight_sq = (scale / prior_std) ** 2
-    last, iterations, variance = np.inf, 0, np.inf
+    last, iterations, balance = np.inf, 0, None
     while last > STEP_TOLERANCE and iterations < MAX_ITERATIONS:
         iterations += 1
         normal = _normal_equations(system, x, scale)
-        displacement = (x - prior_mean) / scale
-        step, variance = _step_with_prior(normal, weight_sq, displacement, variance, name)
+        balance = _balanced(normal, weight_sq, (x - prior_mean) / scale, balance, name)
 
-        def total(at: np.ndarray, variance: float = variance) -> float:
+        def total(at: np.ndarray, variance: float = balance.variance) -> float:
             return system.cost(at) + variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
 
-        x, _, last = _advance(system, x, scale * step, total(x), scale, name, total)
-    cost, count = system.cost(x), normal.count
-    _require(last <= STEP_TOLERANCE, name, iterations, last, cost, count)
-    factor, count = triangle(system, x, scale)
-    values = np.linalg.svd(factor[frames:, frames:-1], compute_uv=False)
-    rank = int(np.sum(values > threshold * values[0])) if values.size else 0
-    weight = np.diag(np.sqrt(variance * weight_sq))
-    with_prior = np.linalg.qr(np.concatenate([factor[:, :-1], weight]), mode="r")
-    root = solve_triangular(with_prior, np.eye(len(with_prior)))
-    covariance = variance * (root @ root.T) * np.outer(scale, scale)
+        x, _, last = _advance(system, x, scale * balance.step, total(x), scale, name, total)
+    cost = system.cost(x)
+    _require(last <= STEP_TOLERANCE, name, iterations, last, cost, normal.count)
+    covariance = balance.variance * balance.inverse * np.outer(scale, scale)
     return Solution(
         x=x,
         std=np.sqrt(np.diag(covariance)),
         covariance=covariance,
-        singular_values=values,
-        rank=rank,
-        gap=_gap(values, rank),
-        frame_rank=frames,
-        threshold=threshold,
         cost=cost,
-        count=count,
-        degrees_of_freedom=count - frames - rank,
+        count=normal.count,
+        degrees_of_freedom=normal.count - balance.effective,
+        variance=balance.variance,
         iterations=iterations,
         last_step=last,
         converged=True,
-        variance=variance,
     )
 
 
@@ -288,30 +295,39 @@ class _Normal(NamedTuple):
     count: int
 
 
-def _step_with_prior(
+class _Balance(NamedTuple):
+    """Step and residual variance that agree on the linearised residuals.
+
+    ``inverse`` (P, P) of J'J plus the prior's part, all scaled; ``effective`` parameters fitted.
+    """
+
+    step: np.ndarray
+    variance: float
+    inverse: np.ndarray
+    effective: float
+
+
+def _balanced(
     normal: _Normal,
     weight_sq: np.ndarray,
     displacement: np.ndarray,
-    variance: float,
+    before: _Balance | None,
     name: str,
-) -> tuple[np.ndarray, float]:
-    """Scaled step and residual variance that agree with each other on the linearised residuals."""
-    if not np.isfinite(variance):
-        variance = normal.cost / normal.count
+) -> _Balance:
+    variance = normal.cost / normal.count if before is None else before.variance
     for _ in range(MAX_VARIANCE_STEPS):
-        floored = max(variance, LEAST_VARIANCE)
+        variance = max(variance, LEAST_VARIANCE)
         gram = normal.gram.copy()
-        gram[np.diag_indices_from(gram)] += floored * weight_sq
-        chol = _cholesky(gram, name)
-        step = -cho_solve(chol, normal.gradient + floored * weight_sq * displacement)
+        gram[np.diag_indices_from(gram)] += variance * weight_sq
+        inverse = _inverse(gram, name)
+        step = -inverse @ (normal.gradient + variance * weight_sq * displacement)
         cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
-        inverse_diagonal = np.diag(cho_solve(chol, np.eye(len(step))))
-        effective = len(step) - floored * float(weight_sq @ inverse_diagonal)
+        effective = len(step) - variance * float(weight_sq @ np.diag(inverse))
         found = max(cost, 0.0) / max(normal.count - effective, 1.0)
         if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
-            return step, floored
+            break
         variance = found
-    return step, max(variance, LEAST_VARIANCE)
+    return _Balance(step, variance, inverse, effective)
 
 
 def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
@@ -325,9 +341,9 @@ def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Norm
     return _Normal(gram * np.outer(scale, scale), gradient * scale, cost, count)
 
 
-def _cholesky(gram: np.ndarray, name: str) -> tuple[np.ndarray, bool]:
+def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
     try:
-        return cho_factor(gram)
+        return cho_solve(cho_factor(gram, check_finite=False), np.eye(len(gram)))
     except np.linalg.LinAlgError:
         raise FitError(
             f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
@@ -350,12 +366,6 @@ def _advance(system, x, step, cost, scale, name, objective=None):
             return trial, trial_cost, size * factor
         factor *= 0.5
     return x, cost, size
-
-
-def _gap(values: np.ndarray, rank: int) -> float:
-    if rank == 0 or rank >= values.size or values[rank] == 0.0:
-        return float("inf")
-    return float(values[rank - 1] / values[rank])
 
 
 def _require(converged: bool, name: str, iterations: int, last: float, cost: float, count: int):

@@ -9,13 +9,13 @@ import numpy as np
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.frames import Frames, coordinates
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.solve import Solution, minimise_with_prior
+from kinacc.calibration.solve import Solution, Spectrum, minimise_with_prior, spectrum
 from kinacc.calibration.system import FlangeModel, PoseSystem
 from kinacc.models import vec
 from kinacc.models.vec import ERRORS, VECModel
 
 FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames; holds what no pose shows
-RANK_THRESHOLD = 1e-10  # an exact null direction of the data, whatever the prior
+RANK_THRESHOLD = 1e-10  # far below every weak direction, far above rounding: exact gauges only
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,6 @@ def fit(
         prior_mean=start,
         prior_std=np.concatenate([frame_std, prior_std[free]]),
         scale=np.concatenate([_units(coords.is_angle()), _units(_is_angle(empty)[free])]),
-        threshold=RANK_THRESHOLD,
-        frames=coords.size,
         name="VEC fit",
     )
     vector, std = np.zeros(free.size), np.full(free.size, np.nan)
@@ -94,6 +92,24 @@ def fit(
         std=std,
         prior_std=prior_std,
         solution=solution,
+    )
+
+
+def gauge(
+    observations: Observations, empty: VECModel, frames: Frames, rotation_weight_mm_per_rad: float
+) -> Spectrum:
+    """What the poses tell of the coefficients without a prior, about zero errors.
+
+    Base and targets count as known. Directions beyond the rank change no pose to first order:
+    constant frame changes between neighbouring joints.
+    """
+    coords = coordinates(observations, frames, base_free=False, targets_free=False)
+    free = _informed(observations, empty)
+    system = PoseSystem(
+        observations, _flange_model(empty, free), coords, rotation_weight_mm_per_rad
+    )
+    return spectrum(
+        system, np.zeros(system.size), _units(_is_angle(empty)[free]), 0, RANK_THRESHOLD
     )
 
 

@@ -1,0 +1,102 @@
+"""The three models of an arm fitted to observations: VEC, DH and nominal, by stated options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.calibration import dh_fit, vec_fit
+from kinacc.calibration.dh_fit import DHFit
+from kinacc.calibration.frames import Frames, known
+from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.vec_fit import Prior, VECFit
+from kinacc.geometry import IDENTITY, Pose, compose
+from kinacc.models import vec
+from kinacc.models.dh import DHModel
+from kinacc.models.vec import VECModel
+
+
+@dataclass(frozen=True)
+class Options:
+    """How models are fitted; see the ``calibration`` section of the configuration.
+
+    ``frames_estimated``: base and tool are unknown; else both are the identity. ``dh_to_vec``: the
+    DH model follows the VEC at the measured joints instead of the measurements.
+    """
+
+    rotation_weight_mm_per_rad: float
+    frames_estimated: bool
+    order: int = 0
+    prior: Prior | None = None
+    travel_direction: bool = False
+    dh_to_vec: bool = True
+    hayati_joints: tuple[int, ...] = ()
+    threshold: float = 1e-3
+
+
+def fit_vec(
+    observations: Observations,
+    nominal: DHModel,
+    joint_range_rad: tuple[np.ndarray, np.ndarray],
+    options: Options,
+) -> VECFit:
+    """VEC model on the nominal arm over ``joint_range_rad`` (k,), (k,). Raises FitError."""
+    frames = known()
+    if options.frames_estimated:
+        frames = fit_nominal(observations, nominal, options).frames
+    if not options.travel_direction:
+        observations = observations.without_directions()
+    return vec_fit.fit(
+        observations,
+        vec.without_errors(nominal, *joint_range_rad, options.order),
+        prior=options.prior,
+        rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
+        frames=frames,
+        frames_free=options.frames_estimated,
+    )
+
+
+def fit_dh(
+    observations: Observations,
+    nominal: DHModel,
+    options: Options,
+    vec_model: VECModel,
+    vec_frames: Frames,
+) -> DHFit:
+    """DH model of the measurements or, with ``dh_to_vec``, of the VEC at their joints.
+
+    Following the VEC, base and targets are the VEC's. Raises FitError.
+    """
+    frames = None if options.frames_estimated else known()
+    if options.dh_to_vec:
+        at_target = compose(
+            vec.pose(vec_model, observations.q_rad, observations.s),
+            _rows(vec_frames.targets, observations.target),
+        )
+        followed = full_poses(observations.q_rad, at_target)
+        observations = followed.with_targets_of(observations)
+        frames = Frames(IDENTITY, vec_frames.targets)
+    fitted = dh_fit.fit(
+        observations,
+        nominal,
+        free=dh_fit.free_parameters(nominal.joints, options.hayati_joints),
+        rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
+        threshold=options.threshold,
+        frames=frames,
+    )
+    return fitted.with_frames(vec_frames) if options.dh_to_vec else fitted
+
+
+def fit_nominal(observations: Observations, nominal: DHModel, options: Options) -> DHFit:
+    """Base and targets of the nominal arm; nothing to fit where they are known. Raises FitError."""
+    return dh_fit.fit_frames(
+        observations,
+        nominal,
+        rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
+        frames=None if options.frames_estimated else known(),
+    )
+
+
+def _rows(targets: Pose, target: np.ndarray) -> Pose:
+    return Pose(targets.rotation[target], targets.position_mm[target])

@@ -1,0 +1,146 @@
+"""Fits as columns of ``vec_model``, ``dh_model``, ``frames``, ``vec_fit`` and ``dh_fit``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from kinacc.calibration.dh_fit import DHFit
+from kinacc.calibration.frames import Frames
+from kinacc.calibration.solve import Solution, Spectrum
+from kinacc.calibration.vec_fit import VECFit
+from kinacc.geometry import Pose, quaternion_from_rotation
+from kinacc.models.dh import PARAMETERS
+from kinacc.models.tables import frame
+from kinacc.models.vec import ERRORS, VECModel
+
+Columns = dict[str, np.ndarray]
+_DELTAS = 3
+_DIRECTIONS = (-1, 1)
+
+
+def vec_model_columns(fit: VECFit) -> Columns:
+    """``vec_model``: coefficients of both directions, then the offsets that were fitted."""
+    model = fit.model
+    joints, errors, terms = model.coefficients.shape
+    split = model.coefficients.size
+    joint, error, order = (part.ravel() for part in np.indices((joints, errors, terms)))
+    offset_std = fit.std[split:].reshape(joints, 2)
+    more, which = np.nonzero(np.isfinite(offset_std))
+    joint = np.concatenate([joint, more])
+    columns: Columns = {
+        "joint": joint + 1,
+        "error": np.array(ERRORS, dtype=object)[
+            np.concatenate([error, np.full(more.size, ERRORS.index("eps_z"))])
+        ],
+        "direction": np.concatenate([np.zeros(split, int), np.array(_DIRECTIONS)[which]]),
+        "order": np.concatenate([order, np.zeros(more.size, int)]),
+        "coefficient": np.concatenate(
+            [model.coefficients.ravel(), model.direction_offsets_rad[more, which]]
+        ),
+        "std": np.concatenate([fit.std[:split], offset_std[more, which]]),
+        "q_min_rad": model.q_min_rad[joint],
+        "q_max_rad": model.q_max_rad[joint],
+    }
+    return columns | {name: getattr(model.dh, name)[joint] for name in PARAMETERS}
+
+
+def dh_model_columns(fit: DHFit) -> Columns:
+    """``dh_model``: parameters and their standard deviations, NaN where undetermined."""
+    columns: Columns = {"joint": np.arange(1, fit.model.joints + 1)}
+    columns |= {name: getattr(fit.model, name) for name in PARAMETERS}
+    return columns | {f"std_{name}": fit.std[:, i] for i, name in enumerate(PARAMETERS)}
+
+
+def frames_columns(frames: Mapping[str, Frames], target_names: tuple[str, ...]) -> Columns:
+    """``frames`` of models by name: the base, then every target."""
+    rows = []
+    for model, each in frames.items():
+        rows.append((model, "base", each.base.position_mm, each.base.rotation))
+        for number, name in enumerate(target_names):
+            targets = each.targets
+            rows.append((model, name, targets.position_mm[number], targets.rotation[number]))
+    position = np.array([row[2] for row in rows])
+    quaternion = quaternion_from_rotation(np.array([row[3] for row in rows]))
+    return {
+        "model": np.array([row[0] for row in rows], dtype=object),
+        "frame": np.array([row[1] for row in rows], dtype=object),
+        **{f"{axis}_mm": position[:, i] for i, axis in enumerate("xyz")},
+        **{f"q{part}": quaternion[:, i] for i, part in enumerate("wxyz")},
+    }
+
+
+def frames_of(columns: Mapping, model: str, target_names: tuple[str, ...]) -> Frames:
+    """The ``Frames`` of one model in a ``frames`` table. Raises InputError for a missing one."""
+    targets = [frame(columns, model, name) for name in target_names]
+    stacked = Pose(
+        np.stack([each.rotation for each in targets]),
+        np.stack([each.position_mm for each in targets]),
+    )
+    return Frames(frame(columns, model, "base"), stacked)
+
+
+def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:
+    """``vec_fit``: figures of the fit, the prior of every coefficient, singular values."""
+    rows = [*_solution_rows(fit.solution), *_spectrum_rows(gauge)]
+    names = vec_parameter_names(fit.model)
+    units = ["mm" if "delta" in name else "rad" for name in names]
+    rows += [
+        ("prior_std", number, name, value, unit)
+        for number, (name, value, unit) in enumerate(
+            zip(names, fit.prior_std, units, strict=True), 1
+        )
+    ]
+    return _long(rows)
+
+
+def dh_fit_columns(fit: DHFit) -> Columns:
+    """``dh_fit``: figures of the fit and singular values."""
+    return _long([*_solution_rows(fit.solution), *_spectrum_rows(fit.solution.spectrum)])
+
+
+def vec_parameter_names(model: VECModel) -> list[str]:
+    """Names (P,) of the coefficients, ordered as ``vec.to_vector``: j1.delta_x.0, ..."""
+    coefficients = [
+        f"j{joint}.{error}.{order}"
+        for joint in range(1, model.joints + 1)
+        for error in ERRORS
+        for order in range(model.order + 1)
+    ]
+    offsets = [
+        f"j{joint}.eps_z.{'minus' if direction < 0 else 'plus'}"
+        for joint in range(1, model.joints + 1)
+        for direction in _DIRECTIONS
+    ]
+    return coefficients + offsets
+
+
+def _solution_rows(solution: Solution) -> Iterable[tuple]:
+    yield ("parameters", None, None, len(solution.x), "1")
+    yield ("residual_components", None, None, solution.count, "1")
+    yield ("degrees_of_freedom", None, None, solution.degrees_of_freedom, "1")
+    yield ("cost", None, None, solution.cost, "mm^2")
+    yield ("residual_std", None, None, np.sqrt(solution.variance), "mm")
+    yield ("iterations", None, None, solution.iterations, "1")
+    yield ("last_step", None, None, solution.last_step, "mm or mrad")
+    yield ("converged", None, None, float(solution.converged), "1")
+
+
+def _spectrum_rows(spectrum: Spectrum) -> Iterable[tuple]:
+    yield ("rank", None, None, spectrum.rank, "1")
+    yield ("rank_threshold", None, None, spectrum.threshold, "1")
+    yield ("gap", None, None, spectrum.gap if np.isfinite(spectrum.gap) else np.nan, "1")
+    for number, value in enumerate(spectrum.values, 1):
+        yield ("singular_value", number, None, value, "mm per mm or mrad")
+
+
+def _long(rows: Iterable[tuple]) -> Columns:
+    quantity, number, parameter, value, unit = zip(*rows, strict=True)
+    return {
+        "quantity": np.array(quantity, dtype=object),
+        "number": np.array([np.nan if n is None else n for n in number], dtype=float),
+        "parameter": np.array(parameter, dtype=object),
+        "value": np.array(value, dtype=float),
+        "unit": np.array(unit, dtype=object),
+    }

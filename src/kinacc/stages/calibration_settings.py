@@ -1,0 +1,60 @@
+"""What the calibration stages share: settings and tables as records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.calibration.models import Options
+from kinacc.calibration.observations import Observations, from_columns
+from kinacc.calibration.vec_fit import Prior
+from kinacc.robot import Robot
+
+TRAIN = "train"
+
+
+def options(calibration: Mapping) -> Options:
+    """Options of the ``calibration`` settings; a stage that lacks a section gets its defaults."""
+    given: dict = {
+        "rotation_weight_mm_per_rad": float(calibration["rotation_weight_mm_per_rad"]),
+        "frames_estimated": calibration["base_and_tool"] == "estimated",
+    }
+    if "vec" in calibration:
+        section = calibration["vec"]
+        angle_rad = 1e-3 * float(section["prior_std_mrad"])
+        given |= {
+            "order": int(section["order"]),
+            "travel_direction": bool(section["travel_direction"]),
+            "prior": Prior(float(section["prior_std_mm"]), angle_rad, 1.0, angle_rad),
+        }
+    if "dh" in calibration:
+        section = calibration["dh"]
+        given |= {
+            "dh_to_vec": section["fit_to"] == "vec",
+            "hayati_joints": tuple(int(joint) for joint in section["hayati_joints"]),
+            "threshold": float(section["truncation"]),
+        }
+    return Options(**given)
+
+
+def observed(inputs: Mapping, robot: Robot) -> tuple[Observations, np.ndarray]:
+    """All observations of ``measurements`` and the mask (n,) of the rows that train."""
+    columns = inputs["measurements"]
+    return from_columns(columns, robot.joint_map), np.asarray(columns["subset"]) == TRAIN
+
+
+def joint_range_rad(
+    section: Mapping, robot: Robot, q_rad: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Range (k,), (k,) of the VEC model's DH joint angles; ``q_rad`` (n, k) are the data's."""
+    wanted = section["joint_range"]
+    if wanted == "data":
+        margin = np.deg2rad(float(section["joint_range_margin_deg"]))
+        return q_rad.min(axis=0) - margin, q_rad.max(axis=0) + margin
+    low, high = robot.q_min_rad, robot.q_max_rad
+    if wanted != "limits":
+        low, high = np.deg2rad(np.array(wanted, dtype=float)).T
+    centre, half = 0.5 * (low + high), 0.5 * (high - low)
+    centre, half = robot.joint_map @ centre, np.abs(robot.joint_map) @ half
+    return centre - half, centre + half

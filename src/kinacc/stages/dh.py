@@ -1,0 +1,35 @@
+"""Fit the DH model by least squares, to the VEC model or to the measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc import robot
+from kinacc.calibration import models, tables
+from kinacc.models.tables import vec_model
+from kinacc.stages import calibration_settings as shared
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
+    """``dh_model``, ``frames`` of all three models and ``dh_fit``, from the rows that train."""
+    arm = robot.load(settings["robot"])
+    options = shared.options(settings["calibration"])
+    every, train = shared.observed(inputs, arm)
+    observations = every.select(train)
+    vec_frames = tables.frames_of(inputs["vec_frames"], "vec", every.target_names)
+    volumetric = vec_model(inputs["vec_model"])
+    fitted = models.fit_dh(observations, arm.dh, options, volumetric, vec_frames)
+    nominal = models.fit_nominal(observations, arm.dh, options)
+    frames = {"dh": fitted.frames, "nominal": nominal.frames}
+    others = tables.frames_columns(frames, every.target_names)
+    kept = inputs["vec_frames"]
+    return {
+        "dh_model": tables.dh_model_columns(fitted),
+        "frames": {
+            name: np.concatenate([np.asarray(kept[name]), values])
+            for name, values in others.items()
+        },
+        "dh_fit": tables.dh_fit_columns(fitted),
+    }

@@ -1,0 +1,29 @@
+"""Fit the VEC model to the training poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc import robot
+from kinacc.calibration import models, tables, vec_fit
+from kinacc.stages import calibration_settings as shared
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
+    """``vec_model``, ``vec_frames`` and ``vec_fit`` of the rows that train."""
+    arm, calibration = robot.load(settings["robot"]), settings["calibration"]
+    options = shared.options(calibration)
+    every, train = shared.observed(inputs, arm)
+    joint_range = shared.joint_range_rad(calibration["vec"], arm, every.q_rad)
+    observations = every.select(train)
+    fitted = models.fit_vec(observations, arm.dh, joint_range, options)
+    gauge = vec_fit.gauge(
+        observations, fitted.model, fitted.frames, options.rotation_weight_mm_per_rad
+    )
+    return {
+        "vec_model": tables.vec_model_columns(fitted),
+        "vec_frames": tables.frames_columns({"vec": fitted.frames}, every.target_names),
+        "vec_fit": tables.vec_fit_columns(fitted, gauge),
+    }
