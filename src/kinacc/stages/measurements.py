@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
@@ -21,9 +22,12 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
 
         seen = synthetic.measure(arm, section["synthetic"])
     else:
-        from kinacc.data import read
+        from kinacc.data.measurements import read
 
-        seen = read.measurements(section["file"], arm)
+        reading = read(section["file"], arm)
+        if reading.unused:
+            warnings.warn(f"columns not used: {', '.join(reading.unused)}", stacklevel=1)
+        seen = reading.columns
     return {"measurements": split(seen, settings)}
 
 
