@@ -105,7 +105,7 @@ def test_fig2_without_a_point_says_so():
 def test_fig3_shares_one_colour_scale_per_row_and_hatches_what_is_not_reached():
     table = tables.accuracy_map()
     figure = fig3.draw(table)
-    panels = [axes for axes in figure.axes if len(axes.lines) == 2]
+    panels = [axes for axes in figure.axes if len(axes.lines) == 3]
     assert len(panels) == 10
     for row, column in ((0, "position_max_mm"), (1, "orientation_max_mrad")):
         limits = {axes.collections[0].get_clim() for axes in panels[5 * row : 5 * row + 5]}
@@ -116,13 +116,27 @@ def test_fig3_shares_one_colour_scale_per_row_and_hatches_what_is_not_reached():
 
 def test_fig3_rings_the_largest_cell_of_each_slice():
     table = tables.accuracy_map()
-    panels = [axes for axes in fig3.draw(table).axes if len(axes.lines) == 2]
+    panels = [axes for axes in fig3.draw(table).axes if len(axes.lines) == 3]
     for axes, angle in zip(panels, (0, 15, 30, 45, 60), strict=False):
         mine = np.flatnonzero(table["slice_deg"] == angle)
         worst = mine[np.nanargmax(table["position_max_mm"][mine])]
-        at = axes.lines[0].get_xydata()[0]
+        at = axes.lines[1].get_xydata()[0]
         assert at == pytest.approx([table["radius_mm"][worst], table["height_mm"][worst]])
         assert f"max {table['position_max_mm'][worst]:.2f} mm" in axes.get_title()
+
+
+def test_fig3_dots_cells_reached_in_some_poses_only():
+    table = tables.accuracy_map()
+    assert "some poses" not in said(fig3.draw(table))
+    some = (table["radius_mm"] > 1700) & (table["solutions"] > 0)
+    table["solutions"] = np.where(some, 11, table["solutions"])
+    figure = fig3.draw(table)
+    assert "some poses not reachable" in said(figure)
+    first = table["slice_deg"] == 0
+    assert len(figure.axes[0].lines[0].get_xdata()) == np.count_nonzero(some & first)
+    assert problems(figure) == []
+    alone = {name: column[first] for name, column in table.items()}
+    assert problems(fig3.draw(alone)) == []
 
 
 def test_fig3_places_each_value_in_its_own_cell_whatever_the_row_order():

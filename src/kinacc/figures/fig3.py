@@ -16,10 +16,20 @@ from kinacc.errors import InputError, Problem
 from kinacc.figures import style
 from kinacc.figures.columns import Table, floats, require
 
-COLUMNS = ("slice_deg", "radius_mm", "height_mm", "position_max_mm", "orientation_max_mrad")
+COLUMNS = (
+    "slice_deg",
+    "radius_mm",
+    "height_mm",
+    "position_max_mm",
+    "orientation_max_mrad",
+    "solutions",
+    "wanted",
+)
 ROWS = (("position_max_mm", "Position", "mm"), ("orientation_max_mrad", "Orientation", "mrad"))
 COLOURMAP = "viridis"
+MIDDLE = "#21918c"  # of the colour map
 UNREACHED = {"facecolor": "#e2e2e2", "hatch": "//////", "edgecolor": "#9a9a9a", "linewidth": 0}
+PARTLY = {"marker": ".", "ms": 1.6, "mew": 0, "mfc": "white", "ls": ""}
 RING = {"marker": "o", "ms": 5.5, "mfc": "none", "ls": ""}
 DEFAULT_CELL_MM = 25.0
 
@@ -63,8 +73,9 @@ class Layout:
 def draw(accuracy_map: Table, *, dataset: str | None = None) -> Figure:
     """Draw ``accuracy_map``: a column per slice, position above orientation.
 
-    One colour scale per row; unreachable cells are hatched; the largest value of each slice is
-    ringed and stated. Raises InputError where a column is missing or there is no row.
+    One colour scale per row; unreachable cells are hatched, and those reached in some but not all
+    orientations and branches dotted; the largest value of each slice is ringed and stated.
+    Raises InputError where a column is missing or there is no row.
     """
     require(accuracy_map, COLUMNS, "accuracy_map")
     slice_deg = floats(accuracy_map, "slice_deg")
@@ -74,8 +85,10 @@ def draw(accuracy_map: Table, *, dataset: str | None = None) -> Figure:
     radius, height = (np.round(floats(accuracy_map, c), 3) for c in ("radius_mm", "height_mm"))
     radii, heights = np.unique(radius), np.unique(height)
     edges = _edges(radii), _edges(heights)
-    layout = _layout(slices.size, *edges, named=bool(dataset))
+    solutions, wanted = floats(accuracy_map, "solutions"), floats(accuracy_map, "wanted")
+    partly = (solutions > 0) & (solutions < wanted)
     unreached = False
+    layout = _layout(slices.size, *edges, named=bool(dataset), wordy=bool(partly.any()))
     with style.house():
         figure = style.new_figure(layout.width, layout.height, arranged=False)
         for row, (column, words, unit) in enumerate(ROWS):
@@ -87,6 +100,8 @@ def draw(accuracy_map: Table, *, dataset: str | None = None) -> Figure:
                 unreached |= bool(np.isnan(grid).any())
                 ax = figure.add_axes(layout.box(row, place))
                 mesh = _panel(ax, *edges, grid, norm)
+                some = mine & partly
+                ax.plot(radius[some], height[some], **PARTLY, rasterized=True)
                 title = _largest(ax, radii, heights, grid, unit)
                 ax.set_title(title if row else f"{angle:g}°\n{title}", fontsize=style.SMALL_PT)
                 ax.tick_params(labelleft=place == 0, labelbottom=row == 1)
@@ -95,17 +110,24 @@ def draw(accuracy_map: Table, *, dataset: str | None = None) -> Figure:
             )
             bar.set_label(f"{words}\nerror ({unit})")
             bar.outline.set_linewidth(0.4)
-        _words(figure, layout, unreached, dataset)
+        _words(figure, layout, unreached, bool(partly.any()), dataset)
     return figure
 
 
-def _layout(count: int, r_edges: np.ndarray, h_edges: np.ndarray, named: bool) -> Layout:
-    """Fit ``count`` panels into the column width, at the same scale in both directions."""
-    width = style.DOUBLE_COLUMN_IN if count > 2 else style.SINGLE_COLUMN_IN
+def _layout(
+    count: int, r_edges: np.ndarray, h_edges: np.ndarray, named: bool, wordy: bool
+) -> Layout:
+    """Fit ``count`` panels into the column width, at the same scale in both directions.
+
+    ``named`` leaves room for the data set's name, ``wordy`` for three entries in the legend.
+    """
+    wide = count > 2
+    width = style.DOUBLE_COLUMN_IN if wide else style.SINGLE_COLUMN_IN
     free = width - Layout.left - Layout.right - count * Layout.gap
     ratio = float(np.ptp(h_edges) / np.ptp(r_edges))
     panel_w = min(max(free / count, 0.5), 3.2 / ratio)
-    return Layout(count, panel_w, panel_w * ratio, name_h=0.17 if named else 0.0)
+    foot = Layout.foot + (0.0 if wide or not wordy else 0.17)
+    return Layout(count, panel_w, panel_w * ratio, name_h=0.17 if named else 0.0, foot=foot)
 
 
 def _edges(levels: np.ndarray) -> np.ndarray:
@@ -169,7 +191,9 @@ def _largest(ax: Axes, radii: np.ndarray, heights: np.ndarray, grid: np.ndarray,
     return f"max {grid[row, column]:.2f} {unit}"
 
 
-def _words(figure: Figure, layout: Layout, unreached: bool, dataset: str | None) -> None:
+def _words(
+    figure: Figure, layout: Layout, unreached: bool, partly: bool, dataset: str | None
+) -> None:
     """Write axis names, the legend and the data set's name into the margins."""
     left, right = layout.left / layout.width, 1 - (layout.right + layout.gap) / layout.width
     middle = (layout.foot + layout.panel_h + layout.between / 2) / layout.height
@@ -178,7 +202,7 @@ def _words(figure: Figure, layout: Layout, unreached: bool, dataset: str | None)
         fontsize=style.TEXT_PT,
     )  # fmt: skip
     figure.text(
-        (left + right) / 2, 0.37 / layout.height, "Radius (mm)", ha="center", va="center",
+        (left + right) / 2, (layout.foot - 0.31) / layout.height, "Radius (mm)", ha="center", va="center",
         fontsize=style.TEXT_PT,
     )  # fmt: skip
     handles = [Line2D([], [], **RING, mec=style.INK, mew=0.9)]
@@ -186,12 +210,17 @@ def _words(figure: Figure, layout: Layout, unreached: bool, dataset: str | None)
     if unreached:
         handles.append(Patch(**UNREACHED))
         names.append("not reachable")
+    if partly:
+        handles.append(
+            (Patch(facecolor=MIDDLE), Line2D([0.25, 0.5, 0.75], [0.5] * 3, **PARTLY | {"ms": 3}))
+        )
+        names.append("some poses not reachable")
     figure.legend(
         handles,
         names,
         loc="lower center",
         bbox_to_anchor=((left + right) / 2, 0.04 / layout.height),
         borderpad=0,
-        ncols=2,
+        ncols=3 if layout.columns > 2 else 2,
     )
     style.name_dataset(figure, dataset)
