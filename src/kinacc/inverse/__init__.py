@@ -82,7 +82,9 @@ def solve(
     ``newton.ROTATION_TOLERANCE_RAD``; otherwise it is dropped. Turns are those of
     ``limits.take_turns``. Solutions outside the joint limits are OUTSIDE_LIMITS, those within them
     but outside ``fitted_range_rad`` (6,), (6,) OUTSIDE_RANGE. A branch that converged to the
-    joints of an earlier one is a DUPLICATE. Branches keep the name they started from.
+    joints of an earlier one is a DUPLICATE. Branches keep the name they started from. On a
+    calibrated arm a branch may be missed within 5 mm of axis 1 and where two singularities meet
+    (9 of 20,000 random postures).
     """
     arm = closed_form_of(robot)
     names = BRANCHES if branches is None else tuple(branches)
