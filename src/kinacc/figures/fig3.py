@@ -202,9 +202,13 @@ def _words(
         fontsize=style.TEXT_PT,
     )  # fmt: skip
     figure.text(
-        (left + right) / 2, (layout.foot - 0.31) / layout.height, "Radius (mm)", ha="center", va="center",
+        (left + right) / 2,
+        (layout.foot - 0.31) / layout.height,
+        "Radius (mm)",
+        ha="center",
+        va="center",
         fontsize=style.TEXT_PT,
-    )  # fmt: skip
+    )
     handles = [Line2D([], [], **RING, mec=style.INK, mew=0.9)]
     names = ["largest in the slice"]
     if unreached:
