@@ -220,6 +220,9 @@ RULES = [
     ("dh", "frames", "model", 2, "vec", "no base of model dh"),
     ("dh", "frames", "x_mm", 0, 3.0, "frame base of model vec differs"),
     ("dh", "dh_model", "joint", 5, 7, "joints 1, 2, 3, 4, 5, 7"),
+    ("residuals", "pose_errors", "row", 3, 9, "no such row in row 3"),
+    ("residuals", "pose_errors", "pose", 2, 1, "another pose in row 2"),
+    ("residuals", "pose_errors", "target", 2, "A", "another target in row 2"),
     ("residuals", "residuals", "fold", 0, 1, "0 pooled rows of vec_vs_measured, train, position"),
     ("residuals", "residuals", "rms", 2, 0.9, "mean, rms and max out of order in row 2"),
     ("residuals", "residuals", "unit", 0, "mrad", "unit in row 0"),
@@ -321,6 +324,15 @@ def test_robustness_of_claims_that_are_none(results):
     table = {"draw": [1], "claim": ["hearsay"], "reproduced": [None], "verdict": ["agrees"]}
     store.write(results.path("robustness"), "robustness", table, results.marks("claims"))
     assert any("unknown claim in row 0" in text for text in problems(results))
+
+
+def test_shares_that_are_not_those_of_the_draws(results):
+    names = ("draw", "claim", "reproduced", "verdict")
+    rows = [(1, "agrees"), (2, "differs"), (3, "not comparable")]
+    values = ([draw for draw, _ in rows], ["table_1.mean"] * 3, [0.7] * 3, [v for _, v in rows])
+    table = dict(zip(names, values, strict=True))
+    store.write(results.path("robustness"), "robustness", table, results.marks("claims"))
+    assert any("share 1 of table_1.mean; allowed: 0.5" in text for text in problems(results))
 
 
 @pytest.fixture

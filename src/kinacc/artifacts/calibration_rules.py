@@ -1,0 +1,153 @@
+"""What tables from measured poses to residuals must say of each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinacc.artifacts.rule import TOLERANCE, Columns, Rule, Tables, mark
+from kinacc.errors import Problem
+
+
+def _unit_quaternions(name: str) -> Rule:
+    def rule(tables: Tables) -> Iterator[Problem]:
+        parts = np.stack([tables[name][column] for column in ("qw", "qx", "qy", "qz")])
+        null = np.isnan(parts)
+        yield from mark(
+            name, null.any(axis=0) != null.all(axis=0), "quaternion null in part", "all or none"
+        )
+        length = np.linalg.norm(parts, axis=0)
+        wrong = np.abs(length - 1.0) > 1e-6
+        yield from mark(name, wrong, "quaternion not of length 1", "unit quaternions")
+        yield from mark(name, parts[0] < -TOLERANCE, "quaternion with qw < 0", "qw >= 0")
+
+    return rule
+
+
+def _measurements(tables: Tables) -> Iterator[Problem]:
+    table = tables["measurements"]
+    joints = np.stack(
+        [values for name, values in table.items() if name[0] == "q" and name[1:].isdigit()]
+    )
+    first = np.unique(table["pose"], return_index=True, return_inverse=True)
+    same = joints[:, first[1]][:, first[2]]
+    yield from mark(
+        "measurements", np.any(joints != same, axis=0), "pose at other joints", "one configuration"
+    )
+    for name in ("fold", "subset"):
+        values = table[name].astype(str)
+        wrong = values != values[first[1]][first[2]]
+        yield from mark("measurements", wrong, f"pose in another {name}", f"one {name} per pose")
+
+
+def _frames(name: str, models: tuple[str, ...]) -> Rule:
+    def rule(tables: Tables) -> Iterator[Problem]:
+        present = set(zip(tables[name]["model"], tables[name]["frame"], strict=True))
+        for model in models:
+            for frame in ("base", "tool"):
+                if (model, frame) not in present:
+                    what = f"no {frame} of model {model}"
+                    yield Problem(f"{name}.parquet", what, "base and tool of every model")
+
+    return rule
+
+
+def _vec_frames_kept(tables: Tables) -> Iterator[Problem]:
+    before, after = tables["vec_frames"], tables["frames"]
+    kept = {row[0]: row[1:] for row in _frame_rows(after)}
+    for row in _frame_rows(before):
+        if kept.get(row[0]) != row[1:]:
+            what = f"frame {row[0]} of model vec differs from vec_frames.parquet"
+            yield Problem("frames.parquet", what, "the frames of the VEC fit")
+
+
+def _frame_rows(table: Columns) -> list[tuple]:
+    names = [name for name in table if name not in ("model", "frame")]
+    return [
+        (table["frame"][i], *(float(table[name][i]) for name in names))
+        for i in np.flatnonzero(table["model"] == "vec")
+    ]
+
+
+def _every_joint(name: str) -> Rule:
+    def rule(tables: Tables) -> Iterator[Problem]:
+        joints = sorted({int(joint) for joint in tables[name]["joint"]})
+        measured = tables["measurements"]
+        count = sum(column[0] == "q" and column[1:].isdigit() for column in measured)
+        if joints != list(range(1, count + 1)):
+            what = f"joints {', '.join(map(str, joints))}"
+            yield Problem(f"{name}.parquet", what, f"1 to {count}, as in measurements.parquet")
+
+    return rule
+
+
+def _vec_model(tables: Tables) -> Iterator[Problem]:
+    table = tables["vec_model"]
+    yield from mark(
+        "vec_model", table["q_min_rad"] >= table["q_max_rad"], "empty joint range", "q_min < q_max"
+    )
+    turning = (table["direction"] != 0) & (table["error"] != "eps_z")
+    yield from mark("vec_model", turning, "travel direction", "only in eps_z (eq. 6)")
+    first = np.unique(table["joint"], return_index=True, return_inverse=True)
+    for name in (
+        "q_min_rad",
+        "q_max_rad",
+        "theta_offset_rad",
+        "d_mm",
+        "a_mm",
+        "alpha_rad",
+        "beta_rad",
+    ):
+        wrong = table[name] != table[name][first[1]][first[2]]
+        yield from mark("vec_model", wrong, f"another {name}", "one value per joint")
+
+
+def _residuals(tables: Tables) -> Iterator[Problem]:
+    table = tables["residuals"]
+    kinds = list(zip(table["comparison"], table["subset"], table["quantity"], strict=True))
+    pooled = np.isnan(table["fold"])
+    for kind in dict.fromkeys(kinds):
+        count = sum(bool(pooled[i]) for i, each in enumerate(kinds) if each == kind)
+        if count != 1:
+            what = f"{count} pooled rows of {', '.join(kind)}"
+            yield Problem("residuals.parquet", what, "exactly one (fold null)")
+    for wanted in ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured"):
+        if (wanted, "train", "position") not in kinds:
+            yield Problem("residuals.parquet", f"no row {wanted}, train, position")
+    right = np.where(table["quantity"] == "position", "mm", "mrad")
+    yield from mark("residuals", table["unit"] != right, "unit", "position mm, orientation mrad")
+    slack = 1.0 + TOLERANCE
+    yield from mark(
+        "residuals",
+        (table["rms"] > table["max"] * slack) | (table["mean"] > table["rms"] * slack),
+        "mean, rms and max out of order",
+        "mean <= rms <= max",
+    )
+
+
+def _pose_errors(tables: Tables) -> Iterator[Problem]:
+    errors, measured = tables["pose_errors"], tables["measurements"]
+    row = errors["row"]
+    beyond = row >= len(measured["pose"])
+    yield from mark("pose_errors", beyond, "no such row", "rows of measurements.parquet")
+    row = np.where(beyond, 0, row)
+    for name in ("pose", "target", "repeat", "subset"):
+        wrong = ~beyond & (errors[name] != measured[name][row])
+        yield from mark("pose_errors", wrong, f"another {name}", "as in the row of measurements")
+
+
+RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
+    (("measurements",), _unit_quaternions("measurements")),
+    (("measurements",), _measurements),
+    (("vec_frames",), _unit_quaternions("vec_frames")),
+    (("vec_frames",), _frames("vec_frames", ("vec",))),
+    (("frames",), _unit_quaternions("frames")),
+    (("frames",), _frames("frames", ("vec", "dh", "nominal"))),
+    (("vec_frames", "frames"), _vec_frames_kept),
+    (("vec_model",), _vec_model),
+    (("vec_model", "measurements"), _every_joint("vec_model")),
+    (("dh_model", "measurements"), _every_joint("dh_model")),
+    (("pose_errors", "measurements"), _pose_errors),
+    (("residuals",), _residuals),
+)
