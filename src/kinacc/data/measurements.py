@@ -77,7 +77,7 @@ def read(section: Mapping, robot: Robot) -> Reading:
 
     Raises InputError listing everything that is wrong with the file.
     """
-    table = load(section["path"], section["delimiter"], section["decimal"], section["source"])
+    table = load(section["path"], section["delimiter"], section["decimal"], section.get("source"))
     return convert(table, Layout.of(section), robot)
 
 
