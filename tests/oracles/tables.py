@@ -114,7 +114,10 @@ def apart(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
 def magnitudes(
     models_: Models, measurements: list[Row], comparison: str
 ) -> tuple[list[float], list[float]]:
-    """Position (mm) and orientation (mrad) magnitudes of one comparison, row by row."""
+    """Position (mm) and orientation (mrad) magnitudes of one comparison, row by row.
+
+    Two models are compared where the instrument sees them: their own bases are two estimates of
+    one place."""
     position, orientation = [], []
     for row in measurements:
         q, s, target = joints(row), directions(row), row["target"]
@@ -123,7 +126,9 @@ def magnitudes(
         if right == "measured":
             gap, turn = apart(models_.measured(left, q, s, target), reading)
         else:
-            gap, turn = apart(models_.tool(left, q, s, target), models_.tool(right, q, s, target))
+            gap, turn = apart(
+                models_.measured(left, q, s, target), models_.measured(right, q, s, target)
+            )
         position.append(gap)
         if full:
             orientation.append(turn)
