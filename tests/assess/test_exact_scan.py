@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -24,27 +25,30 @@ def field(seed: int, points: int, largest_mm: float = 0.906) -> np.ndarray:
     return error * largest_mm / np.linalg.norm(error, axis=1).max()
 
 
-def rejected(world, assessor: ModelInvalidation) -> np.ndarray:
-    """Whether each grid bound from 0 to the largest first reading is rejected, run by run."""
-    settings = (
-        assessor.alpha,
-        assessor.distance == "squared",
-        {"r": 0.5, "sqrt_r": 0.25}[assessor.covariance],
-        assessor.measurements,
-    )
-    bounds = range(assessor.top(world) + 1)
-    return np.array([kernels.run(world.arrays, k / 1000, *settings)[0] for k in bounds])
+def arguments(assessor: ModelInvalidation) -> tuple:
+    power = {"r": 0.5, "sqrt_r": 0.25}[assessor.covariance]
+    return assessor.alpha, assessor.distance == "squared", power, assessor.measurements
 
 
 def check(world, distance: str, covariance: str, **more) -> np.ndarray:
-    flags = rejected(world, ModelInvalidation(distance=distance, covariance=covariance, **more))
+    """Hold the searches, and the scans between any two changes of decision, to single runs."""
+    plain = ModelInvalidation(distance=distance, covariance=covariance, **more)
+    top, settings = plain.top(world), arguments(plain)
+    flags = np.array([kernels.run(world.arrays, k / 1000, *settings)[0] for k in range(top + 1)])
     highest = int(np.max(np.flatnonzero(flags), initial=-1))
     lowest = int(np.flatnonzero(~flags)[0])
     for search, k in (("from_above", highest + 1), ("from_below", lowest)):
-        assessor = ModelInvalidation(
-            distance=distance, covariance=covariance, search=search, **more
-        )
+        assessor = replace(plain, search=search)
         assert assessor.assess(world).assessed_mm == k / 1000
+    # The searches stop at one change of the decision; these ask for all of them.
+    changes = np.flatnonzero(flags[1:] != flags[:-1]).tolist()
+    for k, below in zip(changes, [-1, *changes][:-1], strict=True):
+        if flags[k]:
+            found, _ = kernels.scan(world.arrays, below + 1, top, True, *settings)
+            assert found == k + 1
+        else:
+            found, _ = kernels.scan(world.arrays, 0, k, False, *settings)
+            assert found == below
     return flags
 
 
@@ -59,6 +63,17 @@ def test_scans_of_the_study_equal_every_single_run(noise_mm, distance, covarianc
         flips.append(np.count_nonzero(flags[1:] != flags[:-1]))
     # The decision is not monotone in the bound: a bisection could not have found the same.
     assert noise_mm < 0.3 or max(flips) > 2
+
+
+@pytest.mark.parametrize(("distance", "covariance"), SWITCHES)
+def test_scans_of_many_noisy_worlds_equal_every_single_run(distance, covariance):
+    # Few points, much noise, a long budget: much measuring again, at points that change places.
+    rng = np.random.default_rng(0)
+    for case in range(150):
+        points, budget = int(rng.integers(3, 25)), int(rng.integers(20, 90))
+        world = drawn_world(field(case, points), rng.uniform(0.2, 0.6), key_of(case), budget)
+        alpha = float(rng.choice([0.3, 0.6, 0.8]))
+        check(world, distance, covariance, alpha=alpha, measurements=budget)
 
 
 @settings(max_examples=60)
