@@ -1,4 +1,4 @@
-"""Small but whole studies, run stage by stage once for all tests here; figures are left out.
+"""Small but whole studies, run once for all tests here; figures are left out.
 
 ``file``: measurements written by the oracle's own arm, so that nothing of kinacc made them.
 ``synthetic``: the shipped synthetic arm.
@@ -7,100 +7,10 @@
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pytest
-from oracles import kinematics
-from scipy.spatial.transform import Rotation
-
-SETTINGS = """
-datasets:
-  small:
-    robot: mh180
-    measurements: {source: %s, file: {path: %s}}
-seed: 4711
-measurements:
-  folds: 4
-  validation_fold: 1
-  synthetic: {poses: 160, tracker_noise_mm: 0.02}
-calibration:
-  vec: {order: 3}
-evaluation:
-  points: 24
-map: {slices_deg: [0, 30], grid_mm: 225}
-study: {noise_mm: [0.05, 0.3], repetitions: 2, measurements: 24, chunks: 2}
-histories: {simulations_searched: 30}
-figures: {formats: [svg]}
-"""
-WORKING_RANGE_DEG = [(-12, 72), (-30, 54), (-74, 18), (-180, 180), (-122, 122), (-180, 180)]
-
-
-@dataclass(frozen=True)
-class Written:
-    """What the oracle wrote into the measurement file, row by row."""
-
-    q_rad: np.ndarray
-    frames: np.ndarray
-
-
-def write_measurements(path: Path) -> Written:
-    """150 poses and ten revisits of an arm with errors like Table III's, 0.03 mm of noise."""
-    rng = np.random.default_rng(2)
-    low, high = np.radians(WORKING_RANGE_DEG).T
-    table = np.array(kinematics.MH180) + rng.normal(size=(6, 5)) * [1e-3, 0.7, 0.7, 1e-3, 0]
-    lever = np.array([1, 1, 1, 3, 4, 6])[:, None, None] * 1e-4
-    series = rng.normal(size=(6, 6, 5)) * np.concatenate(
-        [np.broadcast_to(0.1, (6, 3, 1)), np.broadcast_to(lever, (6, 3, 1))], axis=1
-    )
-    q = rng.uniform(low, high, (150, 6))
-    q = np.concatenate([q, q[::15]]).round(9)
-    lines = ["q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg"]
-    frames = []
-    degrees = np.degrees(q).round(10)
-    for row in degrees:
-        frame = kinematics.projected(
-            kinematics.vec_forward(
-                table, series, low, high, np.zeros((6, 2)), np.radians(row), [0] * 6
-            )
-        )
-        position = (frame[:3, 3] + rng.normal(size=3) * 0.03).round(6)
-        angles = Rotation.from_matrix(frame[:3, :3]).as_euler("XYZ", degrees=True).round(8)
-        lines.append(",".join(repr(float(x)) for x in [*row, *position, *angles]))
-        frame[:3, :3] = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
-        frame[:3, 3] = position
-        frames.append(frame)
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return Written(np.radians(degrees), np.array(frames))
-
-
-def run_stages(config: Path, dataset: str, results: Path, names: tuple[str, ...] = ()) -> Path:
-    """Every stage of a data set but its figures, or those named; its folder."""
-    from kinacc.stages.plan import planned
-    from kinacc.stages.runner import Job, perform
-
-    plan = planned([str(config)], results=str(results))
-    stages = [s for s in plan.stages(dataset).values() if not s.is_figure and not s.on_request]
-    missing = [s.module for s in stages if importlib.util.find_spec(s.module) is None]
-    if missing:
-        pytest.skip(f"the study cannot run yet: no {', '.join(missing)}")
-    for stage in stages:
-        if names and stage.name not in names:
-            continue
-        for part in plan.part_names(stage.name, dataset):
-            perform(
-                Job(
-                    stage.module,
-                    plan.inputs(stage.name, dataset),
-                    plan.outputs(stage.name, dataset, part),
-                    plan.settings(stage.name, dataset),
-                    plan.seed(dataset),
-                    part=part,
-                    log=plan.log(stage.name, dataset, part),
-                )
-            )
-    return results / dataset
+from oracles.small_study import SETTINGS, Written, run_stages, write_measurements
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
-from oracles import assessors, fits, kinematics, maps, tables, worlds
+from oracles import assessors, fits, kinematics, maps, small_study, tables, worlds
 
 SEED = 4711
 WEIGHT = 500.0
@@ -75,8 +75,11 @@ def test_dh_model_is_the_least_squares_fit_to_the_vec_at_the_training_poses(mode
         table = table.reshape(6, 5)
         return fits.residual(lambda i: kinematics.dh_forward(table, q[i]), wanted, WEIGHT)
 
-    expected = fits.truncated_fit(function, nominal[DH_FREE], DH_UNIT, THRESHOLD)
     found = np.array(models.dh).ravel()
+    # At the optimum one more step from there leads nowhere.
+    expected = fits.truncated_fit(
+        function, nominal[DH_FREE], DH_UNIT, THRESHOLD, start=found[DH_FREE], iterations=1
+    )
     assert not found[~DH_FREE].any()
     assert np.abs((found[DH_FREE] - expected["x"]) / DH_UNIT).max() < 1e-4
 
@@ -376,3 +379,57 @@ def test_numbers_of_the_claims(finished, models, measurements):
     fifth = claims["table2_theta_offset_5"]
     assert fifth["paper"] == pytest.approx(-3.141)
     assert math.cos(fifth["reproduced"] - models.dh[4][0]) == pytest.approx(1, abs=1e-12)
+
+
+# --- measured files and folds ---------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def other_fold(tmp_path_factory, written):
+    """The study of the written file with fold 2 held out of the delivered models."""
+    folder = tmp_path_factory.mktemp("other")
+    config = folder / "config.yaml"
+    settings = small_study.SETTINGS % ("file", written[0])
+    config.write_text(settings.replace("validation_fold: 1", "validation_fold: 2"), "utf-8")
+    stages = ("measurements", "vec", "dh", "residuals")
+    return small_study.run_stages(config, "small", folder / "results", stages)
+
+
+def test_a_written_file_is_read_back(other_fold, written):
+    rows = tables.rows(other_fold, "measurements")
+    assert len(rows) == len(written[1].q_rad)
+    for row, q, frame in zip(rows, written[1].q_rad, written[1].frames, strict=True):
+        np.testing.assert_allclose(tables.joints(row), q, rtol=0, atol=1e-12)
+        reading, full = tables.measured_frame(row)
+        assert full
+        assert row["qw"] >= 0
+        np.testing.assert_allclose(reading, frame, rtol=0, atol=1e-12)
+        assert tables.directions(row) == [0] * 6
+    # Every fifteenth pose is revisited at the end: in the same fold, whichever that is.
+    for first, again in zip(rows[:150:15], rows[150:], strict=True):
+        assert first["fold"] == again["fold"]
+
+
+def test_cross_validated_errors_are_those_of_models_that_never_saw_the_fold(
+    other_fold, tmp_path_factory, written
+):
+    folder = tmp_path_factory.mktemp("this")
+    config = folder / "config.yaml"
+    config.write_text(small_study.SETTINGS % ("file", written[0]), "utf-8")
+    stages = ("measurements", "vec", "dh", "residuals")
+    here = small_study.run_stages(config, "small", folder / "results", stages)
+    rows = tables.rows(here, "measurements")
+    assert [r["fold"] for r in rows] == [r["fold"] for r in tables.rows(other_fold, "measurements")]
+    unseen = tables.models(other_fold)
+    checked = 0
+    for row in tables.rows(here, "pose_errors"):
+        if (row["estimate"], row["fold"]) != ("cross_validated", 2):
+            continue
+        source = rows[row["row"]]
+        position, turn = tables.magnitudes(unseen, [source], row["comparison"])
+        found = math.dist((row["ex_mm"], row["ey_mm"], row["ez_mm"]), (0, 0, 0))
+        assert found == pytest.approx(position[0], abs=1e-6)
+        found = math.dist((row["rx_mrad"], row["ry_mrad"], row["rz_mrad"]), (0, 0, 0))
+        assert found == pytest.approx(turn[0], abs=1e-6)
+        checked += 1
+    assert checked >= 4 * 35

@@ -40,11 +40,12 @@ def truncated_fit(
     nominal: np.ndarray,
     unit: np.ndarray,
     threshold: float,
+    start: np.ndarray | None = None,
     iterations: int = 12,
 ) -> dict[str, np.ndarray | int | float]:
     """Smallest displacement from nominal, in units of ``unit``, that minimises the residual:
     singular values below ``threshold`` times the largest are left out."""
-    x = nominal.astype(float)
+    x = (nominal if start is None else start).astype(float)
     for _ in range(iterations):
         r = function(x)
         jacobian = slopes(function, x, unit * 0.1) * unit

@@ -1,0 +1,98 @@
+"""A real UR10 through measurements, fits and residuals, recomputed from its Parquet files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles import small_study, tables
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = ROOT.parent / "shared" / "data" / "ur10_tmac"
+
+# An independent fit's cross-validated position rms over several random splits, upper end.
+REACH_MM = {"series_B": 0.475, "series_D": 0.43}
+
+SETTINGS = """
+datasets:
+  arm:
+    robot: ur10
+    measurements: {source: file, file: {path: %s}, folds: 5, validation_fold: 0}
+    calibration: {base_and_tool: estimated, dh: {fit_to: measurements, hayati_joints: [2, 3]}}
+    evaluation: {space: measured}
+"""
+
+
+@pytest.fixture(scope="module", params=["series_D", "series_B"])
+def series(request, tmp_path_factory):
+    path = DATA / f"{request.param}.csv"
+    if not path.is_file():
+        pytest.skip(f"no {path.name} in ../shared/data/ur10_tmac")
+    folder = tmp_path_factory.mktemp("ur10")
+    config = folder / "config.yaml"
+    config.write_text(SETTINGS % path, encoding="utf-8")
+    stages = ("measurements", "vec", "dh", "residuals", "assessment_points")
+    return request.param, small_study.run_stages(config, "arm", folder / "results", stages)
+
+
+def test_residuals_of_the_measured_arm(series):
+    name, folder = series
+    models, rows = tables.models(folder), tables.rows(folder, "measurements")
+    residuals = tables.rows(folder, "residuals")
+    for comparison in ("vec_vs_measured", "dh_vs_measured", "dh_vs_vec"):
+        train = [row for row in rows if row["subset"] == "train"]
+        both = tables.magnitudes(models, train, comparison)
+        for quantity, values in zip(("position", "orientation"), both, strict=True):
+            (row,) = [
+                r
+                for r in residuals
+                if (r["comparison"], r["subset"], r["fold"], r["quantity"])
+                == (comparison, "train", None, quantity)
+            ]
+            expected = tables.statistics(values)
+            for statistic, value in expected.items():
+                assert row[statistic] == pytest.approx(value, rel=1e-7)
+    (row,) = [
+        r
+        for r in residuals
+        if (r["comparison"], r["subset"], r["fold"], r["quantity"])
+        == ("dh_vs_measured", "validation", None, "position")
+    ]
+    assert row["n"] == len(rows)
+    assert row["rms"] <= REACH_MM[name]
+
+
+def test_revisits_stay_in_one_fold(series):
+    _, folder = series
+    rows = tables.rows(folder, "measurements")
+    q = np.array([tables.joints(row) for row in rows])
+    fold = np.array([row["fold"] for row in rows])
+    revisits = 0
+    for i in range(len(q)):
+        gap = np.abs((q[i + 1 :] - q[i] + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
+        same = np.flatnonzero(gap < np.radians(0.05)) + i + 1
+        assert (fold[same] == fold[i]).all()
+        revisits += len(same)
+    sizes = np.bincount(fold)
+    assert len(sizes) == 5
+    assert sizes.min() >= 0.8 * len(q) / 5
+    if series[0] == "series_B":
+        assert revisits >= 39
+
+
+def test_study_points_are_cross_validated_errors_at_measured_configurations(series):
+    _, folder = series
+    rows = tables.rows(folder, "measurements")
+    held_out = {
+        tuple(np.round(tables.joints(rows[e["row"]]), 9)): (e["ex_mm"], e["ey_mm"], e["ez_mm"])
+        for e in tables.rows(folder, "pose_errors")
+        if (e["comparison"], e["estimate"]) == ("dh_vs_measured", "cross_validated")
+    }
+    points = tables.rows(folder, "assessment_points")
+    assert len(points) == 200
+    for point in points:
+        error = held_out[tuple(np.round(tables.joints(point), 9))]
+        found = (point["ex_mm"], point["ey_mm"], point["ez_mm"])
+        np.testing.assert_allclose(found, error, rtol=0, atol=1e-12)
+        assert point["true_error_mm"] == pytest.approx(np.linalg.norm(error), rel=1e-12)
