@@ -10,6 +10,7 @@ from kinacc.calibration import dh_fit, vec_fit
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import Frames, known
 from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.solve import Spectrum
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.models import vec
@@ -45,15 +46,23 @@ def fit_vec(
     frames = known()
     if options.frames_estimated:
         frames = fit_nominal(observations, nominal, options).frames
-    if not options.travel_direction:
-        observations = observations.without_directions()
     return vec_fit.fit(
-        observations,
+        _with_wanted_directions(observations, options),
         vec.without_errors(nominal, *joint_range_rad, options.order),
         prior=options.prior,
         rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
         frames=frames,
         frames_free=options.frames_estimated,
+    )
+
+
+def vec_gauge(observations: Observations, fitted: VECFit, options: Options) -> Spectrum:
+    """What the poses tell of the VEC coefficients without a prior; see ``vec_fit.gauge``."""
+    return vec_fit.gauge(
+        _with_wanted_directions(observations, options),
+        fitted.model,
+        fitted.frames,
+        options.rotation_weight_mm_per_rad,
     )
 
 
@@ -96,6 +105,10 @@ def fit_nominal(observations: Observations, nominal: DHModel, options: Options) 
         rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
         frames=None if options.frames_estimated else known(),
     )
+
+
+def _with_wanted_directions(observations: Observations, options: Options) -> Observations:
+    return observations if options.travel_direction else observations.without_directions()
 
 
 def _rows(targets: Pose, target: np.ndarray) -> Pose:

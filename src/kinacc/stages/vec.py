@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinacc import robot
-from kinacc.calibration import models, tables, vec_fit
+from kinacc.calibration import models, tables
 from kinacc.stages import calibration_settings as shared
 
 
@@ -19,9 +19,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     joint_range = shared.joint_range_rad(calibration["vec"], arm, every.q_rad)
     observations = every.select(train)
     fitted = models.fit_vec(observations, arm.dh, joint_range, options)
-    gauge = vec_fit.gauge(
-        observations, fitted.model, fitted.frames, options.rotation_weight_mm_per_rad
-    )
+    gauge = models.vec_gauge(observations, fitted, options)
     return {
         "vec_model": tables.vec_model_columns(fitted),
         "vec_frames": tables.frames_columns({"vec": fitted.frames}, every.target_names),
