@@ -60,3 +60,21 @@ def accepted_draw(number: int) -> AcceptedDraw:
         Scales(*(float(row[name]) for name in Scales._fields)),
         DHModel(*values.T, np.zeros(JOINTS)),
     )
+
+
+def further_draws(own: int, count: int) -> list[int]:
+    """Numbers of the first ``count`` accepted draws other than ``own``.
+
+    Raises InputError where there are fewer.
+    """
+    others = [number for number in range(len(rows())) if number != own]
+    if count > len(others):
+        raise InputError(
+            Problem(
+                "robustness.draws",
+                f"{count} further draws are wanted",
+                f"at most {len(others)}",
+                "kinacc draw-robots searches for more",
+            )
+        )
+    return others[:count]

@@ -59,8 +59,8 @@ def linearise(
 ) -> Response:
     """Response at the arm of ``empty``, fitted at ``q_rad[train]`` under a prior (P,).
 
-    ``noise_mm`` sets the balance of residuals and prior, as in the VEC fit; ``points_rad`` (p, 6)
-    are the assessed points.
+    ``noise_mm`` is the whitened residual that balances the prior; ``points_rad`` (p, 6) are the
+    assessed points.
     """
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
     size = prior_std.size
@@ -70,6 +70,9 @@ def linearise(
     gram[np.diag_indices(size)] += prior_std**-2
     dh_all = dh.parameter_jacobian(empty.dh, q_rad[train])[..., :4].reshape(-1, 6, 24)
     dh_train = (dh_all * weights[:, None]).reshape(-1, 24)
+    # At rest between both directions: the mean of what each of them gives.
+    one_way = np.ones(points_rad.shape)
+    vec_points = sum(vec.parameter_jacobian(empty, points_rad, s) for s in (-one_way, one_way)) / 2
     dh_points = dh.parameter_jacobian(empty.dh, points_rad)[:, :3, :, :4]
     return Response(
         train=train,
@@ -78,7 +81,7 @@ def linearise(
         dh_fit=_DH_UNITS[:, None] * np.linalg.pinv(dh_train * _DH_UNITS, rcond=_DH_THRESHOLD),
         vec_train=vec_train,
         dh_train=dh_train,
-        vec_points=vec.parameter_jacobian(empty, points_rad)[:, :3].reshape(-1, size),
+        vec_points=vec_points[:, :3].reshape(-1, size),
         dh_points=dh_points.reshape(-1, 24),
     )
 

@@ -19,7 +19,7 @@ PROBE_MM = 200.0  # distance over which the probe's orientation is measured
 class Run:
     """What was done and how well it is seen, in units of chance: one standard normal each.
 
-    ``visits`` as the arm makes them; ``position`` and ``rotation`` (n, 3), the tracker's deviations.
+    ``visits`` as the arm makes them; ``position`` and ``rotation`` (n, 3) of the tracker.
     """
 
     visits: Visits

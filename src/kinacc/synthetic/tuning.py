@@ -40,6 +40,11 @@ class Targets:
     tables: np.ndarray
     accuracy_mm: float
 
+    def noise_mm(self, rotation_weight_mm_per_rad: float) -> float:
+        """Whitened residual per axis that Table I leaves, if it were normal."""
+        position, orientation = self.tables[:2, 0] * np.sqrt(np.pi / 8.0)
+        return np.hypot(position, 1e-3 * orientation * rotation_weight_mm_per_rad) / np.sqrt(2.0)
+
 
 def tuned(
     robot: Robot,

@@ -1,0 +1,54 @@
+"""Stage: every claim on further accepted draws of the synthetic arm, one part of the draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.claims.evaluate import evaluate
+from kinacc.stages import in_memory
+from kinacc.synthetic.accepted import further_draws
+
+STAGES = (
+    "measurements",
+    "vec",
+    "dh",
+    "residuals",
+    "accuracy_map",
+    "assessment_points",
+    "study_chunk",
+    "study",
+    "histories",
+)
+
+
+def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+    """Return ``robustness_chunk`` for ``settings["part"]`` (default: all further draws).
+
+    Raises InputError where fewer draws were accepted than are wanted.
+    """
+    own = int(settings["measurements"]["synthetic"]["draw"])
+    draws = further_draws(own, int(settings["robustness"]["draws"]))
+    part = settings.get("part") or {"number": 1, "of": 1}
+    chosen = draws[part["number"] - 1 :: part["of"]]
+    config = {name: value for name, value in settings.items() if name != "part"}
+    parts = []
+    for done, draw in enumerate(chosen, 1):
+        parts.append(claims_on(draw, config))
+        if progress is not None:
+            progress(done, len(chosen))
+    names = ("draw", "claim", "reproduced", "verdict")
+    return {
+        "robustness_chunk": {name: np.concatenate([part[name] for part in parts]) for name in names}
+    }
+
+
+def claims_on(draw: int, config: Mapping) -> dict[str, np.ndarray]:
+    """Rows of ``robustness`` of one accepted draw under the configuration of a data set."""
+    measurements = config["measurements"]
+    synthetic = {**measurements["synthetic"], "draw": draw}
+    own = {**config, "measurements": {**measurements, "synthetic": synthetic}}
+    claims = evaluate(in_memory.run(STAGES, own, {}), paper_arm=True)
+    rows = {name: claims[name] for name in ("claim", "reproduced", "verdict")}
+    return {"draw": np.full(len(claims["claim"]), draw), **rows}
