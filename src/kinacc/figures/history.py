@@ -24,6 +24,7 @@ COLUMNS = (
     "true_mm",
     "rejection_probability",
 )
+LINE_IN = 0.15  # of text beside the panels
 
 
 def draw(
@@ -46,7 +47,8 @@ def draw(
     values = _sorted(histories, example)
     again = resampled(values["point"])
     with style.house():
-        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.9)
+        height = 4.0 + LINE_IN * (bool(dataset) + noisy_truth)
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, height)
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(1.35, 1))
         _magnitudes(top, values, again, true_accuracy_mm, noisy_truth)
         _probability(bottom, values, again)
