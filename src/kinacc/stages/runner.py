@@ -46,7 +46,7 @@ class Job:
 def execute(job: Job, bar: bool = False) -> None:
     """Run a stage; on failure print the reason, log it and leave with exit code 1."""
     label = job.label or job.module.rpartition(".")[2]
-    with _recording(job.log) as log, reporting(label, bar) as progress:
+    with _recording(job.log, label) as log, reporting(label, bar) as progress:
         try:
             perform(job, progress)
             return
@@ -145,7 +145,7 @@ def _write_tables(job: Job, tables: Mapping[str, Mapping[str, object]]) -> None:
 
 
 @contextmanager
-def _recording(path: str | None) -> Iterator[TextIO | None]:
+def _recording(path: str | None, label: str) -> Iterator[TextIO | None]:
     """Every warning to the screen and the log; the log is there, and empty if all went well."""
     if path is None:
         yield None
@@ -155,7 +155,10 @@ def _recording(path: str | None) -> Iterator[TextIO | None]:
         warnings.simplefilter("default")
 
         def show(message, category, filename, lineno, file=None, line=None) -> None:
-            text = warnings.formatwarning(message, category, filename, lineno, line)
+            # A plain warning speaks to the user; others (overflow, deprecation) to a developer.
+            text = f"{label}: {message}\n"
+            if category is not UserWarning:
+                text = f"{label}: " + warnings.formatwarning(message, category, filename, lineno)
             for stream in (sys.stderr, log):
                 stream.write(text)
                 stream.flush()
