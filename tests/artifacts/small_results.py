@@ -168,30 +168,53 @@ def _models() -> dict:
 
 
 def _residuals() -> dict:
+    return {"residuals": _statistics(), "pose_errors": _error_vectors()}
+
+
+_LENGTHS = {"train": np.array([0.2, 0.4, 0.6]), "cross_validated": np.array([0.8, 0.2, 0.4, 0.6])}
+
+
+def _statistics() -> dict:
     kinds = list(product(allowed.COMPARISONS, allowed.SUBSETS, allowed.QUANTITIES))
-    residuals = {
+    values = [_LENGTHS["train" if kind[1] == "train" else "cross_validated"] for kind in kinds]
+    return {
         "comparison": [kind[0] for kind in kinds],
         "subset": [kind[1] for kind in kinds],
         "fold": [None] * len(kinds),
         "quantity": [kind[2] for kind in kinds],
         "unit": ["mm" if kind[2] == "position" else "mrad" for kind in kinds],
-        "n": [3] * len(kinds),
-        **{name: np.full(len(kinds), value) for name, value in (("mean", 0.4), ("max", 0.8))},
-        **{name: np.full(len(kinds), value) for name, value in (("rms", 0.5), ("gamma99", 0.9))},
+        "n": [each.size for each in values],
+        "mean": [each.mean() for each in values],
+        "max": [each.max() for each in values],
+        "rms": [np.sqrt(np.mean(each**2)) for each in values],
+        "gamma99": [0.9] * len(kinds),
     }
-    errors = {
-        "comparison": ["dh_vs_vec"] * 4,
-        "estimate": ["train"] * 4,
-        "row": np.arange(4),
-        "pose": np.arange(4),
-        "target": ["tool"] * 4,
-        "repeat": np.zeros(4),
-        "subset": ["validation", "train", "train", "train"],
-        "fold": [0, 1, 1, 1],
-        **{f"e{axis}_mm": np.full(4, 0.1) for axis in "xyz"},
-        **{f"r{axis}_mrad": np.full(4, np.nan) for axis in "xyz"},
+
+
+def _error_vectors() -> dict:
+    rows = [
+        (comparison, estimate, row, length)
+        for comparison in allowed.COMPARISONS
+        for estimate, first in (("train", 1), ("cross_validated", 0))
+        for row, length in enumerate(_LENGTHS[estimate], first)
+    ]
+    lengths = np.array([row[3] for row in rows])
+    return {
+        "comparison": [row[0] for row in rows],
+        "estimate": [row[1] for row in rows],
+        "row": [row[2] for row in rows],
+        "pose": [row[2] for row in rows],
+        "target": ["tool"] * len(rows),
+        "repeat": np.zeros(len(rows)),
+        "subset": ["train" if row[2] else "validation" for row in rows],
+        "fold": [min(row[2], 1) for row in rows],
+        "ex_mm": lengths,
+        "ey_mm": np.zeros(len(rows)),
+        "ez_mm": np.zeros(len(rows)),
+        "rx_mrad": np.zeros(len(rows)),
+        "ry_mrad": lengths,
+        "rz_mrad": np.zeros(len(rows)),
     }
-    return {"residuals": residuals, "pose_errors": errors}
 
 
 def _map() -> dict:
@@ -253,7 +276,7 @@ def _study() -> dict:
         "study_chunk": study | switches,
         "study": study,
         "study_summary": summary,
-        "readings": _readings(),
+        "readings": _readings(summary),
         "histories": _histories(),
     }
 
@@ -261,7 +284,7 @@ def _study() -> dict:
 _SWITCHES = ("outlier_rule", "distance", "covariance", "search")
 
 
-def _readings() -> dict:
+def _readings(summary: dict) -> dict:
     rows = [("outlier_rejection", rule, None, None, None) for rule in allowed.OUTLIER_RULES]
     rows += [
         ("model_invalidation", None, *switches)
@@ -270,8 +293,10 @@ def _readings() -> dict:
     rows = [(*row, noise) for noise in NOISE_MM for row in rows]
     names = ("assessor", *_SWITCHES, "noise_mm")
     table = {name: [row[i] for row in rows] for i, name in enumerate(names)}
-    numbers = {"mean_mm": 0.3, "min_mm": 0.2, "max_mm": 0.4, "bias_mm": 0.0}
-    return table | {name: np.full(len(rows), value) for name, value in numbers.items()}
+    cells = list(zip(summary["assessor"], summary["noise_mm"], strict=True))
+    at = [cells.index((row[0], row[-1])) for row in rows]
+    numbers = ("mean_mm", "min_mm", "max_mm", "bias_mm")
+    return table | {name: [summary[name][i] for i in at] for name in numbers}
 
 
 def _histories() -> dict:

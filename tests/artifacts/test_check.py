@@ -95,7 +95,7 @@ def test_a_map_may_be_left_out_where_the_claims_were_made_without_it(results):
         (results.folder / "figures" / f"fig3.{kind}").unlink()
     report = check.check_results(results.root)
     assert report.ok, str(report)
-    assert any("accuracy_map left out" in note for note in report.datasets[0].notes)
+    assert any("accuracy_map, fig3 left out" in note for note in report.datasets[0].notes)
 
 
 @pytest.mark.parametrize(
@@ -220,9 +220,18 @@ RULES = [
     ("dh", "frames", "model", 2, "vec", "no base of model dh"),
     ("dh", "frames", "x_mm", 0, 3.0, "frame base of model vec differs"),
     ("dh", "dh_model", "joint", 5, 7, "joints 1, 2, 3, 4, 5, 7"),
-    ("residuals", "pose_errors", "row", 3, 9, "no such row in row 3"),
+    ("residuals", "pose_errors", "row", 6, 9, "no such row in row 6"),
     ("residuals", "pose_errors", "pose", 2, 1, "another pose in row 2"),
     ("residuals", "pose_errors", "target", 2, "A", "another target in row 2"),
+    (
+        "residuals",
+        "pose_errors",
+        "ex_mm",
+        0,
+        0.3,
+        "residuals.parquet, row 0: mean 0.4; allowed: 0.433333",
+    ),
+    ("residuals", "residuals", "n", 2, 5, "residuals.parquet, row 2: n 5; allowed: 4, computed"),
     ("residuals", "residuals", "fold", 0, 1, "0 pooled rows of vec_vs_measured, train, position"),
     ("residuals", "residuals", "rms", 2, 0.9, "mean, rms and max out of order in row 2"),
     ("residuals", "residuals", "unit", 0, "mrad", "unit in row 0"),
@@ -237,6 +246,7 @@ RULES = [
     ("study", "study_summary", "repetitions", 1, 4, "repetitions 4"),
     ("study", "readings", "search", 3, None, "12 rows of model_invalidation at 0.05 mm"),
     ("study", "readings", "mean_mm", 0, 0.5, "mean_mm outside its range in row 0"),
+    ("study", "readings", "bias_mm", 1, 0.3, "bias_mm in row 1"),
     ("histories", "histories", "true_mm", 0, 0.9, "true_mm in row 0"),
     ("histories", "histories", "repeat", 2, 1, "repeat in row 2"),
     ("histories", "histories", "eta_mm", 0, 0.9, "eta_mm of rejected varies"),
@@ -269,6 +279,14 @@ def test_a_reading_left_out(results):
         "study", "readings", **{name: list(values)[1:] for name, values in table.items()}
     )
     the_one(problems(results), "2 rows of outlier_rejection at 0.05 mm", "3, one per reading")
+
+
+def test_a_summary_that_is_no_reading(results):
+    table = results.tables["readings"]
+    changed = [mean + 0.001 for mean in table["mean_mm"]]
+    results.change("study", "readings", mean_mm=changed)
+    found = problems(results)
+    the_one(found, "study_summary.parquet, row 2: outlier_rejection at 0.05 mm agrees with no")
 
 
 def test_an_input_changed_after_it_was_used(results):

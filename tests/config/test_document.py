@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,19 @@ def test_words_of_the_readings_are_those_of_the_tables():
         ("search", allowed.SEARCHES),
     ):
         assert study.entry(name).choices == words
+
+
+def test_every_key_is_used_by_the_package():
+    package = ROOT / "src" / "kinacc"
+    code = "\n".join(
+        path.read_text(encoding="utf-8")
+        for path in package.rglob("*.py")
+        if "config" not in path.relative_to(package).parts
+    )
+    unused = [
+        ".".join(path)
+        for path, key in walk(settings())
+        if f'"{key.name}"' not in code and not re.search(rf"^    {key.name}: ", code, re.MULTILINE)
+    ]
+    # a setting nobody reads would be accepted and change nothing
+    assert unused == []

@@ -110,6 +110,24 @@ def _readings(tables: Tables) -> Iterator[Problem]:
                 allowed = f"{len(wanted)}, one per reading, null where a switch does not apply"
                 yield Problem("readings.parquet", what, allowed)
     yield from _mean_between("readings", table)
+    yield from _default_among_readings(table, tables["study_summary"])
+    truth = float(np.max(tables["assessment_points"]["true_error_mm"]))
+    wrong = ~np.isclose(table["bias_mm"], table["mean_mm"] - truth, rtol=1e-9, atol=1e-9)
+    yield from mark("readings", wrong, "bias_mm", "mean_mm minus the true accuracy")
+
+
+def _default_among_readings(table: Columns, summary: Columns) -> Iterator[Problem]:
+    """The default reading is one of the readings: study_summary holds one of their rows."""
+    numbers = ("noise_mm", "mean_mm", "min_mm", "max_mm")
+    for i, assessor in enumerate(summary["assessor"]):
+        if assessor not in ("outlier_rejection", "model_invalidation"):
+            continue
+        same = table["assessor"] == assessor
+        for name in numbers:
+            same &= np.isclose(table[name], summary[name][i], rtol=1e-9, atol=1e-9)
+        if not same.any():
+            what = f"{assessor} at {summary['noise_mm'][i]:g} mm agrees with no reading"
+            yield Problem(f"study_summary.parquet, row {i}", what, "a row of readings.parquet")
 
 
 def _mean_between(name: str, table: Columns) -> Iterator[Problem]:
@@ -187,7 +205,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("assessment_points",), _assessment_points),
     (("study", "assessment_points"), _study),
     (("study", "study_summary", "assessment_points"), _study_summary),
-    (("readings", "study_summary"), _readings),
+    (("readings", "study_summary", "assessment_points"), _readings),
     (("histories", "assessment_points"), _histories),
     (("claims",), _claims),
     (("robustness", "claims"), _robustness),

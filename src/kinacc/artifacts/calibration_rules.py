@@ -9,6 +9,8 @@ import numpy as np
 from kinacc.artifacts.rule import TOLERANCE, Columns, Rule, Tables, mark
 from kinacc.errors import Problem
 
+_SAME_CONFIGURATION_RAD = np.deg2rad(0.1)  # readings of one pose state where the arm then was
+
 
 def _unit_quaternions(name: str) -> Rule:
     def rule(tables: Tables) -> Iterator[Problem]:
@@ -31,9 +33,9 @@ def _measurements(tables: Tables) -> Iterator[Problem]:
         [values for name, values in table.items() if name[0] == "q" and name[1:].isdigit()]
     )
     first = np.unique(table["pose"], return_index=True, return_inverse=True)
-    same = joints[:, first[1]][:, first[2]]
+    moved = np.abs(joints - joints[:, first[1]][:, first[2]]) > _SAME_CONFIGURATION_RAD
     yield from mark(
-        "measurements", np.any(joints != same, axis=0), "pose at other joints", "one configuration"
+        "measurements", np.any(moved, axis=0), "pose at other joints", "one configuration"
     )
     for name in ("fold", "subset"):
         values = table[name].astype(str)
@@ -126,6 +128,32 @@ def _residuals(tables: Tables) -> Iterator[Problem]:
     )
 
 
+def _residuals_told(tables: Tables) -> Iterator[Problem]:
+    """Statistics are those of the error vectors beside them."""
+    table, errors = tables["residuals"], tables["pose_errors"]
+    sizes = {
+        "position": np.sqrt(sum(errors[f"e{axis}_mm"] ** 2 for axis in "xyz")),
+        "orientation": np.sqrt(sum(errors[f"r{axis}_mrad"] ** 2 for axis in "xyz")),
+    }
+    for i, subset in enumerate(table["subset"]):
+        fold, pooled = table["fold"][i], np.isnan(table["fold"][i])
+        if subset == "train" and not pooled:
+            continue  # of a fold's own fit, whose training errors are not kept
+        estimate = "train" if subset == "train" else "cross_validated"
+        chosen = (errors["comparison"] == table["comparison"][i]) & (errors["estimate"] == estimate)
+        values = sizes[table["quantity"][i]][chosen & (pooled | (errors["fold"] == fold))]
+        values = values[np.isfinite(values)]
+        right = {"n": float(values.size)}
+        if values.size:
+            right |= {"mean": values.mean(), "max": values.max()}
+            right["rms"] = np.sqrt(np.mean(values**2))
+        for name, value in right.items():
+            if not np.isclose(table[name][i], value, rtol=1e-9, atol=1e-9):
+                allowed = f"{value:g}, computed from pose_errors.parquet"
+                what = f"{name} {table[name][i]:g}"
+                yield Problem(f"residuals.parquet, row {i}", what, allowed)
+
+
 def _pose_errors(tables: Tables) -> Iterator[Problem]:
     errors, measured = tables["pose_errors"], tables["measurements"]
     row = errors["row"]
@@ -150,4 +178,5 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("dh_model", "measurements"), _every_joint("dh_model")),
     (("pose_errors", "measurements"), _pose_errors),
     (("residuals",), _residuals),
+    (("residuals", "pose_errors"), _residuals_told),
 )

@@ -122,10 +122,14 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         except InputError:
             continue
     left_out = _left_out(folder, marks, plan)
-    notes = [f"{folder}: {name} left out, {reason}" for name, reason in left_out.items()]
+    notes = [
+        f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
+        f"{reason}"
+        for reason in dict.fromkeys(left_out.values())
+    ]
     problems += _missing(folder, left_out)
     for picture in _pictures(folder, plan, left_out):
-        checked.append(str(picture))
+        checked += [str(picture)] if picture.exists() else []
         problems += check_picture(picture)
     problems += [_placed(folder, problem) for problem in contradictions(tables)]
     found, said = check_lineage(folder, marks, plan)

@@ -27,16 +27,19 @@ def check_lineage(
     from outside the folder (measurements, a robot of one's own) and configuration are not known.
     """
     problems = list(_one_version(folder, marks))
-    notes: list[str] = []
+    older: list[str] = []
     for stage in STAGES.values():
         made = [name for name in stage.outputs if name in marks]
         problems += _one_run(folder, made, marks)
         if not made or stage.scattered or (plan is None and "measurements_file" in _roles(stage)):
             continue
-        found, said = _held_to_inputs(folder, stage, marks[made[0]], plan)
+        found, is_current = _held_to_inputs(folder, stage, marks[made[0]], plan)
         problems += found
-        notes += said
-    return problems, notes
+        older += [] if is_current else made
+    if not older:
+        return problems, []
+    names = ", ".join(older)
+    return problems, [f"{folder}: made with other code or library versions than installed: {names}"]
 
 
 def made_without(folder: Path, artefact: str, marks: Marks) -> bool:
@@ -94,7 +97,8 @@ def _one_run(folder: Path, made: Sequence[str], marks: Marks) -> Iterator[Proble
 
 def _held_to_inputs(
     folder: Path, stage: Stage, own: Mapping[str, str], plan: Plan | None
-) -> tuple[list[Problem], list[str]]:
+) -> tuple[list[Problem], bool]:
+    """Problems of one stage's provenance, and whether it was made with the code installed."""
     where = str(folder / f"{stage.outputs[0]}.parquet")
     settings, seed = {}, 0
     candidates = _candidates(folder, stage)
@@ -108,14 +112,12 @@ def _held_to_inputs(
             if all(Path(each).is_file() for each in files.values())
         ]
     if not candidates:
-        return [], []
+        return [], True
     problems = []
     try:
         expected = [_expected(stage, inputs, settings, seed) for inputs in candidates]
     except InputError as error:
-        return list(error.problems), []
-    except LookupError:
-        return [], [f"{where}: stage {stage.name} is not part of this version of kinacc"]
+        return list(error.problems), True
     if own.get("inputs_hash") not in [each["inputs_hash"] for each in expected]:
         names = ", ".join(candidates[0]) or "nothing"
         fix = _AGAIN
@@ -128,10 +130,7 @@ def _held_to_inputs(
         problems.append(Problem(where, what, expected[0]["config_hash"], _AGAIN))
     if plan is not None and own.get("seed") != str(seed):
         problems.append(Problem(where, f"seed {own.get('seed')}", str(seed), _AGAIN))
-    notes = []
-    if own.get("code_hash") != expected[0]["code_hash"]:
-        notes.append(f"{where}: made with other code or library versions than those installed")
-    return problems, notes
+    return problems, own.get("code_hash") == expected[0]["code_hash"]
 
 
 def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dict[str, object]:
