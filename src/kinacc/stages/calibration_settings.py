@@ -26,7 +26,9 @@ def options(calibration: Mapping) -> Options:
         given |= {
             "order": int(section["order"]),
             "travel_direction": bool(section["travel_direction"]),
-            "prior": Prior(float(section["prior_std_mm"]), angle_rad, 1.0, angle_rad),
+            "prior": Prior(
+                float(section["prior_std_mm"]), angle_rad, float(section["prior_decay"]), angle_rad
+            ),
         }
     if "dh" in calibration:
         section = calibration["dh"]
