@@ -8,6 +8,8 @@ rule accuracy_map:
         **plan.outputs("accuracy_map", "{dataset}"),
     log:
         plan.log("accuracy_map", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("accuracy_map"),
         seed=lambda w: plan.seed(w.dataset),

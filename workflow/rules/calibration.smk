@@ -10,6 +10,8 @@ rule measurements:
         measurements=update(plan.outputs("measurements", "{dataset}")["measurements"]),
     log:
         plan.log("measurements", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("measurements"),
         contents=lambda w: plan.contents("measurements", w.dataset),
@@ -29,6 +31,8 @@ rule vec:
     log:
         plan.log("vec", "{dataset}"),
     cache: True
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("vec"),
         seed=lambda w: plan.seed(w.dataset),
@@ -47,6 +51,8 @@ rule dh:
     log:
         plan.log("dh", "{dataset}"),
     cache: True
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("dh"),
         seed=lambda w: plan.seed(w.dataset),
@@ -64,6 +70,8 @@ rule residuals:
         **plan.outputs("residuals", "{dataset}"),
     log:
         plan.log("residuals", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("residuals"),
         seed=lambda w: plan.seed(w.dataset),

@@ -8,6 +8,8 @@ rule claims:
         **plan.outputs("claims", "{dataset}"),
     log:
         plan.log("claims", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("claims"),
         seed=lambda w: plan.seed(w.dataset),
@@ -26,6 +28,8 @@ rule robustness_chunk:
     log:
         plan.log("robustness_chunk", "{dataset}", "{part}"),
     cache: True
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("robustness_chunk"),
         part="{part}",
@@ -44,6 +48,8 @@ rule robustness_table:
         **plan.outputs("robustness_table", "{dataset}"),
     log:
         plan.log("robustness_table", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("robustness_table"),
         seed=lambda w: plan.seed(w.dataset),

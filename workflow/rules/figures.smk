@@ -8,6 +8,8 @@ rule fig1:
         **plan.outputs("fig1", "{dataset}"),
     log:
         plan.log("fig1", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("fig1"),
         seed=lambda w: plan.seed(w.dataset),
@@ -25,6 +27,8 @@ rule fig2:
         **plan.outputs("fig2", "{dataset}"),
     log:
         plan.log("fig2", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("fig2"),
         seed=lambda w: plan.seed(w.dataset),
@@ -42,6 +46,8 @@ rule fig3:
         **plan.outputs("fig3", "{dataset}"),
     log:
         plan.log("fig3", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("fig3"),
         seed=lambda w: plan.seed(w.dataset),
@@ -59,6 +65,8 @@ rule fig4:
         **plan.outputs("fig4", "{dataset}"),
     log:
         plan.log("fig4", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("fig4"),
         seed=lambda w: plan.seed(w.dataset),
@@ -76,6 +84,8 @@ rule fig5:
         **plan.outputs("fig5", "{dataset}"),
     log:
         plan.log("fig5", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("fig5"),
         seed=lambda w: plan.seed(w.dataset),
@@ -93,6 +103,8 @@ rule fig6:
         **plan.outputs("fig6", "{dataset}"),
     log:
         plan.log("fig6", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("fig6"),
         seed=lambda w: plan.seed(w.dataset),

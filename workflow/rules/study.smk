@@ -8,6 +8,8 @@ rule assessment_points:
         **plan.outputs("assessment_points", "{dataset}"),
     log:
         plan.log("assessment_points", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("assessment_points"),
         seed=lambda w: plan.seed(w.dataset),
@@ -26,6 +28,8 @@ rule study_chunk:
     log:
         plan.log("study_chunk", "{dataset}", "{part}"),
     cache: True
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("study_chunk"),
         part="{part}",
@@ -44,6 +48,8 @@ rule study:
         **plan.outputs("study", "{dataset}"),
     log:
         plan.log("study", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("study"),
         seed=lambda w: plan.seed(w.dataset),
@@ -61,6 +67,8 @@ rule histories:
         **plan.outputs("histories", "{dataset}"),
     log:
         plan.log("histories", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
     params:
         code=plan.code("histories"),
         seed=lambda w: plan.seed(w.dataset),
