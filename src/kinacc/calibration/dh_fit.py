@@ -9,11 +9,12 @@ import numpy as np
 from kinacc.calibration.frames import Frames, closed_form_start, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution, minimise_truncated
-from kinacc.calibration.system import FlangeModel, PoseSystem
+from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.models import dh
 from kinacc.models.dh import DHModel
 
 ANGLE_UNIT_RAD = 1e-3  # one mrad counts as much displacement as one mm
+_FIX = "measure more poses"
 _ANGLES = np.array([True, False, False, True, True])  # of dh.PARAMETERS
 
 
@@ -59,15 +60,17 @@ def fit(
 
     ``frames`` given: base and targets are known. None: both are estimated, from a closed form.
     Directions of singular value below ``threshold`` times the largest stay nominal.
-    Raises FitError.
+    Raises FitError, and InputError where there are fewer residuals than parameters.
     """
     start = start or nominal
     held = dh.to_vector(nominal)
     mask = free.ravel()
     known = frames is not None
+    require_enough(observations, int(mask.sum()), "DH fit", _FIX)
     anchor = frames if known else _start_frames(observations, start)
     coords = coordinates(observations, anchor, base_free=not known, targets_free=not known)
     flange = flange_model(nominal, free)
+    require_enough(observations, coords.size + flange.size, "DH fit", _FIX)
     system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
     zeros = np.zeros(coords.size)
     scale = np.concatenate([_units(coords.is_angle()), _units(np.tile(_ANGLES, len(free))[mask])])

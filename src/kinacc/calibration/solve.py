@@ -7,7 +7,7 @@ Both take a system that hands out residual and Jacobian in blocks, so memory sta
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -19,6 +19,11 @@ from kinacc.errors import FitError
 STEP_TOLERANCE = 1e-6  # in units of `scale`: mm and mrad
 MAX_ITERATIONS = 60
 MAX_HALVINGS = 12
+COST_RESOLUTION = 1e-9  # close to the optimum the cost no longer resolves a step
+# Going back to nominal where the data is (nearly) blind costs a little: the optimum of a truncated
+# fit is not quite the least cost.
+TRUNCATED_GROWTH = 1e-3
+LEAST_COST = 1e-10  # mm^2: of noise-free data
 MAX_VARIANCE_STEPS = 20
 VARIANCE_TOLERANCE = 1e-5
 LEAST_VARIANCE = 1e-14  # mm^2: noise-free data must not divide by zero
@@ -139,7 +144,7 @@ def minimise_truncated(
         split = _Split.of(factor, frames, threshold, ranks if iterations > 3 else None)
         ranks = split.ranks
         step = scale * split.step((x - nominal) / scale)
-        x, cost, last = _advance(system, x, step, cost, scale, name)
+        x, cost, last = _advance(system.cost, x, step, cost, scale, name, TRUNCATED_GROWTH)
     _require(last <= STEP_TOLERANCE, name, iterations, last, cost, count)
     factor, count = triangle(system, x, scale)
     split = _Split.of(factor, frames, threshold, ranks)
@@ -268,7 +273,7 @@ def minimise_with_prior(
         def total(at: np.ndarray, variance: float = balance.variance) -> float:
             return system.cost(at) + variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
 
-        x, _, last = _advance(system, x, scale * balance.step, total(x), scale, name, total)
+        x, _, last = _advance(total, x, scale * balance.step, total(x), scale, name)
     cost = system.cost(x)
     _require(last <= STEP_TOLERANCE, name, iterations, last, cost, normal.count)
     covariance = balance.variance * balance.inverse * np.outer(scale, scale)
@@ -351,9 +356,20 @@ def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
         ) from None
 
 
-def _advance(system, x, step, cost, scale, name, objective=None):
-    """Take ``step``, halved until the cost does not grow: new x, its cost, largest move."""
-    objective = objective or system.cost
+def _advance(
+    objective: Callable[[np.ndarray], float],
+    x: np.ndarray,
+    step: np.ndarray,
+    cost: float,
+    scale: np.ndarray,
+    name: str,
+    growth: float = COST_RESOLUTION,
+) -> tuple[np.ndarray, float, float]:
+    """Take ``step``, halved until ``objective`` grows by less than ``growth``.
+
+    New x, its cost and the largest move; x itself, with the size of the refused step, if no
+    fraction of the step is any good.
+    """
     size = float(np.max(np.abs(step / scale))) if step.size else 0.0
     if not np.isfinite(size):
         raise FitError(f"{name}: a step is not finite at cost {cost:.6g}")
@@ -361,8 +377,7 @@ def _advance(system, x, step, cost, scale, name, objective=None):
     for _ in range(MAX_HALVINGS):
         trial = x + factor * step
         trial_cost = objective(trial)
-        # Close to the optimum the cost no longer resolves the step: accept what is level with it.
-        if trial_cost <= cost * (1.0 + 1e-9) + 1e-18:
+        if trial_cost <= cost * (1.0 + growth) + LEAST_COST:
             return trial, trial_cost, size * factor
         factor *= 0.5
     return x, cost, size

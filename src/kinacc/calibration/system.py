@@ -9,9 +9,21 @@ import numpy as np
 
 from kinacc.calibration.frames import FrameCoordinates, inverse_left_jacobian, left_jacobian
 from kinacc.calibration.observations import Observations
+from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, exp_so3, log_so3, skew
 
 BLOCK_ROWS = 1024
+
+
+def require_enough(observations: Observations, parameters: int, name: str, fix: str) -> None:
+    """Raise InputError where ``observations`` have fewer residuals than ``parameters`` to fit."""
+    if observations.components < max(parameters, 1):
+        what = (
+            f"{observations.components} residual components of {len(observations)} training rows "
+            f"for the {parameters} free parameters of the {name}"
+        )
+        allowed = "at least as many components as parameters"
+        raise InputError(Problem("measurements", what, allowed, fix))
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.frames import Frames, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution, Spectrum, minimise_with_prior, spectrum
-from kinacc.calibration.system import FlangeModel, PoseSystem
+from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.models import vec
 from kinacc.models.vec import ERRORS, VECModel
 
+_FIX = "measure more poses, or lower calibration.vec.order"
 FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames; holds what no pose shows
 RANK_THRESHOLD = 1e-10  # far below every weak direction, far above rounding: exact gauges only
 
@@ -66,11 +67,14 @@ def fit(
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
     Base and targets are ``frames``, or start there if ``frames_free``. Direction offsets that no
-    observation shows are left at zero, std NaN. Raises FitError.
+    observation shows are left at zero, std NaN. Raises FitError, and InputError where there are fewer
+    residuals than parameters.
     """
-    coords = coordinates(observations, frames, base_free=frames_free, targets_free=frames_free)
     free = _informed(observations, empty)
     flange = _flange_model(empty, free)
+    require_enough(observations, flange.size, "VEC fit", _FIX)
+    coords = coordinates(observations, frames, base_free=frames_free, targets_free=frames_free)
+    require_enough(observations, coords.size + flange.size, "VEC fit", _FIX)
     system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
     prior_std = prior.std(empty)
     frame_std = FRAME_PRIOR_UNITS * _units(coords.is_angle())
