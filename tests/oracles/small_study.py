@@ -24,6 +24,7 @@ measurements:
   synthetic: {poses: 160, tracker_noise_mm: 0.02}
 calibration:
   vec: {order: 3}
+  dh: {truncation: 1.0e-4}
 evaluation:
   points: 24
 map: {slices_deg: [0, 30], grid_mm: 225}
