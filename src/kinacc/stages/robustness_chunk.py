@@ -33,11 +33,8 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     part = settings.get("part") or {"number": 1, "of": 1}
     chosen = draws[part["number"] - 1 :: part["of"]]
     config = {name: value for name, value in settings.items() if name != "part"}
-    parts = []
-    for done, draw in enumerate(chosen, 1):
-        parts.append(claims_on(draw, config))
-        if progress is not None:
-            progress(done, len(chosen))
+    counted = progress(chosen, "draws") if progress else chosen
+    parts = [claims_on(draw, config) for draw in counted]
     names = ("draw", "claim", "reproduced", "verdict")
     return {
         "robustness_chunk": {name: np.concatenate([part[name] for part in parts]) for name in names}
