@@ -8,7 +8,7 @@ from itertools import pairwise, product
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import Axes3D, proj3d
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
@@ -178,12 +178,17 @@ def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
     ax.set_zlabel("z (mm)", labelpad=1)
     ax.tick_params(pad=-2, labelsize=style.SMALL_PT)
     ax.tick_params(axis="z", pad=2)
-    longest = (high - low).max()
-    for axis, span in zip((ax.xaxis, ax.yaxis, ax.zaxis), high - low, strict=True):
+    step = _round_step((high - low).max() / 5)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
         axis._axinfo["grid"].update(color="#e3e3e3", linewidth=0.5)
-        count = max(1, round(4.5 * span / longest))  # short axes have room for few numbers
-        axis.set_major_locator(MaxNLocator(count, steps=[1, 2, 5, 10], min_n_ticks=1))
+        axis.set_major_locator(MultipleLocator(step))
+
+
+def _round_step(least: float) -> float:
+    """Return the smallest of 1, 2, 5 times a power of ten that is at least ``least``."""
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(m * power for m in (1, 2, 5, 10) if m * power >= least))
 
 
 def _fill(figure: Figure, ax: Axes3D, top_in: float, margin_in: float = 0.04) -> None:
