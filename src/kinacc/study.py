@@ -126,16 +126,20 @@ def simulate(
     settings: StudySettings,
     seed: int,
     progress=None,
+    all_readings: bool = True,
 ) -> Columns:
     """Run every assessor under every reading on the given repetitions of each noise.
 
     error_mm: (m, 3) true errors at the operating points, robot base frame, mm. noise_mm: standard
     deviations per axis, mm. ``progress(iterable, what, total)`` reports on the simulations.
+    ``all_readings`` false leaves the default one of each assessor.
     Returns the columns of ``study_chunk``, one row per noise, repetition, assessor and reading.
     Raises InputError for errors of the wrong shape or not finite.
     """
     errors = checked_errors(error_mm)
-    readings = [each for assessor in settings.assessors() for each in every_reading(assessor)]
+    readings = settings.assessors()
+    if all_readings:
+        readings = [each for assessor in readings for each in every_reading(assessor)]
     jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
     reachable = min(errors.shape[0], settings.measurements)
     memory = np.empty((reachable, settings.measurements, 3))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from kinacc.stages import (
     accuracy_map,
     assessment_points,
@@ -33,13 +35,28 @@ RUNS = {
 }
 
 
-def run(names: Sequence[str], config: Mapping, tables: Mapping) -> dict[str, Mapping]:
+def run(
+    names: Sequence[str],
+    config: Mapping,
+    tables: Mapping,
+    extra: Mapping[str, Mapping] | None = None,
+) -> dict[str, Mapping]:
     """``tables`` and all that the stages ``names``, in this order, make of them.
 
-    ``config`` is the complete configuration of one data set.
+    ``config`` is the complete configuration of one data set; ``extra`` are settings by stage that
+    no configuration has.
     """
     plan = Plan({_DATASET: config}, {_DATASET: 1}, ())
     found = dict(tables)
     for name in names:
-        found |= RUNS[name](found, plan.settings(name, _DATASET))
+        settings = plan.settings(name, _DATASET) | dict((extra or {}).get(name, {}))
+        found |= RUNS[name](found, settings)
     return found
+
+
+def without_folds(measurements: Mapping) -> dict[str, np.ndarray]:
+    """Columns of ``measurements`` with no fold named, so that nothing is cross-validated.
+
+    Rows that train stay those that train: the delivered fits and their tables are the same.
+    """
+    return {**measurements, "fold": np.full(len(measurements["pose"]), np.nan)}

@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from kinacc.claims.claim import Claim
 from kinacc.claims.numbers import number_claims
 from kinacc.stages import in_memory
@@ -27,9 +25,8 @@ def judged() -> list[Claim]:
 
 def numbers(config: Mapping, measurements: Mapping) -> dict[str, float]:
     """Reproduced number of every judged claim, by claim id, for ``measurements`` columns."""
-    # Held-out poses play no part in the tables: without folds there is nothing to cross-validate.
-    whole = {**measurements, "fold": np.full(len(measurements["pose"]), np.nan)}
-    tables = in_memory.run(STAGES, config, {"measurements": whole})
+    start = {"measurements": in_memory.without_folds(measurements)}
+    tables = in_memory.run(STAGES, config, start)
     return {claim.id: claim.compute(tables).value for claim in judged()}
 
 
