@@ -82,14 +82,38 @@ def test_search_stops_at_the_draws_wanted_and_keeps_seed_order(bench, monkeypatc
         draw = accepted.AcceptedDraw(seed, Scales(1, 1, 1, 1), TABLE_II)
         return search.Trial(draw, {"true_accuracy": 0.9}, seed % 3 == 2)
 
-    monkeypatch.setattr(search, "trial", quick)
     tried = []
-    found = search.search(bench, 2, tried.append)
+
+    def counting(trials, what):
+        for each in trials:
+            tried.append(each.draw.seed)
+            yield each
+
+    monkeypatch.setattr(search, "trial", quick)
+    found = search.search(bench, 2, counting)
     assert [each.draw.seed for each in found] == [2, 5]
-    assert [each.draw.seed for each in tried] == [0, 1, 2, 3, 4, 5]
+    assert tried == [0, 1, 2, 3, 4, 5]
     text = search.as_csv(found)
     assert "6 seeds were tried for 2 draws" in text
     assert "2,1,1,1,1," in text
+
+
+def test_the_command_writes_a_table_of_the_draws_asked_for(bench, monkeypatch, tmp_path):
+    from click.testing import CliRunner
+
+    from kinacc.cli import main
+
+    def quick(_, seed):
+        draw = accepted.AcceptedDraw(seed, Scales(1, 1, 1, 1), TABLE_II)
+        return search.Trial(draw, {"true_accuracy": 0.9}, seed % 2 == 1)
+
+    monkeypatch.setattr(search, "trial", quick)
+    monkeypatch.setattr(search, "bench_of", lambda config: bench)
+    output = tmp_path / "my draws.csv"
+    done = CliRunner().invoke(main, ["draw-robots", str(output), "--draws", "3"])
+    assert done.exit_code == 0
+    assert "6 seeds tried for 3 draws" in done.output
+    assert [line.split(",")[0] for line in output.read_text().splitlines()[-3:]] == ["1", "3", "5"]
 
 
 def test_the_rule_asks_for_every_number_and_nothing_else():

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from kinacc import robot
 from kinacc.claims.numbers import number_claims
+from kinacc.config.schema import defaults
 from kinacc.models import tables, vec
 from kinacc.robot import Robot
 from kinacc.stages import calibration_settings, in_memory
 from kinacc.stages.measurements import split
+from kinacc.stages.progress import reporting
 from kinacc.synthetic import acceptance, columns
 from kinacc.synthetic.accepted import GEOMETRY, AcceptedDraw, geometry_columns
 from kinacc.synthetic.draw import TABLE_II, Scales
@@ -104,18 +107,25 @@ def trials(bench: Bench, first: int = 0) -> Iterator[Trial]:
         seed += 1
 
 
-def search(
-    bench: Bench, wanted: int, on_trial: Callable[[Trial], None] | None = None
-) -> list[Trial]:
-    """The first ``wanted`` accepted trials of the seeds 0, 1, 2, ..., in order."""
+def search(bench: Bench, wanted: int, progress=None) -> list[Trial]:
+    """The first ``wanted`` accepted trials of the seeds 0, 1, 2, ..., in order.
+
+    ``progress(iterable, what)`` reports on the seeds tried.
+    """
     found: list[Trial] = []
-    for each in trials(bench):
+    for each in progress(trials(bench), "seeds") if progress else trials(bench):
         found += [each] if each.accepted else []
-        if on_trial is not None:
-            on_trial(each)
         if len(found) >= wanted:
             break
     return found
+
+
+def write(path: str, wanted: int) -> int:
+    """Search under the default configuration and write the table; returns the seeds tried."""
+    with reporting("draw-robots", bar=True) as progress:
+        found = search(bench_of({"robot": "mh180", **defaults()}), wanted, progress)
+    Path(path).write_text(as_csv(found), encoding="utf-8")
+    return found[-1].draw.seed + 1
 
 
 def as_csv(found: Sequence[Trial]) -> str:
