@@ -1,5 +1,6 @@
 # configuration -> validate -> plan -> rules -> everything the data sets leave behind
 import re
+import shlex
 import sys
 
 from snakemake.exceptions import WorkflowError
@@ -7,6 +8,9 @@ from snakemake.logging import logger
 
 # Snakemake imports pandas (0.5 s of every start) only to compare parameters that are data frames.
 sys.modules.setdefault("pandas", None)
+
+# Snakemake writes this path into shell commands as it is; a folder may have a space in its name.
+sys.executable = shlex.quote(sys.executable)
 
 from kinacc.errors import InputError
 from kinacc.stages.plan import planned
