@@ -26,7 +26,8 @@ TRUNCATED_GROWTH = 1e-3
 LEAST_COST = 1e-10  # mm^2: of noise-free data
 MAX_VARIANCE_STEPS = 20
 VARIANCE_TOLERANCE = 1e-5
-LEAST_VARIANCE = 1e-14  # mm^2: noise-free data must not divide by zero
+FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
+LEAST_VARIANCE = 1e-8  # mm^2: the prior must stay above rounding where data are free of noise
 FRAME_THRESHOLD = 1e-6  # frames have no nominal value to keep: only exact ambiguities are cut
 TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
 
@@ -319,7 +320,10 @@ def _balanced(
     before: _Balance | None,
     name: str,
 ) -> _Balance:
-    variance = normal.cost / normal.count if before is None else before.variance
+    # From below: started at the variance of the whole misfit, a tight prior could pass for truth
+    # and everything it forbids for noise.
+    least = FIRST_VARIANCE * normal.cost / normal.count
+    variance = least if before is None else before.variance
     for _ in range(MAX_VARIANCE_STEPS):
         variance = max(variance, LEAST_VARIANCE)
         gram = normal.gram.copy()

@@ -67,8 +67,8 @@ def fit(
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
     Base and targets are ``frames``, or start there if ``frames_free``. Direction offsets that no
-    observation shows are left at zero, std NaN. Raises FitError, and InputError where there are fewer
-    residuals than parameters.
+    observation shows are left at zero, std NaN.
+    Raises FitError, and InputError where there are fewer residuals than parameters.
     """
     free = _informed(observations, empty)
     flange = _flange_model(empty, free)

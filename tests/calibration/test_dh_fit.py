@@ -1,0 +1,174 @@
+"""DH fits: a known arm found again from far off, with base and tool known or not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc import robot
+from kinacc.calibration import dh_fit, frames
+from kinacc.calibration.observations import full_poses
+from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, log_so3
+from kinacc.models import dh
+
+WEIGHT = 500.0
+FIVE_DEG = np.deg2rad(5.0)
+NOISE_MM, NOISE_RAD = 0.05, 1e-4
+
+
+def disturbed(arm, free, rng):
+    """Up to 5 degrees and 20 mm off; axes meant to be parallel (Hayati) within a degree."""
+    shift = rng.uniform(-1, 1, (6, 5)) * [FIVE_DEG, 20.0, 20.0, FIVE_DEG, FIVE_DEG] * free
+    shift[free[:, 4], 3:] *= 0.2
+    return dh.with_vector(arm.dh, dh.to_vector(arm.dh) + shift.ravel())
+
+
+def measured(true, base, tool, rng, count=90):
+    arm_range = np.pi * np.array([0.9, 0.4, 0.5, 0.9, 0.7, 0.9])
+    q = rng.uniform(-arm_range, arm_range, (count, 6))
+    seen = compose(base, compose(dh.forward(true, q), tool))
+    turn = exp_so3(NOISE_RAD * rng.normal(size=(count, 3)))
+    return q, Pose(turn @ seen.rotation, seen.position_mm + NOISE_MM * rng.normal(size=(count, 3)))
+
+
+def anywhere(rng, distance_mm):
+    return Pose(exp_so3(rng.normal(size=3) * 1.5), distance_mm * rng.normal(size=3))
+
+
+@pytest.mark.parametrize("name", ["mh180", "ur10"])
+@pytest.mark.parametrize("mode", ["known", "unknown", "points"])
+def test_poses_are_found_again_from_five_degrees_and_twenty_mm(name, mode):
+    arm = robot.load(name)
+    hayati = (2, 3) if name == "ur10" else ()
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        free = dh_fit.free_parameters(6, hayati)
+        true = disturbed(arm, free, rng)
+        base, tool = anywhere(rng, 2000.0), anywhere(rng, 100.0)
+        if mode == "known":
+            base = tool = IDENTITY
+        q, seen = measured(true, base, tool, rng)
+        if mode == "points":
+            seen = Pose(np.full_like(seen.rotation, np.nan), seen.position_mm)
+        found = dh_fit.fit(
+            full_poses(q, seen),
+            arm.dh,
+            free=free,
+            rotation_weight_mm_per_rad=WEIGHT,
+            threshold=1e-3,
+            frames=frames.known() if mode == "known" else None,
+        )
+        assert np.sqrt(found.solution.variance) < 1.1 * NOISE_MM
+        # Poses it has not seen, where the true arm goes.
+        new = rng.uniform(-1.0, 1.0, (50, 6))
+        wanted = compose(base, compose(dh.forward(true, new), tool))
+        got = compose(found.frames.base, compose(dh.forward(found.model, new), found.frames.tool))
+        assert np.linalg.norm(got.position_mm - wanted.position_mm, axis=1).max() < 0.3
+        if mode != "points":
+            turn = log_so3(got.rotation @ np.swapaxes(wanted.rotation, 1, 2))
+            assert np.linalg.norm(turn, axis=1).max() < 1e-3
+
+
+def test_a_hundred_starts_reach_one_optimum():
+    arm = robot.load("mh180")
+    rng = np.random.default_rng(0)
+    free = dh_fit.free_parameters(6)
+    true = disturbed(arm, free, rng)
+    q, seen = measured(true, IDENTITY, IDENTITY, rng, 40)
+    costs = []
+    for seed in range(100):
+        start = disturbed(arm, free, np.random.default_rng(1000 + seed))
+        found = dh_fit.fit(
+            full_poses(q, seen),
+            arm.dh,
+            free=free,
+            rotation_weight_mm_per_rad=WEIGHT,
+            threshold=1e-3,
+            frames=frames.known(),
+            start=start,
+        )
+        costs.append(found.solution.cost)
+    assert np.ptp(costs) < 1e-5 * min(costs)
+
+
+def test_antiparallel_lengths_move_as_little_as_their_difference_asks():
+    arm = robot.load("mh180")
+    rng = np.random.default_rng(3)
+    vector = dh.to_vector(arm.dh).reshape(6, 5).copy()
+    vector[1, 1], vector[2, 1] = 300.0, 301.0  # d2, d3: only d2 - d3 = -1 shows
+    q, seen = measured(dh.with_vector(arm.dh, vector.ravel()), IDENTITY, IDENTITY, rng)
+    found = dh_fit.fit(
+        full_poses(q, seen),
+        arm.dh,
+        free=dh_fit.free_parameters(6),
+        rotation_weight_mm_per_rad=WEIGHT,
+        threshold=1e-3,
+        frames=frames.known(),
+    )
+    d = found.model.d_mm
+    assert d[1] - d[2] == pytest.approx(-1.0, abs=0.05)
+    assert abs(d[1] + d[2]) < 0.1
+    assert np.isnan(found.std[[1, 2], 1]).all()
+    others = np.ones((6, 4), dtype=bool)
+    others[[1, 2], 1] = False
+    assert np.isfinite(found.std[:, :4][others]).all()
+    assert np.isnan(found.std[:, 4]).all()  # no Hayati term was asked for
+    assert found.solution.spectrum.rank == 23
+
+
+def test_deviations_match_the_scatter_of_repeated_fits():
+    arm = robot.load("mh180")
+    estimates, stds = [], []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        q, seen = measured(arm.dh, IDENTITY, IDENTITY, rng, 40)
+        # Orientation noise of the size its weight assumes: all residuals equally uncertain.
+        clean = dh.forward(arm.dh, q)
+        turn = exp_so3(NOISE_MM / WEIGHT * rng.normal(size=(40, 3)))
+        seen = Pose(turn @ clean.rotation, seen.position_mm)
+        found = dh_fit.fit(
+            full_poses(q, seen),
+            arm.dh,
+            free=dh_fit.free_parameters(6),
+            rotation_weight_mm_per_rad=WEIGHT,
+            threshold=1e-3,
+            frames=frames.known(),
+        )
+        estimates.append(
+            dh.to_vector(found.model).reshape(6, 5) - dh.to_vector(arm.dh).reshape(6, 5)
+        )
+        stds.append(found.std)
+    normal = (np.array(estimates) / np.array(stds))[:, np.isfinite(stds[0])]
+    assert np.sqrt(np.mean(normal**2)) == pytest.approx(1.0, abs=0.12)
+
+
+def test_what_base_and_tool_can_express_stays_nominal():
+    arm = robot.load("ur10")
+    rng = np.random.default_rng(5)
+    free = dh_fit.free_parameters(6, (2, 3))
+    true = disturbed(arm, free, rng)
+    q, seen = measured(true, anywhere(rng, 1000.0), anywhere(rng, 50.0), rng)
+    found = dh_fit.fit(
+        full_poses(q, seen),
+        arm.dh,
+        free=free,
+        rotation_weight_mm_per_rad=WEIGHT,
+        threshold=1e-3,
+    )
+    table, nominal = (dh.to_vector(each).reshape(6, 5) for each in (found.model, arm.dh))
+    np.testing.assert_allclose(table[0, :2], nominal[0, :2], atol=1e-5)  # theta1, d1: the base
+    np.testing.assert_allclose(table[5], nominal[5], atol=1e-5)  # joint 6: the tool
+    assert np.isnan(found.std[0, :2]).all()
+    assert np.isnan(found.std[5]).all()
+
+
+def test_frames_alone_leave_the_arm_as_it_is():
+    arm = robot.load("ur10")
+    rng = np.random.default_rng(6)
+    base, tool = anywhere(rng, 1000.0), anywhere(rng, 50.0)
+    q, seen = measured(arm.dh, base, tool, rng)
+    found = dh_fit.fit_frames(full_poses(q, seen), arm.dh, rotation_weight_mm_per_rad=WEIGHT)
+    np.testing.assert_array_equal(dh.to_vector(found.model), dh.to_vector(arm.dh))
+    np.testing.assert_allclose(found.frames.base.position_mm, base.position_mm, atol=0.2)
+    np.testing.assert_allclose(found.frames.tool.position_mm, tool.position_mm, atol=0.1)
+    assert np.isnan(found.std).all()

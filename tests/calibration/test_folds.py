@@ -1,0 +1,83 @@
+"""Folds: what belongs together is held out together, whatever the data looks like."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kinacc.calibration import folds
+
+DEGREE = np.pi / 180.0
+
+
+@st.composite
+def plans(draw):
+    """Joints with revisits a hair apart, full turns apart, and several rows per pose."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    distinct = draw(st.integers(1, 25))
+    q = rng.uniform(-np.pi, np.pi, (distinct, 6))
+    rows = draw(st.integers(distinct, 60))
+    which = np.concatenate([np.arange(distinct), rng.integers(0, distinct, rows - distinct)])
+    pose = np.arange(rows)
+    jitter = rng.uniform(-0.02, 0.02, (rows, 6)) * DEGREE
+    turns = 2 * np.pi * rng.integers(-1, 2, (rows, 6))
+    order = rng.permutation(rows)
+    return which[order], (q[which] + jitter + turns)[order], pose[order], rng
+
+
+@settings(max_examples=60, deadline=None)
+@given(plans(), st.integers(2, 7), st.integers(0, 1000))
+def test_rows_of_one_configuration_share_a_fold(plan, count, seed):
+    which, q, pose, _ = plan
+    configuration = folds.configurations(pose, q, 0.1 * DEGREE)
+    fold = folds.assign(configuration, count, seed)
+    for each in np.unique(which):
+        assert len(set(configuration[which == each])) == 1
+        assert len(set(fold[which == each])) == 1
+    assert fold.min() >= 0
+    assert fold.max() < count
+
+
+@settings(max_examples=60, deadline=None)
+@given(plans(), st.integers(2, 7))
+def test_sizes_differ_by_no_more_than_the_largest_configuration(plan, count):
+    _, q, pose, _ = plan
+    configuration = folds.configurations(pose, q, 0.1 * DEGREE)
+    sizes = np.bincount(folds.assign(configuration, count, 1), minlength=count)
+    assert sizes.sum() == len(q)
+    assert sizes.max() - sizes.min() <= np.bincount(configuration).max()
+
+
+@settings(max_examples=40, deadline=None)
+@given(plans())
+def test_configurations_are_a_partition_no_pair_within_tolerance_breaks(plan):
+    _, q, pose, _ = plan
+    tolerance = 0.1 * DEGREE
+    found = folds.configurations(pose, q, tolerance)
+    apart = np.abs(q[:, None] - q[None])
+    apart = np.abs(apart - 2 * np.pi * np.rint(apart / (2 * np.pi))).max(axis=2)
+    close = apart <= tolerance * (1 - 1e-9)
+    assert np.all((found[:, None] == found[None]) | ~close)
+    # Numbered by first appearance.
+    _, first = np.unique(found, return_index=True)
+    assert np.all(np.diff(first) > 0)
+
+
+def test_targets_of_a_pose_stay_together_even_if_its_joints_were_read_apart():
+    q = np.array([[0.0] * 6, [0.5] * 6, [0.0] * 6, [0.9] * 6])
+    assert folds.configurations(np.array([3, 3, 7, 8]), q, 1e-3).tolist() == [0, 0, 0, 1]
+
+
+def test_seed_decides_and_nothing_else():
+    configuration = np.arange(100)
+    first = folds.assign(configuration, 5, 1)
+    np.testing.assert_array_equal(first, folds.assign(configuration, 5, 1))
+    assert np.any(first != folds.assign(configuration, 5, 2))
+    np.testing.assert_array_equal(np.bincount(first), [20] * 5)
+
+
+def test_fewer_configurations_than_folds_leave_folds_empty():
+    fold = folds.assign(np.array([0, 0, 1]), 5, 0)
+    assert len(set(fold.tolist())) == 2
+    assert fold[0] == fold[1]

@@ -1,0 +1,109 @@
+"""Base and targets: the closed-form start where it is easy, and where half of it fails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc import robot
+from kinacc.calibration.frames import Frames, closed_form_start, coordinates
+from kinacc.calibration.observations import Observations, full_poses
+from kinacc.geometry import Pose, compose, exp_so3, log_so3
+from kinacc.models import dh
+
+ARM = robot.load("ur10")
+BASE = Pose(exp_so3(np.array([0.4, -2.0, 1.1])), np.array([2300.0, -900.0, 450.0]))
+TOOL = Pose(exp_so3(np.array([1.5, 0.3, -0.7])), np.array([12.0, -40.0, 93.0]))
+
+
+def measured(q, tool=TOOL) -> Pose:
+    return compose(BASE, compose(dh.forward(ARM.dh, q), tool))
+
+
+def turned_by(a, b) -> float:
+    return float(np.linalg.norm(log_so3(a @ b.T)))
+
+
+def some_joints(count, seed=0):
+    return np.random.default_rng(seed).uniform(-2.5, 2.5, (count, 6))
+
+
+@pytest.mark.parametrize("orientations", [True, False])
+def test_start_is_exact_on_exact_data(orientations):
+    q = some_joints(20)
+    seen = measured(q)
+    if not orientations:
+        seen = Pose(np.full_like(seen.rotation, np.nan), seen.position_mm)
+    start = closed_form_start(full_poses(q, seen), dh.forward(ARM.dh, q))
+    assert turned_by(start.base.rotation, BASE.rotation) < 1e-9
+    np.testing.assert_allclose(start.base.position_mm, BASE.position_mm, atol=1e-6)
+    np.testing.assert_allclose(start.tool.position_mm, TOOL.position_mm, atol=1e-6)
+    wanted = TOOL.rotation if orientations else np.eye(3)
+    assert turned_by(start.tool.rotation, wanted) < 1e-9
+
+
+def test_start_is_close_when_the_arm_is_five_degrees_off():
+    q = some_joints(60, 1)
+    shift = np.deg2rad(5.0) * np.random.default_rng(2).uniform(-1, 1, 6)
+    start = closed_form_start(full_poses(q, measured(q)), dh.forward(ARM.dh, q + shift))
+    assert turned_by(start.base.rotation, BASE.rotation) < 0.15
+    assert np.linalg.norm(start.base.position_mm - BASE.position_mm) < 200.0
+
+
+def test_start_survives_a_tool_that_turns_about_one_axis_only():
+    """Cube poses with one tool orientation but for turns about the vertical: hand-eye fails."""
+    rng = np.random.default_rng(3)
+    count = 40
+    flange = Pose(
+        exp_so3(np.outer(rng.choice([0.0, np.pi / 2, np.pi], count), [0.0, 0.0, 1.0])),
+        rng.uniform(-400, 400, (count, 3)),
+    )
+    seen = compose(BASE, compose(flange, TOOL))
+    start = closed_form_start(full_poses(np.zeros((count, 6)), seen), flange)
+    again = compose(start.base, compose(flange, start.tool))
+    np.testing.assert_allclose(again.position_mm, seen.position_mm, atol=1e-6)
+    assert max(turned_by(a, b) for a, b in zip(again.rotation, seen.rotation, strict=True)) < 1e-9
+    # Along the axis of the turns the tool cannot be told from the base: it is left at zero.
+    assert abs(start.tool.position_mm[2]) < 1e-6
+
+
+def test_several_targets_of_a_pose_have_a_start_each():
+    q = np.repeat(some_joints(15, 4), 3, axis=0)
+    target = np.tile([0, 1, 2], 15)
+    points = np.array([[10.0, 0, 90], [-60, 30, 95], [0, 80, 110]])
+    flange = dh.forward(ARM.dh, q)
+    seen = compose(BASE, compose(flange, Pose(np.eye(3), points[target])))
+    zeros = np.zeros(len(q), dtype=int)
+    observations = Observations(
+        q_rad=q,
+        s=np.zeros(q.shape, np.int8),
+        position_mm=seen.position_mm,
+        rotation=np.full((len(q), 3, 3), np.nan),
+        pose=np.repeat(np.arange(15), 3),
+        target=target,
+        repeat=zeros,
+        fold=zeros - 1,
+        target_names=("mA", "mB", "mC"),
+    )
+    start = closed_form_start(observations, flange)
+    np.testing.assert_allclose(start.targets.position_mm, points, atol=1e-6)
+    assert turned_by(start.base.rotation, BASE.rotation) < 1e-9
+
+
+def test_coordinates_lead_back_to_frames():
+    q = some_joints(6, 5)
+    observations = full_poses(q, measured(q))
+    anchor = Frames(BASE, Pose(TOOL.rotation[None], TOOL.position_mm[None]))
+    coords = coordinates(observations, anchor, True, True)
+    assert coords.size == 12
+    same = coords.frames(np.zeros(12))
+    np.testing.assert_allclose(same.base.position_mm, BASE.position_mm, atol=1e-9)
+    np.testing.assert_allclose(same.base.rotation, BASE.rotation, atol=1e-12)
+    x = np.random.default_rng(6).normal(size=12) * np.where(coords.is_angle(), 0.1, 10.0)
+    moved = coords.frames(x)
+    # Points of the instrument land where the inverse base of these coordinates puts them.
+    point = np.array([100.0, 200.0, 300.0])
+    inverse = coords.inverse_base(x)
+    by_coordinates = inverse.rotation @ (point - coords.centroid_mm) + inverse.position_mm
+    by_frames = moved.base.rotation.T @ (point - moved.base.position_mm)
+    np.testing.assert_allclose(by_coordinates, by_frames, atol=1e-9)

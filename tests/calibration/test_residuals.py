@@ -1,0 +1,113 @@
+"""Residual statistics and errors against closed forms; cross-validation row by row."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinacc import robot
+from kinacc.calibration import residuals
+from kinacc.calibration.frames import Frames
+from kinacc.calibration.observations import full_poses
+from kinacc.calibration.residuals import COMPARISONS, FittedModels
+from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.models import dh, vec
+
+ARM = robot.load("mh180")
+BASE = Pose(exp_so3(np.array([0.3, -1.0, 2.0])), np.array([900.0, 100.0, -50.0]))
+TOOL = Pose(exp_so3(np.array([0.1, 0.2, 0.3])), np.array([5.0, -6.0, 120.0]))
+COUNT = 12
+Q = np.random.default_rng(0).uniform(-0.5, 0.5, (COUNT, 6))
+
+
+def frames(base=BASE):
+    return Frames(base, Pose(TOOL.rotation[None], TOOL.position_mm[None]))
+
+
+def fitted(base_shift_mm=(0.0, 0.0, 0.0)) -> FittedModels:
+    """All three models the nominal arm; the VEC's base moved (instrument's frame)."""
+    moved = Pose(BASE.rotation, BASE.position_mm + base_shift_mm)
+    empty = vec.without_errors(ARM.dh, np.full(6, -1.0), np.full(6, 1.0), 1)
+    return FittedModels(empty, frames(moved), ARM.dh, frames(), ARM.dh, frames())
+
+
+def measured(shift_mm, turn_rad):
+    """Readings off by a shift and a turn, both given in the robot base."""
+    clean = compose(dh.forward(ARM.dh, Q), TOOL)
+    off = Pose(exp_so3(turn_rad) @ clean.rotation, clean.position_mm + shift_mm)
+    return full_poses(Q, compose(BASE, off))
+
+
+def test_statistics_of_known_vectors():
+    vectors = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 2.0], [1.0, 2.0, 2.0], [np.nan] * 3])
+    found = residuals.statistics(vectors)
+    assert (found.n, found.max) == (3, 5.0)
+    assert found.mean == pytest.approx(10.0 / 3.0)
+    assert found.rms == pytest.approx(np.sqrt((25 + 4 + 9) / 3))
+    assert found.gamma99 > found.max
+
+
+def test_gamma_quantile_of_gamma_magnitudes():
+    rng = np.random.default_rng(1)
+    magnitude = rng.gamma(5.36, 0.076, 200_000)
+    direction = rng.normal(size=(len(magnitude), 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    found = residuals.statistics(magnitude[:, None] * direction)
+    assert found.gamma99 == pytest.approx(np.quantile(magnitude, 0.99), rel=0.01)
+
+
+def test_no_vector_gives_no_statistics_and_a_zero_one_no_gamma():
+    assert residuals.statistics(np.full((3, 3), np.nan)) is None
+    assert np.isnan(residuals.statistics(np.zeros((2, 3))).gamma99)
+
+
+def test_errors_are_measured_minus_model_in_the_robot_base():
+    shift, turn = np.array([0.5, -0.2, 0.1]), np.array([1e-3, -2e-3, 5e-4])
+    found = residuals.errors(fitted(), measured(shift, turn))
+    for name in ("vec_vs_measured", "dh_vs_measured", "nominal_vs_measured"):
+        np.testing.assert_allclose(found[name].position_mm, np.tile(shift, (COUNT, 1)), atol=1e-9)
+        np.testing.assert_allclose(found[name].rotation_rad, np.tile(turn, (COUNT, 1)), atol=1e-12)
+    np.testing.assert_allclose(found["dh_vs_vec"].position_mm, 0.0, atol=1e-9)
+
+
+def test_vec_and_dh_meet_in_one_frame_whatever_base_each_was_fitted_with():
+    shift = np.array([1.0, 2.0, -3.0])
+    found = residuals.errors(fitted(shift), measured(0.0, np.zeros(3)))
+    wanted = np.tile(BASE.rotation.T @ shift, (COUNT, 1))
+    np.testing.assert_allclose(found["dh_vs_vec"].position_mm, wanted, atol=1e-9)
+    np.testing.assert_allclose(found["vec_vs_measured"].position_mm, -wanted, atol=1e-9)
+
+
+def test_position_only_rows_have_no_orientation_error():
+    seen = measured(np.zeros(3), np.zeros(3))
+    blind = seen.rotation.copy()
+    blind[::2] = np.nan
+    found = residuals.errors(fitted(), replace(seen, rotation=blind))["dh_vs_measured"]
+    assert np.isnan(found.rotation_rad[::2]).all()
+    assert np.isfinite(found.rotation_rad[1::2]).all()
+    assert np.isfinite(found.position_mm).all()
+
+
+def test_every_row_is_judged_by_a_model_that_has_not_seen_its_fold():
+    fold = np.array([0, 1, 2, -1] * 3)
+    seen = replace(measured(np.zeros(3), np.zeros(3)), fold=fold, pose=np.arange(COUNT))
+    shown = {}
+
+    def refit(train, number):
+        shown[number] = set(train.pose.tolist())
+        # Each fold's model is told apart by where its base is.
+        moved = Pose(BASE.rotation, BASE.position_mm + np.array([10.0 * (number + 1), 0, 0]))
+        return replace(fitted(), dh_frames=frames(moved))
+
+    held_out, trained = residuals.cross_validated(seen, refit, [0, 1, 2])
+    size = np.linalg.norm(held_out["dh_vs_measured"].position_mm, axis=1)
+    for number in range(3):
+        rows = np.flatnonzero(fold == number)
+        assert shown[number].isdisjoint(rows.tolist())
+        assert len(shown[number]) == COUNT - len(rows)
+        np.testing.assert_allclose(size[rows], 10.0 * (number + 1), atol=1e-9)
+        assert len(trained[number]["dh_vs_measured"].position_mm) == COUNT - len(rows)
+    assert np.isnan(size[fold < 0]).all()
+    assert set(held_out) == set(COMPARISONS)

@@ -1,0 +1,135 @@
+"""VEC fits: the gauge nobody can see, poses found again, travel directions, base and tool."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc import robot
+from kinacc.calibration import frames, vec_fit
+from kinacc.calibration.observations import full_poses
+from kinacc.calibration.vec_fit import Prior
+from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.models import vec
+
+WEIGHT = 500.0
+ARM = robot.load("mh180")
+LOW, HIGH = np.deg2rad([(-10, 70), (-30, 54), (-74, 18), (-170, 170), (-120, 120), (-170, 170)]).T
+PRIOR = Prior(1.0, 1e-3, 1.0, 1e-3)
+
+
+def joints(count, seed=0):
+    return np.random.default_rng(seed).uniform(LOW, HIGH, (count, 6))
+
+
+def true_model(order=5, seed=1):
+    empty = vec.without_errors(ARM.dh, LOW, HIGH, order)
+    spread = Prior(0.2, 0.3e-3, 0.7, 2e-4).std(empty)
+    return vec.with_vector(empty, spread * np.random.default_rng(seed).normal(size=spread.size))
+
+
+def empty_model(order=5):
+    return vec.without_errors(ARM.dh, LOW, HIGH, order)
+
+
+@pytest.mark.parametrize("order", [1, 5])
+def test_full_poses_leave_ten_directions_exactly_null(order):
+    """A turn about and a shift along every inner axis may stand before or behind the joint."""
+    q = joints(300)
+    seen = full_poses(q, vec.pose(empty_model(order), q))
+    found = vec_fit.gauge(seen, empty_model(order), frames.known(), WEIGHT)
+    assert found.values.size == 36 * (order + 1)
+    assert found.rank == found.values.size - 10
+    assert found.gap > 1e6
+
+
+def test_poses_between_the_measured_ones_are_predicted():
+    true = true_model()
+    q = joints(500, 2)
+    rng = np.random.default_rng(3)
+    seen = vec.pose(true, q)
+    seen = Pose(
+        exp_so3(5e-5 * rng.normal(size=(500, 3))) @ seen.rotation,
+        seen.position_mm + 0.025 * rng.normal(size=(500, 3)),
+    )
+    found = vec_fit.fit(
+        full_poses(q, seen),
+        empty_model(),
+        prior=PRIOR,
+        rotation_weight_mm_per_rad=WEIGHT,
+        frames=frames.known(),
+        frames_free=False,
+    )
+    assert np.sqrt(found.solution.variance) == pytest.approx(0.025, rel=0.05)
+    new = joints(300, 4)
+    error = vec.pose(found.model, new).position_mm - vec.pose(true, new).position_mm
+    # 206 coefficients from 3,000 residuals of 0.025 mm: about 0.01 mm per axis is left.
+    assert np.sqrt(np.mean(error**2)) < 0.012
+    # What nobody can see keeps the uncertainty of the prior, what is seen does not.
+    assert np.nanmax(found.std / found.prior_std) <= 1.0 + 1e-9
+    assert np.nanmin(found.std / found.prior_std) < 0.1
+
+
+def test_travel_direction_is_found_where_it_is_known():
+    true = true_model()
+    q = joints(500, 5)
+    s = np.random.default_rng(6).choice([-1, 1], q.shape).astype(np.int8)
+    found = vec_fit.fit(
+        full_poses(q, vec.pose(true, q, s), s),
+        empty_model(),
+        prior=PRIOR,
+        rotation_weight_mm_per_rad=WEIGHT,
+        frames=frames.known(),
+        frames_free=False,
+    )
+    # A constant may sit in the offsets or in eps_z: the difference of directions is what shows.
+    got, wanted = (np.diff(m.direction_offsets_rad)[:, 0] for m in (found.model, true))
+    np.testing.assert_allclose(got, wanted, atol=2e-7)
+
+
+def test_unknown_directions_leave_offsets_zero_and_without_deviation():
+    q = joints(100, 7)
+    found = vec_fit.fit(
+        full_poses(q, vec.pose(true_model(2), q)),
+        empty_model(2),
+        prior=PRIOR,
+        rotation_weight_mm_per_rad=WEIGHT,
+        frames=frames.known(),
+        frames_free=False,
+    )
+    assert not found.model.direction_offsets_rad.any()
+    assert np.isnan(found.std[-12:]).all()
+    assert np.isfinite(found.std[:-12]).all()
+
+
+def test_base_and_tool_are_estimated_along():
+    base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
+    tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
+    true = true_model(3)
+    q = joints(400, 8)
+    seen = compose(base, compose(vec.pose(true, q), tool))
+    start = frames.Frames(
+        Pose(exp_so3(np.full(3, 1e-3)) @ base.rotation, base.position_mm + 2.0),
+        Pose((exp_so3(np.full(3, -1e-3)) @ tool.rotation)[None], tool.position_mm[None] - 2.0),
+    )
+    found = vec_fit.fit(
+        full_poses(q, seen),
+        empty_model(3),
+        prior=PRIOR,
+        rotation_weight_mm_per_rad=WEIGHT,
+        frames=start,
+        frames_free=True,
+    )
+    new = joints(100, 9)
+    wanted = compose(base, compose(vec.pose(true, new), tool)).position_mm
+    flange = vec.pose(found.model, new)
+    got = compose(found.frames.base, compose(flange, found.frames.tool)).position_mm
+    assert np.linalg.norm(got - wanted, axis=1).max() < 1e-3
+
+
+def test_prior_falls_with_the_order_as_stated():
+    std = Prior(2.0, 3e-3, 0.5, 7e-4).std(empty_model(3))
+    table = std[: 36 * 4].reshape(6, 6, 4)
+    np.testing.assert_allclose(table[2, 0], [2.0, 2.0, 1.0, 0.5])
+    np.testing.assert_allclose(table[4, 5], [3e-3, 3e-3, 1.5e-3, 0.75e-3])
+    np.testing.assert_allclose(std[36 * 4 :], 7e-4)
