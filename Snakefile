@@ -17,6 +17,7 @@ from kinacc.stages.plan import planned
 
 try:
     plan = planned(workflow.configfiles or ["config.yaml"], workflow.config_settings.config)
+    plan.check_files()
 except InputError as error:
     raise WorkflowError(str(error)) from None
 for dataset in plan.datasets:

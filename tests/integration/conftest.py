@@ -15,7 +15,10 @@ from pathlib import Path
 
 import pytest
 
+from kinacc.stages.catalogue import STAGES
+
 ROOT = Path(__file__).resolve().parents[2]
+STAGE_OF = {stage.message: name for name, stage in STAGES.items()}
 CONFIGS = ("config.yaml", "small.yaml")
 PARTS = ("Snakefile", "workflow", "config.yaml", "src")
 
@@ -72,10 +75,10 @@ class Project:
         """The stages a run would go through now, by data set."""
         text = self.snakemake(options=("--dry-run",))
         found: dict[str, set[str]] = {}
-        for rule, output in re.findall(
-            r"^(?:local)?rule (\w+):\n(?:    .*\n)*?    output: results/(\w+)/", text, re.MULTILINE
+        for dataset, words in re.findall(
+            r"^Job \d+: (\w+): (.*?)(?:, part [\d-]+of-\d+)?$", text, re.M
         ):
-            found.setdefault(output, set()).add(rule)
+            found.setdefault(dataset, set()).add(STAGE_OF[words])
         if not found:
             assert "Nothing to be done" in text, text
         return found
@@ -159,7 +162,7 @@ def finished_once(tmp_path_factory) -> Path:
         (base / "finishing").mkdir()
     except FileExistsError:
         for _ in range(600):
-            if done.exists() or (base / "failed").exists():
+            if done.exists() or (base / "over").exists():
                 break
             time.sleep(0.5)
         assert done.exists(), "the small study could not be run; see the other worker"
@@ -172,7 +175,7 @@ def finished_once(tmp_path_factory) -> Path:
         project.snakemake()
         done.touch()
     finally:
-        (base / "failed").touch()
+        (base / "over").touch()
     return folder
 
 

@@ -40,7 +40,7 @@ def test_a_comment_in_the_configuration(project):
             {"mh180": ALL - {"measurements", "fig1"}},
         ),
         (
-            "datasets: {mh180: {calibration: {dh: {truncation: 0.001}}}}",
+            "datasets: {mh180: {calibration: {dh: {truncation: 0.002}}}}",
             {"mh180": {"dh"} | AFTER_DH},
         ),
         (

@@ -1,13 +1,12 @@
 # From measured poses to the VEC and DH models and their residuals.
 
 
-# `update` keeps the earlier table when a file cannot be read; the file's content is a parameter, so
-# that the next run still sees that this table is not made from it.
+# The content of files is a parameter, so that one copied here with an old date is noticed as well.
 rule measurements:
     input:
         unpack(lambda w: plan.inputs("measurements", w.dataset)),
     output:
-        measurements=update(plan.outputs("measurements", "{dataset}")["measurements"]),
+        **plan.outputs("measurements", "{dataset}"),
     log:
         plan.log("measurements", "{dataset}"),
     conda:

@@ -122,6 +122,26 @@ class Plan:
             for role, path in self._files(STAGES[name], self.datasets[dataset]).items()
         }
 
+    def check_files(self) -> None:
+        """Read every measured file that is newer than its table; InputError listing all problems.
+
+        Done before anything runs, because Snakemake removes a table before it is made anew.
+        """
+        problems: list[Problem] = []
+        for dataset, config in self.datasets.items():
+            path = self._files(STAGES["measurements"], config).get("measurements_file")
+            table = self._table("measurements", dataset)
+            if path is None or (os.path.exists(table) and _older(path, table)):
+                continue
+            from kinacc.stages import measurements
+
+            try:
+                measurements.run({}, self.settings("measurements", dataset))
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(problems)
+
     def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
         """Files a stage leaves: artefact -> path, or picture format -> path."""
         stage = STAGES[name]
@@ -184,6 +204,10 @@ class Plan:
             elif value is not None and config["measurements"]["source"] == "file":
                 found["measurements_file"] = value
         return found
+
+
+def _older(path: str, table: str) -> bool:
+    return os.path.getmtime(path) < os.path.getmtime(table)
 
 
 def _read_words(values: object) -> object:
