@@ -265,7 +265,7 @@ def true_errors(finished) -> np.ndarray:
 def test_study_rows_follow_from_the_assessment_points_and_the_seed(finished):
     error = true_errors(finished)
     rows = tables.rows(finished, "study")
-    assert len(rows) == 2 * 2 * 3
+    assert len(rows) == 2 * 3 * 3
     for row in rows:
         noise = row["noise_mm"]
         reading = worlds.simulation(error.tolist(), noise, row["repetition"], SEED)
@@ -300,12 +300,12 @@ def test_summary_is_about_the_study_and_the_largest_true_error(finished):
             for r in study
             if (r["assessor"], r["noise_mm"]) == (row["assessor"], row["noise_mm"])
         ]
-        assert row["repetitions"] == len(values) == 2
-        mean = math.fsum(values) / 2
+        assert row["repetitions"] == len(values) == 3
+        mean = math.fsum(values) / 3
         assert row["mean_mm"] == pytest.approx(mean, rel=1e-12)
         assert (row["min_mm"], row["max_mm"]) == (min(values), max(values))
         assert row["bias_mm"] == pytest.approx(mean - truth, abs=1e-12)
-        rmse = math.sqrt(math.fsum((v - truth) ** 2 for v in values) / 2)
+        rmse = math.sqrt(math.fsum((v - truth) ** 2 for v in values) / 3)
         assert row["rmse_mm"] == pytest.approx(rmse, rel=1e-10)
     readings = tables.rows(finished, "readings")
     assert len(readings) == 2 * 15

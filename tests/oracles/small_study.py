@@ -28,7 +28,7 @@ calibration:
 evaluation:
   points: 24
 map: {slices_deg: [0, 30], grid_mm: 225}
-study: {noise_mm: [0.05, 0.3], repetitions: 2, measurements: 24, chunks: 2}
+study: {noise_mm: [0.05, 0.3], repetitions: 3, measurements: 24, chunks: 2}
 histories: {simulations_searched: 30}
 figures: {formats: [svg]}
 """
