@@ -9,6 +9,7 @@ import pytest
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
+from kinacc.stages import in_memory
 from kinacc.synthetic import acceptance, accepted, measure, search
 from kinacc.synthetic.draw import TABLE_II, Scales
 
@@ -160,3 +161,10 @@ def test_measurements_repeat_to_the_bit(config):
     arm, settings = robot.load("mh180"), config["measurements"]["synthetic"]
     one, two = measure(arm, settings), measure(arm, settings)
     assert all(np.array_equal(one[name], two[name]) for name in one)
+
+
+def test_no_pose_of_the_map_is_beyond_the_fitted_range(config):
+    coarse = {**config, "map": {**config["map"], "grid_mm": 100.0}}
+    made = in_memory.run(("measurements", "vec", "dh", "accuracy_map"), coarse, {})["accuracy_map"]
+    assert int(np.sum(made["extrapolating"])) == 0
+    assert np.array_equal(made["solutions"], made["wanted"])
