@@ -115,18 +115,19 @@ class PoseSystem:
         flange, arm, turned = seen
         frames = self.coordinates.size
         frame_x, model_x = x[:frames], x[frames:]
-        jacobian = np.zeros((len(part), 6, self.size))
-        if self.model.size:
-            inner = self.model.jacobian(model_x, part.q_rad, part.s)
-            jacobian[:, :, frames:] = inner
+        jacobian = self.model.jacobian(model_x, part.q_rad, part.s)
+        if self._arms_matter() and self.model.size:
             # A turn of the flange swings the target's arm: w x arm = -[arm] w.
-            if self._arms_matter():
-                jacobian[:, :3, frames:] -= skew(arm) @ inner[:, 3:]
+            jacobian[:, :3] -= skew(arm) @ jacobian[:, 3:]
         angles = residual[:, 3:] / self.rotation_weight_mm_per_rad
-        self._fill_frames(jacobian, frame_x, part, flange, turned, angles)
+        if frames:
+            jacobian = np.concatenate([np.zeros((len(part), 6, frames)), jacobian], axis=2)
+            self._fill_frames(jacobian, frame_x, part, flange, turned, angles)
         if np.any(angles):
-            jacobian[:, 3:] = inverse_left_jacobian(angles) @ jacobian[:, 3:]
-        jacobian *= self._weights()[:, None]
+            weighted = self.rotation_weight_mm_per_rad * inverse_left_jacobian(angles)
+            jacobian[:, 3:] = weighted @ jacobian[:, 3:]
+        else:
+            jacobian[:, 3:] *= self.rotation_weight_mm_per_rad
         return jacobian
 
     def _arms_matter(self) -> bool:

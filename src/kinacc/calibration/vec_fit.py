@@ -125,13 +125,17 @@ def _informed(observations: Observations, empty: VECModel) -> np.ndarray:
 
 
 def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
+    kept = empty.coefficients.size
+    offsets = bool(free[kept:].any())
+
     def model(x: np.ndarray) -> VECModel:
         vector = np.zeros(free.size)
         vector[free] = x
         return vec.with_vector(empty, vector)
 
     def jacobian(x: np.ndarray, q_rad: np.ndarray, s: np.ndarray) -> np.ndarray:
-        return vec.parameter_jacobian(model(x), q_rad, s)[:, :, free]
+        full = vec.parameter_jacobian(model(x), q_rad, s if offsets else None)
+        return full[:, :, free] if offsets else full[:, :, :kept]
 
     return FlangeModel(int(free.sum()), lambda x, q, s: vec.pose(model(x), q, s), jacobian)
 
