@@ -1,8 +1,10 @@
 """Denavit-Hartenberg model with a Hayati term: poses and their analytic Jacobians (eqs. 1-4).
 
 Joint i moves frame i-1 to frame i by ``Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)``; beta is
-the Hayati rotation for (nearly) parallel axes and 0 elsewhere. Poses are of the flange in the
-robot base.
+the Hayati rotation for (nearly) parallel axes and 0 elsewhere. A prismatic joint slides along the
+same axis instead: ``Rz(theta) Tz(q + d) ...``. Poses are of the last frame in the first one.
+
+Joints ``q_rad`` are in rad; those of prismatic joints, columns of the same arrays, in mm.
 """
 
 from __future__ import annotations
@@ -22,17 +24,24 @@ _BLOCK = 2048  # columns of one block stay in the cache
 
 @dataclass(frozen=True)
 class DHModel:
-    """DH parameters of k revolute joints, each array (k,): angles in rad, lengths in mm."""
+    """DH parameters of k joints, each array (k,): angles in rad, lengths in mm.
+
+    ``prismatic`` (k,) says which joints slide; none when not given.
+    """
 
     theta_offset_rad: np.ndarray
     d_mm: np.ndarray
     a_mm: np.ndarray
     alpha_rad: np.ndarray
     beta_rad: np.ndarray
+    prismatic: np.ndarray | None = None
 
     def __post_init__(self) -> None:
+        if self.prismatic is None:
+            object.__setattr__(self, "prismatic", np.zeros(np.size(self.d_mm), dtype=bool))
         for field in fields(self):
-            value = np.array(getattr(self, field.name), dtype=float)
+            kind = bool if field.name == "prismatic" else float
+            value = np.array(getattr(self, field.name), dtype=kind)
             value.setflags(write=False)
             object.__setattr__(self, field.name, value)
 
@@ -86,6 +95,7 @@ def joint_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
     """Jacobian (n, 6, k) of the flange pose in the joints, in the robot base.
 
     Rows 0-2: position, mm/rad. Rows 3-5: rotation vector w with R(q + dq) = exp(w) R(q), rad/rad.
+    Columns of prismatic joints are per mm.
     """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
     frames = _chain.start(len(q_rad))
@@ -96,6 +106,9 @@ def joint_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
         frames = across_joint(model, joint, frames, q_rad[:, joint])
     jacobian = np.empty((len(q_rad), 6, model.joints))
     for joint, (axis, origin) in enumerate(zip(axes, origins, strict=True)):
+        if model.prismatic[joint]:
+            jacobian[:, :3, joint], jacobian[:, 3:, joint] = axis.T, 0.0
+            continue
         jacobian[:, :3, joint] = np.cross(axis, frames.p_mm - origin, axis=0).T
         jacobian[:, 3:, joint] = axis.T
     return jacobian
@@ -126,13 +139,17 @@ def parameter_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
 
 
 def _turned_and_shifted(model: DHModel, joint: int, frames: Columns, q_rad: np.ndarray) -> Columns:
-    frames = _chain.rotate_z(frames, q_rad + model.theta_offset_rad[joint])
-    frames = _chain.shift(frames, frames.z, model.d_mm[joint])
+    if model.prismatic[joint]:
+        frames = _chain.rotate_z(frames, model.theta_offset_rad[joint])
+        frames = _chain.shift(frames, frames.z, q_rad + model.d_mm[joint])
+    else:
+        frames = _chain.rotate_z(frames, q_rad + model.theta_offset_rad[joint])
+        frames = _chain.shift(frames, frames.z, model.d_mm[joint])
     return _chain.shift(frames, frames.x, model.a_mm[joint])
 
 
 def across_joint(model: DHModel, joint: int, frames: Columns, q_rad: np.ndarray) -> Columns:
-    """Frames moved across one joint at angles ``q_rad`` (n,), eq. 4."""
+    """Frames moved across one joint at its values ``q_rad`` (n,), eq. 4."""
     frames = _turned_and_shifted(model, joint, frames, q_rad)
     frames = _chain.rotate_x(frames, model.alpha_rad[joint])
     if model.beta_rad[joint] != 0.0:

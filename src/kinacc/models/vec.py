@@ -1,8 +1,9 @@
 """Volumetric error compensation (VEC) model: joint-dependent Chebyshev errors (eqs. 5-6).
 
 In front of every DH joint stands a first-order error matrix whose six elements (``ERRORS``) are
-Chebyshev polynomials of that joint's angle, mapped from ``[q_min, q_max]`` to [-1, 1]. ``eps_z``
-also takes an offset by travel direction s: none at 0, the first at -1, the second at +1.
+Chebyshev polynomials of that joint's angle (in mm of its travel, for a prismatic one), mapped from
+``[q_min, q_max]`` to [-1, 1]. ``eps_z`` also takes an offset by travel direction s: none at 0, the
+first at -1, the second at +1.
 """
 
 from __future__ import annotations
@@ -115,7 +116,12 @@ def joint_jacobian(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = No
     for joint in range(model.joints):
         before, after = split.before[joint], split.after[joint]
         linear, angular = slopes[:, joint, :3], slopes[:, joint, 3:]
-        spin = skew(angular) + (np.eye(3) + skew(split.errors[:, joint, 3:])) @ turn_z
+        tilted = np.eye(3) + skew(split.errors[:, joint, 3:])
+        spin = skew(angular)
+        if model.dh.prismatic[joint]:
+            linear = linear + tilted[..., 2]
+        else:
+            spin = spin + tilted @ turn_z
         moved = (spin @ after.position_mm[..., None])[..., 0] + linear
         jacobian[:, :3, joint] = (before @ moved[..., None])[..., 0]
         twisted = split.rotation_t @ before @ spin @ after.rotation
