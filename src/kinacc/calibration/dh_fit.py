@@ -8,8 +8,9 @@ import numpy as np
 
 from kinacc.calibration.frames import Frames, closed_form_start, coordinates
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.solve import Solution, minimise_truncated
+from kinacc.calibration.solve import Solution
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
+from kinacc.calibration.truncated import minimise_truncated
 from kinacc.models import dh
 from kinacc.models.dh import DHModel
 

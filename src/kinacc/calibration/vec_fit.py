@@ -9,7 +9,8 @@ import numpy as np
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.frames import Frames, coordinates
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.solve import Solution, Spectrum, minimise_with_prior, spectrum
+from kinacc.calibration.ridge import minimise_with_prior
+from kinacc.calibration.solve import Solution, Spectrum, spectrum
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.models import vec
 from kinacc.models.vec import ERRORS, VECModel

@@ -1,0 +1,129 @@
+"""Gauss-Newton under a Gaussian prior whose weight follows the residuals the data leave."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from kinacc.calibration import solve
+from kinacc.calibration.solve import Solution, System
+from kinacc.errors import FitError
+
+MAX_VARIANCE_STEPS = 20
+VARIANCE_TOLERANCE = 1e-5
+FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
+LEAST_VARIANCE = 1e-8  # mm^2: the prior must stay above rounding where data are free of noise
+
+
+def minimise_with_prior(
+    system: System,
+    start: np.ndarray,
+    prior_mean: np.ndarray,
+    prior_std: np.ndarray,
+    scale: np.ndarray,
+    name: str = "fit",
+) -> Solution:
+    """Gauss-Newton on ``r'r / variance`` plus ``((x - prior_mean) / prior_std)^2``; inf = no prior.
+
+    The variance of the residuals is estimated along with ``x``: what they leave over the number of
+    residuals less the effective number of parameters (the trace of the hat matrix), so the balance
+    against the prior follows the data. ``std`` is the posterior one.
+    Raises FitError where it does not converge.
+    """
+    x = np.array(start, dtype=float)
+    weight_sq = (scale / prior_std) ** 2
+    last, iterations, balance = np.inf, 0, None
+    while last > solve.STEP_TOLERANCE and iterations < solve.MAX_ITERATIONS:
+        iterations += 1
+        normal = _normal_equations(system, x, scale)
+        balance = _balanced(normal, weight_sq, (x - prior_mean) / scale, balance, name)
+
+        def total(at: np.ndarray, variance: float = balance.variance) -> float:
+            return system.cost(at) + variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
+
+        x, _, last = solve.advance(total, x, scale * balance.step, total(x), scale, name)
+    cost = system.cost(x)
+    solve.require_converged(name, iterations, last, cost, normal.count)
+    covariance = balance.variance * balance.inverse * np.outer(scale, scale)
+    return Solution(
+        x=x,
+        std=np.sqrt(np.diag(covariance)),
+        covariance=covariance,
+        cost=cost,
+        count=normal.count,
+        degrees_of_freedom=normal.count - balance.effective,
+        variance=balance.variance,
+        iterations=iterations,
+        last_step=last,
+        converged=True,
+    )
+
+
+class _Normal(NamedTuple):
+    """``gram`` = J'J and ``gradient`` = J'r in scaled parameters, r'r and the residual count."""
+
+    gram: np.ndarray
+    gradient: np.ndarray
+    cost: float
+    count: int
+
+
+class _Balance(NamedTuple):
+    """Step and residual variance that agree on the linearised residuals.
+
+    ``inverse`` (P, P) of J'J plus the prior's part, all scaled; ``effective`` parameters fitted.
+    """
+
+    step: np.ndarray
+    variance: float
+    inverse: np.ndarray
+    effective: float
+
+
+def _balanced(
+    normal: _Normal,
+    weight_sq: np.ndarray,
+    displacement: np.ndarray,
+    before: _Balance | None,
+    name: str,
+) -> _Balance:
+    # From below: started at the variance of the whole misfit, a tight prior could pass for truth
+    # and everything it forbids for noise.
+    least = FIRST_VARIANCE * normal.cost / normal.count
+    variance = least if before is None else before.variance
+    for _ in range(MAX_VARIANCE_STEPS):
+        variance = max(variance, LEAST_VARIANCE)
+        gram = normal.gram.copy()
+        gram[np.diag_indices_from(gram)] += variance * weight_sq
+        inverse = _inverse(gram, name)
+        step = -inverse @ (normal.gradient + variance * weight_sq * displacement)
+        cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
+        effective = len(step) - variance * float(weight_sq @ np.diag(inverse))
+        found = max(cost, 0.0) / max(normal.count - effective, 1.0)
+        if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
+            break
+        variance = found
+    return _Balance(step, variance, inverse, effective)
+
+
+def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
+    gram = np.zeros((system.size, system.size))
+    gradient, cost, count = np.zeros(system.size), 0.0, 0
+    for residual, jacobian in system.blocks(x):
+        gram += jacobian.T @ jacobian
+        gradient += jacobian.T @ residual
+        cost += float(residual @ residual)
+        count += len(residual)
+    return _Normal(gram * np.outer(scale, scale), gradient * scale, cost, count)
+
+
+def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
+    try:
+        return cho_solve(cho_factor(gram, check_finite=False), np.eye(len(gram)))
+    except np.linalg.LinAlgError:
+        raise FitError(
+            f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
+            "give every undetermined direction a prior"
+        ) from None
