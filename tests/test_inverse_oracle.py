@@ -41,13 +41,13 @@ def test_every_closed_form_solution_reaches_the_pose_and_one_is_the_start(arm, s
         assert any(brute.same_turn(q, found) for found in solutions[0][reached[0]])
 
 
-@pytest.mark.parametrize("seed", [1, 3, 7])
+@pytest.mark.parametrize("seed", [1, 3])
 def test_closed_form_finds_all_that_brute_force_finds(arm, seed):
     rng = np.random.default_rng(seed)
     target = oracle.dh_forward(oracle.MH180, rng.uniform(LOW, HIGH))
     solutions, reached = closed_form.solve(arm, as_pose(target))
     found = brute.all_solutions(
-        lambda q: brute.dh_step(oracle.MH180, q), target, rng.uniform(-np.pi, np.pi, (120, 6))
+        lambda q: brute.dh_step(oracle.MH180, q), target, rng.uniform(-np.pi, np.pi, (90, 6))
     )
     assert len(found) == reached.sum()
     for q in found:
@@ -150,7 +150,7 @@ def test_calibrated_arm_has_all_solutions_that_brute_force_finds(seed):
     target = oracle.dh_forward(table, q)
     solutions = inverse.solve(robot.load("mh180"), dh.DHModel(*table.T), as_pose(target))
     listed = solutions.q_rad[0][has_joints(solutions)[0]]
-    starts = rng.uniform(-np.pi, np.pi, (120, 6))
+    starts = rng.uniform(-np.pi, np.pi, (90, 6))
     found = brute.all_solutions(lambda x: brute.dh_step(table, x), target, starts)
     assert len(found) >= 4
     for each in found:

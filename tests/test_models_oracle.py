@@ -258,7 +258,7 @@ def test_vec_joint_jacobian_of_the_projected_pose_equals_differences(case):
     np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=2e-9)
 
 
-@settings(max_examples=12)
+@settings(max_examples=8)
 @given(case=vec_cases())
 def test_vec_parameter_jacobian_equals_differences(case):
     table, series, low, high, offsets, q, s = case

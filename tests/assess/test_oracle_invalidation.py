@@ -117,7 +117,7 @@ def test_one_run_equals_the_oracle(seed, m, budget, kind, switches, alpha, where
         assert mine.rejection_probability == pytest.approx(theirs.probability, abs=1e-12)
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     m=st.sampled_from([1, 2, 4, 9, 20]),

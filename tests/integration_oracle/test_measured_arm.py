@@ -40,7 +40,9 @@ def test_residuals_of_the_measured_arm(series):
     name, folder = series
     models, rows = tables.models(folder), tables.rows(folder, "measurements")
     residuals = tables.rows(folder, "residuals")
-    for comparison in ("vec_vs_measured", "dh_vs_measured", "dh_vs_vec"):
+    # The longer series only in the comparison that the reach is stated for.
+    every = ("vec_vs_measured", "dh_vs_measured", "dh_vs_vec")
+    for comparison in every if name == "series_D" else every[1:2]:
         train = [row for row in rows if row["subset"] == "train"]
         both = tables.magnitudes(models, train, comparison)
         for quantity, values in zip(("position", "orientation"), both, strict=True):
