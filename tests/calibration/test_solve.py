@@ -90,7 +90,11 @@ def test_undetermined_parameters_have_no_deviation_and_others_the_textbook_one()
     covariance = found.cost / 26 * np.linalg.inv(reduced.T @ reduced)
     np.testing.assert_allclose(found.std[:3], np.sqrt(np.diag(covariance))[:3], rtol=1e-9)
     np.testing.assert_allclose(found.covariance[:3, :3], covariance[:3, :3], rtol=1e-8, atol=1e-12)
-    assert np.isnan(found.covariance[0, 3])
+    # Along the direction nobody sees (the last two against each other) nothing is known.
+    unseen = np.array([0.0, 0.0, 0.0, 1.0, -1.0]) / np.sqrt(2.0)
+    np.testing.assert_allclose(found.covariance @ unseen, 0.0, atol=1e-12)
+    assert len(found.undetermined) == 1
+    assert abs(found.undetermined[0] @ unseen) == pytest.approx(1.0, abs=1e-10)
 
 
 def test_frames_take_what_they_can_before_anything_is_truncated():

@@ -63,7 +63,9 @@ class Solution:
     """Outcome of a fit of P parameters to ``count`` residuals; only converged fits are returned.
 
     ``std`` (P,) and ``covariance`` (P, P) in the parameters' own units for residuals of
-    ``variance``; NaN where undetermined. ``cost`` is the sum of squared residuals,
+    ``variance``. The covariance is that of the determined directions; ``undetermined`` (m, P) are
+    the others, unit displacements in units of ``scale`` that change no residual, and ``std`` is NaN
+    where one of them reaches a parameter. ``cost`` is the sum of squared residuals,
     ``degrees_of_freedom`` their number less the (effective) number of fitted parameters,
     ``last_step`` the largest last change in units of ``scale``. ``spectrum`` is None where a prior
     made it needless; see ``spectrum``.
@@ -80,6 +82,7 @@ class Solution:
     last_step: float
     converged: bool
     spectrum: Spectrum | None = None
+    undetermined: np.ndarray | None = None
 
 
 def spectrum(

@@ -52,11 +52,9 @@ def minimise_truncated(
     freedom = count - sum(split.ranks)
     variance = cost / freedom if freedom > 0 else np.nan
     covariance = variance * split.inverse_gram() * np.outer(scale, scale)
-    undetermined = split.touched()
-    covariance[undetermined, :] = covariance[:, undetermined] = np.nan
     return Solution(
         x=x,
-        std=np.sqrt(np.diag(covariance)),
+        std=np.where(split.touched(), np.nan, np.sqrt(np.diag(covariance))),
         covariance=covariance,
         cost=cost,
         count=count,
@@ -66,6 +64,7 @@ def minimise_truncated(
         last_step=last,
         converged=True,
         spectrum=split.others.spectrum,
+        undetermined=split.undetermined(),
     )
 
 
@@ -141,6 +140,15 @@ class _Split:
         blank = np.zeros((len(self.others.right), self.frames.rank))
         full = np.block([[self.frames.root, seen], [blank, self.others.root]])
         return full @ full.T
+
+    def undetermined(self) -> np.ndarray:
+        """Truncated directions (m, P), frames first; those of the others carry the frames along."""
+        alone = self.frames.right[self.frames.rank :]
+        lost = self.others.right[self.others.rank :]
+        kept = self.frames.left[:, : self.frames.rank]
+        followed = -(self.frames.root @ (kept.T @ (self.coupling @ lost.T))).T
+        blank = np.zeros((len(alone), len(self.others.right)))
+        return np.block([[alone, blank], [followed, lost]])
 
     def touched(self) -> np.ndarray:
         """True (P,) where a truncated direction reaches a parameter."""
