@@ -1,4 +1,5 @@
 # make reproduce   the paper's study, from a bare checkout to results/
+# make robustness  the claims again on further draws of the arm; their shares go into claims.parquet
 # make test        everything a change has to pass
 # make lock        renew requirements/*.txt (needs uv)
 # make clean       remove results/; make distclean removes .venv as well
@@ -6,7 +7,7 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce test lock clean distclean
+.PHONY: reproduce robustness test lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 PIP = $(PY) -m pip install -qq --disable-pip-version-check
@@ -22,6 +23,10 @@ KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
 
 reproduce: $(KINACC)
+	@$(PY) -m snakemake --cores $(CORES)
+
+robustness: $(KINACC)
+	@$(PY) -m snakemake --cores $(CORES) robustness
 	@$(PY) -m snakemake --cores $(CORES)
 
 test: $(KINACC) $(TOOLS)
