@@ -32,7 +32,7 @@ robustness: $(KINACC)
 test: $(KINACC) $(TOOLS)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
-	$(PY) -m snakefmt --check --quiet Snakefile workflow
+	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PY) -m pytest -n $(CORES)
 

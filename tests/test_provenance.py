@@ -1,7 +1,8 @@
 """Hashes that decide what reruns: too narrow gives stale results, too wide reruns the world."""
 
 import ast
-import importlib
+import importlib.metadata
+import importlib.util
 from pathlib import Path
 
 import pytest
@@ -122,6 +123,11 @@ def test_every_module_a_stage_loads_counts_in_its_hash(stage):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     covered, _ = provenance.closure(stage.module)
     assert set(done.stdout.split()) <= covered
+
+
+@pytest.mark.parametrize("name", provenance.LIBRARIES)
+def test_versions_read_from_folder_names_are_those_of_the_metadata(name):
+    assert provenance._library_version(name) == importlib.metadata.version(name)
 
 
 def test_config_hash_depends_on_values_and_not_on_their_order():

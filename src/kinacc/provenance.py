@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
@@ -28,10 +29,15 @@ _TEXT = re.compile(r"""["']([\w./-]+)["']""")
 
 @dataclass(frozen=True)
 class SourceTree:
-    """The files of one package: module name -> (file, imported names, data files it names)."""
+    """The files of one package: by file its content, by module what it runs, uses and names.
+
+    ``runs`` are modules of the package (an import runs the packages around a module as well),
+    ``libraries`` those of LIBRARIES, ``data`` package data files.
+    """
 
     digests: Mapping[str, bytes]
-    imports: Mapping[str, frozenset[str]]
+    runs: Mapping[str, frozenset[str]]
+    libraries: Mapping[str, frozenset[str]]
     data: Mapping[str, frozenset[str]]
 
 
@@ -60,27 +66,27 @@ def code_hash(*modules: str, alone: Iterable[str] = (), root: Path = PACKAGE) ->
 
 
 def stage_code_hash(module: str) -> str:
-    """Hash of the code of a stage, of the writing of its tables and of the runner that calls it."""
-    return code_hash(module, "kinacc.artifacts.store", alone=("kinacc.stages.runner",))
+    """Hash of the code of a stage, of what reads and writes its files and of the runner."""
+    writers = ["kinacc.artifacts.store"]
+    if "kinacc.figures" in closure(module)[0]:
+        writers.append("kinacc.figures.save")
+    return code_hash(module, *writers, alone=("kinacc.stages.runner",))
 
 
 @cache
 def closure(module: str, root: Path = PACKAGE) -> tuple[frozenset[str], frozenset[str]]:
     """Names of the package's modules that a module runs, itself included, and its libraries."""
     tree = source_tree(root)
-    if module not in tree.imports:
+    if module not in tree.runs:
         raise LookupError(f"no module {module} in {root.name}")
     seen: set[str] = set()
-    libraries: set[str] = set()
     waiting = {module}
     while waiting:
         name = waiting.pop()
         seen.add(name)
-        for imported in tree.imports[name]:
-            libraries |= {imported.partition(".")[0]} & set(LIBRARIES)
-            waiting |= set(_with_parents(imported)) & tree.imports.keys() - seen
-        waiting |= set(_with_parents(name)) & tree.imports.keys() - seen
-    return frozenset(seen), frozenset(libraries)
+        waiting |= tree.runs[name] - seen
+    libraries = frozenset().union(*(tree.libraries[name] for name in seen))
+    return frozenset(seen), libraries
 
 
 @cache
@@ -94,16 +100,19 @@ def source_tree(root: Path = PACKAGE) -> SourceTree:
         name: {path.name} | ({path.parent.name} if path.parent not in packages else set())
         for name, path in data.items()
     }
-    digests, imports, named = {}, {}, {}
+    digests, runs, libraries, named = {}, {}, {}, {}
     for name, path in modules.items():
         content = path.read_bytes()
         text = content.decode("utf-8")
         digests[name] = hashlib.sha256(content).digest()
-        imports[name] = imported_names(text, name, is_package=path.name == "__init__.py")
+        imported = imported_names(text, name, is_package=path.name == "__init__.py")
+        own = {each for full in (name, *imported) for each in _with_parents(full)}
+        runs[name] = frozenset(own & modules.keys())
+        libraries[name] = frozenset(own & set(LIBRARIES))
         named[name] = _data_named(text, labels)
     for name, path in data.items():
         digests[name] = hashlib.sha256(path.read_bytes()).digest()
-    return SourceTree(digests, imports, named)
+    return SourceTree(digests, runs, libraries, named)
 
 
 def imported_names(text: str, module: str, is_package: bool) -> frozenset[str]:
@@ -169,7 +178,16 @@ def _counts(path: Path) -> bool:
 
 @cache
 def _library_version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "absent"
+    return _installed().get(name) or version(name)
+
+
+@cache
+def _installed() -> dict[str, str]:
+    """Versions by name, from folder names: reading the metadata of five takes 30 ms."""
+    found: dict[str, str] = {}
+    for folder in filter(os.path.isdir, sys.path):
+        for entry in os.listdir(folder):
+            if entry.endswith(".dist-info"):
+                name, _, number = entry.removesuffix(".dist-info").partition("-")
+                found.setdefault(name.lower(), number)
+    return found

@@ -64,6 +64,7 @@ def test_one_value_of_the_configuration(project, change, reruns):
     [
         ("accuracy_map", {"mh180": {"accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS}),
         ("figures/fig4", {"mh180": {"fig4"}, "own": {"fig4"}}),
+        ("figures/save", {"mh180": FIGURES, "own": FIGURES - {"fig3"}}),
         ("claims/numbers", {"mh180": {"claims"}, "own": {"claims"}}),
         ("histories", {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")}),
         ("calibration/vec_fit", None),
