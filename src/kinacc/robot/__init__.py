@@ -1,0 +1,9 @@
+"""Nominal description of an arm: joints, limits, how reported joints turn the axes.
+
+A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
+"""
+
+from kinacc.robot.description import files, load, shipped
+from kinacc.robot.record import Robot, carried, dh_angles, forward
+
+__all__ = ["Robot", "carried", "dh_angles", "files", "forward", "load", "shipped"]
