@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,36 @@ def test_travel_direction_is_found_where_it_is_known():
     # A constant may sit in the offsets or in eps_z: the difference of directions is what shows.
     got, wanted = (np.diff(m.direction_offsets_rad)[:, 0] for m in (found.model, true))
     np.testing.assert_allclose(got, wanted, atol=2e-7)
+
+
+def test_an_unknown_direction_is_the_mean_of_both():
+    """Constants of eps_z and of both offsets are one: none of it may be lost at s = 0."""
+    true = replace(empty_model(1), direction_offsets_rad=np.full((6, 2), 4e-4))
+    q = joints(300, 9)
+    s = np.random.default_rng(10).choice([-1, 1], q.shape).astype(np.int8)
+    s[:, 5] = np.where(np.arange(300) % 3, s[:, 5], 0)  # joint 6 also seen standing still
+    seen = full_poses(q, vec.pose(true, q, s), s)
+    found = vec_fit.fit(
+        seen,
+        empty_model(1),
+        prior=PRIOR,
+        rotation_weight_mm_per_rad=WEIGHT,
+        frames=frames.known(),
+        frames_free=False,
+    )
+    fitted = vec.pose(found.model, q, s)
+    np.testing.assert_allclose(fitted.position_mm, seen.position_mm, atol=1e-3)
+    np.testing.assert_allclose(found.model.direction_offsets_rad[:5].sum(axis=1), 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.model.direction_offsets_rad[5], 4e-4, atol=2e-6)
+    still = np.zeros_like(s)
+    still[:, 5] = 1
+    moved = vec.pose(found.model, q, still).position_mm
+    np.testing.assert_allclose(moved, fitted_at(true, q), atol=1e-3)
+
+
+def fitted_at(true, q):
+    """Positions of a model whose offsets are the same in both directions."""
+    return vec.pose(true, q, np.ones_like(q, dtype=np.int8)).position_mm
 
 
 def test_unknown_directions_leave_offsets_zero_and_without_deviation():

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
-from kinacc.calibration.frames import Frames, coordinates
+from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.ridge import minimise_with_prior
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
@@ -46,14 +46,17 @@ class Prior:
 class VECFit:
     """Fitted ``model`` and ``frames``; ``std`` (P,) as ``vec.to_vector``; ``prior_std`` (P,).
 
-    ``solution`` has the figures of the fit over the frame coordinates and the free coefficients.
+    ``solution`` has the figures of the fit over the frame coordinates (``coordinates``) and the
+    ``free`` (P,) coefficients.
     """
 
     model: VECModel
     frames: Frames
     std: np.ndarray
     prior_std: np.ndarray
+    free: np.ndarray
     solution: Solution
+    coordinates: FrameCoordinates
 
 
 def fit(
@@ -68,7 +71,8 @@ def fit(
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
     Base and targets are ``frames``, or start there if ``frames_free``. Direction offsets that no
-    observation shows are left at zero, std NaN.
+    observation shows are left at zero, std NaN; the two of a joint that always travelled sum to
+    zero, so that the model at an unknown direction is the mean of both.
     Raises FitError, and InputError where there are fewer residuals than parameters.
     """
     free = _informed(observations, empty)
@@ -88,6 +92,7 @@ def fit(
         scale=np.concatenate([_units(coords.is_angle()), _units(_is_angle(empty)[free])]),
         name="VEC fit",
     )
+    solution = _with_centred_offsets(solution, observations, empty, free, coords.size)
     vector, std = np.zeros(free.size), np.full(free.size, np.nan)
     vector[free] = solution.x[coords.size :]
     std[free] = solution.std[coords.size :]
@@ -96,7 +101,9 @@ def fit(
         frames=coords.frames(solution.x[: coords.size]),
         std=std,
         prior_std=prior_std,
+        free=free,
         solution=solution,
+        coordinates=coords,
     )
 
 
@@ -123,6 +130,38 @@ def _informed(observations: Observations, empty: VECModel) -> np.ndarray:
     directions = np.array([-1, 1])
     seen = (observations.s[:, :, None] == directions).any(axis=0)
     return np.concatenate([np.ones(empty.coefficients.size, dtype=bool), seen.ravel()])
+
+
+def _with_centred_offsets(
+    solution: Solution,
+    observations: Observations,
+    empty: VECModel,
+    free: np.ndarray,
+    frames: int,
+) -> Solution:
+    """The solution with the mean of both offsets of a joint moved into eps_z of order 0.
+
+    A gauge: it changes no pose of a joint whose every observation travels in a known direction.
+    Without it the prior splits the constant between both, and a pose at s = 0 loses a part.
+    """
+    joints, errors, terms = empty.coefficients.shape
+    split = empty.coefficients.size
+    place = frames + np.cumsum(free) - 1
+    mapping = np.eye(solution.x.size)
+    for joint in range(joints):
+        offsets = split + 2 * joint + np.arange(2)
+        if not free[offsets].all() or (observations.s[:, joint] == 0).any():
+            continue
+        eps_z = (joint * errors + ERRORS.index("eps_z")) * terms
+        mapping[place[eps_z], place[offsets]] += 0.5
+        mapping[np.ix_(place[offsets], place[offsets])] -= 0.5
+    covariance = mapping @ solution.covariance @ mapping.T
+    return replace(
+        solution,
+        x=mapping @ solution.x,
+        covariance=covariance,
+        std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+    )
 
 
 def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
