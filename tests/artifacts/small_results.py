@@ -143,6 +143,12 @@ def _models() -> dict:
         "value": [2.0, 1.0, 0.5],
         "unit": ["1", "1", "1"],
     }
+    covariance = {
+        "parameter": ["j1.d_mm", "j2.d_mm", "j2.d_mm"],
+        "other": ["j1.d_mm", "j1.d_mm", "j2.d_mm"],
+        "covariance": [1e-4, 1e-5, 4e-4],
+        "correlation": [1.0, None, 1.0],
+    }
     return {
         "vec_model": {
             "joint": [joint for joint, _ in terms],
@@ -157,6 +163,7 @@ def _models() -> dict:
         },
         "vec_frames": _frame_table(("vec",)),
         "vec_fit": fit,
+        "vec_covariance": covariance,
         "dh_model": {
             "joint": joints,
             **_dh(6),
@@ -164,6 +171,7 @@ def _models() -> dict:
         },
         "frames": _frame_table(("vec", "dh", "nominal")),
         "dh_fit": fit,
+        "dh_covariance": covariance,
     }
 
 

@@ -26,7 +26,7 @@ def test_any_number_of_parts(project, chunks):
     ("stage", "made"),
     [
         ("measurements", ["measurements.parquet"]),
-        ("vec", ["vec_model.parquet", "vec_frames.parquet", "vec_fit.parquet"]),
+        ("vec", ["vec_model.parquet", "vec_frames.parquet", "vec_covariance.parquet"]),
         ("study_chunk", ["study_chunk/1-of-2.parquet", "study_chunk/2-of-2.parquet"]),
         ("study", ["study.parquet", "study_summary.parquet", "readings.parquet"]),
         ("fig4", ["figures/fig4.svg"]),

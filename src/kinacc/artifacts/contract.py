@@ -10,7 +10,7 @@ A value that does not apply is null, never zero. After a change run
 
 from __future__ import annotations
 
-from kinacc.artifacts import assessment_tables, calibration_tables
+from kinacc.artifacts import assessment_tables, calibration_tables, covariance_tables
 from kinacc.artifacts.columns import Artefact
 
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed")
@@ -25,6 +25,8 @@ ARTEFACTS: dict[str, Artefact] = {
         calibration_tables.DH_MODEL,
         calibration_tables.FRAMES,
         calibration_tables.DH_FIT,
+        covariance_tables.VEC_COVARIANCE,
+        covariance_tables.DH_COVARIANCE,
         calibration_tables.RESIDUALS,
         calibration_tables.POSE_ERRORS,
         assessment_tables.ACCURACY_MAP,

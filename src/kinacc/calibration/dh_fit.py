@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration.frames import Frames, closed_form_start, coordinates
+from kinacc.calibration.frames import FrameCoordinates, Frames, closed_form_start, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
@@ -24,7 +24,7 @@ class DHFit:
     """Fitted ``model`` and ``frames``; ``std`` (k, 5) as ``dh.PARAMETERS``, NaN undetermined.
 
     ``free`` (k, 5) marks the parameters that took part; ``solution`` has the figures of the fit,
-    frame coordinates first.
+    frame coordinates (``coordinates``) first.
     """
 
     model: DHModel
@@ -32,6 +32,7 @@ class DHFit:
     std: np.ndarray
     free: np.ndarray
     solution: Solution
+    coordinates: FrameCoordinates
 
     def with_frames(self, frames: Frames) -> DHFit:
         """The same arm seen through other frames."""
@@ -93,6 +94,7 @@ def fit(
         std=std.reshape(free.shape),
         free=free,
         solution=solution,
+        coordinates=coords,
     )
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.solve import Solution, Spectrum
+from kinacc.calibration.uncertainty import Uncertainty, is_angle, vec_parameter_names
 from kinacc.calibration.vec_fit import VECFit
 from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.models.dh import PARAMETERS
 from kinacc.models.tables import frame
-from kinacc.models.vec import ERRORS, VECModel
+from kinacc.models.vec import ERRORS
 
 Columns = dict[str, np.ndarray]
 _DELTAS = 3
@@ -95,25 +96,32 @@ def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:
     return _long(rows)
 
 
-def dh_fit_columns(fit: DHFit) -> Columns:
-    """``dh_fit``: figures of the fit and singular values."""
-    return _long([*_solution_rows(fit.solution), *_spectrum_rows(fit.solution.spectrum)])
+def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
+    """``dh_fit``: figures of the fit, singular values, directions the data do not determine."""
+    rows = [*_solution_rows(fit.solution), *_spectrum_rows(fit.solution.spectrum)]
+    for number, direction in enumerate(uncertainty.undetermined, 1):
+        rows += [
+            ("undetermined_direction", number, name, value, "mrad" if is_angle(name) else "mm")
+            for name, value in zip(uncertainty.names, direction, strict=True)
+        ]
+    return _long(rows)
 
 
-def vec_parameter_names(model: VECModel) -> list[str]:
-    """Names (P,) of the coefficients, ordered as ``vec.to_vector``: j1.delta_x.0, ..."""
-    coefficients = [
-        f"j{joint}.{error}.{order}"
-        for joint in range(1, model.joints + 1)
-        for error in ERRORS
-        for order in range(model.order + 1)
-    ]
-    offsets = [
-        f"j{joint}.eps_z.{'minus' if direction < 0 else 'plus'}"
-        for joint in range(1, model.joints + 1)
-        for direction in _DIRECTIONS
-    ]
-    return coefficients + offsets
+def covariance_columns(uncertainty: Uncertainty) -> Columns:
+    """``dh_covariance`` or ``vec_covariance``: every pair of parameters once, row by row."""
+    first, second = np.tril_indices(len(uncertainty.names))
+    names = np.array(uncertainty.names, dtype=object)
+    variance = np.maximum(np.diag(uncertainty.covariance), 0.0)
+    std = np.where(uncertainty.determined, np.sqrt(variance), np.nan)
+    covariance = uncertainty.covariance[first, second]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        correlation = np.clip(covariance / (std[first] * std[second]), -1.0, 1.0)
+    return {
+        "parameter": names[first],
+        "other": names[second],
+        "covariance": covariance,
+        "correlation": np.where(np.isfinite(correlation), correlation, np.nan),
+    }
 
 
 def _solution_rows(solution: Solution) -> Iterable[tuple]:

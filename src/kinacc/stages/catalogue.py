@@ -61,7 +61,7 @@ STAGES: dict[str, Stage] = {
             "vec",
             "fitting the volumetric error compensation (VEC) model to the training poses",
             ("measurements",),
-            ("vec_model", "vec_frames", "vec_fit"),
+            ("vec_model", "vec_frames", "vec_fit", "vec_covariance"),
             (
                 "robot",
                 "calibration.rotation_weight_mm_per_rad",
@@ -74,7 +74,7 @@ STAGES: dict[str, Stage] = {
             "dh",
             "fitting the DH model by least squares (Table II)",
             ("measurements", "vec_model", "vec_frames"),
-            ("dh_model", "frames", "dh_fit"),
+            ("dh_model", "frames", "dh_fit", "dh_covariance"),
             (
                 "robot",
                 "calibration.rotation_weight_mm_per_rad",

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinacc import robot
-from kinacc.calibration import models, tables
+from kinacc.calibration import models, tables, uncertainty
 from kinacc.models.tables import vec_model
 from kinacc.stages import calibration_settings as shared
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
-    """``dh_model``, ``frames`` of all three models and ``dh_fit``, from the rows that train."""
+    """``dh_model``, its covariance, ``frames`` of all models and ``dh_fit``, from training rows."""
     arm = robot.load(settings["robot"])
     options = shared.options(settings["calibration"])
     every, train = shared.observed(inputs, arm)
@@ -25,11 +25,13 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     frames = {"dh": fitted.frames, "nominal": nominal.frames}
     others = tables.frames_columns(frames, every.target_names)
     kept = inputs["vec_frames"]
+    known = uncertainty.of_dh(fitted, every.target_names)
     return {
         "dh_model": tables.dh_model_columns(fitted),
         "frames": {
             name: np.concatenate([np.asarray(kept[name]), values])
             for name, values in others.items()
         },
-        "dh_fit": tables.dh_fit_columns(fitted),
+        "dh_fit": tables.dh_fit_columns(fitted, known),
+        "dh_covariance": tables.covariance_columns(known),
     }

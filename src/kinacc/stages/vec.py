@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinacc import robot
-from kinacc.calibration import models, tables
+from kinacc.calibration import models, tables, uncertainty
 from kinacc.stages import calibration_settings as shared
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
-    """``vec_model``, ``vec_frames`` and ``vec_fit`` of the rows that train."""
+    """``vec_model``, its covariance, ``vec_frames`` and ``vec_fit`` of the rows that train."""
     arm, calibration = robot.load(settings["robot"]), settings["calibration"]
     options = shared.options(calibration)
     every, train = shared.observed(inputs, arm)
@@ -24,4 +24,5 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
         "vec_model": tables.vec_model_columns(fitted),
         "vec_frames": tables.frames_columns({"vec": fitted.frames}, every.target_names),
         "vec_fit": tables.vec_fit_columns(fitted, gauge),
+        "vec_covariance": tables.covariance_columns(uncertainty.of_vec(fitted, every.target_names)),
     }

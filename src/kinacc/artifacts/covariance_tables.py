@@ -1,0 +1,33 @@
+"""Contract of the tables that say how sure a fit is of everything it estimated."""
+
+from __future__ import annotations
+
+from kinacc.artifacts.columns import Artefact, real, text
+
+_NAMES = (
+    "base.x_mm .. base.rz_rad (base in the instrument's frame), tool.x_mm .. (target in the flange "
+    "frame), then the model's own"
+)
+_COLUMNS = (
+    text("parameter", f"an estimated parameter: {_NAMES}"),
+    text("other", "the same parameter (its variance) or one before it"),
+    real(
+        "covariance",
+        "product of the units of both",
+        "covariance; mm for lengths and delta, rad for angles and eps",
+    ),
+    real("correlation", "1", "correlation; null where one of both is undetermined", -1, 1, True),
+)
+VEC_COVARIANCE = Artefact(
+    "vec_covariance",
+    "Posterior covariance of the VEC coefficients and the frames estimated with them.",
+    _COLUMNS,
+    ("parameter", "other"),
+)
+DH_COVARIANCE = Artefact(
+    "dh_covariance",
+    "Covariance of the DH parameters and their frames in the directions the poses determine; the "
+    "others are the undetermined_direction rows of dh_fit.",
+    _COLUMNS,
+    ("parameter", "other"),
+)
