@@ -25,9 +25,7 @@ from kinacc.geometry import (
 from kinacc.models.dh import DHModel
 from kinacc.robot.forms import from_modified
 from kinacc.robot.reader import ANGLE, LENGTH, Reader
-from kinacc.robot.record import Robot
-
-FEWEST_JOINTS, MOST_JOINTS = 4, 7
+from kinacc.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
 
 _SHIPPED = Path(__file__).parents[1] / "robots"
 _ANGLES, _LENGTHS = ("theta_offset", "alpha", "beta"), ("d", "a")

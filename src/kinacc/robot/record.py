@@ -10,6 +10,8 @@ from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.models import dh as _dh
 from kinacc.models.dh import DHModel
 
+FEWEST_JOINTS, MOST_JOINTS = 4, 7
+
 
 @dataclass(frozen=True)
 class Robot:
