@@ -5,14 +5,14 @@ Every rule yields problems; ``place(*keys)`` words where a setting of the data s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from kinacc.config.reading import read
 from kinacc.config.validate import ROBOTS
 from kinacc.config.values import shown
-from kinacc.errors import Problem
+from kinacc.errors import InputError, Problem
 
 Place = Callable[..., str]
 _SYNTHESISED = "mh180"
@@ -90,35 +90,36 @@ def _study(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
 
 def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Iterator[Problem]:
     """Settings that speak of joints the robot has not; faults of a robot file are its reader's."""
-    path = ROBOTS / f"{robot}.yaml"
-    described, problems = read(path if path.is_file() else folder / robot)
-    limits = described.data.get("limits_deg")
-    if problems or not isinstance(limits, list) or not all(map(_is_pair, limits)):
+    hayati = full["calibration"]["dh"]["hayati_joints"]
+    ranges = (("calibration", "vec", "joint_range"), ("evaluation", "joint_box", "joints_deg"))
+    given = {keys: full[keys[0]][keys[1]][keys[2]] for keys in ranges}
+    if not hayati and not any(isinstance(pairs, list) for pairs in given.values()):
         return
-    joints = len(limits)
-    beyond = [each for each in full["calibration"]["dh"]["hayati_joints"] if each > joints]
+    from kinacc.robot import load, shipped
+
+    try:
+        arm = load(robot if robot in shipped() else folder / robot)
+    except InputError:
+        return
+    joints = arm.dh.joints
+    beyond = [each for each in hayati if each > joints]
     if beyond:
         what = f"{robot} has no joint {', '.join(map(str, beyond))}"
         yield Problem(place("calibration", "dh", "hayati_joints"), what, f"1 to {joints}")
-    for keys in (("calibration", "vec", "joint_range"), ("evaluation", "joint_box", "joints_deg")):
-        pairs = full[keys[0]][keys[1]][keys[2]]
+    for keys, pairs in given.items():
         if isinstance(pairs, list) and len(pairs) != joints:
             what = f"{len(pairs)} pairs for the {joints} joints of {robot}"
             yield Problem(place(*keys), what, "one pair per joint")
-    box = full["evaluation"]["joint_box"]["joints_deg"]
-    for number, (pair, limit) in enumerate(zip(box or (), limits, strict=False), 1):
-        if not limit[0] <= pair[0] < pair[1] <= limit[1]:
+    box = given["evaluation", "joint_box", "joints_deg"] or ()
+    limits = zip(arm.q_min_rad, arm.q_max_rad, arm.dh.prismatic, strict=True)
+    for number, (pair, (low, high, slides)) in enumerate(zip(box, limits, strict=False), 1):
+        if slides:
+            continue
+        low, high = (round(math.degrees(limit), 9) for limit in (low, high))
+        if not low <= pair[0] < pair[1] <= high:
             what = f"{shown(pair)} reaches beyond the limits of joint {number} of {robot}"
-            allowed = f"{limit[0]:g} to {limit[1]:g} deg"
+            allowed = f"{low:g} to {high:g} deg"
             yield Problem(place("evaluation", "joint_box", "joints_deg"), what, allowed)
-
-
-def _is_pair(limit: Any) -> bool:
-    return (
-        isinstance(limit, list)
-        and len(limit) == 2
-        and all(isinstance(each, (int, float)) for each in limit)
-    )
 
 
 def _folds(measurements: Mapping[str, Any], place) -> Iterator[Problem]:

@@ -96,7 +96,8 @@ def files(name_or_path: str | Path) -> list[Path]:
     if path.suffix.lower() not in (".yaml", ".yml"):
         return [path]
     inner = read(path)[0].data.get("urdf")
-    return [path, path.parent / inner] if isinstance(inner, str) else [path]
+    named = [path.parent / inner] if isinstance(inner, str) else []
+    return [path, *(file for file in named if file.is_file())]
 
 
 def _path(name_or_path: str | Path) -> Path:

@@ -200,7 +200,11 @@ class Plan:
                 value = value.get(key) if isinstance(value, Mapping) else None
             if path == "robot":
                 if isinstance(value, str) and os.path.isfile(value):
-                    found["robot_file"] = value
+                    from kinacc.robot import files
+
+                    roles = ("robot_file", "robot_urdf")
+                    read = zip(roles, files(value), strict=False)
+                    found |= {role: str(file) for role, file in read}
             elif value is not None and config["measurements"]["source"] == "file":
                 found["measurements_file"] = value
         return found
