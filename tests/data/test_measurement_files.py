@@ -72,9 +72,11 @@ def assert_is_truth(columns, truth):
 
 
 def test_euler_degrees_and_millimetres(tmp_path, good, truth):
-    reading = read(SECTION | {"path": written(tmp_path, good | {"temp_C": np.ones(12)})}, ARM)
+    reading = read(SECTION | {"path": written(tmp_path, good | {"stamp": np.ones(12)})}, ARM)
     assert_is_truth(reading.columns, truth)
-    assert reading.unused == ("temp_C",)
+    assert reading.unused == ("stamp",)
+    assert reading.left_out() == ["columns not used: stamp"]
+    np.testing.assert_array_equal(reading.columns["row"], np.arange(2, 14))
 
 
 def test_rotation_vectors_metres_and_radians(tmp_path, good, truth):

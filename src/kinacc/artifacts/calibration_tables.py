@@ -25,6 +25,7 @@ from kinacc.artifacts.columns import (
     magnitude,
     real,
     text,
+    unstated,
     whole,
 )
 
@@ -83,6 +84,25 @@ _FIT_COLUMNS = (
     real("value", "see unit", "the value", nullable=True),
     text("unit", "unit of the value; 1 for a pure number"),
 )
+_STATED_BY_FILES = (
+    text("session", "session with a base frame of its own; null for one alone"),
+    *(magnitude(f"std_{axis}_mm", "mm", f"standard deviation of {axis}_mm", 1e3) for axis in "xyz"),
+    *(
+        real(f"corr_{pair}", "1", f"correlation of {pair[0]}_mm and {pair[1]}_mm", -1, 1)
+        for pair in ("xy", "xz", "yz")
+    ),
+    *(
+        magnitude(
+            f"std_r{axis}_rad",
+            "rad",
+            f"standard deviation of the target's small turn about the instrument's {axis}",
+            TURN_RAD,
+        )
+        for axis in "xyz"
+    ),
+    real("temperature_c", "degC", "temperature stated with the reading", -273.15, 1e3),
+    whole("row", "line of the measured file the reading stands in", 1),
+)
 MEASUREMENTS = Artefact(
     "measurements",
     "Measured poses, one row per reading of one target.",
@@ -95,6 +115,7 @@ MEASUREMENTS = Artefact(
         whole("repeat", "number of the reading at this configuration and target"),
         text("subset", "train (used by the delivered fits) or validation (held out)", SUBSETS),
         whole("fold", "fold in which the row is held out; null without folds", nullable=True),
+        *unstated(_STATED_BY_FILES),
     ),
     ("pose", "target", "repeat"),
 )

@@ -15,7 +15,8 @@ class Column:
 
     ``kind`` is float, int, int8 or text. ``unit`` is empty for text and names, "1" for pure
     numbers. ``low`` and ``high`` bound what is physically possible, both included; ``choices`` or
-    ``pattern`` bound what a text may say.
+    ``pattern`` bound what a text may say. An ``optional`` column is null throughout where a table
+    does not state it.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Column:
     high: float | None = None
     choices: tuple[str | int, ...] = ()
     pattern: str = ""
+    optional: bool = False
 
     @property
     def per_joint(self) -> bool:
@@ -115,6 +117,11 @@ def whole(name: str, meaning: str, low=0, high=None, nullable=False, choices=())
 
 def text(name: str, meaning: str, choices=(), pattern="", nullable=False) -> Column:
     return Column(name, "text", "", meaning, nullable, None, None, tuple(choices), pattern)
+
+
+def unstated(columns: Iterable[Column]) -> tuple[Column, ...]:
+    """The columns as ones a table may leave out, which makes them null."""
+    return tuple(replace(column, optional=True, nullable=True) for column in columns)
 
 
 def length(name: str, meaning: str, limit: float, nullable=False) -> Column:

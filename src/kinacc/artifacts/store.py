@@ -61,8 +61,9 @@ def arrow_schema(artefact: str, joints: int = 0, provenance: Mapping | None = No
 def to_table(artefact: str, columns: Mapping[str, object], provenance: Mapping) -> pa.Table:
     """Cast columns (each of shape (rows,)) to the artefact's Arrow table.
 
-    NaN and None become null where the contract allows null. Raises InputError naming every missing
-    or unknown column, null where none may be, number that is not finite, and value of a wrong type.
+    NaN and None become null where the contract allows null; so do optional columns not given.
+    Raises InputError naming every missing or unknown column, null where none may be, number that is
+    not finite, and value of a wrong type.
     """
     contract = artefact_named(artefact)
     where = f"table {artefact}"
@@ -82,10 +83,13 @@ def to_table(artefact: str, columns: Mapping[str, object], provenance: Mapping) 
     arrays = []
     for column in wanted:
         place = f"{where}, column {column.name}"
-        if column.name not in columns:
+        if column.name not in columns and not column.optional:
             problems.append(Problem(place, "missing"))
             continue
-        array, found = _to_arrow(place, column, columns[column.name])
+        values = columns.get(column.name)
+        if values is None:
+            values = [None] * len(next(iter(columns.values())))
+        array, found = _to_arrow(place, column, values)
         problems += found
         arrays.append(array)
     lengths = {c.name: len(a) for c, a in zip(wanted, arrays, strict=False) if a is not None}

@@ -7,331 +7,279 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.data import faults
+from kinacc.data.layout import STD, TOOL, Found, Layout, Place, Target, find
+from kinacc.data.orientation import quaternions, rotation_std
 from kinacc.data.table import RawTable, load, numbers
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import quaternion_from_rotation
-from kinacc.models import dh as _dh
-from kinacc.robot import Robot, dh_angles
+from kinacc.robot import Robot
 
-TOOL = "tool"
-
-_TO_RAD = {"deg": np.pi / 180.0, "rad": 1.0}
-_TO_MM = {"mm": 1.0, "m": 1000.0}
-_UNIT_QUATERNION = 1e-3  # how far from 1 a measured quaternion's length may be
-_ORIENTATION_NAMES = {
-    "none": (),
-    "quaternion": ("qw", "qx", "qy", "qz"),
-    "rotation_vector": ("rx", "ry", "rz"),
-    "euler": ("rx", "ry", "rz"),
-}
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How a file states its measurements; the ``measurements.file`` section of the configuration.
-
-    ``columns`` maps our names (``q1``, ``x``, ``rx``, ``pose``, ...) to the file's own, which then
-    carry ``joint_unit``, ``length_unit`` and ``angle_unit``; other columns carry the unit in their
-    name (``q1_deg``, ``x_m``).
-    """
-
-    columns: Mapping[str, str]
-    joint_unit: str = "deg"
-    length_unit: str = "mm"
-    orientation: str = "euler"
-    convention: str = "XYZ"
-    angle_unit: str = "deg"
-
-    @classmethod
-    def of(cls, section: Mapping) -> Layout:
-        """Layout from the configuration section ``measurements.file``."""
-        turn = section["orientation"]
-        return cls(
-            section["columns"],
-            section["joint_unit"],
-            section["length_unit"],
-            turn["kind"],
-            turn["convention"],
-            turn["unit"],
-        )
+POSITION = ("x_mm", "y_mm", "z_mm")
+QUATERNION = ("qw", "qx", "qy", "qz")
+UNCERTAINTY = (
+    *(f"{name}_mm" for name in STD),
+    *("corr_xy", "corr_xz", "corr_yz"),
+    *("std_rx_rad", "std_ry_rad", "std_rz_rad"),
+)
 
 
 @dataclass(frozen=True)
 class Reading:
-    """``columns`` of the measurements artefact without folds, and the names that were not used."""
+    """What a file holds.
+
+    ``columns`` of the measurements artefact but fold and subset, one row per reading of a target;
+    ``commanded`` (rows, k) the joints as commanded, None where the file does not say; ``unused``
+    columns of the file; ``notes`` say what else was left out, with its lines.
+    """
 
     columns: dict[str, np.ndarray]
-    unused: tuple[str, ...]
+    unused: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    commanded: np.ndarray | None = None
+
+    def left_out(self) -> list[str]:
+        """All that was not used, in words."""
+        unused = [f"columns not used: {', '.join(self.unused)}"] if self.unused else []
+        return [*unused, *self.notes]
 
 
-@dataclass(frozen=True)
-class _Column:
-    """Where a quantity stands in the file and the factor to our unit."""
-
-    name: str
-    factor: float
-
-
-def read(section: Mapping, robot: Robot) -> Reading:
+def read(section: Mapping, robot: Robot, strict: bool = True) -> Reading:
     """Measurements of the file that ``section`` (``measurements.file``) names.
 
-    Raises InputError listing everything that is wrong with the file.
+    ``strict``: values that cannot be meant (joints outside their limits, metres taken for
+    millimetres) are refused too. Raises InputError listing everything that is wrong with the file.
     """
-    table = load(section["path"], section["delimiter"], section["decimal"], section.get("source"))
-    return convert(table, Layout.of(section), robot)
-
-
-def convert(table: RawTable, layout: Layout, robot: Robot) -> Reading:
-    """Measurements of a table as read. Raises InputError listing every problem."""
-    problems: list[Problem] = []
-    joints = robot.dh.joints
-    found = _find(table, layout, joints, problems)
-    if problems:
-        raise InputError(problems, f"{table.path} cannot be used")
-    scaled = {
-        name: numbers(table, place.name, problems) * place.factor for name, place in found.items()
-    }
-    names = _ORIENTATION_NAMES[layout.orientation]
-    turns = np.stack([scaled[name] for name in names], axis=1) if names else None
-    if turns is not None and layout.orientation == "quaternion":
-        problems += _quaternion_problems(table, turns)
-    q_rad = np.stack([scaled[f"q{i}"] for i in range(1, joints + 1)], axis=1)
-    position_mm = np.stack([scaled[axis] for axis in "xyz"], axis=1)
-    problems += _limit_problems(table, q_rad, robot, found)
-    s = _directions(table, layout, joints, problems)
-    pose, repeat = _numbering(table, layout, problems)
-    if not problems:
-        problems += _scale_problems(table, q_rad, position_mm, robot)
-    if problems:
-        raise InputError(problems, f"{table.path} cannot be used")
-    columns = {"pose": pose}
-    columns |= {f"q{i + 1}": q_rad[:, i] for i in range(joints)}
-    columns |= {f"s{i + 1}": s[:, i] for i in range(joints)}
-    columns["target"] = np.full(len(table), TOOL, dtype=object)
-    columns |= dict(zip(("x_mm", "y_mm", "z_mm"), position_mm.T, strict=True))
-    quaternion = _quaternions(turns, layout, len(table))
-    columns |= dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True))
-    columns["repeat"] = repeat
-    used = {place.name for place in found.values()} | set(_extras(table, layout, joints).values())
-    return Reading(columns, tuple(name for name in table.columns if name not in used))
-
-
-def _find(
-    table: RawTable, layout: Layout, joints: int, problems: list[Problem]
-) -> dict[str, _Column]:
-    """Columns of every quantity wanted; what is missing is added to ``problems``."""
-    wanted = [(f"q{i}", layout.joint_unit, _TO_RAD) for i in range(1, joints + 1)]
-    wanted += [(axis, layout.length_unit, _TO_MM) for axis in "xyz"]
-    for name in _ORIENTATION_NAMES[layout.orientation]:
-        units = {"": 1.0} if layout.orientation == "quaternion" else _TO_RAD
-        wanted.append(
-            (name, "" if layout.orientation == "quaternion" else layout.angle_unit, units)
-        )
-    found = {}
-    for name, unit, units in wanted:
-        place = _place(table, layout, name, unit, units, problems)
-        if place is not None:
-            found[name] = place
-    spare = f"q{joints + 1}"
-    if any(column in table.columns for column in (f"{spare}_deg", f"{spare}_rad")):
-        where = f"{table.path}: columns"
-        problems.append(Problem(where, f"{spare} is there, the robot has {joints} joints"))
-    return found
-
-
-def _place(
-    table: RawTable,
-    layout: Layout,
-    name: str,
-    unit: str,
-    units: Mapping[str, float],
-    problems: list[Problem],
-) -> _Column | None:
-    if name in layout.columns:
-        foreign = layout.columns[name]
-        if foreign in table.columns:
-            return _Column(foreign, units[unit])
-        problems.append(
-            Problem(
-                f"{table.path}: column {foreign}",
-                f"is not there, but measurements.file.columns maps {name} to it",
-                _listed(table),
-            )
-        )
-        return None
-    own = [f"{name}_{each}" if each else name for each in units]
-    present = [
-        (each, factor)
-        for each, factor in zip(own, units.values(), strict=True)
-        if each in table.columns
-    ]
-    if len(present) == 1:
-        return _Column(*present[0])
-    what = "is given in two units" if present else "is missing"
-    problems.append(
-        Problem(
-            f"{table.path}: column {' or '.join(own)}",
-            what,
-            _listed(table),
-            "" if present else f"or map {name} in measurements.file.columns",
-        )
+    table = load(
+        section["path"],
+        section["delimiter"],
+        section["decimal"],
+        section.get("source"),
+        (section.get("skip_lines", 0), section.get("skip_under_names", 0)),
     )
-    return None
+    return convert(table, Layout.of(section), robot, strict)
 
 
-def _listed(table: RawTable) -> str:
-    return "the file has " + ", ".join(table.columns)
+def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> Reading:
+    """Measurements of a table as read; see ``read``. Raises InputError listing every problem."""
+    problems: list[Problem] = []
+    title = f"{table.path} cannot be used"
+    found = find(table, layout, robot.dh.prismatic, problems)
+    if found is None:
+        raise InputError(problems, title)
+    q_rad = _stacked(table, found.joints, problems)
+    commanded = _stacked(table, found.commanded, problems, gaps=True) if found.commanded else None
+    shared = _numbered(table, found, problems)
+    s = _directions(table, found, len(found.joints), problems)
+    parts = [_target(table, target, layout, problems) for target in found.targets]
+    nothing = ~np.any([part["there"] for part in parts], axis=0)
+    if nothing.all() and not problems:
+        problems.append(Problem(table.path, "no target was measured in any row", "positions"))
+    if strict:
+        problems += faults.limit_problems(table, q_rad, robot, found.joints)
+    order = np.concatenate([np.flatnonzero(part["there"]) for part in parts])
+    columns = _row_columns(q_rad, s, shared, order)
+    for name in ("target", *POSITION, *QUATERNION, *UNCERTAINTY):
+        columns[name] = np.concatenate([part[name][part["there"]] for part in parts])
+    if "target" in shared:
+        columns["target"] = shared["target"][order]
+    columns["row"] = table.line[order]
+    by_row = np.argsort(order, kind="stable")
+    columns = {name: values[by_row] for name, values in columns.items()}
+    order = order[by_row]
+    if "repeat" not in found.single:
+        columns["repeat"] = _count_within(columns)
+    elif "pose" in found.single:
+        problems += _doubled(table, columns, order)
+    if strict and not problems:
+        problems += faults.scale_problems(table, columns, robot)
+    if problems:
+        raise InputError(problems, title)
+    notes = [f"nothing was measured in {table.rows_in_words(np.flatnonzero(nothing))}"]
+    return Reading(
+        columns,
+        found.unused(table),
+        tuple(notes if nothing.any() else ()),
+        commanded if commanded is None else commanded[order],
+    )
 
 
-def _extras(table: RawTable, layout: Layout, joints: int) -> dict[str, str]:
-    """Optional columns that are there: our name -> the file's name."""
-    names = ["pose", "repeat", *(f"s{i}" for i in range(1, joints + 1))]
-    own = {name: layout.columns.get(name, name) for name in names}
-    return {name: column for name, column in own.items() if column in table.columns}
+def _stacked(table: RawTable, places: tuple[Place, ...], problems, gaps=False) -> np.ndarray:
+    """Columns (n, len(places)) in our units."""
+    columns = [numbers(table, each.column, problems, gaps=gaps) * each.factor for each in places]
+    return np.stack(columns, axis=1)
 
 
-def _directions(
-    table: RawTable, layout: Layout, joints: int, problems: list[Problem]
-) -> np.ndarray:
+def _row_columns(q_rad, s, shared, order) -> dict[str, np.ndarray]:
+    """What the targets of a row of the file have in common."""
+    columns = {"pose": shared["pose"][order]}
+    columns |= {f"q{i + 1}": q_rad[order, i] for i in range(q_rad.shape[1])}
+    columns |= {f"s{i + 1}": s[order, i] for i in range(s.shape[1])}
+    columns["repeat"] = shared["repeat"][order]
+    columns["session"] = shared["session"][order]
+    columns["temperature_c"] = shared["temperature"][order]
+    return columns
+
+
+def _target(table: RawTable, target: Target, layout: Layout, problems) -> dict[str, np.ndarray]:
+    """Columns (n,) of one target, and ``there`` (n,): where it was measured."""
+    count = len(table)
+    position = _stacked(table, target.position, problems, gaps=True)
+    empty = _empty(table, target.position, problems)
+    part = {"there": ~empty, "target": np.full(count, target.name, dtype=object)}
+    turn = np.full((count, 3), np.nan)
+    quaternion = np.full((count, 4), np.nan)
+    if target.turn:
+        _empty(table, target.turn, problems)
+        turn = _stacked(table, target.turn, problems, gaps=True)
+        if layout.orientation == "quaternion":
+            problems += faults.quaternion_problems(table, turn, target.turn)
+        quaternion = quaternions(turn, layout)
+    part |= dict(zip(POSITION, position.T, strict=True))
+    part |= dict(zip(QUATERNION, quaternion.T, strict=True))
+    part |= _uncertainty(table, target, turn, layout, problems)
+    return part
+
+
+def _empty(table: RawTable, places: tuple[Place, ...], problems) -> np.ndarray:
+    """True (n,) where the columns are empty; some of them empty in a row is a problem."""
+    cells = np.stack([table.gaps(place.column) for place in places], axis=1)
+    partly = np.flatnonzero(cells.any(axis=1) & ~cells.all(axis=1))
+    if partly.size:
+        names = ", ".join(place.column for place in places)
+        where = f"{table.path}: columns {names}, {table.rows_in_words(partly)}"
+        problems.append(Problem(where, "some of them are empty", "all of them, or none"))
+    return cells.all(axis=1)
+
+
+def _uncertainty(table, target, turn, layout, problems) -> dict[str, np.ndarray]:
+    """Standard deviations and correlations (n,) of a target, NaN where the file has none."""
+    values = np.full((9, len(table)), np.nan)
+    if target.std:
+        values[:3] = _spread(table, target.std, problems).T
+    if target.covariance:
+        xx, xy, xz, yy, yz, zz = _stacked(table, target.covariance, problems, gaps=True).T
+        problems += faults.covariance_problems(table, (xx, xy, xz, yy, yz, zz), target.covariance)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values[:3] = np.sqrt([xx, yy, zz])
+            values[3:6] = xy / np.sqrt(xx * yy), xz / np.sqrt(xx * zz), yz / np.sqrt(yy * zz)
+    if target.std_turn and target.turn and layout.orientation != "quaternion":
+        std = _spread(table, target.std_turn, problems)
+        there = np.isfinite(turn).all(axis=1) & np.isfinite(std).all(axis=1)
+        values[6:, there] = rotation_std(
+            turn[there], _in_reading_order(std[there], layout), layout
+        ).T
+    return dict(zip(UNCERTAINTY, values, strict=True))
+
+
+def _spread(table: RawTable, places: tuple[Place, ...], problems) -> np.ndarray:
+    """Standard deviations (n, 3); an empty cell or a zero, which says nothing, is NaN."""
+    std = _stacked(table, places, problems, gaps=True)
+    problems += faults.negative(table, std, places)
+    return np.where(std > 0.0, std, np.nan)
+
+
+def _in_reading_order(std: np.ndarray, layout: Layout) -> np.ndarray:
+    """``std_rx``, ``std_ry``, ``std_rz`` (n, 3) in the order of the convention's angles."""
+    axes = layout.convention.lower()
+    if layout.orientation != "euler" or len(set(axes)) < 3:
+        return std
+    return std[:, ["xyz".index(axis) for axis in axes]]
+
+
+def _directions(table: RawTable, found: Found, joints: int, problems) -> np.ndarray:
     """Travel directions (n, k), 0 where the file says nothing."""
     s = np.zeros((len(table), joints), dtype=np.int8)
-    for name, column in _extras(table, layout, joints).items():
-        if not name.startswith("s"):
-            continue
-        values = numbers(table, column, problems)
+    for joint, place in found.directions.items():
+        values = numbers(table, place.column, problems, gaps=True)
         bad = np.flatnonzero(np.isfinite(values) & ~np.isin(values, (-1, 0, 1)))
         if bad.size:
-            where = f"{table.path}: column {column}, {table.rows_in_words(bad)}"
+            where = f"{table.path}: column {place.column}, {table.rows_in_words(bad)}"
             problems.append(Problem(where, f"{values[bad[0]]:g}", "-1, 0 or 1"))
-        s[:, int(name[1:]) - 1] = np.where(np.isin(values, (-1, 0, 1)), values, 0)
+        s[:, joint] = np.where(np.isin(values, (-1, 0, 1)), values, 0)
     return s
 
 
-def _numbering(
-    table: RawTable, layout: Layout, problems: list[Problem]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Pose and repeat numbers (n,); without them every row is a pose of its own."""
-    extras = _extras(table, layout, 0)
-    found = {}
-    for name in ("pose", "repeat"):
-        if name in extras:
-            values = numbers(table, extras[name], problems)
-            bad = np.flatnonzero(np.isfinite(values) & ((values < 0) | (values % 1 != 0)))
-            if bad.size:
-                where = f"{table.path}: column {extras[name]}, {table.rows_in_words(bad)}"
-                problems.append(Problem(where, f"{values[bad[0]]:g}", "whole numbers from 0"))
-            found[name] = np.where(np.isfinite(values), values, 0).astype(np.int64)
-    pose = found.get("pose", np.arange(len(table)))
-    repeat = found.get("repeat")
-    if repeat is None:
-        repeat = _count_within(pose)
-    elif "pose" in found:
-        problems += _doubled(table, pose, repeat)
-    return pose, repeat
+def _numbered(table: RawTable, found: Found, problems) -> dict[str, np.ndarray]:
+    """Pose, repeat, session and temperature (n,); without poses every row is one of its own."""
+    count = len(table)
+    shared = {
+        "pose": np.arange(count),
+        "repeat": np.zeros(count, dtype=np.int64),
+        "session": np.full(count, None, dtype=object),
+        "temperature": np.full(count, np.nan),
+    }
+    for name, place in found.single.items():
+        if name in ("target", "session"):
+            shared[name] = _labels(table, place.column, problems)
+        elif name == "temperature":
+            shared[name] = numbers(table, place.column, problems, gaps=True)
+        else:
+            shared[name] = _whole(table, place.column, problems, words=name == "pose")
+    if "session" in found.single and "pose" in found.single:
+        # Every session may count its poses from 0.
+        pairs = list(zip(shared["session"], shared["pose"].tolist(), strict=True))
+        shared["pose"] = _by_appearance(pairs)
+    return shared
 
 
-def _count_within(pose: np.ndarray) -> np.ndarray:
-    """Running number of every row among the rows of its pose, from 0."""
-    order = np.argsort(pose, kind="stable")
-    ordered = pose[order]
-    first = np.searchsorted(ordered, ordered, side="left")
-    count = np.empty(len(pose), dtype=np.int64)
-    count[order] = np.arange(len(pose)) - first
+def _labels(table: RawTable, column: str, problems) -> np.ndarray:
+    cells = [None if table.is_gap(cell) else str(cell).strip() for cell in table.columns[column]]
+    labels = np.array([*cells, None], dtype=object)[:-1]
+    empty = np.flatnonzero([cell is None for cell in cells])
+    if empty.size:
+        where = f"{table.path}: column {column}, {table.rows_in_words(empty)}"
+        problems.append(Problem(where, "is empty", "a name in every row"))
+    return labels
+
+
+def _whole(table: RawTable, column: str, problems, words: bool) -> np.ndarray:
+    """Whole numbers (n,); with ``words``, names are numbered as they first appear."""
+    found: list[Problem] = []
+    values = numbers(table, column, found)
+    if words and not np.isfinite(values).any():
+        labels = _labels(table, column, problems)
+        return _by_appearance(labels.tolist())
+    bad = np.flatnonzero(np.isfinite(values) & ((values < 0) | (values % 1 != 0)))
+    if bad.size:
+        where = f"{table.path}: column {column}, {table.rows_in_words(bad)}"
+        found.append(Problem(where, f"{values[bad[0]]:g}", "whole numbers from 0"))
+    problems += found
+    return np.where(np.isfinite(values), values, 0).astype(np.int64)
+
+
+def _by_appearance(labels: list) -> np.ndarray:
+    numbers_of = {label: number for number, label in enumerate(dict.fromkeys(labels))}
+    return np.array([numbers_of[label] for label in labels], dtype=np.int64)
+
+
+def _keys(columns: Mapping) -> np.ndarray:
+    """Number (n,) of every pose and target."""
+    pairs = zip(columns["pose"].tolist(), columns["target"].tolist(), strict=True)
+    return _by_appearance(list(pairs))
+
+
+def _count_within(columns: Mapping) -> np.ndarray:
+    """Running number of every row among the rows of its pose and target, from 0."""
+    key = _keys(columns)
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    count = np.empty(len(key), dtype=np.int64)
+    count[order] = np.arange(len(key)) - np.searchsorted(ordered, ordered, side="left")
     return count
 
 
-def _doubled(table: RawTable, pose: np.ndarray, repeat: np.ndarray) -> list[Problem]:
-    pairs = np.stack([pose, repeat], axis=1)
+def _doubled(table: RawTable, columns: Mapping, order: np.ndarray) -> list[Problem]:
+    pairs = np.stack([_keys(columns), columns["repeat"]], axis=1)
     _, first, inverse = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
-    again = np.flatnonzero(first[inverse.ravel()] != np.arange(len(pose)))
+    again = np.flatnonzero(first[inverse.ravel()] != np.arange(len(pairs)))
     if not again.size:
         return []
-    row = again[0]
+    pose, repeat, target = (columns[name][again[0]] for name in ("pose", "repeat", "target"))
+    of = "" if target == TOOL else f", target {target}"
     return [
         Problem(
-            f"{table.path}: {table.rows_in_words(again)}",
-            f"pose {pose[row]}, repeat {repeat[row]} is given again",
-            "one row per pose and repeat",
+            f"{table.path}: {table.rows_in_words(np.unique(order[again]))}",
+            f"pose {pose}, repeat {repeat}{of} is given again",
+            "one row per pose, repeat and target",
         )
     ]
-
-
-def _quaternion_problems(table: RawTable, quaternion: np.ndarray) -> list[Problem]:
-    length = np.linalg.norm(quaternion, axis=1)
-    bad = np.flatnonzero(np.isfinite(length) & (np.abs(length - 1.0) > _UNIT_QUATERNION))
-    if not bad.size:
-        return []
-    return [
-        Problem(
-            f"{table.path}: columns qw, qx, qy, qz, {table.rows_in_words(bad)}",
-            f"quaternion of length {length[bad[0]]:.6g}",
-            f"length 1 within {_UNIT_QUATERNION:g}",
-            "check the order w, x, y, z and the decimals written",
-        )
-    ]
-
-
-def _limit_problems(
-    table: RawTable, q_rad: np.ndarray, robot: Robot, found: Mapping[str, _Column]
-) -> list[Problem]:
-    problems = []
-    slack = 1e-6
-    for joint in range(robot.dh.joints):
-        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
-        values = q_rad[:, joint]
-        bad = np.flatnonzero((values < low - slack) | (values > high + slack))
-        if bad.size:
-            column = found[f"q{joint + 1}"]
-            limits = f"{np.rad2deg(low):g} to {np.rad2deg(high):g} deg ({robot.name})"
-            hint = ""
-            if column.factor == 1.0 and np.max(np.abs(values)) > 4.0 * np.pi:
-                hint = "the column looks like degrees"
-            value = f"{values[bad[0]] / column.factor:g}"
-            where = f"{table.path}: column {column.name}, {table.rows_in_words(bad)}"
-            problems.append(Problem(where, f"{value} is outside the joint limits", limits, hint))
-    return problems
-
-
-def _scale_problems(
-    table: RawTable, q_rad: np.ndarray, position_mm: np.ndarray, robot: Robot
-) -> list[Problem]:
-    """Units that cannot be meant: measured points spread unlike the points the arm reaches."""
-    expected = _spread(_dh.forward(robot.dh, dh_angles(robot, q_rad)).position_mm)
-    measured = _spread(position_mm)
-    if len(table) < 4 or expected < 1.0:
-        return []
-    ratio = measured / expected
-    where = f"{table.path}: columns x, y, z and q1 .. q{robot.dh.joints}"
-    told = (
-        f"the points spread over {measured:.4g} mm rms, the joints move {robot.name} by "
-        f"{expected:.4g} mm rms"
-    )
-    if ratio < 0.02:
-        return [Problem(where, told, "about the same", "the positions look like metres")]
-    if ratio > 50.0:
-        hint = "the positions look like micrometres, or the joints like radians"
-        return [Problem(where, told, "about the same", hint)]
-    if ratio > 3.0 and np.max(np.abs(q_rad)) < np.deg2rad(2.0 * np.pi) + 1e-9:
-        return [Problem(where, told, "about the same", "the joints look like radians")]
-    return []
-
-
-def _spread(points_mm: np.ndarray) -> float:
-    centred = points_mm - points_mm.mean(axis=0)
-    return float(np.sqrt(np.mean(np.sum(centred**2, axis=1))))
-
-
-def _quaternions(turns: np.ndarray | None, layout: Layout, count: int) -> np.ndarray:
-    """Unit quaternions (n, 4) w, x, y, z with w >= 0; NaN for position only."""
-    if turns is None:
-        return np.full((count, 4), np.nan)
-    if layout.orientation == "quaternion":
-        unit = turns / np.linalg.norm(turns, axis=1, keepdims=True)
-        return np.where(unit[:, :1] < 0.0, -unit, unit)
-    from scipy.spatial.transform import Rotation
-
-    if layout.orientation == "rotation_vector":
-        rotation = Rotation.from_rotvec(turns)
-    else:
-        rotation = Rotation.from_euler(layout.convention, turns)
-    return quaternion_from_rotation(rotation.as_matrix())

@@ -28,6 +28,15 @@ class RawTable:
     def __len__(self) -> int:
         return len(self.line)
 
+    @staticmethod
+    def is_gap(cell: object) -> bool:
+        """Whether a cell is empty."""
+        return _is_gap(cell)
+
+    def gaps(self, name: str) -> np.ndarray:
+        """True (n,) where the cell of column ``name`` is empty."""
+        return np.array([_is_gap(cell) for cell in self.columns[name]], dtype=bool)
+
     def rows_in_words(self, rows: np.ndarray) -> str:
         """Lines of the rows at indices ``rows``, the first few by number."""
         lines = [str(self.line[row]) for row in rows[:_SHOWN]]
@@ -35,15 +44,24 @@ class RawTable:
         return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
 
 
-def load(path: str | Path, delimiter: str, decimal: str, source: str | None = None) -> RawTable:
-    """Read a CSV or Parquet file. Raises InputError where it is missing, empty or ragged."""
+def load(
+    path: str | Path,
+    delimiter: str,
+    decimal: str,
+    source: str | None = None,
+    skip: tuple[int, int] = (0, 0),
+) -> RawTable:
+    """Read a CSV or Parquet file. Raises InputError where it is missing, empty or ragged.
+
+    ``skip``: lines of a CSV that are left out above and under the line of column names.
+    """
     path = Path(path)
     if not path.is_file():
         origin = f"the data comes from: {source}" if source else "check measurements.file.path"
         raise InputError(Problem(str(path), "no such file", "a CSV or Parquet file", origin))
     if path.suffix.lower() in (".parquet", ".pq"):
         return _parquet(path)
-    return _csv(path, delimiter, decimal)
+    return _csv(path, delimiter, decimal, skip)
 
 
 def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool = False):
@@ -96,16 +114,19 @@ def _is_gap(cell: object) -> bool:
     return cell is None or (isinstance(cell, str) and not cell.strip())
 
 
-def _csv(path: Path, delimiter: str, decimal: str) -> RawTable:
+def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> RawTable:
+    above, under = skip
     with open(path, newline="", encoding="utf-8-sig", errors="replace") as stream:
         reader = csv.reader(stream, delimiter=delimiter)
         header: list[str] = []
         rows, lines = [], []
         for cells in reader:
-            if not any(cell.strip() for cell in cells):
+            if reader.line_num <= above or not any(cell.strip() for cell in cells):
                 continue
             if not header:
                 header = [cell.strip() for cell in cells]
+            elif under > 0:
+                under -= 1
             else:
                 rows.append(cells)
                 lines.append(reader.line_num)

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc import robot
 from kinacc.calibration import folds
+from kinacc.data.measurements import UNCERTAINTY
 
 Columns = dict[str, np.ndarray]
 SAME_CONFIGURATION_DEG = 0.1  # joints this close are one configuration visited again
@@ -25,8 +26,8 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
         from kinacc.data.measurements import read
 
         reading = read(section["file"], arm)
-        if reading.unused:
-            warnings.warn(f"columns not used: {', '.join(reading.unused)}", stacklevel=1)
+        for words in reading.left_out():
+            warnings.warn(words, stacklevel=1)
         seen = reading.columns
     return {"measurements": split(seen, settings)}
 
@@ -49,4 +50,10 @@ def split(columns: Mapping, settings: Mapping) -> Columns:
         fold = folds.assign(same, int(section["folds"]), int(settings["seed"])).astype(float)
     held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])
     subset = np.where(held_out, "validation", "train").astype(object)
-    return {**columns, "subset": subset, "fold": fold}
+    return {**_not_stated(count), **columns, "subset": subset, "fold": fold}
+
+
+def _not_stated(count: int) -> Columns:
+    """Null columns of all that a source of measurements need not state."""
+    null = {name: np.full(count, np.nan) for name in ("row", "temperature_c", *UNCERTAINTY)}
+    return null | {"session": np.full(count, None, dtype=object)}
