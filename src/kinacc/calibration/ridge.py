@@ -40,10 +40,17 @@ def minimise_with_prior(
         normal = _normal_equations(system, x, scale)
         balance = _balanced(normal, weight_sq, (x - prior_mean) / scale, balance, name)
 
-        def total(at: np.ndarray, variance: float = balance.variance) -> float:
-            return system.cost(at) + variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
+        def held(at: np.ndarray, variance: float = balance.variance) -> float:
+            return variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
 
-        x, _, last = solve.advance(total, x, scale * balance.step, total(x), scale, name)
+        x, _, last = solve.advance(
+            lambda at, held=held: system.cost(at) + held(at),
+            x,
+            scale * balance.step,
+            normal.cost + held(x),
+            scale,
+            name,
+        )
     cost = system.cost(x)
     solve.require_converged(name, iterations, last, cost, normal.count)
     covariance = balance.variance * balance.inverse * np.outer(scale, scale)
@@ -109,14 +116,9 @@ def _balanced(
 
 
 def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
-    gram = np.zeros((system.size, system.size))
-    gradient, cost, count = np.zeros(system.size), 0.0, 0
-    for residual, jacobian in system.blocks(x):
-        gram += jacobian.T @ jacobian
-        gradient += jacobian.T @ residual
-        cost += float(residual @ residual)
-        count += len(residual)
-    return _Normal(gram * np.outer(scale, scale), gradient * scale, cost, count)
+    full, count = solve.gram(system, x)
+    gram, gradient = full[:-1, :-1] * np.outer(scale, scale), full[:-1, -1] * scale
+    return _Normal(gram, gradient, float(full[-1, -1]), count)
 
 
 def _inverse(gram: np.ndarray, name: str) -> np.ndarray:

@@ -110,6 +110,21 @@ def triangle(system: System, x: np.ndarray, scale: np.ndarray) -> tuple[np.ndarr
     return factor, count
 
 
+def gram(system: System, x: np.ndarray) -> tuple[np.ndarray, int]:
+    """Gram matrix (P+1, P+1) of ``[J | r]`` and the number of residuals.
+
+    A system with a ``gram(x)`` and a ``count`` of its own knows how to sum it up cheaper.
+    """
+    if hasattr(system, "gram"):
+        return system.gram(x), system.count
+    total, count = np.zeros((system.size + 1, system.size + 1)), 0
+    for residual, jacobian in system.blocks(x):
+        both = np.concatenate([jacobian, residual[:, None]], axis=1)
+        total += both.T @ both
+        count += len(residual)
+    return total, count
+
+
 def advance(
     objective: Callable[[np.ndarray], float],
     x: np.ndarray,

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.calibration.frames import FrameCoordinates, inverse_left_jacobian, left_jacobian
 from kinacc.calibration.observations import Observations
+from kinacc.calibration.spread import Group, gram, spread
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, exp_so3, log_so3, skew
 
@@ -30,13 +31,15 @@ def require_enough(observations: Observations, parameters: int, name: str, fix: 
 class FlangeModel:
     """A kinematic model with P parameters, as functions of the vector and of the observations.
 
-    ``pose(x, q, s)``: flange poses (n, ...). ``jacobian(x, q, s)``: (n, 6, P), rows 0-2 mm per
-    parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base.
+    ``pose(x, q, s)``: flange poses (n, ...). ``jacobian(x, q, s)``: (n, 6, E), rows 0-2 mm per
+    parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base. Its columns are the
+    parameters, E = P, or motions that ``expansion(q, s)`` spreads over them.
     """
 
     size: int
     pose: Callable[[np.ndarray, np.ndarray, np.ndarray], Pose]
     jacobian: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+    expansion: Callable[[np.ndarray, np.ndarray], list[Group]] | None = None
 
 
 @dataclass(frozen=True)
@@ -77,11 +80,47 @@ class PoseSystem:
         for rows in self._row_blocks():
             part = self.observations.select(rows)
             residual, keep, seen = self._residual(x, part)
-            jacobian = self._jacobian(x, part, residual, seen)
+            jacobian = spread(self._jacobian(x, part, residual, seen), self._groups(part))
             if keep.all():
                 yield residual.ravel(), jacobian.reshape(residual.size, self.size)
             else:
                 yield residual[keep], jacobian[keep]
+
+    def gram(self, x: np.ndarray) -> np.ndarray:
+        """Gram matrix (P+1, P+1) of ``[J | r]``: normal equations and, last, the cost."""
+        total = np.zeros((self.size + 1, self.size + 1))
+        for columns, groups in self.gram_blocks(x):
+            total += gram(columns, groups)
+        return total
+
+    def gram_blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, list[Group]]]:
+        """Per block the columns (n, 6, E+1) of motions and, last, residuals, and their groups.
+
+        Rows that were not measured are zero.
+        """
+        for rows in self._row_blocks():
+            part = self.observations.select(rows)
+            residual, keep, seen = self._residual(x, part)
+            jacobian = self._jacobian(x, part, residual, seen)
+            columns = np.concatenate([jacobian, residual[:, :, None]], axis=2)
+            columns *= keep[:, :, None]
+            last = Group(slice(columns.shape[2] - 1, columns.shape[2]), None)
+            yield columns, [*self._groups(part), last]
+
+    @property
+    def count(self) -> int:
+        """Number of residuals."""
+        return self.observations.components
+
+    def _groups(self, part: Observations) -> list[Group]:
+        frames = self.coordinates.size
+        if self.model.expansion is None:
+            return [Group(slice(0, self.size), None)]
+        groups = [Group(slice(0, frames), None)]
+        for group in self.model.expansion(part.q_rad, part.s):
+            columns = slice(group.columns.start + frames, group.columns.stop + frames)
+            groups.append(Group(columns, group.basis))
+        return groups
 
     def _row_blocks(self) -> Iterator[slice]:
         for begin in range(0, len(self.observations), BLOCK_ROWS):

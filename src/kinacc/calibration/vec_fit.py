@@ -11,6 +11,7 @@ from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.ridge import minimise_with_prior
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
+from kinacc.calibration.spread import Group
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.models import vec
 from kinacc.models.vec import ERRORS, VECModel
@@ -165,8 +166,9 @@ def _with_centred_offsets(
 
 
 def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
-    kept = empty.coefficients.size
-    offsets = bool(free[kept:].any())
+    seen = free[empty.coefficients.size :].reshape(empty.joints, 2)
+    directed = np.flatnonzero(seen.any(axis=1))
+    errors = len(ERRORS)
 
     def model(x: np.ndarray) -> VECModel:
         vector = np.zeros(free.size)
@@ -174,10 +176,23 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
         return vec.with_vector(empty, vector)
 
     def jacobian(x: np.ndarray, q_rad: np.ndarray, s: np.ndarray) -> np.ndarray:
-        full = vec.parameter_jacobian(model(x), q_rad, s if offsets else None)
-        return full[:, :, free] if offsets else full[:, :, :kept]
+        motions = vec.elementary_jacobian(model(x), q_rad, s)
+        about_z = motions[:, :, directed, ERRORS.index("eps_z")]
+        return np.concatenate([motions.reshape(len(motions), 6, -1), about_z], axis=2)
 
-    return FlangeModel(int(free.sum()), lambda x, q, s: vec.pose(model(x), q, s), jacobian)
+    def expansion(q_rad: np.ndarray, s: np.ndarray) -> list[Group]:
+        basis, travelled = vec.chebyshev_basis(empty, q_rad), vec.direction_basis(s)
+        groups = [
+            Group(slice(errors * joint, errors * (joint + 1)), basis[:, joint])
+            for joint in range(empty.joints)
+        ]
+        for number, joint in enumerate(directed, errors * empty.joints):
+            groups.append(Group(slice(number, number + 1), travelled[:, joint, seen[joint]]))
+        return groups
+
+    return FlangeModel(
+        int(free.sum()), lambda x, q, s: vec.pose(model(x), q, s), jacobian, expansion
+    )
 
 
 def _is_angle(model: VECModel) -> np.ndarray:

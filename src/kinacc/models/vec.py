@@ -129,22 +129,35 @@ def joint_jacobian(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = No
     return jacobian
 
 
+def elementary_jacobian(
+    model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
+) -> np.ndarray:
+    """Jacobian (n, 6, k, 6) of ``pose`` in the six errors of every joint, as ``ERRORS``. Exact."""
+    return _elementary_jacobian(_split(model, q_rad, s))
+
+
 def parameter_jacobian(
     model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
 ) -> np.ndarray:
     """Jacobian (n, 6, P) of ``pose`` in the coefficients, ordered as ``to_vector``. Exact."""
     split = _split(model, q_rad, s)
-    count, terms = len(split.rotation), model.order + 1
-    jacobian = np.empty((count, 6, model.joints, len(ERRORS), terms))
-    offsets = np.zeros((count, 6, model.joints, 2))
-    for joint in range(model.joints):
-        elementary = _elementary_jacobian(split, joint)
-        jacobian[:, :, joint] = elementary[..., None] * split.basis[:, None, joint, None, :]
-        if s is not None:
-            for column, direction in enumerate((-1, 1)):
-                chosen = np.asarray(s)[:, joint] == direction
-                offsets[chosen, :, joint, column] = elementary[chosen, :, 5]
-    return np.concatenate([jacobian.reshape(count, 6, -1), offsets.reshape(count, 6, -1)], axis=2)
+    elementary = _elementary_jacobian(split)
+    count, cut = len(elementary), model.coefficients.size
+    jacobian = np.empty((count, 6, cut + model.direction_offsets_rad.size))
+    expanded = jacobian[:, :, :cut].reshape(count, 6, *model.coefficients.shape)
+    np.multiply(elementary[..., None], split.basis[:, None, :, None, :], out=expanded)
+    offsets = jacobian[:, :, cut:].reshape(count, 6, model.joints, 2)
+    if s is None:
+        offsets[:] = 0.0
+    else:
+        chosen = direction_basis(s)[:, None]
+        np.multiply(elementary[..., ERRORS.index("eps_z"), None], chosen, out=offsets)
+    return jacobian
+
+
+def direction_basis(s: np.ndarray) -> np.ndarray:
+    """Indicators (n, k, 2) of the travel directions -1 and +1 in ``s`` (n, k)."""
+    return (np.asarray(s)[..., None] == np.array([-1, 1])).astype(float)
 
 
 @dataclass(frozen=True)
@@ -176,8 +189,9 @@ def _split(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None) -> _Split:
     for joint in range(model.joints - 2, -1, -1):
         following = after[0]
         error = joint_errors[:, joint + 1]
-        tilted = following.rotation + _cross_columns(error[:, 3:], following.rotation)
-        moved = following.position_mm + np.cross(error[:, 3:], following.position_mm) + error[:, :3]
+        tilt = np.eye(3) + skew(error[:, 3:])
+        tilted = tilt @ following.rotation
+        moved = (tilt @ following.position_mm[..., None])[..., 0] + error[:, :3]
         link = links[joint]
         after.insert(
             0,
@@ -195,25 +209,34 @@ def _split(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None) -> _Split:
     return _Split(basis, joint_errors, before, after, rotation, rotation_t, rate_matrix)
 
 
-def _elementary_jacobian(split: _Split, joint: int) -> np.ndarray:
-    """Jacobian (n, 6, 6) of the projected pose in the six elements of one error matrix."""
-    before, after = split.before[joint], split.after[joint]
-    seen = split.rotation_t @ before
-    jacobian = np.zeros((len(before), 6, 6))
-    jacobian[:, :3, :3] = before
+def _elementary_jacobian(split: _Split) -> np.ndarray:
+    """Jacobian (n, 6, k, 6) of the projected pose in the elements of every error matrix."""
+    # Arrays of one number per pose, poses last: small batched cross products would cost 5 times.
+    before = np.stack(split.before).transpose(2, 3, 0, 1)  # row, column, joint, pose
+    after = np.stack([pose.rotation for pose in split.after]).transpose(2, 3, 0, 1)
+    reach = np.stack([pose.position_mm for pose in split.after]).transpose(2, 0, 1)
+    turned = np.einsum("nji,gnjk->ikgn", split.rotation, np.stack(split.before))
+    rate = (split.rotation @ split.rate_matrix).transpose(1, 2, 0)[:, :, None]
+    jacobian = np.zeros((6, len(ERRORS), *reach.shape[1:]))
+    jacobian[:3, :3] = before
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         # e_axis x r has two entries: -r_v along u and r_u along v.
-        jacobian[:, :3, 3 + axis] = (
-            before[:, :, v] * after.position_mm[:, u, None]
-            - before[:, :, u] * after.position_mm[:, v, None]
-        )
-        # The skew part of seen [e_axis] after, written with columns and rows.
-        twist = np.cross(after.rotation[:, u, :], seen[:, :, v]) - np.cross(
-            after.rotation[:, v, :], seen[:, :, u]
-        )
-        jacobian[:, 3:, 3 + axis] = _angular_rate(split, twist)
-    return jacobian
+        jacobian[:3, 3 + axis] = before[:, v] * reach[u] - before[:, u] * reach[v]
+        # The skew part of turned [e_axis] after, written with columns and rows.
+        twist = _cross(after[u], turned[:, v]) - _cross(after[v], turned[:, u])
+        for row in range(3):
+            jacobian[3 + row, 3 + axis] = (
+                rate[row, 0] * twist[0] + rate[row, 1] * twist[1] + rate[row, 2] * twist[2]
+            )
+    return np.ascontiguousarray(jacobian.transpose(3, 0, 2, 1))
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of vectors along the first axis."""
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
 
 
 def _angular_rate(split: _Split, twist: np.ndarray) -> np.ndarray:
@@ -253,7 +276,3 @@ def _slopes(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
         second, previous = 2.0 * x * second - previous, second
     values = np.einsum("nkt,ket->nke", slope, model.coefficients)
     return values * (2.0 / (model.q_max_rad - model.q_min_rad))[:, None]
-
-
-def _cross_columns(vector: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    return np.cross(vector[:, :, None], matrix, axis=1)
