@@ -19,7 +19,7 @@ NUMERIC = {
     "pairs": "a list of pairs [smaller, larger]",
 }
 _KEY_FIELDS = ("kind", "default", "unit", "low", "high", "open_ends", "choices", "length")
-_KEY_FIELDS += ("nullable", "execution", "about")
+_KEY_FIELDS += ("behind", "nullable", "execution", "about")
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Key:
     high: float | None = None
     open_ends: bool = False
     choices: tuple[str, ...] = ()
+    behind: tuple[str, ...] = ()
     length: tuple[int, int] = (0, 100_000)
     nullable: bool = False
     execution: bool = False
@@ -44,7 +45,7 @@ class Key:
         """What the key takes, in words."""
         parts = []
         if self.kind == "names":
-            parts.append("a mapping of " + ", ".join(self.choices) + " to text")
+            parts.append(f"a mapping of {self.names} to text")
         elif self.kind == "texts" and self.choices:
             parts.append("a list of " + ", ".join(self.choices))
         elif self.choices:
@@ -60,6 +61,21 @@ class Key:
         if self.nullable:
             parts.append("null")
         return " or ".join(parts)
+
+    @property
+    def names(self) -> str:
+        """The names a mapping takes, in words."""
+        behind = f"; of a target, or of one named before it (mA_{self.behind[0]}), {{}}"
+        return ", ".join(self.choices) + (
+            behind.format(", ".join(self.behind)) if self.behind else ""
+        )
+
+    def takes(self, name: object) -> bool:
+        """Whether a mapping takes ``name``."""
+        ends = tuple(f"_{word}" for word in self.behind)
+        return name in self.choices + self.behind or (
+            bool(ends) and isinstance(name, str) and name.endswith(ends)
+        )
 
     @property
     def numbers(self) -> str:
@@ -127,7 +143,7 @@ def _key(name: str, content: Mapping[str, Any]) -> Key:
             f"schema.yaml, {name}: {sorted(unknown) or content['kind']} not understood"
         )
     fields = dict(content)
-    for each in ("choices", "length"):
+    for each in ("choices", "behind", "length"):
         if each in fields:
             fields[each] = tuple(fields[each])
     return Key(name=name, **fields)

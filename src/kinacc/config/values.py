@@ -220,12 +220,10 @@ def _names(key, value, path, place):
     problems = []
     for name, each in value.items():
         here = place((*path, name))
-        if name not in key.choices:
-            close = nearest(name, key.choices)
+        if not key.takes(name):
+            close = nearest(name, key.choices + key.behind)
             fix = f"did you mean {close}?" if close else ""
-            problems.append(
-                Problem(here, f"unknown name {shown(name)}", ", ".join(key.choices), fix)
-            )
+            problems.append(Problem(here, f"unknown name {shown(name)}", key.names, fix))
         if not isinstance(each, str) or not each:
             problems.append(Problem(here, f"{shown(each)} is not text", "name of a column"))
     return (INVALID if problems else dict(value)), problems
