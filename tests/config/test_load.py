@@ -80,7 +80,7 @@ def test_the_ur10_example_adds_its_data_sets():
         assert own["measurements"]["folds"] == 5
         assert own["calibration"]["base_and_tool"] == "estimated"
         assert own["calibration"]["dh"]["hayati_joints"] == [2, 3]
-        assert own["calibration"]["vec"] == loaded["mh180"]["calibration"]["vec"]
+        assert own["study"] == loaded["mh180"]["study"]
         assert own["evaluation"]["space"] == "measured"
     assert loaded["mh180"] == load([PAPER])["mh180"]
 
