@@ -44,11 +44,7 @@ _TARGET_QUANTITIES = (
     *ANGLES,
     *ANGLES_IN_ORDER,
 )
-# The longest quantity first, so that std_x_mm is not the x of a target named std.
-_BEHIND = "|".join(sorted(_TARGET_QUANTITIES, key=len, reverse=True))
-_MAPPED = re.compile(rf"(?:(?P<target>.+?)_)?(?P<quantity>{_BEHIND})")
-_POINT = re.compile(r"(?P<target>.+?)_x_(?:mm|m)")
-_NO_TARGETS = ("std", "cov")
+_POINT = re.compile(r"(?P<name>.+_x)_(?:mm|m)")
 
 
 @dataclass(frozen=True)
@@ -213,12 +209,12 @@ class _Finder:
             if column in ("x_mm", "x_m"):
                 names.append(TOOL)
             match = _POINT.fullmatch(column)
-            if match and match["target"] not in _NO_TARGETS:
-                names.append(match["target"])
+            if match and split(match["name"])[1] == "x":
+                names.append(split(match["name"])[0])
         for name in self.layout.columns:
-            match = _MAPPED.fullmatch(name)
-            if match and match["quantity"] == "x":
-                names.append(match["target"] or TOOL)
+            target, quantity = split(name)
+            if quantity == "x":
+                names.append(target or TOOL)
         return list(dict.fromkeys(names)) or [TOOL]
 
     def target(self, name: str) -> Target:
@@ -310,9 +306,16 @@ def in_order_of(convention: str) -> tuple[str, ...]:
     return tuple(f"r{axis}" for axis in axes) if len(set(axes)) == 3 else ANGLES
 
 
-def is_known(name: str) -> bool:
-    """Whether ``name`` is a quantity of a target, alone or behind a target's name."""
-    return _MAPPED.fullmatch(name) is not None
+def split(name: str) -> tuple[str, str]:
+    """Target (may be empty) and quantity of a name such as std_x or mA_std_x; empty if neither."""
+    if name in _TARGET_QUANTITIES:
+        return "", name
+    # The longest quantity counts: mA_std_x is no x of a target named mA_std.
+    ends = [each for each in _TARGET_QUANTITIES if name.endswith(f"_{each}")]
+    if not ends:
+        return "", ""
+    quantity = max(ends, key=len)
+    return name[: -len(quantity) - 1], quantity
 
 
 def _with(names, missing, prefix: str) -> str:
