@@ -8,6 +8,7 @@ from collections.abc import Callable
 import click
 
 from kinacc import __version__
+from kinacc.commands.predict import predict
 from kinacc.errors import InputError, Problem
 from kinacc.stages.catalogue import STAGES, Stage, maker_of
 
@@ -116,6 +117,7 @@ def _help(stage: Stage) -> str:
 
 for _stage in STAGES.values():
     run.add_command(_stage_command(_stage))
+main.add_command(predict)
 
 
 def run_stage(

@@ -1,0 +1,1 @@
+"""What a calibrated arm can be used for: predict, compensate, compare; from a results folder."""

@@ -1,0 +1,120 @@
+"""A calibrated arm as one record: robot, chosen model, frames, and how sure the fit was of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
+from kinacc.calibration.uncertainty import Uncertainty, is_angle
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import IDENTITY, Pose, compose
+from kinacc.models import dh, vec
+from kinacc.models.dh import DHModel
+from kinacc.models.vec import VECModel
+from kinacc.robot import Robot
+
+MODELS = ("dh", "vec", "nominal")
+FRAMES = ("base", "instrument")
+FLANGE, TOOL = "flange", "tool"
+_LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Rms magnitudes of what a model leaves unexplained, and of which rows ("validation")."""
+
+    position_mm: float
+    orientation_rad: float
+    subset: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One model of one calibrated arm.
+
+    ``choice`` is nominal, dh or vec. ``base`` is the first DH frame in the instrument's frame,
+    ``targets`` are tool and other targets in the last DH frame. ``known`` is the uncertainty of the
+    fit (None for the nominal model), ``residual`` what the model does not explain.
+    ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides).
+    """
+
+    name: str
+    robot: Robot
+    choice: str
+    model: DHModel | VECModel
+    base: Pose
+    targets: Mapping[str, Pose]
+    known: Uncertainty | None = None
+    residual: Residual | None = None
+    fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None
+
+    @property
+    def default_point(self) -> str:
+        """The tool where there is one, else the first target."""
+        return TOOL if TOOL in self.targets else next(iter(self.targets), FLANGE)
+
+    def point(self, name: str | None) -> Pose:
+        """A target by name, or the flange, in the last DH frame. InputError for another name."""
+        name = name or self.default_point
+        if name in self.targets:
+            return self.targets[name]
+        if name == FLANGE:
+            return self.robot.flange
+        known = ", ".join([*self.targets, FLANGE])
+        raise InputError(Problem("point", f"{name!r} is none of this calibration", known))
+
+    def origin(self, frame: str) -> Pose:
+        """First DH frame in ``frame``: the robot's own base, or the instrument."""
+        if frame not in FRAMES:
+            raise InputError(Problem("frame", f"{frame!r}", ", ".join(FRAMES)))
+        return self.base if frame == "instrument" else self.robot.base
+
+    def forward(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+        """Last DH frame in the first one, (n, ...), at DH joints (n, k)."""
+        if isinstance(self.model, VECModel):
+            return vec.pose(self.model, q_rad, s)
+        return dh.forward(self.model, q_rad)
+
+    def pose(
+        self,
+        q_rad: np.ndarray,
+        s: np.ndarray | None = None,
+        frame: str = "base",
+        point: str | None = None,
+    ) -> Pose:
+        """Poses (n, ...) of a point in ``frame`` at DH joints (n, k); s (n, k) travel directions."""
+        return compose(self.origin(frame), compose(self.forward(q_rad, s), self.point(point)))
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """Matrix (P, r) whose product with its transpose is the covariance of ``known``."""
+        if self.known is None:
+            return np.zeros((0, 0))
+        units = self.units
+        values, vectors = np.linalg.eigh(self.known.covariance / np.outer(units, units))
+        kept = values > _LEAST_SHARE * max(float(values[-1]), 0.0)
+        return units[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+
+    @property
+    def units(self) -> np.ndarray:
+        """Unit (P,) in which displacements of the parameters are measured: mm, and one mrad."""
+        names = self.known.names if self.known else ()
+        return np.where([is_angle(name) for name in names], ANGLE_UNIT_RAD, 1.0)
+
+    def outside_range(self, q_rad: np.ndarray) -> np.ndarray:
+        """True (n, k) where a DH joint lies outside what the data cover."""
+        q_rad = np.atleast_2d(q_rad)
+        if self.fitted_range_rad is None:
+            return np.zeros(q_rad.shape, dtype=bool)
+        low, high = self.fitted_range_rad
+        return (q_rad < low - 1e-9) | (q_rad > high + 1e-9)
+
+
+def nominal(robot: Robot, name: str = "") -> Calibration:
+    """A robot as its maker describes it, as a calibration that nothing was learned for."""
+    tool = compose(robot.flange, robot.tool)
+    return Calibration(name or robot.name, robot, "nominal", robot.dh, IDENTITY, {TOOL: tool})

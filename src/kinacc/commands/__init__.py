@@ -1,0 +1,1 @@
+"""Commands that use a calibration; one module each, loaded only when called."""

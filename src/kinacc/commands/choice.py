@@ -1,0 +1,108 @@
+"""Options the commands share: which calibration, which robot, and where the answer goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from kinacc.errors import InputError, Problem
+
+if TYPE_CHECKING:
+    from kinacc.calibrated.record import Calibration
+    from kinacc.commands.sheet import Sheet
+    from kinacc.robot import Robot
+
+CONFIG = "config.yaml"
+
+
+def calibration_options(command: Callable) -> Callable:
+    """Which calibration: its folder, the model, and the robot or the configuration naming it."""
+    for option in (
+        click.option(
+            "--robot", help="Robot of the results: a shipped name or file. [as the configuration]"
+        ),
+        click.option("--config", multiple=True, help=f"Configuration naming the robot. [{CONFIG}]"),
+        click.option(
+            "--model",
+            type=click.Choice(["dh", "vec", "nominal"]),
+            help="Model to use. [the one selected; else the better on held-out poses]",
+        ),
+        click.argument("folder", type=click.Path()),
+    ):
+        command = option(command)
+    return command
+
+
+def output_options(command: Callable) -> Callable:
+    """Where the answer goes."""
+    for option in (
+        click.option("--force", is_flag=True, help="Replace a file that is there."),
+        click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON."),
+        click.option(
+            "--output", "-o", type=click.Path(), help="Write to a .csv, .json or .parquet file."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def point_options(command: Callable) -> Callable:
+    """Which point in which frame."""
+    for option in (
+        click.option("--point", help="Target, or flange. [the tool]"),
+        click.option(
+            "--frame",
+            type=click.Choice(["base", "instrument"]),
+            default="base",
+            show_default=True,
+            help="The robot's own base, or the instrument that measured it.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> Robot:
+    """The robot a results folder belongs to: as given, or as the configuration names it."""
+    from kinacc import robot as robots
+
+    if robot is not None:
+        return robots.load(robot)
+    from kinacc.stages.plan import planned
+
+    if not config and not Path(CONFIG).is_file():
+        what = f"is not given, and there is no {CONFIG} here"
+        raise InputError(Problem("--robot", what, "a shipped name, a robot file"))
+    plan = planned(config or (CONFIG,))
+    name = Path(folder).resolve().name
+    if name not in plan.datasets:
+        what = f"data set {name} is not in the configuration"
+        allowed = ", ".join(plan.datasets)
+        raise InputError(Problem(str(folder), what, allowed, "give --config or --robot"))
+    return robots.load(plan.datasets[name]["robot"])
+
+
+def calibration_of(
+    folder: str | Path, model: str | None, robot: str | None, config: tuple[str, ...]
+) -> Calibration:
+    """The calibration of a results folder."""
+    from kinacc.calibrated import folder as results
+
+    tables = results.read_tables(folder)
+    name = Path(folder).resolve().name
+    return results.calibration(tables, robot_of(folder, robot, config), model, name)
+
+
+def deliver(sheet: Sheet, output: str | None, as_json: bool, force: bool) -> None:
+    """Write, and print for a machine or for a person."""
+    if output is not None:
+        sheet.write(output, force)
+    if as_json:
+        click.echo(sheet.as_json())
+    elif output is None:
+        click.echo(sheet.as_text())
+    else:
+        click.echo(f"{sheet.title}\n{len(sheet)} rows: {output}" if sheet.title else output)

@@ -1,0 +1,209 @@
+"""Joint and pose files a command is given: units by column name, all faults listed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.data.table import RawTable, load, numbers
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
+from kinacc.robot import Robot
+
+ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
+LENGTH = {"mm": 1.0, "m": 1e3}
+_UNIT_QUATERNION = 1e-3
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What a file holds: ``joints`` (n, k) reported joints (rad, mm), ``directions`` (n, k) of
+    travel, wanted ``pose`` (n, ...) in mm; each None where the file has no such columns.
+
+    ``label`` (n,) is the file's ``pose`` column, or the line a row stands on.
+    """
+
+    count: int
+    label: np.ndarray
+    joints: np.ndarray | None
+    directions: np.ndarray | None
+    pose: Pose | None
+    unused: tuple[str, ...]
+
+
+def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False) -> Rows:
+    """Rows of a CSV or Parquet file, which must have ``joints`` or ``pose`` where asked for.
+
+    Poses are not looked for where they are not asked for.
+
+    Joints: ``q1_deg``, ``q1_rad`` (``q1_mm``, ``q1_m`` where a joint slides). Poses: ``x_mm`` or
+    ``x_m`` .., and ``qw`` .. ``qz``, or a rotation vector ``rvx_deg`` .. , or intrinsic XYZ angles
+    ``rx_deg`` .. (or rad). Raises InputError listing every problem.
+    """
+    table = _load(Path(path))
+    reader = _Reader(table, [], set())
+    slides = robot.dh.prismatic
+    q_rad = reader.group(
+        [f"q{i + 1}" for i in range(len(slides))],
+        [LENGTH if each else ANGLE for each in slides],
+        joints,
+    )
+    if any(f"q{len(slides) + 1}_{unit}" in table.columns for unit in (*ANGLE, *LENGTH)):
+        what = f"has a joint q{len(slides) + 1}, {robot.name} has {len(slides)} joints"
+        reader.problems.append(Problem(table.path, what))
+    directions = reader.directions(len(slides))
+    wanted = reader.pose() if pose else None
+    label = table.line
+    if "pose" in table.columns:
+        reader.used.add("pose")
+        label = np.array([str(cell) for cell in table.columns["pose"]], dtype=object)
+    if reader.problems:
+        raise InputError(reader.problems, f"{table.path} cannot be used")
+    unused = tuple(name for name in table.columns if name not in reader.used)
+    return Rows(len(table), label, q_rad, directions, wanted, unused)
+
+
+def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -> np.ndarray:
+    """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in ``unit``; InputError if unfit."""
+    slides, rows, problems = robot.dh.prismatic, [], []
+    for text in texts:
+        words = text.replace(",", " ").split()
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            row = []
+        if len(row) != len(slides) or not np.isfinite(row).all():
+            allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
+            problems.append(Problem(option, repr(text), allowed))
+        rows.append(row)
+    if problems:
+        raise InputError(problems)
+    return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
+
+
+def limit_problems(
+    robot: Robot, joints: np.ndarray, label: np.ndarray, where: str
+) -> list[Problem]:
+    """A problem for every joint of which a row lies outside the robot's limits."""
+    problems = []
+    for joint in range(joints.shape[1]):
+        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
+        bad = np.flatnonzero((joints[:, joint] < low - 1e-9) | (joints[:, joint] > high + 1e-9))
+        if bad.size:
+            slides = robot.dh.prismatic[joint]
+            factor, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
+            shown = ", ".join(str(each) for each in label[bad[:5]])
+            more = f" and {bad.size - 5} more" if bad.size > 5 else ""
+            value = joints[bad[0], joint] * factor
+            hint = ""
+            if not slides and np.abs(joints[:, joint]).max() > 4.0 * np.pi:
+                hint = f"the column looks like degrees: name it q{joint + 1}_deg"
+            allowed = f"{low * factor:g} to {high * factor:g} {unit} ({robot.name})"
+            place = f"{where}, q{joint + 1}, rows {shown}{more}"
+            problems.append(Problem(place, f"{value:g} {unit}", allowed, hint))
+    return problems
+
+
+@dataclass
+class _Reader:
+    table: RawTable
+    problems: list[Problem]
+    used: set[str]
+
+    def group(self, names: list[str], units: list[dict], needed: bool) -> np.ndarray | None:
+        """Columns (n, m) of quantities that come together, or None where none is there."""
+        found = [self._column(name, own) for name, own in zip(names, units, strict=True)]
+        present = [each is not None for each in found]
+        if not any(present) and not needed:
+            return None
+        for name, own, there in zip(names, units, present, strict=True):
+            if not there:
+                where = f"{self.table.path}: column {_names(name, own)}"
+                listed = "the file has " + ", ".join(self.table.columns)
+                self.problems.append(Problem(where, "is missing", listed))
+        if not all(present):
+            return None
+        columns = []
+        for name, factor in found:
+            self.used.add(name)
+            columns.append(numbers(self.table, name, self.problems) * factor)
+        return np.stack(columns, axis=1)
+
+    def _column(self, name: str, units: dict) -> tuple[str, float] | None:
+        present = {
+            each: factor
+            for unit, factor in units.items()
+            if (each := f"{name}_{unit}" if unit else name) in self.table.columns
+        }
+        if len(present) > 1:
+            where = f"{self.table.path}: columns {', '.join(present)}"
+            self.problems.append(Problem(where, f"{name} is given in two units"))
+        return next(iter(present.items()), None)
+
+    def directions(self, joints: int) -> np.ndarray | None:
+        names = [f"s{i + 1}" for i in range(joints)]
+        s = self.group(names, [{"": 1.0}] * joints, False)
+        if s is not None and not np.isin(s, (-1, 0, 1)).all():
+            where = f"{self.table.path}: columns s1 .. s{joints}"
+            self.problems.append(Problem(where, "a value is no direction", "-1, 0 or 1"))
+        return None if s is None else s.astype(np.int8)
+
+    def pose(self) -> Pose | None:
+        position = self.group(["x", "y", "z"], [LENGTH] * 3, True)
+        quaternion = self.group(["qw", "qx", "qy", "qz"], [{"": 1.0}] * 4, False)
+        vector = self.group(["rvx", "rvy", "rvz"], [ANGLE] * 3, False)
+        euler = self.group(["rx", "ry", "rz"], [ANGLE] * 3, False)
+        given = [each is not None for each in (quaternion, vector, euler)]
+        where = f"{self.table.path}: orientation"
+        if sum(given) > 1:
+            self.problems.append(Problem(where, "is given in more than one form", "one form"))
+        elif position is not None and not any(given):
+            allowed = "qw .. qz, or rvx_deg .. rvz_deg, or rx_deg .. rz_deg (or rad)"
+            self.problems.append(Problem(where, "is missing", allowed))
+        if position is None or sum(given) != 1:
+            return None
+        if quaternion is not None:
+            length = np.linalg.norm(quaternion, axis=1)
+            bad = np.flatnonzero(~(np.abs(length - 1.0) <= _UNIT_QUATERNION))
+            if bad.size:
+                place = f"{where}, {self.table.rows_in_words(bad)}"
+                what = f"quaternion of length {length[bad[0]]:.6g}"
+                self.problems.append(Problem(place, what, "length 1 within 0.001"))
+            rotation = rotation_from_quaternion(quaternion / length[:, None])
+        elif vector is not None:
+            rotation = exp_so3(vector)
+        else:
+            from scipy.spatial.transform import Rotation
+
+            rotation = Rotation.from_euler("XYZ", euler).as_matrix()
+        return Pose(rotation, position)
+
+
+def _load(path: Path) -> RawTable:
+    """The file with the delimiter its first line shows: , or ; (decimal comma) or tab."""
+    delimiter, decimal = ",", "."
+    if path.is_file() and path.suffix.lower() not in (".parquet", ".pq"):
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            head, first = file.readline(), file.readline()
+        if ";" in head:
+            delimiter = ";"
+            decimal = "," if "," in first and "." not in first else "."
+        elif "\t" in head:
+            delimiter = "\t"
+    if not path.is_file():
+        raise InputError(Problem(str(path), "no such file", "a CSV or Parquet file"))
+    return load(path, delimiter, decimal)
+
+
+def _names(name: str, units: dict) -> str:
+    return " or ".join(f"{name}_{unit}" if unit else name for unit in units)
+
+
+def say_unused(given: Rows) -> None:
+    """Name the columns of a file that were not used, on the error stream."""
+    if given.unused:
+        import sys
+
+        print(f"not used: {', '.join(given.unused)}", file=sys.stderr)
