@@ -125,7 +125,7 @@ def test_every_module_a_stage_loads_counts_in_its_hash(stage):
     assert set(done.stdout.split()) <= covered
 
 
-@pytest.mark.parametrize("name", provenance.LIBRARIES)
+@pytest.mark.parametrize("name", ["matplotlib", "numba", "numpy", "pandas", "pyarrow", "scipy"])
 def test_versions_read_from_folder_names_are_those_of_the_metadata(name):
     assert provenance._library_version(name) == importlib.metadata.version(name)
 

@@ -13,11 +13,9 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
-LIBRARIES = ("matplotlib", "numba", "numpy", "pandas", "pyarrow", "scipy")
 
 # Parsing 60 modules with `ast` takes 0.1 s, ten times as long; a test holds this scan to `ast`.
 _IMPORT = re.compile(
@@ -32,7 +30,8 @@ class SourceTree:
     """The files of one package: by file its content, by module what it runs, uses and names.
 
     ``runs`` are modules of the package (an import runs the packages around a module as well),
-    ``libraries`` those of LIBRARIES, ``data`` package data files.
+    ``libraries`` other packages installed under the name they are imported by, ``data`` package
+    data files.
     """
 
     digests: Mapping[str, bytes]
@@ -45,8 +44,8 @@ def code_hash(*modules: str, alone: Iterable[str] = (), root: Path = PACKAGE) ->
     """Hash of all that the results of modules can depend on besides their arguments.
 
     The modules, every module of the package these import directly or indirectly (imports inside
-    functions included), the package data files these name, the versions of the numerical
-    libraries they use, and the Python minor version. ``alone`` are modules counted without what
+    functions included), the package data files these name, the versions of the libraries they
+    use, and the Python minor version. ``alone`` are modules counted without what
     they import.
     """
     tree = source_tree(root)
@@ -108,7 +107,7 @@ def source_tree(root: Path = PACKAGE) -> SourceTree:
         imported = imported_names(text, name, is_package=path.name == "__init__.py")
         own = {each for full in (name, *imported) for each in _with_parents(full)}
         runs[name] = frozenset(own & modules.keys())
-        libraries[name] = frozenset(own & set(LIBRARIES))
+        libraries[name] = frozenset(own & _installed().keys() - {root.name})
         named[name] = _data_named(text, labels)
     for name, path in data.items():
         digests[name] = hashlib.sha256(path.read_bytes()).digest()
@@ -176,9 +175,8 @@ def _counts(path: Path) -> bool:
     return "__pycache__" not in path.parts and not path.name.startswith(".")
 
 
-@cache
 def _library_version(name: str) -> str:
-    return _installed().get(name) or version(name)
+    return _installed()[name]
 
 
 @cache

@@ -29,7 +29,7 @@ def test_a_comment_in_the_configuration(project):
         ("map: {grid_mm: 200}", {"mh180": {"accuracy_map", "fig3", "claims"}}),
         (
             "study: {noise_mm: [0.1, 0.2]}",
-            {"mh180": AFTER_POINTS - {"fig2"}, "own": AFTER_POINTS - {"fig2"}},
+            {name: {"study_chunk", "study", "fig4", "claims"} for name in ("mh180", "own")},
         ),
         (
             "histories: {noise_mm: 0.2}",

@@ -41,7 +41,7 @@ def test_a_urdf_named_by_a_yaml_is_an_input_too(tmp_path):
     arm.write_text("urdf: arm.urdf\n")
     inputs = planned(own(tmp_path, arm)).inputs("vec", "own")
     assert inputs["robot_file"] == str(arm)
-    assert inputs["robot_urdf"] == str(tmp_path / "arm.urdf")
+    assert inputs["robot_urdf_file"] == str(tmp_path / "arm.urdf")
 
 
 def test_settings_are_held_to_the_joints_of_a_urdf(tmp_path):

@@ -17,9 +17,6 @@ from kinacc.stages import (
     study_chunk,
     vec,
 )
-from kinacc.stages.plan import Plan
-
-_DATASET = "draw"
 
 # Named one by one, so that whatever runs stages in memory depends on their code.
 RUNS = {
@@ -46,11 +43,9 @@ def run(
     ``config`` is the complete configuration of one data set; ``extra`` are settings by stage that
     no configuration has.
     """
-    plan = Plan({_DATASET: config}, {_DATASET: 1}, ())
     found = dict(tables)
     for name in names:
-        settings = plan.settings(name, _DATASET) | dict((extra or {}).get(name, {}))
-        found |= RUNS[name](found, settings)
+        found |= RUNS[name](found, {**config, **(extra or {}).get(name, {})})
     return found
 
 

@@ -44,7 +44,7 @@ def planned(
     if problems:
         raise InputError(problems)
     return Plan(
-        {name: without_execution_keys(config) for name, config in full.items()},
+        {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
         {name: config["study"]["chunks"] for name, config in full.items()},
         first,
         results,
@@ -202,7 +202,7 @@ class Plan:
                 if isinstance(value, str) and os.path.isfile(value):
                     from kinacc.robot import files
 
-                    roles = ("robot_file", "robot_urdf")
+                    roles = ("robot_file", "robot_urdf_file")
                     read = zip(roles, files(value), strict=False)
                     found |= {role: str(file) for role, file in read}
             elif value is not None and config["measurements"]["source"] == "file":
@@ -223,6 +223,13 @@ def _read_words(values: object) -> object:
     if isinstance(values, (list, tuple)):
         return [_read_words(value) for value in values]
     return yaml.safe_load(values) if isinstance(values, str) else values
+
+
+def _in_use(config: dict) -> dict:
+    """The configuration without the section of the source of measurements that is not used."""
+    unused = {"synthetic", "file"} - {config["measurements"]["source"]}
+    measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
+    return {**config, "measurements": measurements}
 
 
 def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:
