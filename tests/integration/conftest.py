@@ -50,16 +50,17 @@ class Project:
         options: tuple[str, ...] = (),
         ok: bool = True,
         cores: int = 2,
+        configs: tuple[str, ...] = CONFIGS,
         **env: str,
     ) -> str:
         """What ``snakemake`` prints; fails the test unless it ends as expected."""
         command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--nocolor", *options]
-        return self.run([*command, "--configfile", *CONFIGS, "--", *targets], ok, **env)
+        return self.run([*command, "--configfile", *configs, "--", *targets], ok, **env)
 
-    def kinacc(self, *words: str, ok: bool = True) -> str:
+    def kinacc(self, *words: str, ok: bool = True, configs: tuple[str, ...] = CONFIGS) -> str:
         """What ``kinacc`` prints when given the same configuration."""
-        configs = [word for name in CONFIGS for word in ("--config", name)]
-        return self.run([sys.executable, "-m", "kinacc.cli", *words, *configs], ok)
+        options = [word for name in configs for word in ("--config", name)]
+        return self.run([sys.executable, "-m", "kinacc.cli", *words, *options], ok)
 
     def run(self, command: list[str], ok: bool = True, **environment: str) -> str:
         """Output and errors of a command started in the project's folder."""

@@ -1,0 +1,51 @@
+"""The measured UR10 of `examples/ur10.yaml`, where its data lie beside the project."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinacc.artifacts.store import read
+
+ROOT = Path(__file__).resolve().parents[2]
+SHARED = ROOT.parent / "shared"
+REACH_RMS_MM = {"ur10_b": 0.475, "ur10_d": 0.43}
+
+pytestmark = pytest.mark.skipif(
+    not (SHARED / "data" / "ur10_tmac").is_dir(),
+    reason="no shared/data/ur10_tmac beside the project",
+)
+
+
+@pytest.fixture
+def ur10(project):
+    """A project whose neighbour is the measured data, as the example expects."""
+    shutil.copytree(ROOT / "examples", project.folder / "examples")
+    (project.folder.parent / "shared").symlink_to(SHARED)
+    return project
+
+
+def test_held_out_positions_are_met_as_well_as_an_independent_fit_met_them(ur10):
+    targets = [f"results/{name}/residuals.parquet" for name in REACH_RMS_MM]
+    ur10.snakemake(*targets, configs=("config.yaml", "examples/ur10.yaml"))
+    for name, reach in REACH_RMS_MM.items():
+        table = read(ur10.folder / "results" / name / "residuals.parquet")
+        row = (
+            (table["comparison"] == "dh_vs_measured")
+            & (table["subset"] == "validation")
+            & (table["quantity"] == "position")
+            & np.isnan(table["fold"])
+        )
+        assert table["rms"][row].item() <= reach
+
+
+def test_a_real_arm_goes_all_the_way_and_says_what_it_leaves_out(ur10):
+    configs = ("config.yaml", "small.yaml", "examples/ur10.yaml")
+    text = ur10.snakemake(configs=configs)
+    assert "ur10_d: accuracy_map is left out" in text
+    folder = ur10.folder / "results" / "ur10_d"
+    assert (folder / "figures" / "fig4.svg").is_file()
+    assert (folder / "claims.parquet").is_file()
+    assert not (folder / "accuracy_map.parquet").exists()
+    assert "all is well" in ur10.kinacc("check-results", "results", configs=configs)
