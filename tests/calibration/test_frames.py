@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from kinacc import robot
-from kinacc.calibration.frames import Frames, closed_form_start, coordinates
+from kinacc.calibration.frames import Frames, coordinates
 from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.start import closed_form_start
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.models import dh
 
@@ -104,6 +105,6 @@ def test_coordinates_lead_back_to_frames():
     # Points of the instrument land where the inverse base of these coordinates puts them.
     point = np.array([100.0, 200.0, 300.0])
     inverse = coords.inverse_base(x)
-    by_coordinates = inverse.rotation @ (point - coords.centroid_mm) + inverse.position_mm
+    by_coordinates = inverse.rotation @ (point - coords.centroid_mm[0]) + inverse.position_mm
     by_frames = moved.base.rotation.T @ (point - moved.base.position_mm)
     np.testing.assert_allclose(by_coordinates, by_frames, atol=1e-9)

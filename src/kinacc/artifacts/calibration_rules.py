@@ -46,28 +46,31 @@ def _measurements(tables: Tables) -> Iterator[Problem]:
 def _frames(name: str, models: tuple[str, ...]) -> Rule:
     def rule(tables: Tables) -> Iterator[Problem]:
         present = set(zip(tables[name]["model"], tables[name]["frame"], strict=True))
+        targets = dict.fromkeys(str(each) for each in tables["measurements"]["target"])
         for model in models:
-            for frame in ("base", "tool"):
+            for frame in ("base", *targets):
                 if (model, frame) not in present:
                     what = f"no {frame} of model {model}"
-                    yield Problem(f"{name}.parquet", what, "base and tool of every model")
+                    allowed = "base and every measured target of every model"
+                    yield Problem(f"{name}.parquet", what, allowed)
 
     return rule
 
 
 def _vec_frames_kept(tables: Tables) -> Iterator[Problem]:
     before, after = tables["vec_frames"], tables["frames"]
-    kept = {row[0]: row[1:] for row in _frame_rows(after)}
+    kept = {row[:2]: row[2:] for row in _frame_rows(after)}
     for row in _frame_rows(before):
-        if kept.get(row[0]) != row[1:]:
+        if kept.get(row[:2]) != row[2:]:
             what = f"frame {row[0]} of model vec differs from vec_frames.parquet"
             yield Problem("frames.parquet", what, "the frames of the VEC fit")
 
 
 def _frame_rows(table: Columns) -> list[tuple]:
-    names = [name for name in table if name not in ("model", "frame")]
+    names = [name for name in table if name not in ("model", "frame", "session")]
+    sessions = table.get("session", np.full(len(table["frame"]), None))
     return [
-        (table["frame"][i], *(float(table[name][i]) for name in names))
+        (table["frame"][i], sessions[i], *(float(table[name][i]) for name in names))
         for i in np.flatnonzero(table["model"] == "vec")
     ]
 
@@ -169,9 +172,9 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("measurements",), _unit_quaternions("measurements")),
     (("measurements",), _measurements),
     (("vec_frames",), _unit_quaternions("vec_frames")),
-    (("vec_frames",), _frames("vec_frames", ("vec",))),
+    (("vec_frames", "measurements"), _frames("vec_frames", ("vec",))),
     (("frames",), _unit_quaternions("frames")),
-    (("frames",), _frames("frames", ("vec", "dh", "nominal"))),
+    (("frames", "measurements"), _frames("frames", ("vec", "dh", "nominal"))),
     (("vec_frames", "frames"), _vec_frames_kept),
     (("vec_model",), _vec_model),
     (("vec_model", "measurements"), _every_joint("vec_model")),

@@ -68,6 +68,7 @@ _FRAME_COLUMNS = (
         "base (robot base in the instrument's frame), tool (tool centre point in the flange frame) "
         "or the name of a target (in the flange frame)",
     ),
+    *unstated((text("session", "session a base belongs to; null for one alone and for targets"),)),
     *_position("the frame's origin"),
     *_quaternion("the frame's orientation"),
 )
@@ -151,10 +152,11 @@ DH_MODEL = Artefact(
     (whole("joint", "joint number, from 1", 1, JOINTS_MAX), *_DH_FITTED, *_DH_STD),
     ("joint",),
 )
+_FRAME_KEY = ("model", "frame", "session")
 VEC_FRAMES = Artefact(
-    "vec_frames", "Frames estimated with the VEC model.", _FRAME_COLUMNS, ("model", "frame")
+    "vec_frames", "Frames estimated with the VEC model.", _FRAME_COLUMNS, _FRAME_KEY
 )
-FRAMES = Artefact("frames", "Frames of every model.", _FRAME_COLUMNS, ("model", "frame"))
+FRAMES = Artefact("frames", "Frames of every model.", _FRAME_COLUMNS, _FRAME_KEY)
 VEC_FIT = Artefact(
     "vec_fit",
     "How the VEC fit went: rank, singular values, prior, iterations, parameters.",

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration.frames import FrameCoordinates, Frames, closed_form_start, coordinates
+from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution
+from kinacc.calibration.start import closed_form_start
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.calibration.truncated import minimise_truncated
 from kinacc.models import dh

@@ -43,7 +43,7 @@ def fit_vec(
     options: Options,
 ) -> VECFit:
     """VEC model on the nominal arm over ``joint_range_rad`` (k,), (k,). Raises FitError."""
-    frames = known()
+    frames = _stated(observations)
     if options.frames_estimated:
         frames = fit_nominal(observations, nominal, options).frames
     return vec_fit.fit(
@@ -77,7 +77,7 @@ def fit_dh(
 
     Following the VEC, base and targets are the VEC's. Raises FitError.
     """
-    frames = None if options.frames_estimated else known()
+    frames = None if options.frames_estimated else _stated(observations)
     if options.dh_to_vec:
         at_target = compose(
             vec.pose(vec_model, observations.q_rad, observations.s),
@@ -103,8 +103,13 @@ def fit_nominal(observations: Observations, nominal: DHModel, options: Options) 
         observations,
         nominal,
         rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
-        frames=None if options.frames_estimated else known(),
+        frames=None if options.frames_estimated else _stated(observations),
     )
+
+
+def _stated(observations: Observations) -> Frames:
+    """Frames nobody estimates: every base and every target at the identity."""
+    return known(sessions=len(observations.session_names), targets=len(observations.target_names))
 
 
 def _with_wanted_directions(observations: Observations, options: Options) -> Observations:

@@ -19,7 +19,8 @@ class Observations:
     ``q_rad`` (n, k) DH joint angles; ``s`` (n, k) travel direction -1, 0 (unknown), +1;
     ``position_mm`` (n, 3) and ``rotation`` (n, 3, 3) in the instrument's frame, a rotation of NaN
     where only the position was measured; ``pose``, ``target`` (index into ``target_names``),
-    ``repeat`` and ``fold`` (n,) integers, fold -1 where no fold is assigned.
+    ``repeat`` and ``fold`` (n,) integers, fold -1 where no fold is assigned; ``session`` (n,) index
+    into ``session_names``, each with a base frame of its own (one session where not given).
     """
 
     q_rad: np.ndarray
@@ -31,6 +32,12 @@ class Observations:
     repeat: np.ndarray
     fold: np.ndarray
     target_names: tuple[str, ...] = (TOOL,)
+    session: np.ndarray | None = None
+    session_names: tuple[str | None, ...] = (None,)
+
+    def __post_init__(self) -> None:
+        if self.session is None:
+            object.__setattr__(self, "session", np.zeros(len(self.q_rad), dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.q_rad)
@@ -60,7 +67,7 @@ class Observations:
         columns = {
             field.name: getattr(self, field.name)[rows]
             for field in fields(self)
-            if field.name != "target_names"
+            if not field.name.endswith("_names")
         }
         return replace(self, **columns)
 
@@ -69,7 +76,7 @@ class Observations:
         return replace(self, s=np.zeros_like(self.s))
 
     def with_targets_of(self, other: Observations) -> Observations:
-        """These measurements labelled as those of ``other``, row by row."""
+        """These measurements, of one session, labelled as those of ``other``, row by row."""
         names = ("s", "pose", "target", "repeat", "fold", "target_names")
         return replace(self, **{name: getattr(other, name) for name in names})
 
@@ -105,6 +112,9 @@ def from_columns(columns: Mapping[str, np.ndarray], joint_map: np.ndarray) -> Ob
     names = columns["target"]
     target_names = tuple(dict.fromkeys(str(name) for name in names))
     index = {name: number for number, name in enumerate(target_names)}
+    sessions = columns.get("session", np.full(len(names), None))
+    session_names = tuple(dict.fromkeys(sessions))
+    session_index = {name: number for number, name in enumerate(session_names)}
     return Observations(
         q_rad=reported @ np.asarray(joint_map).T,
         s=s,
@@ -115,4 +125,6 @@ def from_columns(columns: Mapping[str, np.ndarray], joint_map: np.ndarray) -> Ob
         repeat=np.asarray(columns["repeat"]).astype(np.int64),
         fold=np.nan_to_num(np.asarray(columns["fold"], dtype=float), nan=-1.0).astype(np.int64),
         target_names=target_names,
+        session=np.array([session_index[name] for name in sessions], dtype=np.int64),
+        session_names=session_names,
     )

@@ -12,7 +12,7 @@ from kinacc.calibration.frames import Frames
 from kinacc.calibration.models import Options
 from kinacc.calibration.observations import Observations
 from kinacc.gamma import gamma99
-from kinacc.geometry import Pose, compose, invert, log_so3
+from kinacc.geometry import Pose, compose, log_so3
 from kinacc.models import dh, vec
 from kinacc.models.dh import DHModel
 from kinacc.models.vec import VECModel
@@ -86,10 +86,12 @@ def errors(fitted: FittedModels, observations: Observations) -> dict[str, Errors
     by_nominal = _seen(dh.forward(fitted.nominal, q_rad), fitted.nominal_frames, observations)
     measured = observations.measured
     return {
-        "vec_vs_measured": _difference(measured, by_vec, fitted.vec_frames.base),
-        "dh_vs_vec": _difference(by_vec, by_dh, fitted.dh_frames.base),
-        "dh_vs_measured": _difference(measured, by_dh, fitted.dh_frames.base),
-        "nominal_vs_measured": _difference(measured, by_nominal, fitted.nominal_frames.base),
+        "vec_vs_measured": _difference(measured, by_vec, _bases(fitted.vec_frames, observations)),
+        "dh_vs_vec": _difference(by_vec, by_dh, _bases(fitted.dh_frames, observations)),
+        "dh_vs_measured": _difference(measured, by_dh, _bases(fitted.dh_frames, observations)),
+        "nominal_vs_measured": _difference(
+            measured, by_nominal, _bases(fitted.nominal_frames, observations)
+        ),
     }
 
 
@@ -144,13 +146,20 @@ def _seen(flange: Pose, frames: Frames, observations: Observations) -> Pose:
         frames.targets.rotation[observations.target],
         frames.targets.position_mm[observations.target],
     )
-    return compose(frames.base, compose(flange, targets))
+    return compose(_bases(frames, observations), compose(flange, targets))
 
 
-def _difference(reference: Pose, model: Pose, base: Pose) -> Errors:
-    back = invert(base).rotation
+def _bases(frames: Frames, observations: Observations) -> Pose:
+    """The base of every row's session, (n, ...)."""
+    rows = observations.session
+    return Pose(frames.bases.rotation[rows], frames.bases.position_mm[rows])
+
+
+def _difference(reference: Pose, model: Pose, bases: Pose) -> Errors:
+    back = np.swapaxes(bases.rotation, 1, 2)
     known = np.isfinite(reference.rotation[:, 0, 0])
     rotation = np.full(reference.position_mm.shape, np.nan)
     turned = reference.rotation[known] @ np.swapaxes(model.rotation[known], 1, 2)
-    rotation[known] = log_so3(turned) @ back.T
-    return Errors((reference.position_mm - model.position_mm) @ back.T, rotation)
+    rotation[known] = (back[known] @ log_so3(turned)[..., None])[..., 0]
+    position = (back @ (reference.position_mm - model.position_mm)[..., None])[..., 0]
+    return Errors(position, rotation)

@@ -133,22 +133,32 @@ class PoseSystem:
 
     def _residual(self, x, part):
         frame_x, model_x = x[: self.coordinates.size], x[self.coordinates.size :]
-        inverse = self.coordinates.inverse_base(frame_x)
         targets = self.coordinates.targets(frame_x)
         flange = self.model.pose(model_x, part.q_rad, part.s)
-        centred = part.position_mm - self.coordinates.centroid_mm
         arm = np.einsum("nij,nj->ni", flange.rotation, targets.position_mm[part.target])
-        turned = centred @ inverse.rotation.T
+        turned, inverse = self._from_base(frame_x, part)
         turn = part.has_rotation
         rotation = np.zeros((len(part), 3))
         if turn.any():
             model_rotation = flange.rotation[turn] @ targets.rotation[part.target[turn]]
-            measured = inverse.rotation @ part.rotation[turn]
+            measured = inverse.rotation[turn] @ part.rotation[turn]
             rotation[turn] = log_so3(model_rotation @ np.swapaxes(measured, 1, 2))
         position = flange.position_mm + arm - turned - inverse.position_mm
         residual = np.concatenate([position, rotation], axis=1) * self._weights()
         keep = np.concatenate([np.ones((len(part), 3), bool), np.repeat(turn[:, None], 3, 1)], 1)
         return residual, keep, (flange, arm, turned)
+
+    def _from_base(self, frame_x, part):
+        """Measured points turned (n, 3) about their centroid, and inverse bases (n, ...)."""
+        turned = np.empty((len(part), 3))
+        rotation, position = np.empty((len(part), 3, 3)), np.empty((len(part), 3))
+        for session in np.unique(part.session):
+            rows = part.session == session
+            inverse = self.coordinates.inverse_base(frame_x, session)
+            centred = part.position_mm[rows] - self.coordinates.centroid_mm[session]
+            turned[rows] = centred @ inverse.rotation.T
+            rotation[rows], position[rows] = inverse
+        return turned, Pose(rotation, position)
 
     def _jacobian(self, x, part, residual, seen):
         flange, arm, turned = seen
@@ -175,12 +185,14 @@ class PoseSystem:
 
     def _fill_frames(self, jacobian, frame_x, part, flange, turned, angles):
         coordinates = self.coordinates
-        if coordinates.base_free:
-            turn = left_jacobian(frame_x[3:6])
-            jacobian[:, :3, :3] = -np.eye(3)
-            jacobian[:, :3, 3:6] = skew(turned) @ turn
+        for session in np.unique(part.session) if coordinates.base_free else ():
+            rows = part.session == session
+            begin = coordinates.base_columns(session).start
+            turn = left_jacobian(frame_x[begin + 3 : begin + 6])
+            jacobian[rows, :3, begin : begin + 3] = -np.eye(3)
+            jacobian[rows, :3, begin + 3 : begin + 6] = skew(turned[rows]) @ turn
             # The measured side stands behind exp(r): exp(r) exp(-d) = exp(-exp(r) d) exp(r).
-            jacobian[:, 3:, 3:6] = -exp_so3(angles) @ turn
+            jacobian[rows, 3:, begin + 3 : begin + 6] = -exp_so3(angles[rows]) @ turn
         if not coordinates.targets_free:
             return
         for target in range(coordinates.turns.size):

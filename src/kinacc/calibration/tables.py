@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from kinacc.calibration.dh_fit import DHFit
-from kinacc.calibration.frames import Frames
+from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.solve import Solution, Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, is_angle, vec_parameter_names
 from kinacc.calibration.vec_fit import VECFit
-from kinacc.geometry import Pose, quaternion_from_rotation
+from kinacc.geometry import quaternion_from_rotation
 from kinacc.models.dh import PARAMETERS
 from kinacc.models.tables import frame
 from kinacc.models.vec import ERRORS
@@ -54,32 +54,43 @@ def dh_model_columns(fit: DHFit) -> Columns:
     return columns | {f"std_{name}": fit.std[:, i] for i, name in enumerate(PARAMETERS)}
 
 
-def frames_columns(frames: Mapping[str, Frames], target_names: tuple[str, ...]) -> Columns:
-    """``frames`` of models by name: the base, then every target."""
+def frames_columns(
+    frames: Mapping[str, Frames],
+    target_names: tuple[str, ...],
+    session_names: tuple[str | None, ...] = (None,),
+) -> Columns:
+    """``frames`` of models by name: the base of every session, then every target."""
     rows = []
     for model, each in frames.items():
-        rows.append((model, "base", each.base.position_mm, each.base.rotation))
-        for number, name in enumerate(target_names):
-            targets = each.targets
-            rows.append((model, name, targets.position_mm[number], targets.rotation[number]))
-    position = np.array([row[2] for row in rows])
-    quaternion = quaternion_from_rotation(np.array([row[3] for row in rows]))
+        for session, at, turned in zip(
+            session_names, each.bases.position_mm, each.bases.rotation, strict=True
+        ):
+            rows.append((model, "base", session, at, turned))
+        for name, at, turned in zip(
+            target_names, each.targets.position_mm, each.targets.rotation, strict=True
+        ):
+            rows.append((model, name, None, at, turned))
+    position = np.array([row[3] for row in rows])
+    quaternion = quaternion_from_rotation(np.array([row[4] for row in rows]))
     return {
         "model": np.array([row[0] for row in rows], dtype=object),
         "frame": np.array([row[1] for row in rows], dtype=object),
+        "session": np.array([row[2] for row in rows], dtype=object),
         **{f"{axis}_mm": position[:, i] for i, axis in enumerate("xyz")},
         **{f"q{part}": quaternion[:, i] for i, part in enumerate("wxyz")},
     }
 
 
-def frames_of(columns: Mapping, model: str, target_names: tuple[str, ...]) -> Frames:
+def frames_of(
+    columns: Mapping,
+    model: str,
+    target_names: tuple[str, ...],
+    session_names: tuple[str | None, ...] = (None,),
+) -> Frames:
     """The ``Frames`` of one model in a ``frames`` table. Raises InputError for a missing one."""
+    bases = [frame(columns, model, "base", name) for name in session_names]
     targets = [frame(columns, model, name) for name in target_names]
-    stacked = Pose(
-        np.stack([each.rotation for each in targets]),
-        np.stack([each.position_mm for each in targets]),
-    )
-    return Frames(frame(columns, model, "base"), stacked)
+    return Frames(stacked(bases), stacked(targets))
 
 
 def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:

@@ -1,9 +1,10 @@
 """Joint uncertainty of everything a fit estimated, in coordinates that need no memory of the fit.
 
 Parameters are named: ``base.x_mm`` .. ``base.rz_rad`` move the robot base in the instrument's
-frame; ``<target>.x_mm`` .. ``<target>.rz_rad`` move a target in the flange frame; a rotation vector
-w turns R to exp(w) R in the frame the motion is given in. DH parameters are ``j1.d_mm`` and the
-like, VEC coefficients ``j1.delta_x.0``.
+frame, ``base2`` and so on that of further sessions in the order they come in; ``<target>.x_mm`` ..
+``<target>.rz_rad`` move a target in the flange frame; a rotation vector w turns R to exp(w) R in
+the frame the motion is given in. DH parameters are ``j1.d_mm`` and the like, VEC coefficients
+``j1.delta_x.0``.
 """
 
 from __future__ import annotations
@@ -85,7 +86,10 @@ def is_angle(name: str) -> bool:
 
 def frame_motion_names(coordinates: FrameCoordinates, target_names: tuple[str, ...]) -> list[str]:
     """Names of the frame parameters, in the order of the rows of ``frame_motions``."""
-    names = [f"{BASE}.{motion}" for motion in MOTIONS] if coordinates.base_free else []
+    names = []
+    for session in range(coordinates.anchor.sessions if coordinates.base_free else 0):
+        base = BASE if session == 0 else f"{BASE}{session + 1}"
+        names += [f"{base}.{motion}" for motion in MOTIONS]
     if coordinates.targets_free:
         for name, turns in zip(target_names, coordinates.turns, strict=True):
             names += [f"{name}.{motion}" for motion in (MOTIONS if turns else MOTIONS[:3])]
@@ -95,14 +99,16 @@ def frame_motion_names(coordinates: FrameCoordinates, target_names: tuple[str, .
 def frame_motions(coordinates: FrameCoordinates, x: np.ndarray) -> np.ndarray:
     """Derivative (F, F) of the named motions of base and targets in the frame coordinates at x."""
     motions = np.zeros((coordinates.size, coordinates.size))
-    if coordinates.base_free:
-        inverse = coordinates.inverse_base(x)
+    for session in range(coordinates.anchor.sessions if coordinates.base_free else 0):
+        inverse = coordinates.inverse_base(x, session)
+        place = coordinates.base_columns(session)
+        shift, turned = slice(place.start, place.start + 3), slice(place.start + 3, place.stop)
         base = inverse.rotation.T
-        turn = base @ left_jacobian(x[3:6])
+        turn = base @ left_jacobian(x[turned])
         # m = c - R'p, R' turning by exp(-R'J dw): see FrameCoordinates.inverse_base.
-        motions[:3, :3] = -base
-        motions[:3, 3:6] = -skew(base @ inverse.position_mm) @ turn
-        motions[3:6, 3:6] = -turn
+        motions[shift, shift] = -base
+        motions[shift, turned] = -skew(base @ inverse.position_mm) @ turn
+        motions[turned, turned] = -turn
     if coordinates.targets_free:
         for target, turns in enumerate(coordinates.turns):
             columns = coordinates.target_columns(target)

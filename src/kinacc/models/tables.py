@@ -14,14 +14,18 @@ from kinacc.models.vec import ERRORS, VECModel
 Columns = Mapping[str, np.ndarray]
 
 
-def dh_model(columns: Columns) -> DHModel:
-    """DH model of a ``dh_model`` table."""
+def dh_model(columns: Columns, prismatic: np.ndarray | None = None) -> DHModel:
+    """DH model of a ``dh_model`` table; ``prismatic`` (k,) is the robot's to say."""
     order = np.argsort(columns["joint"], kind="stable")
-    return DHModel(*(np.asarray(columns[name], dtype=float)[order] for name in PARAMETERS))
+    values = (np.asarray(columns[name], dtype=float)[order] for name in PARAMETERS)
+    return DHModel(*values, prismatic)
 
 
-def vec_model(columns: Columns) -> VECModel:
-    """VEC model of a ``vec_model`` table; coefficients it does not list are zero."""
+def vec_model(columns: Columns, prismatic: np.ndarray | None = None) -> VECModel:
+    """VEC model of a ``vec_model`` table; coefficients it does not list are zero.
+
+    ``prismatic`` (k,): joints that slide, which is the robot's to say.
+    """
     joint = np.asarray(columns["joint"]).astype(int) - 1
     order = np.asarray(columns["order"]).astype(int)
     direction = np.asarray(columns["direction"]).astype(int)
@@ -39,7 +43,7 @@ def vec_model(columns: Columns) -> VECModel:
     offsets = np.zeros((joints, 2))
     offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
     return VECModel(
-        DHModel(*(per_joint(name) for name in PARAMETERS)),
+        DHModel(*(per_joint(name) for name in PARAMETERS), prismatic),
         per_joint("q_min_rad"),
         per_joint("q_max_rad"),
         coefficients,
@@ -47,13 +51,17 @@ def vec_model(columns: Columns) -> VECModel:
     )
 
 
-def frame(columns: Columns, model: str, name: str) -> Pose:
+def frame(columns: Columns, model: str, name: str, session: str | None = None) -> Pose:
     """One frame of a ``frames`` table: ``base``, ``tool`` or a target of ``model``.
 
+    ``session`` chooses among the bases of several sessions; without it the first is taken.
     Raises InputError naming the frames there are.
     """
     models, names = np.asarray(columns["model"]), np.asarray(columns["frame"])
-    rows = np.flatnonzero((models == model) & (names == name))
+    chosen = (models == model) & (names == name)
+    if session is not None:
+        chosen &= np.asarray(columns["session"]) == session
+    rows = np.flatnonzero(chosen)
     if len(rows) == 0:
         known = ", ".join(str(other) for other in names[models == model]) or "none"
         raise InputError(Problem("table frames", f"has no frame {name!r} of model {model}", known))

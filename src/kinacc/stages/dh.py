@@ -18,12 +18,14 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     options = shared.options(settings["calibration"])
     every, train = shared.observed(inputs, arm)
     observations = every.select(train)
-    vec_frames = tables.frames_of(inputs["vec_frames"], "vec", every.target_names)
-    volumetric = vec_model(inputs["vec_model"])
+    vec_frames = tables.frames_of(
+        inputs["vec_frames"], "vec", every.target_names, every.session_names
+    )
+    volumetric = vec_model(inputs["vec_model"], arm.dh.prismatic)
     fitted = models.fit_dh(observations, arm.dh, options, volumetric, vec_frames)
     nominal = models.fit_nominal(observations, arm.dh, options)
     frames = {"dh": fitted.frames, "nominal": nominal.frames}
-    others = tables.frames_columns(frames, every.target_names)
+    others = tables.frames_columns(frames, every.target_names, every.session_names)
     kept = inputs["vec_frames"]
     known = uncertainty.of_dh(fitted, every.target_names)
     return {

@@ -18,6 +18,7 @@ from kinacc.calibration.residuals import (
     fit_all,
     statistics,
 )
+from kinacc.models.dh import DHModel
 from kinacc.models.tables import dh_model, vec_model
 from kinacc.stages import calibration_settings as shared
 
@@ -34,7 +35,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     arm = robot.load(settings["robot"])
     options = shared.options(settings["calibration"])
     every, train = shared.observed(inputs, arm)
-    delivered = _delivered(inputs, arm.dh, every.target_names)
+    delivered = _delivered(inputs, arm.dh, every)
     joint_range = delivered.vec.q_min_rad, delivered.vec.q_max_rad
 
     def refit(observations: Observations, fold: int) -> FittedModels:
@@ -52,18 +53,18 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     }
 
 
-def _delivered(inputs: Mapping, nominal, target_names: tuple[str, ...]) -> FittedModels:
+def _delivered(inputs: Mapping, nominal: DHModel, every: Observations) -> FittedModels:
     frames = {
-        model: tables.frames_of(inputs["frames"], model, target_names)
+        model: tables.frames_of(inputs["frames"], model, every.target_names, every.session_names)
         for model in ("vec", "dh", "nominal")
     }
     return FittedModels(
-        vec_model(inputs["vec_model"]),
-        frames["vec"],
-        dh_model(inputs["dh_model"]),
-        frames["dh"],
-        nominal,
-        frames["nominal"],
+        vec=vec_model(inputs["vec_model"], nominal.prismatic),
+        vec_frames=frames["vec"],
+        dh=dh_model(inputs["dh_model"], nominal.prismatic),
+        dh_frames=frames["dh"],
+        nominal=nominal,
+        nominal_frames=frames["nominal"],
     )
 
 

@@ -22,7 +22,9 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     gauge = models.vec_gauge(observations, fitted, options)
     return {
         "vec_model": tables.vec_model_columns(fitted),
-        "vec_frames": tables.frames_columns({"vec": fitted.frames}, every.target_names),
+        "vec_frames": tables.frames_columns(
+            {"vec": fitted.frames}, every.target_names, every.session_names
+        ),
         "vec_fit": tables.vec_fit_columns(fitted, gauge),
         "vec_covariance": tables.covariance_columns(uncertainty.of_vec(fitted, every.target_names)),
     }

@@ -1,0 +1,93 @@
+"""Several sessions of one arm: a base each, one robot and one tool."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import simulated
+
+from kinacc import robot
+from kinacc.calibration import dh_fit, frames, residuals, tables, uncertainty
+from kinacc.calibration.models import Options
+from kinacc.calibration.system import PoseSystem
+from kinacc.calibration.vec_fit import Prior
+
+ARM = robot.load("ur10")
+FREE = dh_fit.free_parameters(6, (2, 3))
+OPTIONS = Options(
+    500.0, True, 1, Prior(0.3, 3e-4, 0.7, 3e-4), dh_to_vec=False, hayati_joints=(2, 3)
+)
+
+
+def observed(kind, sessions, count=120, seed=0, noise_mm=0.02):
+    rng = np.random.default_rng(seed)
+    true = simulated.disturbed(ARM.dh, FREE, rng)
+    q = simulated.joints(ARM, count, rng)
+    return simulated.measure(true, q, kind, rng, noise_mm, sessions)
+
+
+def fit(seen):
+    return dh_fit.fit(seen, ARM.dh, free=FREE, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
+
+
+@pytest.mark.parametrize("kind", [simulated.POINT, simulated.THREE, simulated.POSE])
+def test_sessions_share_the_arm_and_not_the_base(kind):
+    seen = observed(kind, 4)
+    found = fit(seen)
+    noise = np.sqrt(found.solution.variance)
+    assert noise == pytest.approx(0.02 if kind != simulated.POSE else 0.037, rel=0.15)
+    assert found.frames.sessions == 4
+    # All sessions tell of one arm: together they know it better than the first alone.
+    first = seen.select(seen.session == 0)
+    alone = fit(replace(first, session_names=(None,)))
+    assert np.nanmedian(found.std / alone.std) == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_session_of_three_poses_is_placed():
+    seen = observed(simulated.POINT, 2, 80)
+    few = (seen.session == 0) | (np.cumsum(seen.session == 1) <= 3)
+    found = fit(seen.select(few))
+    assert np.sqrt(found.solution.variance) < 0.03
+
+
+def test_jacobian_of_every_base_is_the_derivative_of_the_residual():
+    rng = np.random.default_rng(3)
+    seen = observed(simulated.POSE, 3, 9)
+    anchor = frames.Frames(simulated.anywhere(rng, 900.0, 3), simulated.anywhere(rng, 90.0, 1))
+    coordinates = frames.coordinates(seen, anchor, base_free=True, targets_free=True)
+    model = dh_fit.flange_model(ARM.dh, np.zeros((6, 5), dtype=bool))
+    system = PoseSystem(seen, model, coordinates, 300.0)
+    x = np.where(coordinates.is_angle(), 0.2, 10.0) * rng.normal(size=coordinates.size)
+    (_, jacobian), *_ = system.blocks(x)
+    for column in range(x.size):
+        step = np.zeros(x.size)
+        step[column] = 1e-6
+        slope = (system.residual(x + step) - system.residual(x - step)) / 2e-6
+        assert np.abs(jacobian[:, column] - slope).max() < 1e-5 * max(1.0, np.abs(slope).max())
+
+
+def test_every_base_keeps_its_session_in_the_tables():
+    seen = observed(simulated.POSE, 3)
+    found = fit(seen)
+    columns = tables.frames_columns({"dh": found.frames}, seen.target_names, seen.session_names)
+    again = tables.frames_of(columns, "dh", seen.target_names, seen.session_names)
+    np.testing.assert_allclose(again.bases.rotation, found.frames.bases.rotation, atol=1e-12)
+    np.testing.assert_array_equal(again.bases.position_mm, found.frames.bases.position_mm)
+    names = uncertainty.of_dh(found, seen.target_names).names
+    assert [name for name in names if name.endswith(".rx_rad")] == [
+        "base.rx_rad",
+        "base2.rx_rad",
+        "base3.rx_rad",
+        "t0.rx_rad",
+    ]
+
+
+def test_errors_of_every_session_are_in_its_own_base():
+    seen = observed(simulated.POSE, 3, noise_mm=1e-4)
+    span = seen.q_rad.min(axis=0), seen.q_rad.max(axis=0)
+    fitted = residuals.fit_all(seen, ARM.dh, span, OPTIONS)
+    errors = residuals.errors(fitted, seen)
+    assert np.abs(errors["dh_vs_measured"].position_mm).max() < 0.03
+    assert np.abs(errors["dh_vs_vec"].position_mm).max() < 0.03
