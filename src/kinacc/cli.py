@@ -8,6 +8,7 @@ from collections.abc import Callable
 import click
 
 from kinacc import __version__
+from kinacc.commands.compensate import compensate
 from kinacc.commands.predict import predict
 from kinacc.errors import InputError, Problem
 from kinacc.stages.catalogue import STAGES, Stage, maker_of
@@ -118,6 +119,7 @@ def _help(stage: Stage) -> str:
 for _stage in STAGES.values():
     run.add_command(_stage_command(_stage))
 main.add_command(predict)
+main.add_command(compensate)
 
 
 def run_stage(

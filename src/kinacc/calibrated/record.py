@@ -86,7 +86,7 @@ class Calibration:
         frame: str = "base",
         point: str | None = None,
     ) -> Pose:
-        """Poses (n, ...) of a point in ``frame`` at DH joints (n, k); s (n, k) travel directions."""
+        """Poses (n, ...) of a point in ``frame`` at DH joints (n, k); travel s (n, k)."""
         return compose(self.origin(frame), compose(self.forward(q_rad, s), self.point(point)))
 
     @cached_property
@@ -105,13 +105,13 @@ class Calibration:
         names = self.known.names if self.known else ()
         return np.where([is_angle(name) for name in names], ANGLE_UNIT_RAD, 1.0)
 
-    def outside_range(self, q_rad: np.ndarray) -> np.ndarray:
-        """True (n, k) where a DH joint lies outside what the data cover."""
+    def outside_range(self, q_rad: np.ndarray, slack: np.ndarray | float = 1e-9) -> np.ndarray:
+        """True (n, k) where a DH joint lies outside what the data cover by more than ``slack``."""
         q_rad = np.atleast_2d(q_rad)
         if self.fitted_range_rad is None:
             return np.zeros(q_rad.shape, dtype=bool)
         low, high = self.fitted_range_rad
-        return (q_rad < low - 1e-9) | (q_rad > high + 1e-9)
+        return (q_rad < low - slack) | (q_rad > high + slack)
 
 
 def nominal(robot: Robot, name: str = "") -> Calibration:
