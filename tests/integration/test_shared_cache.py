@@ -4,16 +4,14 @@ import shutil
 
 import pytest
 
-TARGET = "results/mh180/dh_model.parquet"
 
-
-def from_cache(text: str) -> set[str]:
+def from_cache(text: str, dataset: str) -> set[str]:
     """Tables linked from the cache that this run had not put there itself."""
     return {
         name
         for name in ("vec_model", "dh_model")
-        if f"Symlinking output file results/mh180/{name}.parquet" in text
-        and f"Moving output file results/mh180/{name}.parquet" not in text
+        if f"Symlinking output file results/{dataset}/{name}.parquet" in text
+        and f"Moving output file results/{dataset}/{name}.parquet" not in text
     }
 
 
@@ -23,10 +21,11 @@ def run(project, tmp_path):
     cache = tmp_path / "shared cache"
     cache.mkdir()
 
-    def once() -> set[str]:
+    def once(dataset: str = "mh180") -> set[str]:
         shutil.rmtree(project.folder / "results", ignore_errors=True)
-        text = project.snakemake(TARGET, options=("--cache",), SNAKEMAKE_OUTPUT_CACHE=str(cache))
-        return from_cache(text)
+        target = f"results/{dataset}/dh_model.parquet"
+        text = project.snakemake(target, options=("--cache",), SNAKEMAKE_OUTPUT_CACHE=str(cache))
+        return from_cache(text, dataset)
 
     return once
 
@@ -42,9 +41,17 @@ def test_equal_work_is_taken_from_the_cache(run):
         ("src/kinacc/calibration/dh_fit.py", "# changed", set()),
         ("src/kinacc/stages/dh.py", "# changed", {"vec_model"}),
         ("src/kinacc/robots/mh180.yaml", "# changed", set()),
+        ("src/kinacc/synthetic/accepted_draws.csv", "# changed", set()),
     ],
 )
 def test_other_code_or_robot_data_is_never_a_hit(project, run, file, line, left):
     run()
     project.append(file, line)
     assert run() == left
+
+
+def test_another_measured_file_is_never_a_hit(project, run):
+    run("own")
+    path = project.folder / "own data" / "poses.csv"
+    path.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
+    assert run("own") == set()
