@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.calibrated.record import Calibration
-from kinacc.errors import InputError
+from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.inverse import limits, newton
 from kinacc.inverse import solve as all_branches
@@ -70,8 +70,9 @@ def compensate(
     reported joints, is taken; where that is not given, the one nearest to zero among those the
     data cover. The largest joint movement counts. ``s`` (n, k): directions the joints will travel
     in, for a VEC model that knows them.
-    Raises InputError for an unknown frame or point.
+    Raises InputError for an unknown frame or point, and for poses that are no numbers.
     """
+    _require_numbers(wanted)
     robot, count = calibration.robot, len(wanted.position_mm)
     carried, origin = calibration.point(point), calibration.origin(frame)
     goal = compose(invert(origin), compose(wanted, invert(carried)))
@@ -89,6 +90,14 @@ def compensate(
         if wanting.any():
             best.offer(arm.judged(start[wanting], own[wanting]), own[wanting])
     return _outcome(calibration, best, near, given)
+
+
+def _require_numbers(wanted: Pose) -> None:
+    known = np.isfinite(wanted.position_mm).all(axis=1)
+    known &= np.isfinite(wanted.rotation).all(axis=(1, 2))
+    if not known.all():
+        shown = ", ".join(str(row) for row in np.flatnonzero(~known)[:5])
+        raise InputError(Problem("wanted poses", f"no number in row {shown}", "finite poses"))
 
 
 def programmed(calibration: Calibration, q_rad: np.ndarray, point: str | None = None) -> Pose:
