@@ -65,6 +65,15 @@ def test_a_good_folder_has_no_problem(results):
     assert {path.parent.name for path in paths} == {"mh180", "study_chunk"}
 
 
+def test_one_data_set_may_be_checked_by_its_own_folder(results):
+    (folder,) = [path for path in results.root.iterdir() if path.is_dir()]
+    report = check.check_results(folder)
+    assert report.ok, str(report)
+    assert [each.name for each in report.datasets] == [folder.name]
+    (folder / "claims.parquet").unlink()
+    assert not check.check_results(folder).ok
+
+
 def test_the_report_is_readable_by_people_and_machines(results, capsys):
     (results.folder / "figures" / "fig4.png").unlink()
     assert check.main(str(results.root), as_json=True) == 1

@@ -91,6 +91,8 @@ def check_results(results: Path | str, plan: Plan | None = None) -> Report:
     if not folder.is_dir():
         problem = Problem(str(folder), "no such folder", "a results folder", "run snakemake -c2")
         return Report(str(folder), (), (problem,))
+    if _is_dataset(folder):
+        return Report(str(folder), (check_dataset(folder, plan),))
     names = sorted(
         path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")
     )
@@ -104,6 +106,11 @@ def check_results(results: Path | str, plan: Plan | None = None) -> Report:
     return Report(
         str(folder), tuple(check_dataset(folder / name, plan) for name in names), tuple(problems)
     )
+
+
+def _is_dataset(folder: Path) -> bool:
+    """Whether the folder is that of one data set, given in place of the folder of all of them."""
+    return any((folder / artefact.file_name).is_file() for artefact in ARTEFACTS.values())
 
 
 def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:

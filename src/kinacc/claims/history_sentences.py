@@ -30,6 +30,7 @@ def history_claims() -> list[Claim]:
             _first_near_alpha,
             paper=20.0,
             tolerance=20.0,
+            arm_specific=True,
         ),
         Claim(
             "fig5_few_true_errors_above",
