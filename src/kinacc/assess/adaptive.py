@@ -1,0 +1,230 @@
+"""Adaptive assessors: told what was measured, they say what to measure next and what is known.
+
+A campaign is one run of an assessor over candidate points. It is told readings one by one, names
+the next point or says that it is done, and states at any moment what the readings so far allow.
+Equal readings in equal order lead to equal answers, so a campaign is restored by telling it its
+readings again. To add an assessor: a module with a frozen dataclass that has the members of
+:class:`AdaptiveAssessor`, and a line in :mod:`kinacc.assess.registry`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from kinacc.assess.statement import Statement
+from kinacc.assess.world import World
+from kinacc.errors import InputError, Problem
+
+_SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """The m points an assessor may measure, rows in random order.
+
+    The order must have been drawn without regard to the errors: the first k rows then stand for
+    all. covariance_mm2: (m, 3, 3) of one reading at each point, robot base frame; q_rad: (m, k)
+    joints, and ``effects`` (m, 3, P) the motion of the tool per unit of P possible causes (mm),
+    for assessors that use them.
+    """
+
+    covariance_mm2: np.ndarray
+    q_rad: np.ndarray | None = None
+    effects: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        covariance = np.array(self.covariance_mm2, dtype=float)
+        if covariance.ndim != 3 or covariance.shape[1:] != (3, 3) or not len(covariance):
+            found = f"shape {covariance.shape}"
+            raise InputError(Problem("covariance", found, "(m, 3, 3) with m at least 1, in mm^2"))
+        problems = [
+            Problem(f"covariance of point {row}", said, "symmetric, positive definite, in mm^2")
+            for row, said in covariance_faults(covariance)
+        ]
+        for name in ("q_rad", "effects"):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            if len(given) != len(covariance):
+                problems.append(Problem(name, f"{len(given)} rows", f"{len(covariance)} rows"))
+            elif not np.all(np.isfinite(given)):
+                problems.append(Problem(name, "holds values that are not finite", "numbers"))
+        if problems:
+            raise InputError(problems, "these candidates cannot be assessed")
+        object.__setattr__(self, "covariance_mm2", covariance)
+
+    @classmethod
+    def with_equal_noise(cls, sigma_mm: np.ndarray, **more: np.ndarray) -> Candidates:
+        """Candidates with standard deviations (m,), equal in the three axes."""
+        sigma = np.asarray(sigma_mm, dtype=float)
+        return cls(sigma[:, None, None] ** 2 * np.eye(3), **more)
+
+    @property
+    def points(self) -> int:
+        """Number of candidates m."""
+        return len(self.covariance_mm2)
+
+    @cached_property
+    def sigma_mm(self) -> np.ndarray:
+        """Standard deviation per axis (m,), root mean square over the axes."""
+        return np.sqrt(np.trace(self.covariance_mm2, axis1=1, axis2=2) / 3.0)
+
+    @cached_property
+    def is_equal_noise(self) -> np.ndarray:
+        """Whether the noise of a point is equal in all directions (m,)."""
+        even = self.sigma_mm[:, None, None] ** 2 * np.eye(3)
+        spread = np.abs(self.covariance_mm2 - even).max(axis=(1, 2))
+        return spread <= _SYMMETRY * self.sigma_mm**2
+
+
+class Campaign(Protocol):
+    """One assessment under way."""
+
+    def next(self) -> int | None:
+        """The row to measure next; None if no further measurement is wanted."""
+        ...
+
+    def record(
+        self, point: int, reading_mm: np.ndarray, covariance_mm2: np.ndarray | None = None
+    ) -> None:
+        """Take a reading (3,) at a row: measured minus modelled position, robot base frame.
+
+        covariance_mm2: (3, 3) of this reading where it is not the planned one. InputError, and
+        nothing taken, where the reading cannot be used.
+        """
+        ...
+
+    def statements(self) -> tuple[Statement, ...]:
+        """What the readings so far allow to say, the main statement first."""
+        ...
+
+
+class AdaptiveAssessor(Protocol):
+    """A method of assessment: ``name`` in tables, ``measurements`` it may spend."""
+
+    name: ClassVar[str]
+    measurements: int
+
+    def begin(self, candidates: Candidates) -> Campaign:
+        """A new campaign without readings."""
+        ...
+
+
+class Ledger:
+    """Readings of a campaign, averaged by point with the weights their covariances give them."""
+
+    def __init__(self, candidates: Candidates) -> None:
+        points = candidates.points
+        self.candidates = candidates
+        self.count = np.zeros(points, dtype=np.int64)
+        self.visited: list[int] = []  # in the order of their first readings
+        self.taken = 0
+        self.mean_mm = np.zeros((points, 3))
+        self.noise_mm = np.full(points, math.inf)  # of the mean, per axis, root mean square
+        self._weight = np.zeros(points)  # sum of 1 / variance where all noise was equal
+        self._information: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take one reading, or raise InputError and take nothing."""
+        reading = np.asarray(reading_mm, dtype=float)
+        covariance, equal = self._checked(point, reading, covariance_mm2)
+        if not self.count[point]:
+            self.visited.append(point)
+        self.count[point] += 1
+        self.taken += 1
+        if equal and point not in self._information:
+            weight = 1.0 / covariance[0, 0]
+            total = self._weight[point] + weight
+            self.mean_mm[point] += (reading - self.mean_mm[point]) * (weight / total)
+            self._weight[point] = total
+            self.noise_mm[point] = math.sqrt(1.0 / total)
+            return
+        known = self._weight[point]
+        before = (known * np.eye(3), known * self.mean_mm[point])
+        matrix, vector = self._information.get(point, before)
+        inverse = np.linalg.inv(covariance)
+        matrix, vector = matrix + inverse, vector + inverse @ reading
+        self._information[point] = (matrix, vector)
+        spread = np.linalg.inv(matrix)
+        self.mean_mm[point] = spread @ vector
+        self.noise_mm[point] = math.sqrt(np.trace(spread) / 3.0)
+
+    def noise(self, point: int) -> float | np.ndarray:
+        """Noise of a point's mean: standard deviation per axis (mm), or covariance (3, 3)."""
+        if point in self._information:
+            spread = np.linalg.inv(self._information[point][0])
+            return 0.5 * (spread + spread.T)
+        return float(self.noise_mm[point])
+
+    def sizes_mm(self) -> np.ndarray:
+        """Sizes of the mean readings of the visited points, in visiting order."""
+        return np.sqrt(np.sum(self.mean_mm[self.visited] ** 2, axis=1))
+
+    def _checked(self, point, reading, covariance_mm2) -> tuple[np.ndarray, bool]:
+        problems = []
+        points = self.candidates.points
+        if not 0 <= point < points:
+            problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
+        if reading.shape != (3,) or not np.all(np.isfinite(reading)):
+            problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
+        if covariance_mm2 is None:
+            if problems:
+                raise InputError(problems, "this reading cannot be recorded")
+            chosen = self.candidates
+            return chosen.covariance_mm2[point], bool(chosen.is_equal_noise[point])
+        covariance = np.asarray(covariance_mm2, dtype=float)
+        if covariance.shape != (3, 3):
+            problems.append(Problem("covariance", f"shape {covariance.shape}", "(3, 3), in mm^2"))
+        else:
+            allowed = "symmetric, positive definite, in mm^2"
+            faults = covariance_faults(covariance[None])
+            problems += [Problem("covariance", said, allowed) for _, said in faults]
+        if problems:
+            raise InputError(problems, "this reading cannot be recorded")
+        even = np.trace(covariance) / 3.0
+        spread = np.abs(covariance - even * np.eye(3)).max()
+        return covariance, bool(spread <= _SYMMETRY * even)
+
+
+def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
+    """Rows of covariances (n, 3, 3) that are none, each with what is wrong with it."""
+    faults = []
+    finite = np.isfinite(covariance_mm2).all(axis=(1, 2))
+    safe = np.where(finite[:, None, None], covariance_mm2, np.eye(3))
+    scale = np.abs(safe).max(axis=(1, 2))
+    skewed = np.abs(safe - np.swapaxes(safe, 1, 2)).max(axis=(1, 2)) > _SYMMETRY * scale
+    smallest = np.linalg.eigvalsh(safe)[:, 0]
+    for row in np.flatnonzero(~finite | skewed | (smallest <= 1e-14 * scale)):
+        if not finite[row]:
+            said = "holds values that are not finite"
+        elif skewed[row]:
+            said = "not symmetric"
+        else:
+            said = f"not positive definite: smallest eigenvalue {smallest[row]:.3g} mm^2"
+        faults.append((int(row), said))
+    return faults
+
+
+def check_budget(measurements: int, confidence: float = 0.95) -> list[Problem]:
+    """What is wrong with a budget and a confidence."""
+    problems = []
+    if not isinstance(measurements, (int, np.integer)) or measurements < 1:
+        problems.append(Problem("measurements", f"{measurements!r}", "a whole number, at least 1"))
+    if not 0.5 <= confidence < 1.0:
+        problems.append(Problem("confidence", f"{confidence!r}", "at least 0.5 and below 1"))
+    return problems
+
+
+def conduct(assessor: AdaptiveAssessor, world: World, **more: np.ndarray) -> Campaign:
+    """Run a campaign to its end on the readings of a world; ``more`` as in :class:`Candidates`."""
+    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **more))
+    reads = np.zeros(world.points, dtype=np.int64)
+    while (point := campaign.next()) is not None:
+        campaign.record(point, world.reading_mm(point, int(reads[point])))
+        reads[point] += 1
+    return campaign

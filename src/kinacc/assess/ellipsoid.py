@@ -1,0 +1,85 @@
+"""Nearest and farthest points of ellipsoids: exact limits where the noise differs by direction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+_STEPS = 100
+
+
+def nearest_in_ball(
+    reading_mm: np.ndarray, covariance_mm2: np.ndarray, radius_mm: float
+) -> np.ndarray:
+    """Point (3,) of the ball with the least Mahalanobis distance to a reading (3,).
+
+    Replaces the candidate of eq. 21, which is this point only where the covariance (3, 3) is a
+    multiple of the identity. Minimise (x - y)' S^-1 (x - y) over |x| <= radius: a convex problem,
+    x = (I + t S)^-1 y with t >= 0 where |x| meets the radius. Newton's method on 1/|x| - 1/radius,
+    which is concave in t, climbs to the root from t = 0 without overshooting.
+    """
+    if radius_mm <= 0.0:
+        return np.zeros(3)
+    variance, axes = np.linalg.eigh(covariance_mm2)
+    y = axes.T @ reading_mm
+    if math.sqrt(float(y @ y)) <= radius_mm:
+        return np.array(reading_mm, dtype=float)
+    t = 0.0
+    for _ in range(_STEPS):
+        shrunk = y / (1.0 + t * variance)
+        square = float(shrunk @ shrunk)
+        size = math.sqrt(square)
+        slope = float(shrunk @ (shrunk * variance / (1.0 + t * variance)))
+        step = square / slope * (size - radius_mm) / radius_mm
+        t += step
+        if step <= 1e-15 * t:
+            break
+    x = y / (1.0 + t * variance)
+    return axes @ (x * (radius_mm / math.sqrt(float(x @ x))))
+
+
+def mahalanobis_beyond(
+    reading_mm: np.ndarray, covariance_mm2: np.ndarray, radius_mm: float
+) -> float:
+    """Mahalanobis distance (1) from a reading (3,) to the nearest point of the ball; 0 inside."""
+    gap = reading_mm - nearest_in_ball(reading_mm, covariance_mm2, radius_mm)
+    return math.sqrt(max(float(gap @ np.linalg.solve(covariance_mm2, gap)), 0.0))
+
+
+def largest_size(mean_mm: np.ndarray, covariance_mm2: np.ndarray, deviations: float) -> float:
+    """Largest |x| with (x - mean)' S^-1 (x - mean) <= deviations^2, mm.
+
+    With the one-sided normal quantile for ``deviations`` it is an upper limit on the size of the
+    true error: along the true error's own direction the reading is normal, and the largest value
+    over all directions is at least the one along it.
+    """
+    variance, axes = np.linalg.eigh(covariance_mm2)
+    y = axes.T @ mean_mm
+    top = float(variance[-1])
+    # x_i = t y_i / (t - s_i) for the t above the largest variance that meets the boundary.
+    weight = variance * y * y
+    wanted = deviations * deviations
+    low, high = top, top + math.sqrt(3.0 * float(weight.max())) / deviations + 1e-300
+    while float(np.sum(weight / (high - variance) ** 2)) > wanted:
+        high = top + 2.0 * (high - top)
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if float(np.sum(weight / (middle - variance) ** 2)) > wanted:
+            low = middle
+        else:
+            high = middle
+    gap = high - variance
+    free = gap <= 1e-9 * top
+    step = np.where(free, 0.0, variance * y / np.where(free, 1.0, gap))
+    if free.any():
+        # Hardly any component of the mean along the widest axes: the boundary decides how far.
+        left = max(wanted - float(np.sum(step * step / variance)), 0.0)
+        along = np.where(free, y, 0.0)
+        if not along.any():
+            along[-1] = 1.0
+        step += along * math.sqrt(left * top / float(along @ along))
+    x = y + step
+    return math.sqrt(float(x @ x))

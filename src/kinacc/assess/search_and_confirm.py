@@ -1,0 +1,198 @@
+"""The recommended assessor: look for large errors at new points, confirm the suspects, say both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.looks import Looks
+from kinacc.assess.population import LargestSize, largest_size
+from kinacc.assess.sequential import bounding_point, first_points
+from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.errors import InputError, Problem
+
+FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything decides
+MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
+_ALONE = 0.1  # chance of so little company below which the assumption counts as broken
+_WORTH = 3  # times the readings the suspects have: what confirming them is expected to take
+_RESERVE = 0.05  # of the budget, kept for confirming whatever is found last
+_RECONSIDER = 0.06  # of the budget, between two estimates of the likely largest size
+
+
+@dataclass(frozen=True)
+class SearchAndConfirm:
+    """Visit new points while the suspects can still be paid for, else re-measure the suspects.
+
+    A suspect is a point whose mean reading plus one standard deviation exceeds the likely largest
+    size. While the readings left cover reading every suspect three times as often again as it was,
+    and a twentieth of the budget, a new point is visited; otherwise the point with the largest
+    upper limit is measured until its next look. So little noise or one outstanding error lead to
+    many points, much noise to fewer.
+
+    ``measured``: the bounds of :mod:`kinacc.assess.looks`. They hold whatever the errors are,
+    for readings that are normal with known covariance (eq. 9) and points in random order. The
+    number of points is decided by readings; for this the allowed error is divided by 1 + the
+    expected number of largest-so-far points among those that come after the first 60 %.
+    ``candidates``: the bound for the measured points times ``isolation``. Holds if the largest
+    error is not isolated: at least so many candidates (stated in the assumption) have an error
+    above the largest divided by ``isolation`` that missing them all is improbable. Withheld where
+    that number is more than ``crowd`` of the candidates, and where the largest error measured
+    stands so far above all others that the assumption is broken by what was seen.
+    The value is the median of the posterior of :mod:`kinacc.assess.population`.
+    """
+
+    measurements: int = 200
+    confidence: float = 0.95
+    isolation: float = 1.25
+    crowd: float = 0.05
+    name: ClassVar[str] = "search_and_confirm"
+
+    def __post_init__(self) -> None:
+        problems = check_budget(self.measurements, self.confidence)
+        if not self.isolation > 1.0:
+            problems.append(Problem("isolation", f"{self.isolation}", "above 1"))
+        if not 0.0 < self.crowd < 1.0:
+            problems.append(Problem("crowd", f"{self.crowd}", "above 0 and below 1"))
+        if problems:
+            raise InputError(problems, f"{self.name} cannot work with these settings")
+
+    def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
+        """A new campaign."""
+        return SearchAndConfirmCampaign(self, candidates)
+
+
+class SearchAndConfirmCampaign:
+    """See :class:`SearchAndConfirm`."""
+
+    def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
+        self.settings = settings
+        self.ledger = Ledger(candidates)
+        budget = settings.measurements
+        self.first = first_points(budget, candidates.points, FIRST_SHARE)
+        self.most = min(budget, candidates.points)
+        allowed = 1.0 - settings.confidence
+        chosen = records(self.first, self.most)
+        errors = (allowed / chosen, (1.0 - MISSING_PART) * allowed / chosen)
+        self.looks = Looks(self.ledger, errors, allowed / self.most)
+        self._pause = max(round(_RECONSIDER * budget), 2)
+        self._likely_mm, self._asked_at = math.nan, -self._pause
+
+    def next(self) -> int | None:
+        """A new point or the suspect to confirm."""
+        taken, visited = self.ledger.taken, len(self.ledger.visited)
+        left = self.settings.measurements - taken
+        if left <= 0:
+            return None
+        if visited < self.first or (visited < self.most and self._wanted_by_suspects() < left):
+            return visited
+        return bounding_point(self.looks, left)
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take a reading."""
+        self.ledger.record(point, reading_mm, covariance_mm2)
+        self.looks.update(point)
+
+    def statements(self) -> tuple[Statement, ...]:
+        """On the measured points, and on all candidates."""
+        ledger, looks = self.ledger, self.looks
+        visited = ledger.visited
+        if len(visited) < self.first:
+            left = f"{self.first - len(visited)} points of the first visit are left"
+            return Statement(MEASURED, withheld=left), Statement(CANDIDATES, withheld=left)
+        posterior = self._posterior()
+        said = Statement(
+            MEASURED,
+            value_mm=posterior.quantile_mm(0.5, measured_only=True),
+            lower_mm=float(looks.lower_mm[visited].max()),
+            upper_mm=float(looks.upper_mm[0, visited].max()),
+            confidence=self.settings.confidence,
+        )
+        return said, self._about_candidates(said, posterior.quantile_mm(0.5))
+
+    def _about_candidates(self, said: Statement, value_mm: float) -> Statement:
+        points, seen = self.ledger.candidates.points, len(self.ledger.visited)
+        allowed = 1.0 - self.settings.confidence
+        known = Statement(CANDIDATES, value_mm, said.lower_mm, said.upper_mm, said.confidence)
+        if seen == points:
+            return known
+        crowd = companions(points, seen, MISSING_PART * allowed)
+        factor = self.settings.isolation
+        if crowd > self.settings.crowd * points:
+            return Statement(
+                CANDIDATES,
+                value_mm,
+                said.lower_mm,
+                confidence=said.confidence,
+                withheld=f"{seen} of {points} candidates measured: fewer than {crowd} large errors "
+                f"could all have been missed",
+            )
+        if self._stands_alone(crowd, said.lower_mm):
+            return Statement(
+                CANDIDATES,
+                value_mm,
+                said.lower_mm,
+                confidence=said.confidence,
+                withheld=f"one measured error is more than {factor:g} times all others",
+            )
+        upper = factor * float(self.looks.upper_mm[1, self.ledger.visited].max())
+        return Statement(
+            CANDIDATES,
+            value_mm,
+            said.lower_mm,
+            upper,
+            said.confidence,
+            assumption=f"at least {crowd} of the {points} candidates have an error above the "
+            f"largest divided by {factor:g}",
+        )
+
+    def _stands_alone(self, crowd: int, lower_mm: float) -> bool:
+        """Whether hardly any measured error can be as large as the assumption says many are."""
+        visited = self.ledger.visited
+        upper = self.looks.upper_mm[0, visited]
+        company = int(np.sum(upper >= lower_mm / self.settings.isolation))
+        points = self.ledger.candidates.points
+        return at_most(company, crowd, points, len(visited)) < _ALONE
+
+    def _wanted_by_suspects(self) -> float:
+        if self.ledger.taken - self._asked_at >= self._pause:
+            self._likely_mm = self._posterior().quantile_mm(0.5, measured_only=True)
+            self._asked_at = self.ledger.taken
+        visited = self.ledger.visited
+        reach = self.ledger.sizes_mm() + self.ledger.noise_mm[visited]
+        readings = int(self.ledger.count[visited][reach > self._likely_mm].sum())
+        return _WORTH * readings + _RESERVE * self.settings.measurements
+
+    def _posterior(self) -> LargestSize:
+        visited = self.ledger.visited
+        unmeasured = self.ledger.candidates.points - len(visited)
+        return largest_size(self.ledger.sizes_mm(), self.ledger.noise_mm[visited], unmeasured)
+
+
+def records(first: int, most: int) -> float:
+    """1 + expected number of points above all before them among the first+1 .. most, by chance."""
+    return 1.0 + sum(1.0 / place for place in range(first + 1, most + 1))
+
+
+def companions(points: int, seen: int, error: float) -> int:
+    """Smallest number of points of which at least one is among ``seen`` random ones of ``points``.
+
+    But for probability ``error``; the draws are without replacement.
+    """
+    count = 1
+    while at_most(0, count, points, seen) > error:
+        count += 1
+    return count
+
+
+def at_most(found: int, marked: int, points: int, seen: int) -> float:
+    """Probability that at most ``found`` of ``marked`` points are among ``seen`` of ``points``."""
+    from math import comb
+
+    if found >= min(marked, seen):
+        return 1.0
+    ways = sum(comb(marked, k) * comb(points - marked, seen - k) for k in range(found + 1))
+    return ways / comb(points, seen)

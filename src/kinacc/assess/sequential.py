@@ -1,0 +1,125 @@
+"""Anytime-valid bound: measure again wherever the upper limit is largest, stop when it is tight."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.looks import Looks
+from kinacc.assess.single_shot import about_all_if_all_measured
+from kinacc.assess.statement import MEASURED, Statement
+from kinacc.errors import InputError, Problem
+
+
+@dataclass(frozen=True)
+class Sequential:
+    """Visit a fixed number of points, then double the readings of the one with the largest limit.
+
+    ``visited`` is the share of the budget spent on visiting points (all candidates where the
+    budget allows one and a half times as many). The bound is the largest upper limit of the
+    points, each limit valid at all times at once (:mod:`kinacc.assess.looks`), so it holds at
+    whatever moment the campaign is stopped: at the end of the budget, or as soon as upper and
+    lower bound are within ``width_mm`` of each other (null: never early). Assumes normal readings
+    of known covariance (eq. 9).
+    """
+
+    measurements: int = 200
+    visited: float = 0.6
+    width_mm: float | None = None
+    confidence: float = 0.95
+    name: ClassVar[str] = "sequential"
+
+    def __post_init__(self) -> None:
+        problems = check_budget(self.measurements, self.confidence)
+        if not 0.0 < self.visited <= 1.0:
+            problems.append(Problem("visited", f"{self.visited}", "above 0 and at most 1"))
+        if self.width_mm is not None and not self.width_mm > 0.0:
+            problems.append(Problem("width_mm", f"{self.width_mm}", "above 0, in mm"))
+        if problems:
+            raise InputError(problems, f"{self.name} cannot work with these settings")
+
+    def begin(self, candidates: Candidates) -> SequentialCampaign:
+        """A new campaign."""
+        return SequentialCampaign(self, candidates)
+
+
+class SequentialCampaign:
+    """See :class:`Sequential`."""
+
+    def __init__(self, settings: Sequential, candidates: Candidates) -> None:
+        self.settings = settings
+        self.ledger = Ledger(candidates)
+        self.first = first_points(settings.measurements, candidates.points, settings.visited)
+        allowed = 1.0 - settings.confidence
+        self.looks = Looks(self.ledger, (allowed,), allowed / self.first)
+
+    def next(self) -> int | None:
+        """Points in order, then the one whose limit is the bound."""
+        if self.ledger.taken < self.first:
+            return self.ledger.taken
+        if self.ledger.taken >= self.settings.measurements or self._is_tight():
+            return None
+        return bounding_point(self.looks, self.settings.measurements - self.ledger.taken)
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take a reading."""
+        self.ledger.record(point, reading_mm, covariance_mm2)
+        self.looks.update(point)
+
+    def statements(self) -> tuple[Statement, ...]:
+        """The bounds as they stand."""
+        if self.ledger.taken < self.first:
+            left = self.first - self.ledger.taken
+            return (Statement(MEASURED, withheld=f"{left} points of the first visit are left"),)
+        visited = self.ledger.visited
+        said = Statement(
+            MEASURED,
+            value_mm=corrected_largest_mm(self.ledger),
+            lower_mm=float(self.looks.lower_mm[visited].max()),
+            upper_mm=float(self.looks.upper_mm[0, visited].max()),
+            confidence=self.settings.confidence,
+        )
+        return about_all_if_all_measured(said, self.ledger)
+
+    def _is_tight(self) -> bool:
+        if self.settings.width_mm is None:
+            return False
+        upper = float(self.looks.upper_mm[0, self.ledger.visited].max())
+        return upper - float(self.looks.lower_mm.max()) <= self.settings.width_mm
+
+
+def first_points(measurements: int, points: int, share: float) -> int:
+    """How many points are visited before anything is known: all if the budget is 1.5 times them."""
+    if measurements >= 1.5 * points:
+        return points
+    return max(math.ceil(share * min(measurements, points)), 1)
+
+
+def bounding_point(looks: Looks, left: int) -> int:
+    """The visited point with the largest upper limit among those whose next look is affordable.
+
+    With ``left`` readings to go. Where no look is affordable the largest limit decides alone: its
+    readings still serve the value.
+    """
+    visited = np.array(looks.ledger.visited)
+    upper = looks.upper_mm[0, visited]
+    order = np.argsort(-upper, kind="stable")
+    best = visited[order[0]]
+    return int(best if looks.missing(best) <= left else _affordable(looks, visited[order], left))
+
+
+def _affordable(looks: Looks, order: np.ndarray, left: int) -> int:
+    return next((point for point in order if looks.missing(point) <= left), order[0])
+
+
+def corrected_largest_mm(ledger: Ledger) -> float:
+    """Largest mean reading with at least two readings, less what noise adds to it on average."""
+    visited = np.array(ledger.visited)
+    again = visited[ledger.count[visited] > 1]
+    chosen = again if again.size else visited
+    square = np.sum(ledger.mean_mm[chosen] ** 2, axis=1) - 3.0 * ledger.noise_mm[chosen] ** 2
+    return math.sqrt(max(float(square.max()), 0.0))

@@ -1,0 +1,81 @@
+"""Exact single-shot bound: measure points once; the largest reading bounds the largest error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
+from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.errors import InputError
+
+
+@dataclass(frozen=True)
+class SingleShot:
+    """Measure each point once, up to ``measurements`` points.
+
+    Upper bound: the smallest size such that one reading at a point of that size exceeds what was
+    read there with the wanted confidence, largest over the points. It holds with that confidence
+    without correction for the number of points, for it is wrong only if the reading at the one
+    point that is truly largest is too small. Lower bound: the same turned round, corrected for
+    the number of points. Assumes normal readings of known covariance (eq. 9), nothing else. It
+    speaks of the points measured; where these are all candidates, of all candidates.
+    """
+
+    measurements: int = 200
+    confidence: float = 0.95
+    name: ClassVar[str] = "single_shot"
+
+    def __post_init__(self) -> None:
+        if problems := check_budget(self.measurements, self.confidence):
+            raise InputError(problems, f"{self.name} cannot work with these settings")
+
+    def begin(self, candidates: Candidates) -> SingleShotCampaign:
+        """A new campaign."""
+        return SingleShotCampaign(self, candidates)
+
+
+class SingleShotCampaign:
+    """See :class:`SingleShot`."""
+
+    def __init__(self, settings: SingleShot, candidates: Candidates) -> None:
+        self.settings = settings
+        self.ledger = Ledger(candidates)
+        self.points = min(settings.measurements, candidates.points)
+
+    def next(self) -> int | None:
+        """The next point in order."""
+        return self.ledger.taken if self.ledger.taken < self.points else None
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take a reading."""
+        self.ledger.record(point, reading_mm, covariance_mm2)
+
+    def statements(self) -> tuple[Statement, ...]:
+        """The bound, with the largest reading as the value."""
+        ledger = self.ledger
+        if not ledger.visited:
+            return (Statement(MEASURED, withheld="nothing measured yet"),)
+        error = 1.0 - self.settings.confidence
+        each = error / self.points
+        means = [(ledger.mean_mm[point], ledger.noise(point)) for point in ledger.visited]
+        said = Statement(
+            MEASURED,
+            value_mm=float(ledger.sizes_mm().max()),
+            lower_mm=max(lower_limit_mm(mean, noise, each) for mean, noise in means),
+            upper_mm=max(upper_limit_mm(mean, noise, error) for mean, noise in means),
+            confidence=self.settings.confidence,
+        )
+        return about_all_if_all_measured(said, ledger)
+
+
+def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statement, ...]:
+    """A statement on the measured points, and the same on all candidates where they are all."""
+    from dataclasses import replace
+
+    if len(ledger.visited) == ledger.candidates.points:
+        return said, replace(said, target=CANDIDATES)
+    unmeasured = ledger.candidates.points - len(ledger.visited)
+    withheld = f"{unmeasured} of {ledger.candidates.points} candidates are not measured"
+    return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)

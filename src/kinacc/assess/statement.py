@@ -1,0 +1,36 @@
+"""What an assessor says: about which errors, how large, between which bounds, how surely.
+
+Three targets, each with a truth of its own. ``measured``: the largest error of the points measured.
+``candidates``: the largest error of all candidate points, measured or not. ``region``: the size
+that the errors of a stated share of the region do not exceed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+MEASURED = "measured"
+CANDIDATES = "candidates"
+REGION = "region"
+TARGETS = (MEASURED, CANDIDATES, REGION)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One statement on the size of the errors, mm; NaN where nothing is said.
+
+    ``lower_mm`` and ``upper_mm`` each hold with ``confidence`` by themselves. ``share`` is the part
+    of the region the statement is about (1 for the other targets). ``assumption`` names what the
+    bounds rest on beyond normal readings of known covariance; empty if nothing. ``withheld`` says
+    why no bound is stated; empty if one is.
+    """
+
+    target: str
+    value_mm: float = math.nan
+    lower_mm: float = math.nan
+    upper_mm: float = math.nan
+    confidence: float = math.nan
+    share: float = 1.0
+    assumption: str = ""
+    withheld: str = ""

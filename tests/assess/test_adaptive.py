@@ -1,0 +1,283 @@
+"""The adaptive assessors: one interface, honest bounds, nothing lost and nothing taken amiss."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from kinacc.assess import Maximum, OutlierRejection, drawn_world, measured_world
+from kinacc.assess.adaptive import Candidates, Ledger, conduct
+from kinacc.assess.looks import share
+from kinacc.assess.paper_methods import InvalidationAt, OncePerPoint
+from kinacc.assess.population import largest_size
+from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
+from kinacc.assess.search_and_confirm import SearchAndConfirm, companions, records
+from kinacc.assess.sequential import Sequential
+from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS
+from kinacc.assess.streams import key_of
+from kinacc.assess.two_stage import TwoStage
+from kinacc.errors import InputError
+
+EVERY = [*ADAPTIVE.values()]
+LIVE = [
+    *(cls(measurements=40) for cls in EVERY),
+    OncePerPoint(Maximum(40)),
+    OncePerPoint(OutlierRejection(40)),
+    InvalidationAt(0.9, 40),
+]
+
+
+def directions(points: int, seed: int = 5) -> np.ndarray:
+    """Unit vectors."""
+    vectors = np.random.default_rng(seed).normal(size=(points, 3))
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
+
+def field(points: int, seed: int = 5) -> np.ndarray:
+    """Errors of 0.2 to 1 mm, larger ones rarer."""
+    size = 1.0 - 0.8 * np.random.default_rng(seed).uniform(size=points) ** 0.5
+    return directions(points, seed) * size[:, None]
+
+
+def world(points: int = 30, sigma: float = 0.1, seed: int = 1, visits: int = 200):
+    return drawn_world(field(points), sigma, key_of(seed), visits)
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+@pytest.mark.parametrize("points", [1, 2, 15, 60])
+def test_every_assessor_keeps_its_budget_and_says_something_at_the_end(assessor, points):
+    campaign = conduct(assessor, world(points))
+    said = campaign.statements()
+    assert {each.target for each in said} <= set(TARGETS)
+    assert said[0].value_mm > 0.0
+    assert not said[0].withheld
+    for each in said:
+        if not each.withheld and not math.isnan(each.upper_mm):
+            assert each.lower_mm <= each.upper_mm
+            assert each.confidence == 0.95
+    assert campaign.next() is None
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+def test_a_campaign_told_its_readings_again_goes_on_as_before(assessor):
+    readings, candidates = world(), Candidates.with_equal_noise(np.full(30, 0.1))
+    first, reads, told = assessor.begin(candidates), np.zeros(30, int), []
+    while (point := first.next()) is not None:
+        again = assessor.begin(candidates)
+        for each in told:
+            again.record(*each)
+        assert again.next() == point
+        told.append((point, readings.reading_mm(point, int(reads[point])).copy()))
+        first.record(*told[-1])
+        reads[point] += 1
+    assert 1 <= len(told) <= 40
+
+
+@pytest.mark.parametrize("cls", EVERY)
+def test_hardly_any_noise_leaves_hardly_any_doubt(cls):
+    shell = directions(30) * np.linspace(0.98, 1.0, 30)[:, None]
+    said = conduct(cls(measurements=60), drawn_world(shell, 1e-6, key_of(2), 60)).statements()[0]
+    assert said.value_mm == pytest.approx(1.0, abs=0.02)
+    assert said.upper_mm == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("cls", EVERY)
+def test_points_that_are_all_equal_are_no_trouble(cls):
+    errors = np.tile([0.3, 0.0, 0.0], (20, 1))
+    said = conduct(cls(measurements=50), drawn_world(errors, 0.05, key_of(3), 50)).statements()[0]
+    assert said.lower_mm <= 0.3 <= said.upper_mm
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+def test_a_reading_that_cannot_be_used_changes_nothing(assessor):
+    readings, candidates = world(), Candidates.with_equal_noise(np.full(30, 0.1))
+    one, other = assessor.begin(candidates), assessor.begin(candidates)
+    bad = [
+        (0, [math.nan, 0.0, 0.0], None),
+        (0, [0.0, 0.0], None),
+        (30, [0.0, 0.0, 0.0], None),
+        (-1, [0.0, 0.0, 0.0], None),
+        (0, [0.1, 0.0, 0.0], np.zeros((3, 3))),
+        (0, [0.1, 0.0, 0.0], np.diag([1.0, 1.0, -1.0])),
+        (0, [0.1, 0.0, 0.0], [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        (0, [0.1, 0.0, 0.0], np.eye(2)),
+    ]
+    reads = np.zeros(30, int)
+    while (point := one.next()) is not None:
+        for wrong in bad:
+            with pytest.raises(InputError):
+                other.record(*wrong)
+        for campaign in (one, other):
+            campaign.record(point, readings.reading_mm(point, int(reads[point])))
+        reads[point] += 1
+        assert other.next() == one.next()
+    assert repr(other.statements()) == repr(one.statements())
+
+
+@pytest.mark.parametrize(
+    ("covariance", "said"),
+    [
+        (np.zeros((2, 3, 3)), "not positive definite"),
+        (np.stack([np.eye(3), np.diag([1.0, 1.0, -1e-3])]), "point 1: not positive definite"),
+        (np.array([[[1.0, 0.9, 0], [0, 1, 0], [0, 0, 1]]]), "not symmetric"),
+        (np.full((1, 3, 3), np.nan), "not finite"),
+        (np.eye(3), "shape"),
+        (np.ones((3, 3, 3)), "not positive definite"),
+    ],
+)
+def test_covariances_that_are_none_are_refused_with_their_point(covariance, said):
+    with pytest.raises(InputError, match=said):
+        Candidates(covariance)
+
+
+@pytest.mark.parametrize("cls", EVERY)
+def test_settings_that_make_no_sense_are_refused_together(cls):
+    with pytest.raises(InputError) as caught:
+        cls(measurements=0, confidence=1.5)
+    assert {"measurements", "confidence"} <= {each.where for each in caught.value.problems}
+
+
+def test_a_budget_smaller_than_the_two_stages_is_refused():
+    with pytest.raises(InputError, match="do not cover one point and its 4 repeats"):
+        TwoStage(measurements=4)
+
+
+def test_unequal_noise_is_weighted_as_least_squares_would():
+    ledger = Ledger(Candidates.with_equal_noise(np.full(2, 0.1)))
+    rng = np.random.default_rng(6)
+    readings = rng.normal(size=(5, 3))
+    spreads = [np.diag(rng.uniform(0.5, 2.0, 3)) + 0.2 for _ in readings]
+    spreads[0] = 0.01 * np.eye(3)
+    for reading, spread in zip(readings, spreads, strict=True):
+        ledger.record(1, reading, spread)
+    inverses = [np.linalg.inv(each) for each in spreads]
+    total = np.linalg.inv(sum(inverses))
+    weighted = sum(each @ reading for each, reading in zip(inverses, readings, strict=True))
+    assert ledger.mean_mm[1] == pytest.approx(total @ weighted)
+    assert ledger.noise(1) == pytest.approx(total)
+
+
+def test_the_papers_assessors_say_behind_the_interface_what_they_say_without_it():
+    readings = world(25)
+    firsts = np.array([readings.reading_mm(row, 0) for row in range(25)])
+    plain = measured_world(firsts, firsts[:, None], 0.1)
+    for assessor in (Maximum(25), OutlierRejection(25)):
+        said = conduct(OncePerPoint(assessor), readings).statements()[0]
+        assert said.value_mm == assessor.assess(plain).assessed_mm
+        assert math.isnan(said.upper_mm)
+
+
+@pytest.mark.parametrize("bound_mm", [0.7, 0.95, 1.3])
+def test_model_invalidation_measures_live_what_it_measures_in_a_world(bound_mm):
+    from kinacc.assess.model_invalidation import ModelInvalidation
+
+    readings = world(40, 0.3)
+    steps = ModelInvalidation(60).history(readings, bound_mm)
+    campaign = conduct(InvalidationAt(bound_mm, 60), readings)
+    assert campaign.ledger.taken == len(steps)
+    assert campaign.ledger.count.tolist() == np.bincount([s.row for s in steps], None, 40).tolist()
+
+
+def test_looks_share_out_the_whole_error():
+    assert sum(share(look) for look in range(60)) == pytest.approx(1.0)
+    assert all(share(look) >= share(look + 1) > 0.0 for look in range(50))
+
+
+def test_records_and_companions_against_counting():
+    rng = np.random.default_rng(7)
+    orders = rng.permuted(np.tile(np.arange(20), (20_000, 1)), axis=1)
+    largest_so_far = orders == np.maximum.accumulate(orders, axis=1)
+    assert records(8, 20) == pytest.approx(1.0 + largest_so_far[:, 8:].sum(axis=1).mean(), abs=0.02)
+    count = companions(20, 8, 0.1)
+    missed = [np.mean(orders[:, :8].max(axis=1) < 20 - c) for c in (count - 1, count)]
+    assert missed[0] > 0.1 > missed[1]
+    assert companions(20, 20, 0.1) == 1
+
+
+def coverage(assessor, errors, sigma, draws, target=MEASURED):
+    """Share of campaigns whose upper bound, and lower bound, hold."""
+    size = np.linalg.norm(errors, axis=1)
+    upper = lower = said_any = 0
+    for draw in range(draws):
+        order = np.random.default_rng([draw, 3]).permutation(len(errors))
+        readings = drawn_world(errors[order], sigma, key_of(4, draw), assessor.measurements)
+        campaign = conduct(assessor, readings)
+        said = next(each for each in campaign.statements() if each.target == target)
+        seen = getattr(campaign, "ledger", None) or campaign.screen
+        truth = size[order][seen.visited].max() if target == MEASURED else size.max()
+        if not said.withheld:
+            said_any += 1
+            upper += said.upper_mm >= truth
+            lower += said.lower_mm <= truth
+    return upper / said_any, lower / said_any
+
+
+def least(draws: int) -> float:
+    """Share of bounds that 95 % confidence may fall to by chance in a test of many."""
+    return 0.95 - 3.5 * math.sqrt(0.05 * 0.95 / draws)
+
+
+@pytest.mark.parametrize("cls", EVERY)
+@pytest.mark.parametrize("shape", ["one", "equal", "spread"])
+def test_the_bound_on_the_measured_points_holds(cls, shape):
+    # One large error is the hardest for the upper limit: no other point's noise comes to its aid.
+    errors = {
+        "one": np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(24)]),
+        "equal": directions(25),
+        "spread": field(25),
+    }[shape]
+    draws = 400
+    upper, lower = coverage(cls(measurements=40), errors, 0.2, draws)
+    assert upper >= least(draws)
+    assert lower >= least(draws)
+
+
+def test_the_single_shot_bound_is_exact_where_one_point_decides():
+    errors = np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(24)])
+    upper, _ = coverage(ADAPTIVE["single_shot"](measurements=25), errors, 0.1, 1500)
+    assert upper == pytest.approx(0.95, abs=0.02)
+
+
+def test_the_recommended_bound_on_all_candidates_holds_where_its_assumption_does():
+    errors = field(60) * 0.7
+    errors[:12] = directions(12)
+    upper, _ = coverage(SearchAndConfirm(40, crowd=0.2), errors, 0.1, 300, CANDIDATES)
+    assert upper >= least(300)
+
+
+def test_an_error_that_stands_alone_is_seen_to_break_the_assumption():
+    errors = np.vstack([[[3.0, 0.0, 0.0]], 0.1 * directions(79)])
+    said = conduct(SearchAndConfirm(60, crowd=0.5), drawn_world(errors, 0.05, key_of(8), 60))
+    about = said.statements()[1]
+    assert about.target == CANDIDATES
+    assert "more than 1.25 times all others" in about.withheld
+
+
+def test_more_budget_than_candidates_visits_them_all_and_needs_no_assumption():
+    for cls in (Sequential, SearchAndConfirm):
+        measured, everywhere = conduct(cls(measurements=60), world(30)).statements()
+        assert everywhere.upper_mm == measured.upper_mm
+        assert not everywhere.assumption
+
+
+def test_stopping_early_when_the_bounds_are_close_saves_measurements():
+    campaign = conduct(Sequential(400, width_mm=0.25), world(30, 0.05))
+    said = campaign.statements()[0]
+    assert said.upper_mm - said.lower_mm <= 0.25
+    assert campaign.ledger.taken < 200
+
+
+def test_the_population_shrinks_the_largest_of_many_noisy_readings():
+    rng = np.random.default_rng(9)
+    errors = np.linalg.norm(0.4 * directions(200) + 0.3 * rng.normal(size=(200, 3)), axis=1)
+    found = largest_size(errors, np.full(200, 0.3), 0)
+    assert 0.4 < found.quantile_mm(0.5) < 0.8 * errors.max()
+    exact = largest_size(errors, np.full(200, 1e-4), 0)
+    assert exact.quantile_mm(0.5) == pytest.approx(errors.max(), rel=0.01)
+
+
+def test_the_registry_names_the_recommended_assessor():
+    assert RECOMMENDED in ADAPTIVE
+    assert all(cls.name == name and cls.__doc__ for name, cls in ADAPTIVE.items())

@@ -1,0 +1,182 @@
+"""Limits on sizes and points of ellipsoids against closed forms, 50 digits and slow searches."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.special import chndtr, ndtri
+
+from kinacc.assess.ellipsoid import largest_size, mahalanobis_beyond, nearest_in_ball
+from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
+from kinacc.assess.size_kernels import reading_below, size_at
+
+
+def random_covariance(rng: np.random.Generator, condition: float) -> np.ndarray:
+    """Covariance in random axes whose eigenvalues span ``condition``; 0.1 mm in the widest."""
+    axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    variance = 0.01 * np.array([1.0, condition ** -rng.uniform(), 1.0 / condition])
+    return (axes * variance) @ axes.T
+
+
+@pytest.mark.parametrize("a", [0.0, 1e-5, 1e-3, 0.1, 1.0, 4.0, 30.0])
+def test_size_of_a_reading_is_noncentral_chi(a):
+    x = np.linspace(0.05, a + 6.0, 60)
+    ours = [reading_below(each, a) for each in x]
+    assert ours == pytest.approx(chndtr(x**2, 3, a**2).tolist(), abs=1e-9)
+
+
+def test_size_of_a_reading_against_an_integral_of_fifty_digits():
+    mpmath.mp.dps = 50
+    for x, a in [(0.5, 2.0), (3.0, 3.5), (6.0, 9.0), (0.2, 1e-3)]:
+
+        def density(r, a=a):
+            near, far = (mpmath.exp(-((r + side * a) ** 2) / 2) for side in (-1, 1))
+            return r * (near - far) / (mpmath.mpf(a) * mpmath.sqrt(2 * mpmath.pi))
+
+        exact = float(mpmath.quad(density, [0, x]))
+        assert reading_below(x, a) == pytest.approx(exact, rel=1e-9, abs=2e-12)
+
+
+@pytest.mark.parametrize("probability", [0.95, 0.5, 0.05, 1e-4])
+def test_size_at_inverts_the_probability_and_is_zero_where_no_size_is_as_likely(probability):
+    for x in np.linspace(0.01, 12.0, 40):
+        a = size_at(x, probability)
+        if a > 0.0:
+            assert reading_below(x, a) == pytest.approx(probability, abs=1e-9)
+        else:
+            assert reading_below(x, 0.0) <= probability
+
+
+def test_nearest_point_of_the_ball_meets_the_conditions_of_its_problem():
+    rng = np.random.default_rng(1)
+    for _ in range(10_000):
+        covariance = random_covariance(rng, 10.0 ** rng.uniform(0, 6))
+        reading, radius = rng.normal(size=3), rng.uniform(0.01, 1.5)
+        x = nearest_in_ball(reading, covariance, radius)
+        size = math.sqrt(x @ x)
+        if math.sqrt(reading @ reading) <= radius:
+            assert np.array_equal(x, reading)
+            continue
+        # x - y + t S x = 0 with t >= 0 and |x| at the radius.
+        pull = covariance @ x
+        t = float(pull @ (reading - x)) / float(pull @ pull)
+        assert size == pytest.approx(radius, rel=1e-12)
+        assert t >= 0.0
+        assert np.abs(x - reading + t * pull).max() < 1e-9
+
+
+def test_nearest_point_of_the_ball_to_fifty_digits():
+    mpmath.mp.dps = 50
+    rng = np.random.default_rng(2)
+    worst = 0.0
+    for _ in range(1000):
+        covariance = random_covariance(rng, 10.0 ** rng.uniform(0, 6))
+        reading = rng.normal(size=3)
+        radius = rng.uniform(0.05, 0.99) * math.sqrt(reading @ reading)
+        found = nearest_in_ball(reading, covariance, radius)
+        worst = max(worst, np.abs(found - exact_nearest(reading, covariance, radius)).max())
+    assert worst < 1e-9
+
+
+def exact_nearest(reading, covariance, radius) -> np.ndarray:
+    """The same point from the secular equation in 50 digits, by bisection and Newton."""
+    matrix, y = mpmath.matrix(covariance.tolist()), mpmath.matrix(reading.tolist())
+    identity, radius = mpmath.eye(3), mpmath.mpf(float(radius))
+
+    def point(t):
+        return mpmath.lu_solve(identity + t * matrix, y)
+
+    low, high = mpmath.mpf(0), mpmath.mpf(1)
+    while mpmath.norm(point(high)) > radius:
+        low, high = high, high * 8
+    for _ in range(25):
+        middle = (low + high) / 2
+        low, high = (middle, high) if mpmath.norm(point(middle)) > radius else (low, middle)
+    t = low
+    for _ in range(8):
+        x = point(t)
+        size = mpmath.norm(x)
+        rate = mpmath.lu_solve(identity + t * matrix, matrix * x)
+        slope = (x.T * rate)[0] / size
+        t += (size - radius) / slope * size / radius
+    return np.array([float(each) for each in point(t)])
+
+
+def test_nearest_point_of_the_ball_agrees_with_a_general_solver_where_that_converges():
+    rng = np.random.default_rng(3)
+    converged = 0
+    for _ in range(60):
+        covariance = random_covariance(rng, 10.0)
+        reading, radius = rng.normal(size=3), 0.4
+        inverse = np.linalg.inv(covariance) / 1000.0
+        solved = minimize(
+            lambda x, y=reading, w=inverse: (x - y) @ w @ (x - y),
+            0.3 * reading / np.linalg.norm(reading),
+            jac=lambda x, y=reading, w=inverse: 2 * w @ (x - y),
+            constraints={"type": "ineq", "fun": lambda x: 0.16 - x @ x, "jac": lambda x: -2 * x},
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": 500},
+        )
+        if solved.success:
+            converged += 1
+            assert nearest_in_ball(reading, covariance, radius) == pytest.approx(solved.x, abs=1e-5)
+    assert converged > 30
+
+
+def test_with_equal_noise_the_nearest_point_is_the_candidate_of_eq_21():
+    reading = np.array([0.3, -0.4, 1.2])
+    found = nearest_in_ball(reading, 0.04 * np.eye(3), 0.65)
+    assert found == pytest.approx(0.5 * reading)
+    assert mahalanobis_beyond(reading, 0.04 * np.eye(3), 0.65) == pytest.approx(0.65 / 0.2)
+
+
+def test_largest_size_of_an_ellipsoid_against_a_dense_search():
+    rng = np.random.default_rng(4)
+    around = rng.normal(size=(200_000, 3))
+    around /= np.linalg.norm(around, axis=1)[:, None]
+    for case in range(30):
+        covariance = random_covariance(rng, 10.0 ** rng.uniform(0, 4))
+        mean = rng.normal(size=3) * rng.uniform(0, 1)
+        if case % 3 == 0:  # no component along the widest axis
+            widest = np.linalg.eigh(covariance)[1][:, -1]
+            mean -= (mean @ widest) * widest
+        support = around @ mean + 2.0 * np.sqrt(
+            np.einsum("ni,ij,nj->n", around, covariance, around)
+        )
+        found = largest_size(mean, covariance, 2.0)
+        assert found >= support.max() - 1e-12
+        assert found == pytest.approx(support.max(), rel=1e-3)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 30.0])
+def test_limits_miss_as_seldom_as_they_say_whatever_the_direction(ratio):
+    rng = np.random.default_rng(5)
+    covariance = 0.01 * np.diag([1.0, 1.0 / ratio, 1.0 / ratio**2])
+    noise = 0.1 if ratio == 1.0 else covariance
+    draws, allowed = 2000, 0.05
+    worst_upper = worst_lower = 0
+    for direction in ([1, 0, 0], [0, 0, 1], [0.6, 0.0, 0.8]):
+        for size in (0.05, 0.3):
+            error = size * np.array(direction, dtype=float)
+            means = error + rng.multivariate_normal(np.zeros(3), covariance, draws)
+            worst_upper = max(
+                worst_upper, sum(upper_limit_mm(m, noise, allowed) < size for m in means)
+            )
+            worst_lower = max(
+                worst_lower, sum(lower_limit_mm(m, noise, allowed) > size for m in means)
+            )
+    most = allowed * draws + 4 * math.sqrt(allowed * draws)
+    assert worst_upper < most
+    assert worst_lower < most
+
+
+def test_far_from_zero_the_upper_limit_is_the_one_of_a_normal_reading():
+    mean = np.array([100.0, 0.0, 0.0])
+    z = -float(ndtri(0.05))
+    assert upper_limit_mm(mean, 0.2, 0.05) == pytest.approx(100 + 0.2 * z, abs=1e-3)
+    unequal = np.diag([0.04, 0.01, 0.09])
+    assert upper_limit_mm(mean, unequal, 0.05) == pytest.approx(100 + 0.2 * z, abs=2e-3)
