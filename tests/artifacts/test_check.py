@@ -382,7 +382,8 @@ def test_results_of_another_configuration(planned_results):
     other = planned([ROOT / "config.yaml"], {"study": {"alpha": 0.5}})
     report = check.check_results(planned_results.root, other)
     found = [str(problem) for problem in report.datasets[0].problems]
-    the_one(found, "study.parquet: config_hash", "another configuration")
+    the_one(found, "study_chunk/1-of-2.parquet: config_hash", "another configuration")
+    the_one(found, "histories.parquet: config_hash", "another configuration")
     assert not any("vec_model" in text for text in found)
 
 

@@ -31,6 +31,8 @@ def check_lineage(
     for stage in STAGES.values():
         made = [name for name in stage.outputs if name in marks]
         problems += _one_run(folder, made, marks)
+        if stage.scattered and plan is not None:
+            problems += _parts_held_to_settings(folder, stage, plan)
         if not made or stage.scattered or (plan is None and "measurements_file" in _roles(stage)):
             continue
         found, is_current = _held_to_inputs(folder, stage, marks[made[0]], plan)
@@ -131,6 +133,22 @@ def _held_to_inputs(
     if plan is not None and own.get("seed") != str(seed):
         problems.append(Problem(where, f"seed {own.get('seed')}", str(seed), _AGAIN))
     return problems, own.get("code_hash") == expected[0]["code_hash"]
+
+
+def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[Problem]:
+    """Parts of a scattered table that were made with other settings than the plan's."""
+    from kinacc.artifacts.store import read_metadata
+
+    wanted = _expected(stage, {}, plan.settings(stage.name, folder.name), 0)["config_hash"]
+    for part in plan.part_names(stage.name, folder.name):
+        path = folder / stage.outputs[0] / f"{part}.parquet"
+        try:
+            own = read_metadata(path).get("config_hash") if path.is_file() else wanted
+        except InputError:
+            continue  # an unreadable part is reported where parts are held to the contract
+        if own != wanted:
+            what = f"config_hash {own}: made with another configuration"
+            yield Problem(str(path), what, wanted, _AGAIN)
 
 
 def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dict[str, object]:
