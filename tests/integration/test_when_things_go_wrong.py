@@ -70,3 +70,25 @@ def test_a_row_that_cannot_be_right(project, row, column, value, said):
     path.write_text(good)
     project.snakemake("results/own/measurements.parquet")
     assert project.digests() == before
+
+
+def test_a_mapping_that_no_longer_fits_the_file(project):
+    before = project.digests()
+    wrong = project.folder / "wrong.yaml"
+    wrong.write_text("datasets: {own: {measurements: {file: {columns: {q1: shoulder}}}}}\n")
+    text = project.snakemake(ok=False, configs=("config.yaml", "small.yaml", "wrong.yaml"))
+    assert "shoulder" in text
+    assert "Traceback" not in text
+    assert project.digests() == before
+
+
+def test_fewer_readings_than_the_fits_have_parameters(project):
+    before = project.digests()
+    path = project.folder / CSV
+    good = path.read_text()
+    path.write_text("\n".join(good.splitlines()[:12]) + "\n")
+    text = project.snakemake(ok=False)
+    assert "free parameters of the VEC fit" in text
+    assert "Traceback" not in text
+    assert project.digests() == before
+    path.write_text(good)

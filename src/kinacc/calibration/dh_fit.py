@@ -16,7 +16,7 @@ from kinacc.models import dh
 from kinacc.models.dh import DHModel
 
 ANGLE_UNIT_RAD = 1e-3  # one mrad counts as much displacement as one mm
-_FIX = "measure more poses"
+DH_FIX = "measure more poses"
 _ANGLES = np.array([True, False, False, True, True])  # of dh.PARAMETERS
 
 
@@ -69,11 +69,11 @@ def fit(
     held = dh.to_vector(nominal)
     mask = free.ravel()
     known = frames is not None
-    require_enough(observations, int(mask.sum()), "DH fit", _FIX)
+    require_enough(observations, int(mask.sum()), "DH fit", DH_FIX)
     anchor = frames if known else _start_frames(observations, start)
     coords = coordinates(observations, anchor, base_free=not known, targets_free=not known)
     flange = flange_model(nominal, free)
-    require_enough(observations, coords.size + flange.size, "DH fit", _FIX)
+    require_enough(observations, coords.size + flange.size, "DH fit", DH_FIX)
     system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
     zeros = np.zeros(coords.size)
     scale = np.concatenate([_units(coords.is_angle()), _units(np.tile(_ANGLES, len(free))[mask])])

@@ -16,7 +16,7 @@ from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.models import vec
 from kinacc.models.vec import ERRORS, VECModel
 
-_FIX = "measure more poses, or lower calibration.vec.order"
+VEC_FIX = "measure more poses, or lower calibration.vec.order"
 FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames; holds what no pose shows
 RANK_THRESHOLD = 1e-10  # far below every weak direction, far above rounding: exact gauges only
 
@@ -27,20 +27,28 @@ class Prior:
 
     Standard deviation ``delta_mm`` or ``eps_rad`` at order 0 and 1, times ``decay ** (n - 1)``
     above: a smooth error has a falling spectrum. ``offset_rad`` is that of a direction offset.
+    ``constant_mm`` and ``constant_rad`` are those of order 0 where it differs: constants are what
+    a DH model can express as well.
     """
 
     delta_mm: float
     eps_rad: float
     decay: float
     offset_rad: float
+    constant_mm: float | None = None
+    constant_rad: float | None = None
 
     def std(self, model: VECModel) -> np.ndarray:
         """Standard deviations (P,) ordered as ``vec.to_vector``."""
         falling = self.decay ** np.maximum(np.arange(model.order + 1) - 1, 0)
         per_error = np.where(np.arange(len(ERRORS)) < 3, self.delta_mm, self.eps_rad)
-        one = np.outer(per_error, falling).ravel()
+        one = np.outer(per_error, falling)
+        if self.constant_mm is not None:
+            one[:3, 0] = self.constant_mm
+        if self.constant_rad is not None:
+            one[3:, 0] = self.constant_rad
         offsets = np.full(model.direction_offsets_rad.size, self.offset_rad)
-        return np.concatenate([np.tile(one, model.joints), offsets])
+        return np.concatenate([np.tile(one.ravel(), model.joints), offsets])
 
 
 @dataclass(frozen=True)
@@ -76,11 +84,10 @@ def fit(
     zero, so that the model at an unknown direction is the mean of both.
     Raises FitError, and InputError where there are fewer residuals than parameters.
     """
-    free = _informed(observations, empty)
-    flange = _flange_model(empty, free)
-    require_enough(observations, flange.size, "VEC fit", _FIX)
+    free, flange = flange_model(observations, empty)
+    require_enough(observations, flange.size, "VEC fit", VEC_FIX)
     coords = coordinates(observations, frames, base_free=frames_free, targets_free=frames_free)
-    require_enough(observations, coords.size + flange.size, "VEC fit", _FIX)
+    require_enough(observations, coords.size + flange.size, "VEC fit", VEC_FIX)
     system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
     prior_std = prior.std(empty)
     frame_std = FRAME_PRIOR_UNITS * _units(coords.is_angle())
@@ -117,13 +124,17 @@ def gauge(
     constant frame changes between neighbouring joints.
     """
     coords = coordinates(observations, frames, base_free=False, targets_free=False)
-    free = _informed(observations, empty)
-    system = PoseSystem(
-        observations, _flange_model(empty, free), coords, rotation_weight_mm_per_rad
-    )
+    free, flange = flange_model(observations, empty)
+    system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
     return spectrum(
         system, np.zeros(system.size), _units(_is_angle(empty)[free]), 0, RANK_THRESHOLD
     )
+
+
+def flange_model(observations: Observations, empty: VECModel) -> tuple[np.ndarray, FlangeModel]:
+    """Mask (P,) of the coefficients that ``observations`` speak of, and the arm they move."""
+    free = _informed(observations, empty)
+    return free, _flange_model(empty, free)
 
 
 def _informed(observations: Observations, empty: VECModel) -> np.ndarray:
@@ -198,7 +209,7 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
 def _is_angle(model: VECModel) -> np.ndarray:
     one = np.repeat(np.arange(len(ERRORS)) >= 3, model.order + 1)
     offsets = np.ones(model.direction_offsets_rad.size, dtype=bool)
-    return np.concatenate([np.tile(one, model.joints), offsets])
+    return np.concatenate([np.tile(one.ravel(), model.joints), offsets])
 
 
 def _units(is_angle: np.ndarray) -> np.ndarray:

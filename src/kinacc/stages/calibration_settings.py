@@ -6,9 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.calibration.dh_fit import DH_FIX, free_parameters
+from kinacc.calibration.frames import coordinates, known
 from kinacc.calibration.models import Options
 from kinacc.calibration.observations import Observations, from_columns
-from kinacc.calibration.vec_fit import Prior
+from kinacc.calibration.system import require_enough
+from kinacc.calibration.vec_fit import VEC_FIX, Prior
 from kinacc.robot import Robot
 
 TRAIN = "train"
@@ -60,3 +63,20 @@ def joint_range_rad(
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
     centre, half = robot.joint_map @ centre, np.abs(robot.joint_map) @ half
     return centre - half, centre + half
+
+
+def require_enough_rows(inputs: Mapping, robot: Robot, calibration: Mapping) -> None:
+    """Raise InputError where the training rows have fewer residuals than a fit has parameters.
+
+    The fits ask themselves as well; asked beforehand, nothing is remade from data that cannot do.
+    """
+    seen, train = observed(inputs, robot)
+    seen, chosen, joints = seen.select(train), options(calibration), robot.dh.joints
+    frames = 0
+    if chosen.frames_estimated and len(seen):
+        start = known(sessions=int(seen.session.max()) + 1, targets=len(seen.target_names))
+        frames = coordinates(seen, start, base_free=True, targets_free=True).size
+    errors = 6 * joints * (chosen.order + 1)
+    require_enough(seen, errors + frames, "VEC fit", VEC_FIX)
+    parameters = int(free_parameters(joints, chosen.hayati_joints).sum())
+    require_enough(seen, parameters + frames, "DH fit", DH_FIX)

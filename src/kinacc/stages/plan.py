@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kinacc.errors import InputError, Problem
-from kinacc.provenance import file_hash, stage_code_hash
+from kinacc.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.stages.catalogue import FIGURE_FOLDER, STAGES, Stage, maker_of
 
 RESULTS = "results"
@@ -123,20 +123,26 @@ class Plan:
         }
 
     def check_files(self) -> None:
-        """Read every measured file that is newer than its table; InputError listing all problems.
+        """Read every measured file that is newer than its table, or read by other settings.
 
-        Done before anything runs, because Snakemake removes a table before it is made anew.
+        Raises InputError listing all problems. Done before anything runs, because Snakemake
+        removes a table before it is made anew.
         """
         problems: list[Problem] = []
         for dataset, config in self.datasets.items():
             path = self._files(STAGES["measurements"], config).get("measurements_file")
             table = self._table("measurements", dataset)
-            if path is None or (os.path.exists(table) and _older(path, table)):
+            settings = self.settings("measurements", dataset)
+            if path is None or _is_current(table, path, settings):
                 continue
-            from kinacc.stages import measurements
+            from kinacc import robot
+            from kinacc.stages import calibration_settings, measurements
 
             try:
-                measurements.run({}, self.settings("measurements", dataset))
+                made = measurements.run({}, settings)
+                calibration_settings.require_enough_rows(
+                    made, robot.load(config["robot"]), config["calibration"]
+                )
             except InputError as error:
                 problems += error.problems
         if problems:
@@ -210,8 +216,16 @@ class Plan:
         return found
 
 
-def _older(path: str, table: str) -> bool:
-    return os.path.getmtime(path) < os.path.getmtime(table)
+def _is_current(table: str, path: str, settings: Mapping[str, object]) -> bool:
+    """Whether a table was made after the file ``path`` changed, and by these settings."""
+    if not os.path.exists(table) or os.path.getmtime(path) >= os.path.getmtime(table):
+        return False
+    from kinacc.artifacts.store import read_metadata
+
+    try:
+        return read_metadata(table).get("config_hash") == config_hash(settings)
+    except InputError:
+        return False
 
 
 def _read_words(values: object) -> object:
