@@ -9,6 +9,7 @@ import click
 
 from kinacc import __version__
 from kinacc.commands.compensate import compensate
+from kinacc.commands.export import export
 from kinacc.commands.predict import predict
 from kinacc.errors import InputError, Problem
 from kinacc.stages.catalogue import STAGES, Stage, maker_of
@@ -120,6 +121,7 @@ for _stage in STAGES.values():
     run.add_command(_stage_command(_stage))
 main.add_command(predict)
 main.add_command(compensate)
+main.add_command(export)
 
 
 def run_stage(

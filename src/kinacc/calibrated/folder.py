@@ -41,10 +41,15 @@ def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
 
 
 def calibration(
-    tables: Tables, robot: Robot, model: str | None = None, name: str = ""
+    tables: Tables,
+    robot: Robot,
+    model: str | None = None,
+    name: str = "",
+    session: str | None = None,
 ) -> Calibration:
     """The calibration in ``tables`` (``read_tables``): ``model``, or the one selected.
 
+    ``session`` chooses the base where several were measured; the first where not given.
     Raises InputError where the robot is not the one the tables were made with.
     """
     choice = selected_model(tables) if model is None else model
@@ -60,18 +65,32 @@ def calibration(
     }
     frames = tables["frames"]
     of_model = np.asarray(frames["model"]) == choice
-    targets = [str(each) for each in np.asarray(frames["frame"])[of_model] if each != "base"]
+    names = [str(each) for each in np.asarray(frames["frame"])[of_model]]
+    targets = [each for each in names if each != "base"]
+    number = _session_number(frames, of_model, session)
     return Calibration(
         name=name,
         robot=robot,
         choice=choice,
         model=made[choice],
-        base=model_tables.frame(frames, choice, "base"),
+        base=model_tables.frame(frames, choice, "base", session),
+        base_name="base" if number == 0 else f"base{number + 1}",
         targets={each: model_tables.frame(frames, choice, each) for each in targets},
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
         fitted_range_rad=(volumetric.q_min_rad, volumetric.q_max_rad),
     )
+
+
+def _session_number(frames: Mapping, of_model: np.ndarray, session: str | None) -> int:
+    """Place of a session among the bases of a model; InputError for one that is not there."""
+    if session is None or "session" not in frames:
+        return 0
+    bases = of_model & (np.asarray(frames["frame"]) == "base")
+    known = [str(each) for each in np.asarray(frames["session"])[bases]]
+    if session not in known:
+        raise InputError(Problem("session", f"{session!r} is not there", ", ".join(known)))
+    return known.index(session)
 
 
 def selected_model(tables: Tables) -> str:

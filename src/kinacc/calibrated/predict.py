@@ -9,7 +9,6 @@ import numpy as np
 
 from kinacc.calibrated.record import FLANGE, Calibration
 from kinacc.calibration.uncertainty import (
-    BASE,
     MOTIONS,
     dh_parameter_names,
     vec_parameter_names,
@@ -124,7 +123,7 @@ def sensitivity(
     if frame == "instrument":
         seen = compose(origin, compose(end, carried)).position_mm - origin.position_mm
         identity = np.broadcast_to(np.eye(3), end.rotation.shape)
-        _fill(slopes, place, BASE, identity, seen)
+        _fill(slopes, place, calibration.base_name, identity, seen)
     return slopes
 
 

@@ -40,6 +40,7 @@ class Calibration:
     ``targets`` are tool and other targets in the last DH frame. ``known`` is the uncertainty of the
     fit (None for the nominal model), ``residual`` what the model does not explain.
     ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides).
+    ``base_name`` is what ``known`` calls the base, which differs by session.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Calibration:
     known: Uncertainty | None = None
     residual: Residual | None = None
     fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None
+    base_name: str = "base"
 
     @property
     def default_point(self) -> str:

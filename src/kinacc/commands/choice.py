@@ -52,6 +52,7 @@ def output_options(command: Callable) -> Callable:
 def point_options(command: Callable) -> Callable:
     """Which point in which frame."""
     for option in (
+        click.option("--session", help="Session whose instrument is meant. [the first]"),
         click.option("--point", help="Target, or flange. [the tool]"),
         click.option(
             "--frame",
@@ -86,14 +87,18 @@ def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> 
 
 
 def calibration_of(
-    folder: str | Path, model: str | None, robot: str | None, config: tuple[str, ...]
+    folder: str | Path,
+    model: str | None,
+    robot: str | None,
+    config: tuple[str, ...],
+    session: str | None = None,
 ) -> Calibration:
     """The calibration of a results folder."""
     from kinacc.calibrated import folder as results
 
     tables = results.read_tables(folder)
     name = Path(folder).resolve().name
-    return results.calibration(tables, robot_of(folder, robot, config), model, name)
+    return results.calibration(tables, robot_of(folder, robot, config), model, name, session)
 
 
 def deliver(sheet: Sheet, output: str | None, as_json: bool, force: bool) -> None:

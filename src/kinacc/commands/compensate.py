@@ -20,8 +20,8 @@ from kinacc.commands import choice
 @choice.point_options
 @choice.output_options
 def compensate(
-    folder, model, config, robot, poses, pose, near_deg, program, frame, point, output, as_json,
-    force,
+    folder, model, config, robot, poses, pose, near_deg, program, frame, point, session, output,
+    as_json, force,
 ) -> None:  # fmt: skip
     """Find the joints at which the calibrated arm puts its tool where it is wanted.
 
@@ -44,7 +44,7 @@ def compensate(
     from kinacc.stages.progress import reporting
 
     sheet.check_output(output, force)
-    arm = choice.calibration_of(folder, model, robot, config)
+    arm = choice.calibration_of(folder, model, robot, config, session)
     given = wanted.poses(arm, poses, pose, near_deg, program, frame, point)
     with reporting("compensate", bar=True):
         found = joints_for(arm, given.pose, given.joints, given.directions, frame, point)

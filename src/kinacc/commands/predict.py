@@ -15,8 +15,8 @@ from kinacc.commands import choice
 @choice.point_options
 @choice.output_options
 def predict(
-    folder, model, config, robot, joints, joints_deg, joints_rad, frame, point, output, as_json,
-    force,
+    folder, model, config, robot, joints, joints_deg, joints_rad, frame, point, session, output,
+    as_json, force,
 ) -> None:  # fmt: skip
     """Predict the pose of the tool at given joints, with how sure that is.
 
@@ -38,7 +38,7 @@ def predict(
     from kinacc.stages.progress import reporting
 
     sheet.check_output(output, force)
-    arm = choice.calibration_of(folder, model, robot, config)
+    arm = choice.calibration_of(folder, model, robot, config, session)
     given = tables.given_joints(arm.robot, joints, joints_deg, joints_rad)
     with reporting("predict", bar=True) as progress:
         found = poses_at(arm, given.joints, given.directions, frame, point, progress)

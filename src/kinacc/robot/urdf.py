@@ -44,10 +44,8 @@ def load(path: str | Path, base_link: str | None = None, tip_link: str | None = 
     the file leaves a choice. Limits come from the file; a continuous joint gets a turn either way.
     """
     path = Path(path)
-    joints, links, name = _parse(path)
+    chain, name, (base_link, tip_link) = _between_links(path, base_link, tip_link)
     place = str(path)
-    base_link, tip_link = _ends(joints, links, base_link, tip_link, place)
-    chain = _chain(joints, base_link, tip_link, place)
     moving = [joint for joint in chain if joint.kind in MOVING]
     problems = list(_faults(moving, base_link, tip_link, place))
     if problems:
@@ -67,6 +65,22 @@ def load(path: str | Path, base_link: str | None = None, tip_link: str | None = 
         flange=rest,
         joint_names=tuple(joint.name for joint in moving),
     )
+
+
+def joints_between(
+    path: str | Path, base_link: str | None = None, tip_link: str | None = None
+) -> list[Joint]:
+    """Joints of the chain ``load`` takes, from base to tip, fixed ones included."""
+    return _between_links(Path(path), base_link, tip_link)[0]
+
+
+def _between_links(
+    path: Path, base_link: str | None, tip_link: str | None
+) -> tuple[list[Joint], str, tuple[str, str]]:
+    """The chain, the name of the robot and the links the chain runs between."""
+    joints, links, name = _parse(path)
+    ends = _ends(joints, links, base_link, tip_link, str(path))
+    return _chain(joints, *ends, str(path)), name, ends
 
 
 def _axes(chain: list[Joint]) -> tuple[Axes, Pose]:

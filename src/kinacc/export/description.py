@@ -1,0 +1,169 @@
+"""A calibrated arm as a robot file of kinacc, as JSON and as a CSV table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.calibrated.record import TOOL, Calibration
+from kinacc.geometry import IDENTITY, Pose, compose, invert, quaternion_from_rotation
+from kinacc.models.dh import PARAMETERS, DHModel
+
+CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
+SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a joint slides"
+
+
+def robot_name(arm: Calibration) -> str:
+    """Name of the calibrated arm."""
+    own = arm.name if arm.name.startswith(arm.robot.name) else f"{arm.robot.name}_{arm.name}"
+    return f"{own}_calibrated"
+
+
+def robot_yaml(arm: Calibration) -> str:
+    """A robot file that ``kinacc.robot.load`` reads back to the same arm, bit by bit."""
+    robot, dh = arm.robot, _dh_of(arm)
+    lines = [
+        f"# {robot.name} as calibrated by data set {arm.name} ({arm.choice} model).",
+        f"# {CONVENTION}; angles in rad, lengths in mm.",
+        f"name: {_text(robot_name(arm))}",
+        f"source: {_text(f'calibrated from {robot.name} with data set {arm.name}')}",
+        "dh:",
+    ]
+    signs = np.diag(robot.joint_map)
+    simple = np.array_equal(robot.joint_map, np.diag(signs)) and (np.abs(signs) == 1.0).all()
+    for joint in range(dh.joints):
+        entries = [f"{name}: {float(getattr(dh, name)[joint])!r}" for name in PARAMETERS]
+        low, high = float(robot.q_min_rad[joint]), float(robot.q_max_rad[joint])
+        if robot.joint_names and robot.joint_names[joint] != f"joint {joint + 1}":
+            entries.insert(0, f"name: {_text(robot.joint_names[joint])}")
+        if dh.prismatic[joint]:
+            entries += ["joint: prismatic", f"limits_mm: [{low!r}, {high!r}]"]
+        else:
+            entries.append(f"limits_rad: [{low!r}, {high!r}]")
+        if simple and signs[joint] < 0.0:
+            entries.append("sign: -1")
+        lines.append(f"  - {{{', '.join(entries)}}}")
+    if not simple:
+        lines.append("joint_map: # DH joints = joint_map times reported joints")
+        lines += [f"  - {[float(value) for value in row]}" for row in robot.joint_map]
+    frames = {"base": robot.base, "flange": robot.flange}
+    if TOOL in arm.targets:
+        frames["tool"] = compose(invert(robot.flange), arm.targets[TOOL])
+    for name, pose in frames.items():
+        if not _is_identity(pose):
+            lines += _frame_lines(name, pose)
+    return "\n".join(lines) + "\n"
+
+
+def robot_json(
+    arm: Calibration, std: np.ndarray, nominal: DHModel, provenance: Mapping[str, str]
+) -> str:
+    """Everything the calibration says of the arm: parameters, deviations, frames, residuals.
+
+    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined.
+    """
+    dh = _dh_of(arm)
+    joints = []
+    for joint in range(dh.joints):
+        row: dict[str, object] = {
+            "joint": joint + 1,
+            "type": "prismatic" if dh.prismatic[joint] else "revolute",
+        }
+        for column, name in enumerate(PARAMETERS):
+            value = float(getattr(dh, name)[joint])
+            row[name] = value
+            row[f"nominal_{name}"] = float(getattr(nominal, name)[joint])
+            row[f"std_{name}"] = _number(std[joint, column])
+        joints.append(row)
+    left = arm.residual
+    content = {
+        "name": robot_name(arm),
+        "robot": arm.robot.name,
+        "calibration": arm.name,
+        "convention": CONVENTION + (f"; {SLIDING}" if dh.prismatic.any() else ""),
+        "units": {"length": "mm", "angle": "rad", "quaternion": "w, x, y, z"},
+        "joints": joints,
+        "joint_map": arm.robot.joint_map.tolist(),
+        "base_in_instrument": _frame_record(arm.base),
+        "targets_in_last_dh_frame": {
+            name: _frame_record(pose) for name, pose in arm.targets.items()
+        },
+        "residual": left
+        and {
+            "subset": left.subset,
+            "position_rms_mm": _number(left.position_mm),
+            "orientation_rms_mrad": _number(1e3 * left.orientation_rad),
+        },
+        "undetermined": undetermined_in_words(arm),
+        "provenance": dict(provenance),
+    }
+    return json.dumps(content, indent=1) + "\n"
+
+
+def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
+    """One row per joint: fitted values, their standard deviations and the nominal values."""
+    dh, out = _dh_of(arm), io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    names = [name.replace("_rad", "_deg") for name in PARAMETERS]
+    writer.writerow(
+        ["joint", *names, *(f"std_{name}" for name in names), *(f"nominal_{n}" for n in names)]
+    )
+    factor = np.array([180.0 / np.pi if name.endswith("_rad") else 1.0 for name in PARAMETERS])
+    fitted, given = (
+        np.stack([getattr(model, name) for name in PARAMETERS], axis=1) * factor
+        for model in (dh, nominal)
+    )
+    for joint in range(dh.joints):
+        cells = np.concatenate([fitted[joint], std[joint] * factor, given[joint]])
+        writer.writerow([joint + 1, *("" if np.isnan(x) else f"{x:.12g}" for x in cells)])
+    return out.getvalue()
+
+
+def undetermined_in_words(arm: Calibration, least: float = 0.1) -> list[str]:
+    """Each direction the poses do not determine, by the parameters that share it."""
+    if arm.known is None:
+        return []
+    words = []
+    for direction in arm.known.undetermined:
+        length = float(np.linalg.norm(direction))
+        shares = [
+            f"{value:+.2f} {name.rpartition('_')[0] or name}"
+            for value, name in zip(direction / length, arm.known.names, strict=True)
+            if abs(value) >= least
+        ]
+        words.append(" ".join(shares))
+    return words
+
+
+def _dh_of(arm: Calibration) -> DHModel:
+    if not isinstance(arm.model, DHModel):
+        raise TypeError("a VEC model has no DH table: choose dh")
+    return arm.model
+
+
+def _text(text: str) -> str:
+    return json.dumps(text)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _frame_record(pose: Pose) -> dict[str, list[float]]:
+    return {
+        "position_mm": [float(value) for value in pose.position_mm],
+        "quaternion_wxyz": [float(value) for value in quaternion_from_rotation(pose.rotation)],
+    }
+
+
+def _frame_lines(name: str, pose: Pose) -> list[str]:
+    record = _frame_record(pose)
+    return [f"{name}:", *(f"  {key}: {value}" for key, value in record.items())]
+
+
+def _is_identity(pose: Pose) -> bool:
+    return all(np.array_equal(a, b) for a, b in zip(pose, IDENTITY, strict=True))
