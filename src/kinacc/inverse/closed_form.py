@@ -72,7 +72,7 @@ def missing_properties(dh: DHModel, tolerance: float = 1e-9) -> list[str]:
     """
     if dh.joints != 6:
         return [f"it has {dh.joints} joints, the closed form needs 6"]
-    found = []
+    found = [f"joint {joint + 1} slides" for joint in np.flatnonzero(dh.prismatic)]
     for joint in (1, 4, 5):
         if abs(np.cos(dh.alpha_rad[joint - 1])) > tolerance:
             angle = np.rad2deg(dh.alpha_rad[joint - 1])

@@ -19,7 +19,7 @@ def reported_joints(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
 
 
 def dh_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Limits (k,), (k,) of the DH joint angles; infinite where a joint is coupled to others."""
+    """Limits (k,), (k,) of the DH joints; infinite where a joint is coupled to others."""
     joints = len(robot.joint_map)
     lower, upper = np.full(joints, -np.inf), np.full(joints, np.inf)
     for joint in np.flatnonzero(uncoupled(robot)):
@@ -51,13 +51,14 @@ def take_turns(
     q_rad: np.ndarray,
     limits_rad: tuple[np.ndarray, np.ndarray],
     preferred_rad: tuple[np.ndarray, np.ndarray] | None = None,
+    prismatic: np.ndarray | None = None,
 ) -> np.ndarray:
     """Joints (..., k) moved by whole turns: inside the limits, inside the preferred box, near zero.
 
     Of all turns within ``limits_rad`` the one within ``preferred_rad`` (the range a model was
     fitted over: a Chebyshev error differs between q and q + 2 pi) that is nearest to zero is
     taken; where none lies within both, the one within the limits nearest to zero; where none does,
-    the one in (-pi, pi].
+    the one in (-pi, pi]. Joints that slide (``prismatic`` (k,)) are left alone.
     """
     boxes = [limits_rad] if preferred_rad is None else [limits_rad, preferred_rad]
     base = q_rad - _TWO_PI * np.rint(q_rad / _TWO_PI)
@@ -76,7 +77,7 @@ def take_turns(
             cost = cost + weight * outside
         better = cost < lowest
         best, lowest = np.where(better, angle, best), np.where(better, cost, lowest)
-    return best
+    return best if prismatic is None else np.where(prismatic, q_rad, best)
 
 
 _OUTSIDE = 100.0  # more than any angle in rad that is compared
