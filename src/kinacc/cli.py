@@ -8,6 +8,7 @@ from collections.abc import Callable
 import click
 
 from kinacc import __version__
+from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
 from kinacc.commands.predict import predict
@@ -122,6 +123,7 @@ for _stage in STAGES.values():
 main.add_command(predict)
 main.add_command(compensate)
 main.add_command(export)
+main.add_command(compare)
 
 
 def run_stage(

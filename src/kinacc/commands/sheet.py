@@ -39,6 +39,7 @@ class Sheet:
     title: str
     facts: Mapping[str, object]
     fields: Sequence[Field]
+    shown_rows: int = _SHOWN_ROWS
 
     def __len__(self) -> int:
         return len(self.fields[0].values) if self.fields else 0
@@ -61,7 +62,7 @@ class Sheet:
 
     def as_text(self) -> str:
         """Aligned columns of the first rows for a screen."""
-        count = min(len(self), _SHOWN_ROWS)
+        count = min(len(self), self.shown_rows)
         columns = [
             [field.name, *(_short(field.values[i]) for i in range(count))]
             for field in self.fields
