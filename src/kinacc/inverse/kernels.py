@@ -380,18 +380,24 @@ def refine(rows, targets, q, most_steps, tolerance_mm):
 
 @njit(cache=True)
 def _keep(q, error, number, found, left, turning, unit):
-    """Add joints to the list unless they are in it or it is full; how many it then holds."""
+    """Add joints to the list unless they are in it; how many it then holds.
+
+    A full list gives up the worst of its entries for a better one.
+    """
     for joint in range(q.shape[0]):
         if turning[joint]:
             q[joint] -= _TWO_PI * np.rint(q[joint] / _TWO_PI)
-    if number == found.shape[0]:
-        return number
+    place = number
     for other in range(number):
         if _apart(q, found[other], turning, unit) < 1.0:
             return number
-    found[number] = q
-    left[number] = error
-    return number + 1
+    if number == found.shape[0]:
+        place = np.argmax(left)
+        if left[place] <= max(error, 1e-6):
+            return number
+    found[place] = q
+    left[place] = error
+    return max(number, place + 1)
 
 
 @njit(cache=True)

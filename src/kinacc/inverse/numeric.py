@@ -24,8 +24,8 @@ _GRID_RAD = np.deg2rad(30.0)
 _GRID_POINTS = 9  # of a first joint that slides
 _BENDS_RAD = (0.02, 0.1)
 _AT_LIMIT_RAD = 1e-9
-# Postures of one name: sixteen at most in all, eight with spherical shoulder and wrist.
-_PER_NAME, _PER_NAME_SPHERICAL = 4, 2
+# Postures of one name: of sixteen in all five were the most seen; two with spherical joints.
+_PER_NAME, _PER_NAME_SPHERICAL = 8, 2
 
 
 def grid_of(robot: Robot) -> np.ndarray:
