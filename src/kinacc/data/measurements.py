@@ -28,14 +28,16 @@ class Reading:
     """What a file holds.
 
     ``columns`` of the measurements artefact but fold and subset, one row per reading of a target;
-    ``commanded`` (rows, k) the joints as commanded, None where the file does not say; ``unused``
-    columns of the file; ``notes`` say what else was left out, with its lines.
+    ``unused`` columns of the file; ``notes`` say what else was left out, with its lines. For the
+    checks: ``commanded`` (rows, k) the joints as commanded, None where the file does not say;
+    ``turns`` (rows, 3 or 4) the orientations as written, in rad, NaN where there is none.
     """
 
     columns: dict[str, np.ndarray]
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     commanded: np.ndarray | None = None
+    turns: np.ndarray | None = None
 
     def left_out(self) -> list[str]:
         """All that was not used, in words."""
@@ -83,9 +85,10 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     if "target" in shared:
         columns["target"] = shared["target"][order]
     columns["row"] = table.line[order]
+    turns = np.concatenate([part["turns"][part["there"]] for part in parts])
     by_row = np.argsort(order, kind="stable")
     columns = {name: values[by_row] for name, values in columns.items()}
-    order = order[by_row]
+    order, turns = order[by_row], turns[by_row]
     if "repeat" not in found.single:
         columns["repeat"] = _count_within(columns)
     elif "pose" in found.single:
@@ -100,6 +103,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
         found.unused(table),
         tuple(notes if nothing.any() else ()),
         commanded if commanded is None else commanded[order],
+        turns,
     )
 
 
@@ -126,7 +130,7 @@ def _target(table: RawTable, target: Target, layout: Layout, problems) -> dict[s
     position = _stacked(table, target.position, problems, gaps=True)
     empty = _empty(table, target.position, problems)
     part = {"there": ~empty, "target": np.full(count, target.name, dtype=object)}
-    turn = np.full((count, 3), np.nan)
+    turn = np.full((count, 4 if layout.orientation == "quaternion" else 3), np.nan)
     quaternion = np.full((count, 4), np.nan)
     if target.turn:
         _empty(table, target.turn, problems)
@@ -134,6 +138,7 @@ def _target(table: RawTable, target: Target, layout: Layout, problems) -> dict[s
         if layout.orientation == "quaternion":
             problems += faults.quaternion_problems(table, turn, target.turn)
         quaternion = quaternions(turn, layout)
+    part["turns"] = turn
     part |= dict(zip(POSITION, position.T, strict=True))
     part |= dict(zip(QUATERNION, quaternion.T, strict=True))
     part |= _uncertainty(table, target, turn, layout, problems)

@@ -1,0 +1,93 @@
+"""Rows that say the same as another row, and readings that were not taken anew."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinacc.inspection.cells import Cells
+from kinacc.inspection.suspicion import Suspicion, suspicion
+
+_CHANCE = 0.01  # expected number of coincidences above which equal readings say nothing
+
+
+def found(cells: Cells, noise_mm: float) -> list[Suspicion]:
+    """Rows equal in joints and all readings, and readings equal to those of other joints.
+
+    Readings are written to a limited number of digits: where repeats scatter by ``noise_mm`` per
+    axis (NaN if unknown) so little that equal digits are no surprise, they raise no suspicion.
+    """
+    rows, reading = _by_line(cells)
+    if len(rows) < 2:
+        return []
+    joints = cells.q[rows]
+    twice = _earlier_equal(np.column_stack([joints, np.nan_to_num(reading, nan=np.inf)]))
+    same_reading = _earlier_equal(np.nan_to_num(reading, nan=np.inf))
+    stale = (same_reading >= 0) & (twice < 0)
+    # Of two rows with equal joints only equal digits are noteworthy; other joints must differ.
+    stale[stale] = ~np.isclose(joints[stale], joints[same_reading[stale]], atol=1e-6).all(axis=1)
+    stale[np.flatnonzero(stale)] &= _unlikely(cells, np.inf)
+    line = cells.line[rows]
+    suspicions = []
+    if (twice >= 0).any() and _unlikely(cells, noise_mm):
+        again = np.flatnonzero(twice >= 0)
+        suspicions.append(
+            suspicion(
+                "duplicate_rows",
+                f"{again.size} row{'s are' if again.size > 1 else ' is'} equal to an earlier one "
+                f"in every joint and reading, the first to line {line[twice[again[0]]]}",
+                line[again],
+                "take the copies out: they count as measurements that were never made",
+                first_copied_line=int(line[twice[again[0]]]),
+            )
+        )
+    if stale.any():
+        again = np.flatnonzero(stale)
+        suspicions.append(
+            suspicion(
+                "repeated_reading",
+                f"{again.size} reading{'s' if again.size > 1 else ''} equal to an earlier one in "
+                f"every digit although the joints differ, the first to line "
+                f"{line[same_reading[again[0]]]}",
+                line[again],
+                "the instrument was not read anew, or the rows were copied",
+                first_copied_line=int(line[same_reading[again[0]]]),
+            )
+        )
+    return suspicions
+
+
+def _by_line(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
+    """First cell of every line, and all readings of the line side by side, NaN where none."""
+    lines, first, inverse = np.unique(cells.line, return_index=True, return_inverse=True)
+    targets = len(cells.target_names)
+    reading = np.full((len(lines), targets, 12), np.nan)
+    reading[inverse, cells.target, :3] = cells.position_mm
+    reading[inverse, cells.target, 3:] = cells.rotation.reshape(-1, 9)
+    return first, reading.reshape(len(lines), -1)
+
+
+def _earlier_equal(values: np.ndarray) -> np.ndarray:
+    """Index (n,) of the first equal row before each, -1 where there is none."""
+    _, first, inverse = np.unique(values, axis=0, return_index=True, return_inverse=True)
+    earlier = first[inverse.ravel()]
+    return np.where(earlier < np.arange(len(values)), earlier, -1)
+
+
+def _unlikely(cells: Cells, noise_mm: float) -> bool:
+    """Whether equal digits by chance are to be expected less than ``_CHANCE`` times."""
+    if not np.isfinite(noise_mm) or noise_mm <= 0.0:
+        return True
+    values = cells.position_mm
+    digit = resolution(values)
+    per_axis = min(digit / (2.0 * np.sqrt(np.pi) * noise_mm), 1.0)
+    numbers = 3 * len(cells.target_names) + 3 * bool(cells.turned.any())
+    _, counts = np.unique(cells.pose, return_counts=True)
+    pairs = float(np.sum(counts * (counts - 1) / 2)) / max(len(cells.target_names), 1) ** 2
+    return max(pairs, 1.0) * per_axis**numbers < _CHANCE
+
+
+def resolution(values: np.ndarray) -> float:
+    """Smallest step between different values: the last digit that was written."""
+    steps = np.diff(np.unique(values[np.isfinite(values)].ravel()))
+    steps = steps[steps > 1e-12 * np.max(np.abs(values), initial=1.0)]
+    return float(steps.min()) if steps.size else 0.0

@@ -1,0 +1,69 @@
+"""What looks wrong in a file, with the lines it concerns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+KINDS = {
+    "outside_limits": "joints outside the robot's limits",
+    "joint_units": "joints in another unit than stated",
+    "length_units": "positions in another unit than stated",
+    "angle_units": "orientation angles in another unit than stated",
+    "left_handed": "left-handed coordinates",
+    "transposed_rotation": "orientations the wrong way round (transposed)",
+    "euler_convention": "orientations of another convention than stated",
+    "joint_sign": "a joint that counts the other way",
+    "joint_coupling": "joints that are coupled",
+    "joint_zero": "a joint that counts from another zero",
+    "joint_order": "joints in another order",
+    "duplicate_rows": "rows that are there twice",
+    "repeated_reading": "a reading that was not taken anew",
+    "target_moved": "a target that moved",
+    "target_swapped": "targets taken for one another",
+    "base_jump": "a base frame that jumps",
+    "commanded_joints": "joints as commanded, not as read back",
+    "outliers": "readings far from all the others",
+    "does_not_fit": "a robot that is not the one described",
+}
+_RANGES_SHOWN = 6
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """One thing that looks wrong: ``kind`` of ``KINDS``, in words, with its lines of the file.
+
+    ``fix`` says what to do about it; ``values`` are the numbers behind it, units in their names.
+    """
+
+    kind: str
+    what: str
+    lines: tuple[int, ...]
+    fix: str = ""
+    values: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def where(self) -> str:
+        """The lines in words."""
+        return lines_in_words(self.lines)
+
+
+def suspicion(kind: str, what: str, lines: Iterable[int], fix: str = "", **values) -> Suspicion:
+    """A suspicion of any lines, each named once and in order."""
+    unique = tuple(sorted({int(line) for line in lines}))
+    return Suspicion(kind, what, unique, fix, values)
+
+
+def lines_in_words(lines: tuple[int, ...], shown: int = _RANGES_SHOWN) -> str:
+    """``lines 2-9, 12 and 17 more``; runs of lines are drawn together."""
+    if not lines:
+        return "no line"
+    numbers = np.array(lines)
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+    words = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
+    text = ", ".join(words[:shown])
+    rest = sum(len(run) for run in runs[shown:])
+    more = f" and {rest} more" if rest else ""
+    return f"line{'s' if len(lines) > 1 else ''} {text}{more}"
