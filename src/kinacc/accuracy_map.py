@@ -21,9 +21,6 @@ from kinacc.models.vec import VECModel
 from kinacc.region import Cells, Orientations, tool_poses
 from kinacc.robot import Robot
 
-# A machining arm works facing its table with the elbow up; the wrist is what it changes.
-MACHINING_BRANCHES = ("front-up-noflip", "front-up-flip")
-
 _CELLS_PER_BLOCK = 256
 
 
@@ -31,7 +28,8 @@ class ModelPair(NamedTuple):
     """The true arm (``vec``), the model under assessment (``dh``), and what they carry.
 
     ``vec_tool`` and ``dh_tool`` are the tool centre point in the flange frame of each; ``travel``
-    (k,) is the travel direction of every joint, or None for unknown.
+    (k,) is the travel direction of every joint, or None for unknown. ``vec_base`` is the first
+    frame of ``vec`` in that of ``dh`` where the two were fitted with bases of their own.
     """
 
     vec: VECModel
@@ -39,6 +37,7 @@ class ModelPair(NamedTuple):
     vec_tool: Pose = IDENTITY
     dh_tool: Pose = IDENTITY
     travel: np.ndarray | None = None
+    vec_base: Pose | None = None
 
 
 class AccuracyMap(NamedTuple):
@@ -56,11 +55,13 @@ class AccuracyMap(NamedTuple):
 def errors_at(pair: ModelPair, q_rad: np.ndarray) -> np.ndarray:
     """VEC minus DH at joints (n, k), as (n, 6): tool position in mm, rotation vector in rad.
 
-    Both in the robot base; the rotation vector turns the DH orientation into the (projected) VEC
+    Both in the DH base; the rotation vector turns the DH orientation into the (projected) VEC
     orientation.
     """
     travel = None if pair.travel is None else np.broadcast_to(pair.travel, q_rad.shape)
     true = compose(_vec.pose(pair.vec, q_rad, travel), pair.vec_tool)
+    if pair.vec_base is not None:
+        true = compose(pair.vec_base, true)
     modelled = compose(_dh.forward(pair.dh, q_rad), pair.dh_tool)
     return pose_error(true, modelled)
 
@@ -69,17 +70,23 @@ def joints_of(
     robot: Robot,
     pair: ModelPair,
     tool: Pose,
-    branches: tuple[str, ...] = MACHINING_BRANCHES,
+    branches: tuple[str, ...] | None = None,
     invert_with: str = "dh",
 ) -> inverse.Solutions:
     """Joints of tool poses (n, ...) per branch, from the ``dh``, ``vec`` or ``nominal`` model.
 
-    The nominal model carries the tool of the DH model. A solution outside the joint range the VEC
-    model was fitted over is Status.OUTSIDE_RANGE.
+    Tool poses are in the arm's base frame; without ``branches`` they are taken in those of
+    ``inverse.machining_branches``. The nominal model carries the tool of the DH model. A solution
+    outside the joint range the VEC model was fitted over is Status.OUTSIDE_RANGE.
     """
     models = {"dh": pair.dh, "vec": pair.vec, "nominal": robot.dh}
     carried = pair.vec_tool if invert_with == "vec" else pair.dh_tool
     flange = compose(tool, invert(carried))
+    if robot.base is not IDENTITY:
+        flange = compose(invert(robot.base), flange)
+    if invert_with == "vec" and pair.vec_base is not None:
+        flange = compose(invert(pair.vec_base), flange)
+    branches = inverse.machining_branches(robot) if branches is None else branches
     fitted = pair.vec.q_min_rad, pair.vec.q_max_rad
     return inverse.solve(robot, models[invert_with], flange, branches, pair.travel, fitted)
 
@@ -90,7 +97,7 @@ def accuracy_map(
     cells: Cells,
     reference: np.ndarray,
     orientations: Orientations,
-    branches: tuple[str, ...] = MACHINING_BRANCHES,
+    branches: tuple[str, ...] | None = None,
     invert_with: str = "dh",
 ) -> AccuracyMap:
     """Largest errors at cells (n,) over ``orientations`` and ``branches``.
@@ -99,8 +106,9 @@ def accuracy_map(
     VEC model was fitted over, of ``wanted``; only those enter the maxima, since beyond its range a
     Chebyshev error says nothing. ``extrapolating`` counts the combinations left out for that
     reason alone. Cells without a solution have NaN maxima and None branches, which read
-    ``X+ Y- Z0, front-up-flip``. Raises InputError where the arm has no closed-form inverse.
+    ``X+ Y- Z0, front-up-flip``. Without ``branches`` those of ``inverse.machining_branches``.
     """
+    branches = inverse.machining_branches(robot) if branches is None else branches
     count = len(cells.radius_mm)
     parts = [
         _block(

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc import region
-from kinacc.accuracy_map import MACHINING_BRANCHES, ModelPair, errors_at, joints_of
+from kinacc import inverse, region
+from kinacc.accuracy_map import ModelPair, errors_at, joints_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose
 from kinacc.inverse import Status, limits
@@ -27,12 +27,15 @@ class OperatingPoints(NamedTuple):
 
 
 class PosesWanted(NamedTuple):
-    """Which tool poses points are drawn from, and which joints are taken for them."""
+    """Which tool poses points are drawn from, and which joints are taken for them.
+
+    ``branches`` are those of ``inverse.machining_branches`` where None.
+    """
 
     cylinder: Cylinder
     reference: np.ndarray
     orientations: Orientations
-    branches: tuple[str, ...] = MACHINING_BRANCHES
+    branches: tuple[str, ...] | None = None
     invert_with: str = "dh"
 
 
@@ -69,9 +72,10 @@ def _solve_draws(
 ) -> tuple[np.ndarray, np.ndarray]:
     cells = region.fill(wanted.cylinder, unit[:, :3])
     turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
-    branch = (unit[:, 4] * len(wanted.branches)).astype(int)
+    branches = inverse.machining_branches(robot) if wanted.branches is None else wanted.branches
+    branch = (unit[:, 4] * len(branches)).astype(int)
     tool = region.tool_poses(cells, wanted.reference, wanted.orientations.rotation[turn])
-    solved = joints_of(robot, pair, tool, wanted.branches, wanted.invert_with)
+    solved = joints_of(robot, pair, tool, branches, wanted.invert_with)
     rows = np.arange(len(unit))
     return solved.q_rad[rows, branch], solved.status[rows, branch]
 
@@ -105,7 +109,7 @@ def in_joints(
         q_rad = dh_angles(robot, lower + unit * (upper - lower))
         good = limits.within(q_rad, pair.vec.q_min_rad, pair.vec.q_max_rad)
         if cylinder is not None:
-            tool = compose(_dh.forward(pair.dh, q_rad), pair.dh_tool)
+            tool = compose(robot.base, compose(_dh.forward(pair.dh, q_rad), pair.dh_tool))
             good &= region.contains(cylinder, tool.position_mm)
         found.append(q_rad[good])
         first += block

@@ -17,9 +17,10 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     cells = region.grid(
         shared.cylinder(evaluation), np.deg2rad(layout["slices_deg"]), layout["grid_mm"]
     )
+    arm = robot.load(settings["robot"])
     result = accuracy_map(
-        robot.load(settings["robot"]),
-        shared.models(inputs, evaluation),
+        arm,
+        shared.models(inputs, evaluation, arm),
         cells,
         shared.reference(evaluation),
         shared.orientations(evaluation),

@@ -26,7 +26,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
 
 
 def _drawn(arm: Robot, inputs: Mapping, evaluation: Mapping) -> OperatingPoints:
-    pair = shared.models(inputs, evaluation)
+    pair = shared.models(inputs, evaluation, arm)
     sequence, count = evaluation["sequence"], int(evaluation["points"])
     limited = arm.q_min_rad, arm.q_max_rad
     if evaluation["space"] == "joint_box":

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc import region
+from kinacc import region, robot
 from kinacc.accuracy_map import ModelPair
-from kinacc.geometry import IDENTITY, Pose
+from kinacc.geometry import IDENTITY, Pose, compose, invert
 from kinacc.models import tables
 from kinacc.region import Cylinder
+from kinacc.robot import Robot
 
 
 def cylinder(evaluation: Mapping) -> Cylinder:
@@ -37,25 +38,36 @@ def orientations(evaluation: Mapping) -> region.Orientations:
     return region.orientations(np.deg2rad(evaluation["rotation_deg"]), evaluation["rotations"])
 
 
-def models(inputs: Mapping, evaluation: Mapping) -> ModelPair:
-    """VEC and DH model with their tools, joints travelling as the settings say."""
+def models(inputs: Mapping, evaluation: Mapping, arm: Robot) -> ModelPair:
+    """VEC and DH model with their bases and tools, joints travelling as the settings say."""
     vec = tables.vec_model(inputs["vec_model"])
     direction = int(evaluation["travel_direction"])
     return ModelPair(
         vec,
         tables.dh_model(inputs["dh_model"]),
-        _tool(inputs, evaluation, "vec"),
-        _tool(inputs, evaluation, "dh"),
+        _tool(inputs, evaluation, arm, "vec"),
+        _tool(inputs, evaluation, arm, "dh"),
         np.full(vec.joints, direction) if direction else None,
+        _vec_base(inputs),
     )
 
 
-def _tool(inputs: Mapping, evaluation: Mapping, model: str) -> Pose:
-    """The tool fitted with a model; the configured one where none was fitted."""
+def _vec_base(inputs: Mapping) -> Pose | None:
+    """The VEC model's base in that of the DH model; None where both were fitted to one."""
+    if "frames" not in inputs:
+        return None
+    vec, dh = (tables.frame(inputs["frames"], model, "base") for model in ("vec", "dh"))
+    same = all(np.array_equal(a, b) for a, b in zip(vec, dh, strict=True))
+    return None if same else compose(invert(dh), vec)
+
+
+def _tool(inputs: Mapping, evaluation: Mapping, arm: Robot, model: str) -> Pose:
+    """The tool fitted with a model; the configured one, on the arm's flange, where none was."""
     if "frames" in inputs:
         names = np.asarray(inputs["frames"]["frame"])
         if (names == "tool").any():
             fitted = tables.frame(inputs["frames"], model, "tool")
             if any(np.abs(a - b).max() > 0.0 for a, b in zip(fitted, IDENTITY, strict=True)):
                 return fitted
-    return Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float))
+    configured = Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float))
+    return compose(robot.carried(arm), configured)
