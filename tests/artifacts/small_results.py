@@ -164,6 +164,17 @@ def _models() -> dict:
         "vec_frames": _frame_table(("vec",)),
         "vec_fit": fit,
         "vec_covariance": covariance,
+        "vec_orders": {
+            "fold": [np.nan],
+            "order": [0],
+            "prior_std_mm": [1.0],
+            "prior_std_mrad": [1.0],
+            "prior_decay": [1.0],
+            "held_out_rms_mm": [np.nan],
+            "excess_mm2": [np.nan],
+            "excess_std_error_mm2": [np.nan],
+            "chosen": [1],
+        },
         "dh_model": {
             "joint": joints,
             **_dh(6),

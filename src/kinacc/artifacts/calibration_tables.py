@@ -163,6 +163,23 @@ VEC_FIT = Artefact(
     _FIT_COLUMNS,
     ("quantity", "number", "parameter"),
 )
+VEC_ORDERS = Artefact(
+    "vec_orders",
+    "Orders of the VEC model tried by cross-validation, each with its best prior, and the one "
+    "chosen: the lowest whose squared error exceeds the best by no more than one standard error.",
+    (
+        whole("fold", "fold the choice has not seen; null = it has seen all", nullable=True),
+        whole("order", "order of the Chebyshev polynomials", 0, 40),
+        magnitude("prior_std_mm", "mm", "prior standard deviation of delta coefficients", 1e3),
+        magnitude("prior_std_mrad", "mrad", "prior standard deviation of eps coefficients", 1e3),
+        real("prior_decay", "1", "factor on both from each order above the first", 0, 1),
+        magnitude("held_out_rms_mm", "mm", "position rms of rows left out of a fit", 1e4, True),
+        magnitude("excess_mm2", "mm^2", "mean squared error beyond that of the best", 1e8, True),
+        magnitude("excess_std_error_mm2", "mm^2", "standard error of it, by folds", 1e8, True),
+        whole("chosen", "1 = chosen", 0, 1),
+    ),
+    ("fold", "order"),
+)
 DH_FIT = Artefact(
     "dh_fit",
     "How the DH fit went: rank, singular values, truncation, iterations, parameters.",

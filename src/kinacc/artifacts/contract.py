@@ -22,6 +22,7 @@ ARTEFACTS: dict[str, Artefact] = {
         calibration_tables.VEC_MODEL,
         calibration_tables.VEC_FRAMES,
         calibration_tables.VEC_FIT,
+        calibration_tables.VEC_ORDERS,
         calibration_tables.DH_MODEL,
         calibration_tables.FRAMES,
         calibration_tables.DH_FIT,

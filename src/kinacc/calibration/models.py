@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.calibration import dh_fit, vec_fit
+from kinacc.calibration import dh_fit, selection, vec_fit
 from kinacc.calibration.dh_fit import DHFit
-from kinacc.calibration.frames import Frames, known
+from kinacc.calibration.frames import Frames, coordinates, known
 from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.selection import Choice, Grid
 from kinacc.calibration.solve import Spectrum
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import IDENTITY, Pose, compose
@@ -23,13 +24,15 @@ class Options:
     """How models are fitted; see the ``calibration`` section of the configuration.
 
     ``frames_estimated``: base and tool are unknown; else both are the identity. ``dh_to_vec``: the
-    DH model follows the VEC at the measured joints instead of the measurements.
+    DH model follows the VEC at the measured joints instead of the measurements. ``grid``: orders
+    and priors to choose from; None where ``order`` and ``prior`` are stated.
     """
 
     rotation_weight_mm_per_rad: float
     frames_estimated: bool
     order: int = 0
     prior: Prior | None = None
+    grid: Grid | None = None
     travel_direction: bool = False
     dh_to_vec: bool = True
     hayati_joints: tuple[int, ...] = ()
@@ -41,8 +44,12 @@ def fit_vec(
     nominal: DHModel,
     joint_range_rad: tuple[np.ndarray, np.ndarray],
     options: Options,
+    start: VECModel | None = None,
 ) -> VECFit:
-    """VEC model on the nominal arm over ``joint_range_rad`` (k,), (k,). Raises FitError."""
+    """VEC model on the nominal arm over ``joint_range_rad`` (k,), (k,). Raises FitError.
+
+    ``start``: a model of the same order near the solution, which saves steps and changes nothing.
+    """
     frames = _stated(observations)
     if options.frames_estimated:
         frames = fit_nominal(observations, nominal, options).frames
@@ -53,6 +60,31 @@ def fit_vec(
         rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
         frames=frames,
         frames_free=options.frames_estimated,
+        start=start,
+    )
+
+
+def choose_vec(
+    observations: Observations,
+    nominal: DHModel,
+    joint_range_rad: tuple[np.ndarray, np.ndarray],
+    options: Options,
+    progress=None,
+) -> list[Choice]:
+    """Order and prior chosen from ``options.grid``; see ``selection.choices``. Raises FitError."""
+    frames = fit_nominal(observations, nominal, options).frames
+    size = coordinates(observations, frames, *[options.frames_estimated] * 2).size
+    # A choice trains on three blocks of five at least; every fit of the chosen order on more.
+    count = observations.select(observations.fold >= 0).components * 3 // 5
+    grid = options.grid.within(count, nominal.joints, size)
+    return selection.choices(
+        _with_wanted_directions(observations, options),
+        vec.without_errors(nominal, *joint_range_rad, max(grid.orders)),
+        frames,
+        options.frames_estimated,
+        options.rotation_weight_mm_per_rad,
+        grid,
+        progress,
     )
 
 

@@ -64,9 +64,11 @@ def fit_all(
     nominal: DHModel,
     joint_range_rad: tuple[np.ndarray, np.ndarray],
     options: Options,
+    near: VECModel | None = None,
 ) -> FittedModels:
-    """Every model fitted to ``observations``. Raises FitError."""
-    volumetric = models.fit_vec(observations, nominal, joint_range_rad, options)
+    """Every model fitted to ``observations``; the VEC model starts ``near``. Raises FitError."""
+    start = near if near is not None and near.order == options.order else None
+    volumetric = models.fit_vec(observations, nominal, joint_range_rad, options, start)
     best = models.fit_dh(observations, nominal, options, volumetric.model, volumetric.frames)
     plain = models.fit_nominal(observations, nominal, options)
     return FittedModels(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import Frames, stacked
+from kinacc.calibration.selection import Choice
 from kinacc.calibration.solve import Solution, Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, is_angle, vec_parameter_names
-from kinacc.calibration.vec_fit import VECFit
+from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.models.dh import PARAMETERS
 from kinacc.models.tables import frame
@@ -105,6 +106,45 @@ def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:
         )
     ]
     return _long(rows)
+
+
+def vec_orders_columns(choices: Sequence[Choice], stated: tuple[int, Prior]) -> Columns:
+    """``vec_orders``: orders tried with nothing seen of a fold, and the one chosen.
+
+    Without ``choices`` the ``stated`` order and prior are the one row there is.
+    """
+    rows = []
+    for choice in choices:
+        best = min(choice.trials, key=lambda trial: trial.rms_mm)
+        for held_out in choice.held_out or (None,):
+            for trial in choice.trials:
+                worse = trial.squared_mm2 - best.squared_mm2
+                error = worse.std(ddof=1) / np.sqrt(worse.size)
+                figures = trial.rms_mm, worse.mean(), error
+                rows.append((held_out, trial.order, trial.prior, *figures, trial is choice.chosen))
+    if not rows:
+        rows = [(None, *stated, np.nan, np.nan, np.nan, True)]
+    return {
+        "fold": np.array([np.nan if row[0] is None else row[0] for row in rows], dtype=float),
+        "order": np.array([row[1] for row in rows], dtype=int),
+        "prior_std_mm": np.array([row[2].delta_mm for row in rows]),
+        "prior_std_mrad": np.array([1e3 * row[2].eps_rad for row in rows]),
+        "prior_decay": np.array([row[2].decay for row in rows]),
+        "held_out_rms_mm": np.array([row[3] for row in rows], dtype=float),
+        "excess_mm2": np.array([row[4] for row in rows], dtype=float),
+        "excess_std_error_mm2": np.array([row[5] for row in rows], dtype=float),
+        "chosen": np.array([row[6] for row in rows], dtype=int),
+    }
+
+
+def chosen_order(columns: Mapping, fold: int | None) -> tuple[int, float, float]:
+    """Order, prior std in mm and decay that ``vec_orders`` chose without seeing ``fold``."""
+    folds = np.asarray(columns["fold"], dtype=float)
+    own = np.isnan(folds) if fold is None else folds == fold
+    row = np.flatnonzero(own & (np.asarray(columns["chosen"]) == 1))[0]
+    return int(columns["order"][row]), *(
+        float(columns[name][row]) for name in ("prior_std_mm", "prior_decay")
+    )
 
 
 def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:

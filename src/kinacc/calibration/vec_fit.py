@@ -76,10 +76,12 @@ def fit(
     rotation_weight_mm_per_rad: float,
     frames: Frames,
     frames_free: bool,
+    start: VECModel | None = None,
 ) -> VECFit:
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
-    Base and targets are ``frames``, or start there if ``frames_free``. Direction offsets that no
+    Base and targets are ``frames``, or start there if ``frames_free``; coefficients start at those
+    of ``start``, a model like ``empty``, or at zero. Direction offsets that no
     observation shows are left at zero, std NaN; the two of a joint that always travelled sum to
     zero, so that the model at an unknown direction is the mean of both.
     Raises FitError, and InputError where there are fewer residuals than parameters.
@@ -91,11 +93,14 @@ def fit(
     system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
     prior_std = prior.std(empty)
     frame_std = FRAME_PRIOR_UNITS * _units(coords.is_angle())
-    start = np.zeros(system.size)
+    nothing = np.zeros(system.size)
+    begin = nothing.copy()
+    if start is not None:
+        begin[coords.size :] = vec.to_vector(start)[free]
     solution = minimise_with_prior(
         system,
-        start=start,
-        prior_mean=start,
+        start=begin,
+        prior_mean=nothing,
         prior_std=np.concatenate([frame_std, prior_std[free]]),
         scale=np.concatenate([_units(coords.is_angle()), _units(_is_angle(empty)[free])]),
         name="VEC fit",

@@ -16,6 +16,7 @@ from kinacc.errors import InputError, Problem
 
 Place = Callable[..., str]
 _SYNTHESISED = "mh180"
+_FOLDS_TO_CHOOSE = 3  # one held out of the choice, one to try candidates on, one to fit them to
 
 
 def contradictions(
@@ -27,6 +28,7 @@ def contradictions(
     """
     measurements = full["measurements"]
     yield from _folds(measurements, place)
+    yield from _choice(full, place)
     if measurements["source"] == "file":
         yield from _file(name, measurements["file"], place, folder)
     else:
@@ -138,6 +140,17 @@ def _folds(measurements: Mapping[str, Any], place) -> Iterator[Problem]:
             f"there is no fold {held_out} among {folds}, counted from 0",
             f"0 to {folds - 1}, or null",
         )
+
+
+def _choice(full: Mapping[str, Any], place) -> Iterator[Problem]:
+    folds, volumetric = full["measurements"]["folds"], full["calibration"]["vec"]
+    for key, wanted in (("order", "auto"), ("prior", "chosen")):
+        if volumetric[key] == wanted and (folds is None or folds < _FOLDS_TO_CHOOSE):
+            yield Problem(
+                place("calibration", "vec", key),
+                f"{wanted}, but measurements.folds is {shown(folds)}",
+                f"at least {_FOLDS_TO_CHOOSE} folds to choose by, or a stated {key}",
+            )
 
 
 def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:

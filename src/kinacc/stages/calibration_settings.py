@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from kinacc.calibration import selection, tables
 from kinacc.calibration.dh_fit import DH_FIX, free_parameters
 from kinacc.calibration.frames import coordinates, known
 from kinacc.calibration.models import Options
 from kinacc.calibration.observations import Observations, from_columns
+from kinacc.calibration.selection import Grid
 from kinacc.calibration.system import require_enough
 from kinacc.calibration.vec_fit import VEC_FIX, Prior
 from kinacc.robot import Robot
@@ -27,7 +30,8 @@ def options(calibration: Mapping) -> Options:
         section = calibration["vec"]
         angle_rad = 1e-3 * float(section["prior_std_mrad"])
         given |= {
-            "order": int(section["order"]),
+            "order": 1 if section["order"] == "auto" else int(section["order"]),
+            "grid": _grid(section, angle_rad),
             "travel_direction": bool(section["travel_direction"]),
             "prior": Prior(
                 float(section["prior_std_mm"]), angle_rad, float(section["prior_decay"]), angle_rad
@@ -43,10 +47,46 @@ def options(calibration: Mapping) -> Options:
     return Options(**given)
 
 
+def _grid(section: Mapping, offset_rad: float) -> Grid | None:
+    """The orders and priors to choose from; None where both are stated."""
+    by_order, by_prior = section["order"] == "auto", section["prior"] == "chosen"
+    if not by_order and not by_prior:
+        return None
+    stated = Prior(
+        float(section["prior_std_mm"]), offset_rad, float(section["prior_decay"]), offset_rad
+    )
+    orders = (
+        tuple(order for order in selection.ORDERS if order <= int(section["order_highest"]))
+        if by_order
+        else (int(section["order"]),)
+    )
+    return Grid(orders, selection.chosen_priors(offset_rad) if by_prior else (stated,))
+
+
+def chosen(options: Options, choices: Mapping, fold: int | None) -> Options:
+    """The options with the order and prior that a ``vec_orders`` table states for one fold.
+
+    ``fold``: the fold whose rows the choice has not seen; None where it has seen all.
+    """
+    if options.grid is None:
+        return options
+    order, std_mm, decay = tables.chosen_order(choices, fold)
+    for prior in options.grid.priors:
+        if prior.delta_mm == std_mm and prior.decay == decay:
+            return replace(options, order=order, prior=prior)
+    raise ValueError(f"vec_orders states a prior of {std_mm} mm, decay {decay}: not in the grid")
+
+
 def observed(inputs: Mapping, robot: Robot) -> tuple[Observations, np.ndarray]:
     """All observations of ``measurements`` and the mask (n,) of the rows that train."""
     columns = inputs["measurements"]
     return from_columns(columns, robot.joint_map), np.asarray(columns["subset"]) == TRAIN
+
+
+def held_out_fold(every: Observations, train: np.ndarray) -> int | None:
+    """The fold the delivered models have not seen; None where they have seen all."""
+    folds = np.unique(every.fold[~train])
+    return int(folds[0]) if len(folds) else None
 
 
 def joint_range_rad(

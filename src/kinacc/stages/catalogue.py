@@ -61,7 +61,7 @@ STAGES: dict[str, Stage] = {
             "vec",
             "fitting the volumetric error compensation (VEC) model to the training poses",
             ("measurements",),
-            ("vec_model", "vec_frames", "vec_fit", "vec_covariance"),
+            ("vec_model", "vec_frames", "vec_fit", "vec_covariance", "vec_orders"),
             (
                 "robot",
                 "calibration.rotation_weight_mm_per_rad",
@@ -86,7 +86,7 @@ STAGES: dict[str, Stage] = {
         Stage(
             "residuals",
             "comparing models and measurements, cross-validated (Tables I and III)",
-            ("measurements", *_MODELS),
+            ("measurements", *_MODELS, "vec_orders"),
             ("residuals", "pose_errors"),
             ("robot", "calibration"),
             files=("robot",),

@@ -41,7 +41,8 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     def refit(observations: Observations, fold: int) -> FittedModels:
         if np.array_equal(every.fold != fold, train):
             return delivered
-        return fit_all(observations, arm.dh, joint_range, options)
+        own = shared.chosen(options, inputs["vec_orders"], fold)
+        return fit_all(observations, arm.dh, joint_range, own, delivered.vec)
 
     folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
     counted = progress(folds, "folds") if progress else folds
