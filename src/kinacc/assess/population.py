@@ -1,8 +1,8 @@
 """The largest error as a random quantity, points taken as a sample of one population of sizes.
 
 Empirical Bayes: the density of the true sizes is a mixture of smooth bumps of fixed relative width
-whose weights are fitted to the readings by maximum likelihood (EM), a little mass left above the
-largest reading. Given it, every point's true size has a posterior, and so has the largest.
+whose weights are fitted to the readings by maximum likelihood (EM). Given it, every point's true
+size has a posterior, and so has the largest.
 It gives values, not guarantees: no bound rests on it.
 """
 
@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-_FREEDOM = 6  # a bump is a chi density with so many degrees: 29 % standard deviation
-_STEP = 0.25  # distance of bumps in the logarithm of their scale
-_SMALLEST, _LARGEST = 0.03, 2.1  # scales of the first and last bump over the largest reading
-_ROUNDS = 60  # EM steps; many more would follow the noise of the readings
+_FREEDOM = 10  # a bump is a chi density with so many degrees: 23 % standard deviation
+_STEP = 0.2  # distance of bumps in the logarithm of their scale
+_SMALLEST, _LARGEST = 0.03, 0.8  # scales of the first and last bump over the largest reading
+_ROUNDS = 50  # EM steps; many more would follow the noise of the readings
 _PSEUDO = 0.2  # points' worth of mass spread over the bumps before any reading
 
 
@@ -45,8 +45,7 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
     bumps /= bumps.sum(axis=1, keepdims=True)
     likelihood = _reading_density(sizes_mm, noise_mm, size)
     by_bump = likelihood @ bumps.T
-    pseudo = np.where(scale > top, top / scale, 1.0)
-    pseudo *= _PSEUDO / pseudo.sum()
+    pseudo = _PSEUDO / scale.size
     weight = np.full(scale.size, 1.0 / scale.size)
     for _ in range(_ROUNDS):
         share = by_bump * weight
