@@ -9,14 +9,21 @@ import numpy as np
 
 from kinacc.geometry import log_so3
 from kinacc.inspection import start, steps, tails, trial
-from kinacc.inspection.steps import Step
 from kinacc.inspection.trial import Residuals, Seen, Trial
 from kinacc.models.dh import DHModel
 
 _FITTED_ROWS = 900
+_COARSE_ROWS = 240
 _MOST_SPLITS = 8
-_RUN = 6  # readings in a row that are all off
+_TRIED = 5  # places tried for one split
+_FEWEST = 5  # readings on either side of a split
+_RUN = 6  # readings in a row that are far off
 _RUN_SHARE = 0.8
+_OFF = 8.0  # sigma
+_CAP = 10.0  # sigma
+_BETTER = 0.85  # of what is left overall: a split of a good file leaves all but a few per cent
+_BETTER_THERE = 0.55  # of what is left of the readings after the split
+_SURE = 12.0  # excess of a step that needs no such proof
 
 Progress = Callable[[Iterable, str], Iterable]
 
@@ -94,37 +101,111 @@ def with_jumps(seen: Seen, model: DHModel, progress: Progress) -> Fitted:
 
 def _next(fitted: Fitted, model: DHModel) -> tuple[Jump, Fitted] | None:
     """The next jump and the fit without it; None where there is none."""
-    here = _cost(fitted, fitted)
-    for row, target in _places(fitted):
+    best, least = None, 1.0
+    for row, target, sure in _places(fitted):
+        again = fit(_split(fitted.seen, row, target)[0], model)
+        row = _refined(again, row, target)
+        if row is None:
+            continue
         seen, rows = _split(fitted.seen, row, target)
         again = fit(seen, model)
-        # A jump that is one leaves fewer readings off, or explains what it promised.
-        if _cost(again, fitted) < here:
-            return Jump(target, row, rows, np.zeros(3), 0.0), again
-    return None
+        share = _share_left(fitted, again, rows)
+        if (sure or share < 1.0) and share < least:
+            best, least = (Jump(target, row, rows, np.zeros(3), 0.0), again), share
+    return best
 
 
-def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
-    """Places to split at: beginnings of runs of bad readings, then the steps beyond reference."""
+def _share_left(before: Fitted, after: Fitted, rows: np.ndarray) -> float:
+    """What a split leaves, over what it may leave at most to be believed: overall, or where it is.
+
+    The fits' own lengths are compared, each cut at ten sigma so that gross errors do not decide.
+    """
+    cap = _CAP * before.trial.sigma_mm
+    one, other = np.minimum(before.left_mm, cap), np.minimum(after.left_mm, cap)
+    near = rows[: steps.WINDOW // 2]
+    everywhere = float(np.mean(other) / np.mean(one))
+    there = float(np.mean(other[near]) / np.mean(one[near]))
+    return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere))
+
+
+def _places(fitted: Fitted) -> list[tuple[int, int | None, bool]]:
+    """Where to try a split: reading, target or None, and whether the step itself proves it."""
     seen = fitted.seen
-    places: list[tuple[float, int, int | None]] = []
+    far = fitted.left_mm > _OFF * fitted.trial.sigma_mm
+    tried: list[tuple[float, int, int | None, bool]] = []
     for base in np.unique(seen.base):
         rows = np.flatnonzero(seen.base == base)
-        for begin, size in _runs(fitted.bad[rows]):
+        kinds = [None, *(int(each) for each in np.unique(seen.target[rows]))]
+        for begin, size in _runs(far[rows]):
             for row in (begin, begin + size):
-                if 0 < row < len(rows):
-                    kinds = [None, *np.unique(seen.target[rows])]
-                    places += [(1e3 + size, int(rows[row]), kind) for kind in kinds]
+                if _FEWEST <= row <= len(rows) - _FEWEST:
+                    tried += [(1e3 + size, int(rows[row]), kind, False) for kind in kinds]
         for step in steps.candidates(seen, fitted.left, rows):
-            if step.excess > 1.0:
-                places.append((step.excess, step.row, step.target))
-    places.sort(key=lambda place: -place[0])
-    best: list[tuple[int, int | None]] = []
-    for _, row, target in places:
-        kind = None if target is None else int(target)
-        if (row, kind) not in best:
-            best.append((row, kind))
-    return best[:6]
+            if step.excess > 2.0:
+                tried.append((step.excess, step.row, step.target, step.excess > _SURE))
+        tried += _coarse(fitted, rows, kinds)
+    tried.sort(key=lambda place: -place[0])
+    best: dict[tuple[int, int | None], bool] = {}
+    for _, row, kind, sure in tried:
+        best.setdefault((row, kind), sure)
+    return [(row, kind, sure) for (row, kind), sure in list(best.items())[:_TRIED]]
+
+
+def _coarse(fitted: Fitted, rows: np.ndarray, kinds: list) -> list[tuple]:
+    """Splits at a few places of a base's readings that leave clearly less, by short fits."""
+    seen, strength = fitted.seen, fitted.trial.strength
+    chosen = start.thinned(rows, _COARSE_ROWS)
+    few = seen.select(chosen)
+    if len(few.q) < 4 * _FEWEST:
+        return []
+    few = Seen(few.cells, few.q, np.zeros_like(few.base), few.target)
+    used = np.unique(few.target, return_inverse=True)[1].ravel()
+    few = Seen(few.cells, few.q, few.base, used)
+    nominal = fitted.trial.nominal
+    begin = start.found(few, nominal)
+    here = _typical(few, trial.fit(few, begin, nominal, strength, huber=True))
+    found = []
+    for share in range(1, 8):
+        row = len(chosen) * share // 8
+        for kind in kinds:
+            split = _split(few, row, None if kind is None else int(few.target[row]))[0]
+            arm = start.found(split, nominal, draws=0, stretches=())
+            left = _typical(split, trial.fit(split, arm, nominal, strength, huber=True))
+            if left < 0.9 * here:
+                found.append((here / left, int(chosen[row]), kind, False))
+            if kind is not None:
+                break
+    return found
+
+
+def _typical(seen: Seen, fitted: Trial) -> float:
+    return float(np.median(np.linalg.norm(fitted.left_out_mm, axis=1)))
+
+
+def _refined(fitted: Fitted, row: int, target: int | None) -> int | None:
+    """The reading that parts the two frames of a split best; None where it parts none."""
+    seen, arm = fitted.seen, fitted.trial.arm
+    if target is None:
+        one, other = _before(seen.base, row, seen.cells.session), int(seen.base[row])
+        rows = np.flatnonzero((seen.base == one) | (seen.base == other))
+        change = "base"
+    else:
+        other = int(seen.target.max())
+        rows = np.flatnonzero((seen.target == target) | (seen.target == other))
+        one, change = target, "target"
+    costs = []
+    for index in (one, other):
+        part = seen.select(rows)
+        frames = {"base": part.base, "target": part.target} | {change: np.full(len(rows), index)}
+        left = trial.residuals(arm, Seen(part.cells, part.q, **frames)).position_mm
+        length = np.linalg.norm(left, axis=1)
+        costs.append(np.minimum(length, _CAP * fitted.trial.sigma_mm))
+    before = np.concatenate([[0.0], np.cumsum(costs[0])])
+    after = np.concatenate([[0.0], np.cumsum(costs[1][::-1])])[::-1]
+    place = int(np.argmin(before + after))
+    if not _FEWEST <= place <= len(rows) - _FEWEST:
+        return None
+    return int(rows[place])
 
 
 def _runs(bad: np.ndarray) -> list[tuple[int, int]]:
@@ -161,15 +242,10 @@ def _split(seen: Seen, row: int, target: int | None) -> tuple[Seen, np.ndarray]:
     return Seen(seen.cells, seen.q, seen.base, index), np.flatnonzero(rows)
 
 
-def _cost(fitted: Fitted, reference: Fitted) -> float:
-    """What is left, each reading counted up to the limit of ``reference``."""
-    return float(np.sum(np.minimum(fitted.left_mm / reference.limit_mm, 1.0)))
-
-
 def _measured(fitted: Fitted, jump: Jump) -> Jump:
     """How far base or target of the jump's readings are from those before it."""
     arm, seen = fitted.trial.arm, fitted.seen
-    after = jump.rows[-1] if jump.target is None else jump.rows[-1]
+    after = jump.rows[-1]
     middle = fitted.left.predicted.position_mm[jump.rows].mean(axis=0)
     if jump.target is None:
         before = _before(seen.base, jump.row, seen.cells.session)

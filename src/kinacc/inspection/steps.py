@@ -3,7 +3,7 @@
 A step at one reading is judged by how much of the residuals it explains (the score test of two
 more frames). Residuals of real arms are no noise: they vary smoothly with the joints, and files
 run through the joints in order. What a step must beat is therefore not only chance but what steps
-along each joint and each coordinate explain, which cannot be a jump of anything.
+along each joint and each coordinate explain of the rest, which cannot be a jump of anything.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from kinacc.inspection.tails import FAMILY_WISE
 from kinacc.inspection.trial import HUBER, Residuals, Seen, sigma_of
 
 WINDOW = 300  # readings looked at together: drifts are slower
-BEYOND = 2.0  # times what the best step along any joint or coordinate explains
 _FEWEST = 5  # readings on either side of a step
 
 
@@ -27,7 +26,7 @@ class Step:
     """A step before reading ``row``: of the base, or of target ``target`` (None for the base).
 
     ``gain`` is the part of the squared residuals it explains, in squared sigma; ``reference`` what
-    the best step along a joint or coordinate explains, ``chance`` what noise would.
+    the best step along a joint or coordinate explains of the rest, ``chance`` what noise would.
     """
 
     row: int
@@ -39,7 +38,7 @@ class Step:
     @property
     def excess(self) -> float:
         """Gain over what it must beat."""
-        return self.gain / max(BEYOND * self.reference, self.chance)
+        return self.gain / max(self.reference, self.chance)
 
 
 def candidates(seen: Seen, left: Residuals, rows: np.ndarray) -> list[Step]:
@@ -78,12 +77,13 @@ def _in_window(seen: Seen, left: Residuals, rows: np.ndarray) -> list[Step]:
             continue
         chance = float(chdtri(regressors.shape[2], FAMILY_WISE / (len(of) * len(kinds))))
         gains = _gains(regressors[of], residual[of], weight[of])
+        place = int(np.argmax(gains))
+        rest = _without(regressors[of], residual[of], weight[of], place)
         reference = 0.0
         for order in orders:
-            kept = order[np.isin(order, of)] if len(of) < len(rows) else order
-            along = _gains(regressors[kept], residual[kept], weight[kept])
+            kept = np.argsort(np.argsort(order)[of], kind="stable")
+            along = _gains(regressors[of][kept], rest[kept], weight[of][kept])
             reference = max(reference, float(along.max()))
-        place = int(np.argmax(gains))
         found.append(Step(int(rows[of[place]]), target, float(gains[place]), reference, chance))
     return found
 
@@ -105,3 +105,13 @@ def _gains(regressors: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> 
     solved = np.linalg.solve(inner[rows] + ridge, score_after[rows][..., None])[..., 0]
     gains[rows] = np.sum(solved * score_after[rows], axis=1)
     return gains
+
+
+def _without(regressors, residual, weight, place: int) -> np.ndarray:
+    """Residuals (n, 3) without a constant shift and without the step at ``place``."""
+    after = np.where(np.arange(len(residual)) >= place, 1.0, 0.0)[:, None, None]
+    both = np.concatenate([regressors, regressors * after], axis=2)
+    root = np.sqrt(weight)[:, None]
+    design = (both * root[:, :, None]).reshape(-1, both.shape[2])
+    shift = np.linalg.lstsq(design, (residual * root).ravel(), rcond=1e-6)[0]
+    return residual - both @ shift

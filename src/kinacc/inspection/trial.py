@@ -77,10 +77,11 @@ class Trial:
     """A fit: the arm, and robust standard deviations per axis of what it leaves.
 
     ``left_out_mm`` and ``left_out_rad`` (n, 3): residuals of the fitted readings when their
-    configuration is left out, to first order.
+    configuration is left out, to first order. ``nominal`` is the model the corrections lean on.
     """
 
     arm: Arm
+    nominal: DHModel
     sigma_mm: float
     sigma_rad: float
     strength: float
@@ -144,7 +145,7 @@ def fit(seen: Seen, start: Arm, nominal: DHModel, strength: float, huber: bool =
             break
     step = _Step.at(seen, arm, nominal, strength, huber)
     left_mm, left_rad = step.left_out(seen)
-    return Trial(arm, step.sigma_mm, step.sigma_rad, strength, left_mm, left_rad)
+    return Trial(arm, nominal, step.sigma_mm, step.sigma_rad, strength, left_mm, left_rad)
 
 
 def _far(model: DHModel, nominal: DHModel) -> bool:
@@ -245,9 +246,9 @@ class _Step:
             block = self.design[rows].reshape(len(rows), 6 * size, -1)
             weight = self.weights[rows].reshape(len(rows), -1)
             hat = block @ self.inverse @ np.swapaxes(block, 1, 2) * weight[:, None, :]
-            # A reading that alone determines a direction leaves nothing: 1 - 1 is kept off 0.
-            rest = (1.0 + _OFF_ZERO) * np.eye(6 * size) - hat
-            found = np.linalg.solve(rest, self.residual[rows].reshape(len(rows), -1, 1))
+            # A direction that one configuration alone determines has nothing left to tell.
+            rest = np.linalg.pinv(np.eye(6 * size) - hat, rcond=_OFF_ZERO)
+            found = rest @ self.residual[rows].reshape(len(rows), -1, 1)
             result[rows.ravel()] = found.reshape(-1, 6)
         turn = np.where(seen.cells.turned[:, None], result[:, 3:], np.nan)
         return result[:, :3], turn

@@ -102,13 +102,14 @@ def _backwards(turn: Turn, before: Change | None) -> Iterator[Turn]:
     )
     for axis, name in enumerate("xyz"):
         mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
+        both = np.outer(mirror, mirror)
         yield Turn(
             Change(
                 before.kind if before else "left_handed",
                 f"{words}the orientations are in left-handed coordinates ({name} reversed)",
                 "export them in right-handed coordinates",
             ),
-            lambda raw, both=np.outer(mirror, mirror): turn.read(raw) * both,
+            lambda raw, both=both: turn.read(raw) * both,
         )
 
 
