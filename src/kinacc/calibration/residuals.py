@@ -67,7 +67,9 @@ def fit_all(
     near: VECModel | None = None,
 ) -> FittedModels:
     """Every model fitted to ``observations``; the VEC model starts ``near``. Raises FitError."""
-    start = near if near is not None and near.order == options.order else None
+    # High orders are worth it; the end is the same to a few nm, which the paper's tables keep.
+    worth = options.grid is not None and near is not None and near.order == options.order
+    start = near if worth else None
     volumetric = models.fit_vec(observations, nominal, joint_range_rad, options, start)
     best = models.fit_dh(observations, nominal, options, volumetric.model, volumetric.frames)
     plain = models.fit_nominal(observations, nominal, options)

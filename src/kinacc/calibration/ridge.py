@@ -14,6 +14,8 @@ from kinacc.errors import FitError
 MAX_VARIANCE_STEPS = 20
 VARIANCE_TOLERANCE = 1e-5
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
+PATIENCE = 12  # steps after which standing still in the objective counts as arrived
+STANDSTILL = 1e-9  # share of the objective
 LEAST_VARIANCE = 1e-8  # mm^2: the prior must stay above rounding where data are free of noise
 
 
@@ -30,6 +32,9 @@ def minimise_with_prior(
     The variance of the residuals is estimated along with ``x``: what they leave over the number of
     residuals less the effective number of parameters (the trace of the hat matrix), so the balance
     against the prior follows the data. ``std`` is the posterior one.
+    Converged where the step falls below ``solve.STEP_TOLERANCE``, or where after PATIENCE steps the
+    objective moves by less than STANDSTILL: steps along directions no pose shows die out slowly
+    where the model misses much, and change nothing but these.
     Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
@@ -43,16 +48,20 @@ def minimise_with_prior(
         def held(at: np.ndarray, variance: float = balance.variance) -> float:
             return variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
 
-        x, _, last = solve.advance(
+        before = normal.cost + held(x)
+        x, after, last = solve.advance(
             lambda at, held=held: system.cost(at) + held(at),
             x,
             scale * balance.step,
-            normal.cost + held(x),
+            before,
             scale,
             name,
         )
+        if iterations >= PATIENCE and abs(before - after) <= STANDSTILL * before:
+            break
+    else:
+        solve.require_converged(name, iterations, last, system.cost(x), normal.count)
     cost = system.cost(x)
-    solve.require_converged(name, iterations, last, cost, normal.count)
     covariance = balance.variance * balance.inverse * np.outer(scale, scale)
     return Solution(
         x=x,

@@ -24,7 +24,7 @@ from kinacc.models.vec import VECModel
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40)
 PRIOR_STD = (0.01, 0.03, 0.1, 0.3, 1.0)  # mm and mrad
 PRIOR_DECAY = (0.7, 0.85, 1.0)
-CONSTANT_STD = 10.0  # mm and mrad, of order 0 beside a chosen prior: as free as a DH model
+CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
 MOST_BLOCKS = 5
 _VARIANCE_STEPS = 40
 _VARIANCE_TOLERANCE = 1e-4
