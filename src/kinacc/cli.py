@@ -11,6 +11,7 @@ from kinacc import __version__
 from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
+from kinacc.commands.plan_poses import plan_poses
 from kinacc.commands.predict import predict
 from kinacc.errors import InputError, Problem
 from kinacc.stages.catalogue import STAGES, Stage, maker_of
@@ -124,6 +125,7 @@ main.add_command(predict)
 main.add_command(compensate)
 main.add_command(export)
 main.add_command(compare)
+main.add_command(plan_poses)
 
 
 def run_stage(

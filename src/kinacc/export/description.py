@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.calibrated.blind import in_words
 from kinacc.calibrated.record import TOOL, Calibration
 from kinacc.geometry import IDENTITY, Pose, compose, invert, quaternion_from_rotation
 from kinacc.models.dh import PARAMETERS, DHModel
@@ -123,20 +124,11 @@ def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
     return out.getvalue()
 
 
-def undetermined_in_words(arm: Calibration, least: float = 0.1) -> list[str]:
-    """Each direction the poses do not determine, by the parameters that share it."""
-    if arm.known is None:
+def undetermined_in_words(arm: Calibration) -> list[str]:
+    """Ways to change the parameters that change no measured pose, one each."""
+    if arm.known is None or not len(arm.known.undetermined):
         return []
-    words = []
-    for direction in arm.known.undetermined:
-        length = float(np.linalg.norm(direction))
-        shares = [
-            f"{value:+.2f} {name.rpartition('_')[0] or name}"
-            for value, name in zip(direction / length, arm.known.names, strict=True)
-            if abs(value) >= least
-        ]
-        words.append(" ".join(shares))
-    return words
+    return in_words(arm.known.undetermined, arm.known.names)
 
 
 def _dh_of(arm: Calibration) -> DHModel:

@@ -138,7 +138,7 @@ def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str
         notes.append(
             "† shares a direction the poses do not determine; along it the value is nominal."
         )
-    notes += [f"Directions not determined: {'; '.join(unseen)}."] if unseen else []
+    notes += [f"Changes that no measured pose shows: {'; '.join(unseen)}."] if unseen else []
     return Table(
         "dh_parameters",
         f"DH parameters, {name}",

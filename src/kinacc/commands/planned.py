@@ -1,0 +1,247 @@
+"""What ``plan-poses`` is asked, and its answer as a sheet, a picture and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc import region
+from kinacc import robot as robots
+from kinacc.commands import rows
+from kinacc.commands.choice import CONFIG
+from kinacc.commands.sheet import Field, Sheet
+from kinacc.commands.tables import joint_fields
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose, compose
+from kinacc.planning import candidates, exchange, observability, travel
+from kinacc.planning.information import Experiment, Information, information
+from kinacc.robot import Robot
+
+_RANDOM_SETS, _SIZES = 40, 9
+_SEED = 0
+_MM_PER_RAD = 1000.0  # a sliding joint's travel counts like an arc at one metre
+
+
+@dataclass(frozen=True)
+class Question:
+    """Candidates (n, k) of reported joints with their labels, and what is wanted of them."""
+
+    robot: Robot
+    joints: np.ndarray
+    label: np.ndarray
+    experiment: Experiment
+    count: int
+    index: str
+    metric: str
+    start: np.ndarray
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The poses in driving order (N,), rows of the candidates; ``moves`` (N,) leads to each."""
+
+    information: Information
+    plan: exchange.Plan
+    order: np.ndarray
+    moves: np.ndarray
+    unordered: float
+
+
+def question(given: Mapping) -> Question:
+    """The question of the command's options. Raises InputError listing what is wrong."""
+    settings = _settings(given)
+    robot = robots.load(given["robot"] or settings["robot"])
+    problems: list[Problem] = []
+    tool = robots.carried(robot)
+    if given["tool_mm"] is not None:
+        offset = _numbers("--tool-mm", given["tool_mm"], 3, problems)
+        tool = compose(robot.flange, Pose(np.eye(3), offset))
+    hayati = tuple(settings["hayati"])
+    if given["hayati"] is not None:
+        values = _numbers("--hayati", given["hayati"], None, problems)
+        hayati = tuple(int(value) for value in values)
+        if any(not 1 <= joint <= robot.dh.joints for joint in hayati):
+            problems.append(Problem("--hayati", given["hayati"], f"joints 1 to {robot.dh.joints}"))
+    box = _ranges("--joints-deg", given["joints_deg"], robot.dh.joints, problems)
+    if box is not None:
+        box = tuple(np.where(robot.dh.prismatic, end, np.deg2rad(end)) for end in box)
+    space = _ranges("--inside-mm", given["inside_mm"], 3, problems)
+    start = np.zeros(robot.dh.joints)
+    if given["from_deg"] is not None:
+        start = rows.of_arguments((given["from_deg"],), "deg", robot, "--from-deg")[0]
+    if problems:
+        raise InputError(problems)
+    experiment = Experiment(
+        tool,
+        orientation=not given["position_only"],
+        frames_estimated=settings["estimated"] and not given["frames_known"],
+        hayati_joints=hayati,
+        rotation_weight_mm_per_rad=settings["weight"],
+        threshold=given["threshold"],
+    )
+    if given["candidates"] is not None:
+        file = rows.read(given["candidates"], robot)
+        found = rows.limit_problems(robot, file.joints, file.label, given["candidates"])
+        if found:
+            raise InputError(found, "Candidates outside the robot's limits")
+        joints, label = file.joints, file.label
+    else:
+        inside = settings["inside"] if space is None else _inside(space)
+        joints = candidates.spread(
+            robot, given["drawn"], settings["box"] if box is None else box, inside, tool
+        )
+        label = np.arange(1, len(joints) + 1)
+    return Question(
+        robot, joints, label, experiment, given["count"], given["index"], given["metric"], start
+    )
+
+
+def answer(asked: Question, progress: Callable | None = None) -> Answer:
+    """Choose the poses and the order."""
+    told = information(asked.robot, asked.joints, asked.experiment)
+    if told.rank == 0:
+        raise InputError(Problem("candidates", "show no direction at all"))
+    plan = exchange.choose(told.rows, asked.count, asked.index, progress)
+    chosen = np.sort(plan.chosen)
+    scale = np.where(asked.robot.dh.prismatic, _MM_PER_RAD, 1.0)
+    places = np.concatenate([asked.start[None], asked.joints[chosen]]) / scale
+    distance = travel.distances(places, asked.metric)
+    path = travel.order(distance)
+    moves = distance[path[:-1], path[1:]]
+    plain = travel.length(distance, np.arange(len(path)))
+    return Answer(told, plan, chosen[path[1:] - 1], moves, plain)
+
+
+def as_sheet(asked: Question, found: Answer) -> Sheet:
+    """One row per pose, in driving order."""
+    facts = {
+        "robot": asked.robot.name,
+        "index": asked.index,
+        "index_meaning": observability.INDICES[asked.index],
+        "value": found.plan.value,
+        "poses": asked.count,
+        "candidates": len(asked.joints),
+        "parameters": len(found.information.names),
+        "determined_directions": found.information.rank,
+        "undetermined": list(found.information.excluded),
+        "travel_metric": travel.METRICS[asked.metric],
+        "travel_deg": float(np.rad2deg(found.moves.sum())),
+        "travel_unordered_deg": float(np.rad2deg(found.unordered)),
+    }
+    fields = [
+        Field("order", np.arange(1, len(found.order) + 1), "", "order of driving"),
+        *joint_fields(asked.robot, asked.joints[found.order]),
+        Field("move_deg", np.rad2deg(found.moves), "deg", travel.METRICS[asked.metric]),
+        Field("candidate", asked.label[found.order], "", "its pose or line among the candidates"),
+    ]
+    title = f"{asked.count} of {len(asked.joints)} poses of {asked.robot.name} by {asked.index}"
+    return Sheet(title, facts, fields)
+
+
+def in_words(asked: Question, found: Answer) -> str:
+    """What was reached, and what no candidate can tell."""
+    told, plan = found.information, found.plan
+    lines = [
+        f"{asked.index} = {plan.value:.4g} ({observability.INDICES[asked.index]}), "
+        f"{plan.path[-1]:.4g} before {plan.swaps} swaps; no single swap makes it better",
+        f"{told.rank} of {len(told.names)} parameter directions are determined; no candidate shows",
+        *(f"  {words}" for words in told.excluded),
+        f"travel {np.rad2deg(found.moves.sum()):.0f} deg, {np.rad2deg(found.unordered):.0f} deg in "
+        f"the order of the candidates ({travel.METRICS[asked.metric]})",
+    ]
+    if not told.excluded:
+        lines[1] = f"all {told.rank} parameters are determined"
+    return "\n".join(lines)
+
+
+def draw(asked: Question, found: Answer, picture: str, progress: Callable | None = None) -> None:
+    """Index against number of poses, with random sets beside it."""
+    from kinacc.figures import planned_poses
+    from kinacc.figures.save import write
+
+    rows_, index = found.information.rows, asked.index
+    least = -(-found.information.rank // rows_.shape[1])
+    most = min(max(asked.count, least + 1), len(rows_))
+    counts = np.unique(np.linspace(least, most, _SIZES).astype(int))
+    sizes = progress(counts, "numbers of poses") if progress else counts
+    chosen = np.array(
+        [
+            found.plan.value if size == asked.count else exchange.choose(rows_, int(size), index)[1]
+            for size in sizes
+        ]
+    )
+    random = exchange.random_sets(rows_, counts, index, _RANDOM_SETS, _SEED)
+    meaning = observability.INDICES[index]
+    figure = planned_poses.draw(counts, chosen, random, asked.count, index, meaning,
+                                asked.robot.name)  # fmt: skip
+    path = Path(picture)
+    write(figure, {path.suffix[1:]: path})
+
+
+def _settings(given: Mapping) -> dict:
+    """Robot, fit and region of a data set; defaults without one."""
+    plain = {"robot": None, "estimated": True, "weight": 500.0, "hayati": (), "box": None}
+    plain["inside"] = None
+    if given["dataset"] is None:
+        if given["robot"] is None:
+            raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
+        return plain
+    from kinacc.stages.plan import planned
+
+    datasets = planned(given["config"] or (CONFIG,)).datasets
+    if given["dataset"] not in datasets:
+        what = f"{given['dataset']!r} is not in the configuration"
+        raise InputError(Problem("--dataset", what, ", ".join(datasets)))
+    config = datasets[given["dataset"]]
+    calibration, evaluation = config["calibration"], config["evaluation"]
+    plain |= {
+        "robot": config["robot"],
+        "estimated": calibration["base_and_tool"] == "estimated",
+        "weight": float(calibration["rotation_weight_mm_per_rad"]),
+        "hayati": tuple(calibration["dh"]["hayati_joints"]),
+    }
+    box = evaluation["joint_box"]["joints_deg"]
+    if evaluation["space"] == "joint_box" and box is not None:
+        plain["box"] = tuple(np.deg2rad(np.array(box, dtype=float)).T)
+    if evaluation["space"] == "cylinder":
+        from kinacc.stages.evaluation import cylinder
+
+        space = cylinder(evaluation)
+        plain["inside"] = lambda position_mm: region.contains(space, position_mm)
+    return plain
+
+
+def _inside(space: tuple[np.ndarray, np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    low, high = space
+    return lambda position_mm: ((position_mm >= low) & (position_mm <= high)).all(axis=1)
+
+
+def _numbers(option: str, text: str, count: int | None, problems: list[Problem]) -> np.ndarray:
+    try:
+        values = np.array([float(word) for word in text.replace(",", " ").split()])
+    except ValueError:
+        values = np.zeros(0)
+    if not values.size or (count is not None and values.size != count):
+        problems.append(Problem(option, repr(text), f"{count or 'some'} numbers, 1,2,3"))
+        return np.zeros(count or 0)
+    return values
+
+
+def _ranges(
+    option: str, text: str | None, count: int, problems: list[Problem]
+) -> tuple[np.ndarray, np.ndarray] | None:
+    if text is None:
+        return None
+    allowed = f"{count} ranges low:high, apart by commas"
+    try:
+        pairs = [[float(end) for end in pair.split(":")] for pair in text.split(",")]
+    except ValueError:
+        pairs = []
+    if len(pairs) != count or any(len(pair) != 2 or pair[0] >= pair[1] for pair in pairs):
+        problems.append(Problem(option, repr(text), allowed))
+        return None
+    low, high = np.array(pairs).T
+    return low, high

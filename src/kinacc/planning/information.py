@@ -1,0 +1,100 @@
+"""What one measured pose tells of the parameters of a calibration, and what no pose tells.
+
+The arm is linearised at its nominal parameters. Displacements count in mm and mrad, a rotation of
+one radian weighs as much as ``rotation_weight_mm_per_rad`` in position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinacc.calibrated.blind import in_words
+from kinacc.calibrated.predict import sensitivity
+from kinacc.calibrated.record import TOOL, nominal
+from kinacc.calibration.uncertainty import (
+    BASE,
+    MOTIONS,
+    Uncertainty,
+    dh_parameter_names,
+)
+from kinacc.geometry import Pose
+from kinacc.robot import Robot
+
+_BLOCK = 512
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What will be measured and fitted.
+
+    ``tool`` is the measured point or frame in the last DH frame; ``orientation``: a full pose is
+    measured, not a position alone; ``frames_estimated``: base and tool are unknown as well;
+    ``hayati_joints`` (1-based) have a beta. ``threshold``: a direction seen with less than this
+    share of the best-seen one counts as undetermined.
+    """
+
+    tool: Pose
+    orientation: bool = True
+    frames_estimated: bool = True
+    hayati_joints: tuple[int, ...] = ()
+    rotation_weight_mm_per_rad: float = 500.0
+    threshold: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Information:
+    """Rows (n, m, r) that n candidate poses add to the normal equations of r directions.
+
+    The r directions are those at least one candidate shows; ``excluded`` names the others, each in
+    words. ``values`` are the singular values of all candidates together, falling, of ``names``
+    parameters (P,), and ``rank`` how many of them count.
+    """
+
+    rows: np.ndarray
+    names: tuple[str, ...]
+    values: np.ndarray
+    rank: int
+    excluded: tuple[str, ...]
+
+
+def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Information:
+    """Information of poses at reported joints (n, k), rad and mm."""
+    names = parameter_names(robot, experiment)
+    count = len(names)
+    blank = Uncertainty(names, np.eye(count), np.zeros((0, count)))
+    arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
+    q_dh = np.atleast_2d(q_rad) @ robot.joint_map.T
+    weight = np.ones(6)
+    weight[3:] = experiment.rotation_weight_mm_per_rad
+    seen = 6 if experiment.orientation else 3
+    slopes = np.empty((len(q_dh), seen, count))
+    for begin in range(0, len(q_dh), _BLOCK):
+        block = slice(begin, begin + _BLOCK)
+        part = sensitivity(arm, q_dh[block], None, "instrument", TOOL)
+        slopes[block] = (part * weight[:, None])[:, :seen] * arm.units
+    _, values, right = np.linalg.svd(slopes.reshape(-1, count), full_matrices=False)
+    rank = int(np.sum(values > experiment.threshold * values[0]))
+    lost = right[rank:] if len(right) == count else _complement(right[:rank])
+    excluded = tuple(in_words(lost, names)) if len(lost) else ()
+    return Information(slopes @ right[:rank].T, names, values, rank, excluded)
+
+
+def parameter_names(robot: Robot, experiment: Experiment) -> tuple[str, ...]:
+    """Names (P,) of what is fitted, base and tool first."""
+    free = [
+        name
+        for name in dh_parameter_names(robot.dh.joints)
+        if not name.endswith("beta_rad") or int(name[1]) in experiment.hayati_joints
+    ]
+    if not experiment.frames_estimated:
+        return tuple(free)
+    motions = MOTIONS if experiment.orientation else MOTIONS[:3]
+    base = [f"{BASE}.{motion}" for motion in MOTIONS]
+    return (*base, *(f"{TOOL}.{motion}" for motion in motions), *free)
+
+
+def _complement(kept: np.ndarray) -> np.ndarray:
+    """Orthonormal rows that complete ``kept`` (r, P)."""
+    return np.linalg.svd(kept)[2][len(kept) :]
