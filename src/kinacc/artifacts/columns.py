@@ -55,7 +55,7 @@ class Column:
         elif self.high is not None:
             parts.append(f"at most {self.high:g}")
         if self.nullable:
-            parts.append("null")
+            parts += ["null"] if parts else ["any", "null"]
         return " or ".join(parts)
 
 

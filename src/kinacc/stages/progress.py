@@ -44,7 +44,7 @@ class Progress:
 
     def line(self) -> str:
         """Where the stage stands, in one line."""
-        elapsed = f"{time.monotonic() - self._begun:.0f} s"
+        elapsed = f"{time.monotonic() - self._begun:.0f} s so far"
         return f"{self.label}: {', '.join(filter(None, [self.state, elapsed]))}"
 
 

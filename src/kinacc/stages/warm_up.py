@@ -1,4 +1,4 @@
-"""Compile the sequential kernels once, so that no run of the study has to wait for it.
+"""Compile the sequential kernels once, so that no run has to wait for it.
 
 python -m kinacc.stages.warm_up
 """
@@ -7,10 +7,12 @@ from __future__ import annotations
 
 
 def main() -> None:
-    """Run the stages that use compiled kernels on a tiny problem."""
+    """Run what uses compiled kernels on a tiny problem."""
     import numpy as np
 
+    from kinacc import inverse, robot
     from kinacc.config.schema import defaults
+    from kinacc.models import dh
     from kinacc.stages import histories, study_chunk
 
     settings = defaults()
@@ -24,6 +26,8 @@ def main() -> None:
     }
     study_chunk.run({"assessment_points": points}, settings)
     histories.run({"assessment_points": points}, settings)
+    arm = robot.load("iiwa14")  # no closed form: its inverse searches
+    inverse.solve(arm, arm.dh, dh.forward(arm.dh, np.full((1, 7), 0.5)))
 
 
 if __name__ == "__main__":
