@@ -205,8 +205,8 @@ def coverage(assessor, errors, sigma, draws, target=MEASURED):
         readings = drawn_world(errors[order], sigma, key_of(4, draw), assessor.measurements)
         campaign = conduct(assessor, readings)
         said = next(each for each in campaign.statements() if each.target == target)
-        seen = getattr(campaign, "ledger", None) or campaign.screen
-        truth = size[order][seen.visited].max() if target == MEASURED else size.max()
+        _, visited = campaign.taken()
+        truth = size[order][visited].max() if target == MEASURED else size.max()
         if not said.withheld:
             said_any += 1
             upper += said.upper_mm >= truth

@@ -103,6 +103,10 @@ class Campaign(Protocol):
         """What the readings so far allow to say, the main statement first."""
         ...
 
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings so far, and the rows read, in the order of their first readings."""
+        ...
+
 
 class AdaptiveAssessor(Protocol):
     """A method of assessment: ``name`` in tables, ``measurements`` it may spend."""

@@ -59,6 +59,10 @@ class OncePerPointCampaign:
         """Take a reading."""
         self.ledger.record(point, reading_mm, covariance_mm2)
 
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings, and the rows read."""
+        return self.ledger.taken, self.ledger.visited
+
     def statements(self) -> tuple[Statement, ...]:
         """The assessed accuracy of the points read."""
         visited = self.ledger.visited
@@ -130,6 +134,10 @@ class InvalidationCampaign:
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
         """Take a reading."""
         self.ledger.record(point, reading_mm, covariance_mm2)
+
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings, and the rows read."""
+        return self.ledger.taken, self.ledger.visited
 
     def statements(self) -> tuple[Statement, ...]:
         """The smallest bound that the readings do not reject."""

@@ -96,6 +96,10 @@ class SearchAndConfirmCampaign:
         self.ledger.record(point, reading_mm, covariance_mm2)
         self.looks.update(point)
 
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings, and the rows read."""
+        return self.ledger.taken, self.ledger.visited
+
     def statements(self) -> tuple[Statement, ...]:
         """On the measured points, and on all candidates."""
         ledger, looks = self.ledger, self.looks
@@ -147,6 +151,8 @@ class SearchAndConfirmCampaign:
             said.confidence,
             assumption=f"at least {crowd} of the {points} candidates have an error above the "
             f"largest divided by {factor:g}",
+            crowd=crowd,
+            isolation=factor,
         )
 
     def _stands_alone(self, crowd: int, lower_mm: float) -> bool:

@@ -70,6 +70,10 @@ class SequentialCampaign:
         self.ledger.record(point, reading_mm, covariance_mm2)
         self.looks.update(point)
 
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings, and the rows read."""
+        return self.ledger.taken, self.ledger.visited
+
     def statements(self) -> tuple[Statement, ...]:
         """The bounds as they stand."""
         if self.ledger.taken < self.first:

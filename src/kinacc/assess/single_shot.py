@@ -52,6 +52,10 @@ class SingleShotCampaign:
         """Take a reading."""
         self.ledger.record(point, reading_mm, covariance_mm2)
 
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings, and the rows read."""
+        return self.ledger.taken, self.ledger.visited
+
     def statements(self) -> tuple[Statement, ...]:
         """The bound, with the largest reading as the value."""
         ledger = self.ledger

@@ -22,8 +22,9 @@ class Statement:
 
     ``lower_mm`` and ``upper_mm`` each hold with ``confidence`` by themselves. ``share`` is the part
     of the region the statement is about (1 for the other targets). ``assumption`` names what the
-    bounds rest on beyond normal readings of known covariance; empty if nothing. ``withheld`` says
-    why no bound is stated; empty if one is.
+    bounds rest on beyond normal readings of known covariance; empty if nothing. Where it is that
+    at least ``crowd`` candidates have an error above the largest divided by ``isolation``, these
+    say so in numbers. ``withheld`` says why no bound is stated; empty if one is.
     """
 
     target: str
@@ -34,3 +35,5 @@ class Statement:
     share: float = 1.0
     assumption: str = ""
     withheld: str = ""
+    crowd: int = 0
+    isolation: float = 1.0

@@ -83,6 +83,11 @@ class TwoStageCampaign:
             self.suspects = [self.screen.visited[i] for i in order[:count]]
             self.again = Ledger(self.screen.candidates)
 
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings of both stages, and the rows read."""
+        again = self.again.taken if self.again is not None else 0
+        return self.screen.taken + again, self.screen.visited
+
     def statements(self) -> tuple[Statement, ...]:
         """The bound once every suspect was read again; before, none."""
         if self.again is None or len(self.again.visited) < len(self.suspects):

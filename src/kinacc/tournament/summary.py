@@ -1,0 +1,143 @@
+"""Summing up a tournament: errors, coverage with its interval, and whether confidence is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import bdtr, betaincinv
+
+Columns = dict[str, np.ndarray]
+
+CELL = ("assessor", "target", "field", "candidates", "noise_mm", "budget")
+FAMILY_ERROR = 0.01  # of all tests of one assessor together
+MOST_BELOW = 0.03  # coverage a cell may be below the confidence however few repetitions it has
+
+
+def summed(rows: Mapping[str, np.ndarray]) -> Columns:
+    """One row per assessor, target and cell.
+
+    ``upper_holds`` and ``lower_holds`` are shares of the statements made; ``upper_low`` and
+    ``upper_high`` the exact 95 % interval of the first. ``broken`` counts statements whose
+    assumption is not true of the field: coverage and excess leave them out.
+    """
+    found = [_cell(rows, key, places) for key, places in _groups(rows).items()]
+    return {name: np.array([each[name] for each in found], kind) for name, kind in KINDS.items()}
+
+
+def judged(summary: Mapping[str, np.ndarray]) -> Columns:
+    """Whether every assessor keeps what it says, over all cells of a target.
+
+    Holm's test of every cell against its confidence at a family-wise 1 %, and no cell more than
+    three points below. ``worst_holds`` is the smallest coverage.
+    """
+    found = []
+    for assessor, target in dict.fromkeys(zip(summary["assessor"], summary["target"], strict=True)):
+        mine = (summary["assessor"] == assessor) & (summary["target"] == target)
+        mine &= ~np.isnan(summary["confidence"]) & (summary["stated"] > summary["broken"])
+        if not mine.any():
+            continue
+        cells = {name: np.asarray(column)[mine] for name, column in summary.items()}
+        tried = (cells["stated"] - cells["broken"]).astype(int)
+        held = np.rint(cells["upper_holds"] * tried).astype(int)
+        chance = bdtr(held, tried, cells["confidence"])
+        found.append(
+            {
+                "assessor": assessor,
+                "target": target,
+                "cells": int(mine.sum()),
+                "rejected": int(holm(chance, FAMILY_ERROR).sum()),
+                "below": int(np.sum(cells["upper_holds"] < cells["confidence"] - MOST_BELOW)),
+                "worst_holds": float(cells["upper_holds"].min()),
+                "mean_holds": float(held.sum() / tried.sum()),
+            }
+        )
+    kinds = {
+        "assessor": object,
+        "target": object,
+        "cells": np.int64,
+        "rejected": np.int64,
+        "below": np.int64,
+        "worst_holds": float,
+        "mean_holds": float,
+    }
+    return {name: np.array([each[name] for each in found], kind) for name, kind in kinds.items()}
+
+
+def holm(chances: np.ndarray, error: float) -> np.ndarray:
+    """Which of the hypotheses with these p-values (n,) Holm's procedure rejects."""
+    chances = np.asarray(chances, dtype=float)
+    order = np.argsort(chances, kind="stable")
+    limits = error / np.arange(chances.size, 0, -1)
+    passed = np.cumprod(chances[order] <= limits).astype(bool)
+    rejected = np.zeros(chances.size, dtype=bool)
+    rejected[order] = passed
+    return rejected
+
+
+def interval(held: int, tried: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Exact (Clopper-Pearson) interval of a share."""
+    tail = 0.5 * (1.0 - confidence)
+    low = float(betaincinv(held, tried - held + 1, tail)) if held else 0.0
+    high = float(betaincinv(held + 1, tried - held, 1.0 - tail)) if held < tried else 1.0
+    return low, high
+
+
+def _groups(rows: Mapping[str, np.ndarray]) -> dict[tuple, list[int]]:
+    groups: dict[tuple, list[int]] = {}
+    for place, key in enumerate(zip(*(rows[name].tolist() for name in CELL), strict=True)):
+        groups.setdefault(key, []).append(place)
+    return dict(sorted(groups.items()))
+
+
+def _cell(rows: Mapping[str, np.ndarray], key: tuple, places: list[int]) -> dict:
+    own = {name: column[places] for name, column in rows.items()}
+    miss = own["value_mm"] - own["true_mm"]
+    valued = ~np.isnan(miss)
+    stated = ~np.isnan(own["upper_mm"])
+    broken = stated & (own["assumption"] == "broken")
+    counted = stated & ~broken
+    tried = int(counted.sum())
+    excess = (own["upper_mm"] - own["true_mm"])[counted]
+    above = (own["lower_mm"] - own["true_mm"])[~np.isnan(own["lower_mm"])]
+    low, high = interval(int(np.sum(excess >= 0)), tried) if tried else (np.nan, np.nan)
+    every = np.nanmax(own["confidence"]) if not np.isnan(own["confidence"]).all() else np.nan
+    return {
+        **dict(zip(CELL, key, strict=True)),
+        "repetitions": len(places),
+        "bias_mm": miss[valued].mean() if valued.any() else np.nan,
+        "rmse_mm": np.sqrt(np.mean(miss[valued] ** 2)) if valued.any() else np.nan,
+        "confidence": every,
+        "stated": int(stated.sum()),
+        "broken": int(broken.sum()),
+        "upper_holds": np.mean(excess >= 0) if tried else np.nan,
+        "upper_low": low,
+        "upper_high": high,
+        "lower_holds": np.mean(above <= 0) if above.size else np.nan,
+        "excess_mm": excess.mean() if tried else np.nan,
+        "measurements": own["measurements"].mean(),
+        "points_visited": own["points_visited"].mean(),
+    }
+
+
+KINDS = {
+    "assessor": object,
+    "target": object,
+    "field": object,
+    "candidates": np.int64,
+    "noise_mm": float,
+    "budget": np.int64,
+    "repetitions": np.int64,
+    "bias_mm": float,
+    "rmse_mm": float,
+    "confidence": float,
+    "stated": np.int64,
+    "broken": np.int64,
+    "upper_holds": float,
+    "upper_low": float,
+    "upper_high": float,
+    "lower_holds": float,
+    "excess_mm": float,
+    "measurements": float,
+    "points_visited": float,
+}
