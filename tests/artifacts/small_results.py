@@ -187,7 +187,28 @@ def _models() -> dict:
 
 
 def _residuals() -> dict:
-    return {"residuals": _statistics(), "pose_errors": _error_vectors()}
+    return {"residuals": _statistics(), "pose_errors": _error_vectors(), **_worth()}
+
+
+def _worth() -> dict:
+    vector = {"ex_mm": [0.8], "ey_mm": [0.0], "ez_mm": [0.0]}
+    about = {"comparison": ["dh_vs_measured"], "estimate": ["cross_validated"]}
+    region = {"joint": [1], "from_rad": [-1.0], "to_rad": [1.0], "n": [4]}
+    errors = {f"std_error_{axis}_mm": [0.1] for axis in "xyz"}
+    place = {"rank": [1], "row": [0], "line": [None], "pose": [0], "target": ["tool"]}
+    return {
+        "model_selection": {
+            "model": ["dh", "vec"],
+            "selected": [0, 1],
+            "held_out_rms_mm": [0.5, 0.4],
+            "mean_of_folds_mm": [0.5, 0.4],
+            "gain_mm2": [0.0, 0.09],
+            "gain_std_error_mm2": [0.0, 0.01],
+            "configurations": [4, 4],
+        },
+        "joint_bias": {**about, **region, **vector, **errors, "rms_mm": [0.8]},
+        "worst_rows": {**about, **place, **vector, "error_mm": [0.8]},
+    }
 
 
 _LENGTHS = {"train": np.array([0.2, 0.4, 0.6]), "cross_validated": np.array([0.8, 0.2, 0.4, 0.6])}

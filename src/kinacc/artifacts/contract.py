@@ -10,7 +10,12 @@ A value that does not apply is null, never zero. After a change run
 
 from __future__ import annotations
 
-from kinacc.artifacts import assessment_tables, calibration_tables, covariance_tables
+from kinacc.artifacts import (
+    assessment_tables,
+    calibration_tables,
+    covariance_tables,
+    worth_tables,
+)
 from kinacc.artifacts.columns import Artefact
 
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed")
@@ -30,6 +35,9 @@ ARTEFACTS: dict[str, Artefact] = {
         covariance_tables.DH_COVARIANCE,
         calibration_tables.RESIDUALS,
         calibration_tables.POSE_ERRORS,
+        worth_tables.MODEL_SELECTION,
+        worth_tables.JOINT_BIAS,
+        worth_tables.WORST_ROWS,
         assessment_tables.ACCURACY_MAP,
         assessment_tables.ASSESSMENT_POINTS,
         assessment_tables.STUDY_CHUNK,

@@ -18,7 +18,7 @@ from kinacc.robot import Robot
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 
 _NEEDED = ("vec_model", "dh_model", "frames")
-_WANTED = ("dh_fit", "vec_fit", "residuals")  # used where they are there
+_WANTED = ("dh_fit", "vec_fit", "residuals", "model_selection")  # used where they are there
 _COVARIANCE = {"dh": "dh_covariance", "vec": "vec_covariance"}
 _SAME = 1e-9
 
@@ -109,12 +109,9 @@ def selected_model(tables: Tables) -> str:
 
 
 def _recorded(tables: Tables) -> str:
-    for table in ("vec_fit", "dh_fit"):
-        columns = tables.get(table, {})
-        for row in np.flatnonzero(np.asarray(columns.get("quantity", [])) == "selected_model"):
-            if columns["parameter"][row] in MODELS:
-                return str(columns["parameter"][row])
-    return ""
+    columns = tables.get("model_selection", {})
+    chosen = np.flatnonzero(np.asarray(columns.get("selected", [])) == 1)
+    return str(columns["model"][chosen[0]]) if len(chosen) else ""
 
 
 def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual | None:

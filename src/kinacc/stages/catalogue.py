@@ -87,7 +87,7 @@ STAGES: dict[str, Stage] = {
             "residuals",
             "comparing models and measurements, cross-validated (Tables I and III)",
             ("measurements", *_MODELS, "vec_orders"),
-            ("residuals", "pose_errors"),
+            ("residuals", "pose_errors", "model_selection", "joint_bias", "worst_rows"),
             ("robot", "calibration"),
             files=("robot",),
         ),

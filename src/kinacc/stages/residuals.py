@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from kinacc import robot
-from kinacc.calibration import tables
+from kinacc.calibration import tables, worth_columns
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import (
     COMPARISONS,
@@ -27,7 +27,7 @@ _QUANTITIES = (("position", "mm", 1.0), ("orientation", "mrad", 1e3))
 
 
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]:
-    """``residuals`` and ``pose_errors`` of every comparison.
+    """``residuals``, ``pose_errors`` and what follows from them of every comparison.
 
     Train rows are of the delivered models at the rows they were fitted to. Validation rows are of
     rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
@@ -51,6 +51,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     return {
         "residuals": _residuals(every.fold, folds, seen, held_out, trained),
         "pose_errors": _pose_errors(inputs["measurements"], train, seen, held_out, bool(folds)),
+        **worth_columns.columns(inputs["measurements"], every, train, seen, held_out),
     }
 
 
