@@ -1,0 +1,6 @@
+"""Run the commands with ``python -m kinacc``, for environments whose scripts are not on the path."""
+
+from kinacc.cli import main
+
+if __name__ == "__main__":
+    main()
