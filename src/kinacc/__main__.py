@@ -1,4 +1,4 @@
-"""Run the commands with ``python -m kinacc``, for environments whose scripts are not on the path."""
+"""Run the commands with ``python -m kinacc`` where scripts are not on the path."""
 
 from kinacc.cli import main
 

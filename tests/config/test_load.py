@@ -251,6 +251,10 @@ BAD = {
         "file: {path: own.yaml, decimal: ','}}}}",
         ("file.decimal", "also the delimiter"),
     ),
+    "names of columns turned round": (
+        "measurements: {file: {columns: {A1: q1, X: x}}}",
+        ("file.columns", "A1: q1", "q1: A1"),
+    ),
     "name of no column": (
         "measurements: {file: {columns: {qx1: a}}}",
         ("columns.qx1", "unknown name"),

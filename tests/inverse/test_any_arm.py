@@ -180,6 +180,21 @@ def test_machining_branches_face_the_work_with_the_elbow_up():
     assert inverse.machining_branches(IIWA) == inverse.branches_of(IIWA)
 
 
+def test_an_elbow_is_up_above_the_floor_even_where_axis_1_points_down():
+    turned = Pose(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
+    arm = replace(robot.load("mh180"), base=turned)
+    q = np.deg2rad([[10.0, 20.0, -35.0, 30.0, 60.0, 20.0], [10.0, 60.0, -120.0, 30.0, 60.0, 20.0]])
+    for joints in q:
+        frames = dh.chain(arm.dh, joints[None]).position_mm[0]
+        shoulder, elbow, wrist = (frames[row, [0, 2]] for row in (1, 2, 4))
+        reach = wrist - shoulder
+        aside = reach[0] * (elbow - shoulder)[1] - reach[1] * (elbow - shoulder)[0]
+        solved = inverse.solve(arm, arm.dh, dh.forward(arm.dh, joints[None]))
+        near = np.linalg.norm(np.nan_to_num(solved.q_rad[0], nan=9.0) - joints, axis=1).argmin()
+        worked_in = solved.branches[near] in inverse.machining_branches(arm)
+        assert worked_in == (aside < 0.0)  # above the line to the wrist once turned over
+
+
 # --- compiled and plain ---------------------------------------------------------------------------
 
 

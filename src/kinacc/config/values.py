@@ -218,6 +218,12 @@ def _names(key, value, path, place):
     if not isinstance(value, dict):
         return _refuse(key, path, place, f"{shown(value)} is not a mapping")
     problems = []
+    turned = [name for name, each in value.items() if not key.takes(name) and key.takes(each)]
+    if turned and not any(key.takes(name) for name in value):
+        what = f"the file's names stand first, as in {turned[0]}: {value[turned[0]]}"
+        right = f"{value[turned[0]]}: {turned[0]}"
+        problem = Problem(place(path), what, f"ours first, as in {right}", "turn them all round")
+        return INVALID, [problem]
     for name, each in value.items():
         here = place((*path, name))
         if not key.takes(name):

@@ -91,10 +91,12 @@ def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, 
 def machining_branches(robot: Robot) -> tuple[str, ...]:
     """The branches an arm works in: facing the work, elbow up, either wrist.
 
-    All branches of arms that are not named so.
+    Names count up along axis 1; in a table whose axis 1 points down an elbow up is a ``down``. All
+    branches of arms that are not named so.
     """
     names = branches_of(robot)
-    return tuple(name for name in names if name.startswith("front-up")) or names
+    elbow = "front-up" if robot.base.rotation[2, 2] >= 0.0 else "front-down"
+    return tuple(name for name in names if name.startswith(elbow)) or names
 
 
 def solve(
