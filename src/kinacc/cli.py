@@ -13,6 +13,7 @@ from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
 from kinacc.commands.plan_poses import plan_poses
 from kinacc.commands.predict import predict
+from kinacc.commands.tournament import tournament
 from kinacc.errors import InputError, Problem
 from kinacc.stages.catalogue import STAGES, Stage, maker_of
 
@@ -126,6 +127,7 @@ main.add_command(compensate)
 main.add_command(export)
 main.add_command(compare)
 main.add_command(plan_poses)
+main.add_command(tournament)
 
 
 def run_stage(

@@ -21,13 +21,15 @@ SMALL = contest.Size((0.1, 0.3), {20: (10, 40)}, 3, (0,))
 def field() -> Field:
     """Thirty errors in random directions."""
     rng = np.random.default_rng(1)
-    return Field("made_up", "synthetic", "mh180", np.zeros((30, 6)), 0.4 * rng.normal(size=(30, 3)))
+    q_rad = rng.uniform(-0.5, 0.5, (30, 6))
+    return Field("made_up", "synthetic", "mh180", q_rad, 0.4 * rng.normal(size=(30, 3)))
 
 
 @pytest.fixture(scope="module")
 def rows(field):
     """All campaigns of the small tournament."""
-    return contest.simulate([field], SMALL, range(3), seed=5)[0]
+    parts = [contest.campaigns(job, range(3), 5)[0] for job in contest.jobs([field], SMALL)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -91,24 +93,36 @@ def test_every_assessor_is_in_every_cell(rows):
     assert np.all(rows["points_visited"] <= rows["candidates"])
 
 
-def test_worlds_do_not_depend_on_the_part_they_are_simulated_in(field, rows):
-    part = contest.part_of(3, 2, 2)
-    again, _ = contest.simulate([field], SMALL, part, seed=5)
-    same = np.isin(rows["repetition"], list(part))
-    for name, column in again.items():
-        assert repr(column.tolist()) == repr(rows[name][same].tolist())
+def test_parts_of_any_number_give_the_same_table(field):
+    def table(parts):
+        found = []
+        for number in range(1, parts + 1):
+            work = contest.part_of(contest.jobs([field], SMALL), number, parts)
+            found.append(contest.summed(work, 2, 5, ("maximum", "single_shot")))
+        joined = {name: np.concatenate([each[name] for each in found]) for name in found[0]}
+        return summary.in_order(joined)
+
+    whole, scattered = table(1), table(7)
+    assert len(whole["assessor"]) == 4 + 4 * 2
+    for name, column in whole.items():
+        assert repr(column.tolist()) == repr(scattered[name].tolist())
 
 
 def test_larger_budgets_see_the_same_first_readings(field):
     cell = contest.Cell(field, 20, 0.1)
-    few, many = (contest.world_of(cell, 1, visits, 5) for visits in (10, 40))
+    few, many = (contest.world_of(cell, 1, visits, 5)[0] for visits in (10, 40))
     assert np.array_equal(few.error_mm, many.error_mm)
     assert np.array_equal(few.reading_mm(3, 9), many.reading_mm(3, 9))
 
 
-def test_fields_too_small_for_a_candidate_count_are_left_out(field):
-    size = replace(SMALL, budgets={20: (10,), 31: (10,)})
-    assert {cell.candidates for cell in contest.cells([field], size)} == {20}
+def test_a_field_takes_part_with_the_candidate_counts_it_is_large_enough_for(field):
+    def counts(*wanted):
+        size = replace(SMALL, budgets=dict.fromkeys(wanted, (10,)))
+        return {cell.candidates for cell in contest.cells([field], size)}
+
+    assert counts(20, 31) == {20}
+    assert counts(40, 50) == {30}  # smaller than all of them: as it is
+    assert {job.budget for job in contest.jobs([field], replace(SMALL, budgets={40: (7,)}))} == {7}
 
 
 def test_each_target_is_graded_against_its_own_truth(rows):

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinacc.artifacts import store
+from kinacc.artifacts import store, tournament_tables
 from kinacc.artifacts.conformity import check_file
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.artifacts.lineage import check_lineage, made_without, parts
 from kinacc.artifacts.pictures import check_picture
 from kinacc.artifacts.rules import contradictions
+from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.errors import InputError, Problem
 from kinacc.stages.catalogue import FIGURE_FOLDER, STAGES
 from kinacc.stages.plan import Plan
@@ -91,10 +93,14 @@ def check_results(results: Path | str, plan: Plan | None = None) -> Report:
     if not folder.is_dir():
         problem = Problem(str(folder), "no such folder", "a results folder", "run snakemake -c2")
         return Report(str(folder), (), (problem,))
+    if folder.name == TOURNAMENT:
+        return Report(str(folder), (check_tournament(folder),))
     if _is_dataset(folder):
         return Report(str(folder), (check_dataset(folder, plan),))
     names = sorted(
-        path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")
+        path.name
+        for path in folder.iterdir()
+        if path.is_dir() and not path.name.startswith(".") and path.name != TOURNAMENT
     )
     problems = []
     if plan is not None:
@@ -103,9 +109,10 @@ def check_results(results: Path | str, plan: Plan | None = None) -> Report:
         names = [name for name in names if name in plan.datasets]
     elif not names:
         problems = [Problem(str(folder), "holds no data set", "one folder for each data set")]
-    return Report(
-        str(folder), tuple(check_dataset(folder / name, plan) for name in names), tuple(problems)
-    )
+    reports = [check_dataset(folder / name, plan) for name in names]
+    if (folder / TOURNAMENT).is_dir():
+        reports.append(check_tournament(folder / TOURNAMENT))
+    return Report(str(folder), tuple(reports), tuple(problems))
 
 
 def _is_dataset(folder: Path) -> bool:
@@ -144,6 +151,25 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
     return DatasetReport(
         folder.name, tuple(checked), tuple(problems + found), (*notes, *said, *leftovers)
     )
+
+
+def check_tournament(folder: Path) -> DatasetReport:
+    """Check the folder of the tournament: every table whole and as the contract says."""
+    checked, problems, marks = [], [], {}
+    for name, path in _tables_there(folder):
+        checked.append(str(path))
+        problems += check_file(path, ARTEFACTS[name])[1]
+        if path.parent == folder:
+            with suppress(InputError):
+                marks[name] = store.read_metadata(path)
+    gathered = [each.name for each in tournament_tables.ALL[1:]]
+    problems += [
+        Problem(str(folder / f"{name}.parquet"), "missing", fix="run kinacc tournament again")
+        for name in gathered
+        if name not in marks and any(other in marks for other in gathered)
+    ]
+    leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
+    return DatasetReport(folder.name, tuple(checked), tuple(problems), tuple(leftovers))
 
 
 def main(folder: str, as_json: bool = False, plan: Plan | None = None) -> int:

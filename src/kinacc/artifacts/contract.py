@@ -14,6 +14,7 @@ from kinacc.artifacts import (
     assessment_tables,
     calibration_tables,
     covariance_tables,
+    tournament_tables,
     worth_tables,
 )
 from kinacc.artifacts.columns import Artefact
@@ -48,5 +49,6 @@ ARTEFACTS: dict[str, Artefact] = {
         assessment_tables.CLAIMS,
         assessment_tables.ROBUSTNESS_CHUNK,
         assessment_tables.ROBUSTNESS,
+        *tournament_tables.ALL,
     )
 }

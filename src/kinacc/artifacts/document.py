@@ -24,6 +24,9 @@ give equal bytes. A table appears under its name only when it is whole.
 `q*` stands for `q1`, `q2`, ... for every joint of the arm, `s*` likewise. Rows are unique in the
 columns named as key. `figures/fig1` to `fig6` are pictures (.svg, .png, .pdf).
 
+`results/tournament/` holds the tables named `tournament_*`, about all data sets together; they are
+made on request by `kinacc tournament` or `snakemake tournament`.
+
 `kinacc check-results results/` holds a folder to all of this.
 
 Written from the contract by `python -m kinacc.artifacts.document`.
@@ -39,7 +42,7 @@ def artifacts_markdown() -> str:
 def _section(artefact: Artefact) -> str:
     makers = [stage for stage in STAGES.values() if artefact.name in stage.outputs]
     made = f" Made by stage `{makers[0].name}`." if makers else ""
-    if makers and makers[0].scattered:
+    if artefact.name == "tournament_chunk" or (makers and makers[0].scattered):
         made += f" One file per part, `{artefact.name}/<part>-of-<parts>.parquet`."
     if makers and makers[0].on_request:
         made += " Made on request."

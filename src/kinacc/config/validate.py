@@ -50,6 +50,9 @@ def check_dataset_name(name: Any, place: Place) -> list[Problem]:
     if not isinstance(name, str):
         fix = "put the name in quotes"
         return [Problem(where, f"the data set's name {shown(name)} is not text", allowed, fix)]
+    if name == "tournament":
+        what = "'tournament' is the folder of the tournament of all data sets"
+        return [Problem(where, what, f"another name of {allowed}")]
     if not re.fullmatch(DATASET_NAME, name):
         return [Problem(where, f"{shown(name)} cannot be the name of a data set", allowed)]
     return []

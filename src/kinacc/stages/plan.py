@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from kinacc.errors import InputError, Problem
 from kinacc.provenance import config_hash, file_hash, stage_code_hash
@@ -32,6 +32,7 @@ def planned(
     full = load(paths, _read_words(overrides or {}))
     formats = {name: tuple(config["figures"]["formats"]) for name, config in full.items()}
     first = next(iter(formats.values()))
+    tournament = next(iter(full.values()))["tournament"]
     problems = [
         Problem(
             f"datasets.{name}.figures.formats",
@@ -40,6 +41,10 @@ def planned(
         )
         for name, own in formats.items()
         if own != first
+    ] + [
+        Problem(f"datasets.{name}.tournament", "differs from data set to data set", "one for all")
+        for name, config in full.items()
+        if config["tournament"] != tournament
     ]
     if problems:
         raise InputError(problems)
@@ -48,6 +53,7 @@ def planned(
         {name: config["study"]["chunks"] for name, config in full.items()},
         first,
         results,
+        tournament,
     )
 
 
@@ -57,13 +63,15 @@ class Plan:
 
     ``datasets`` maps a data set's name to its complete configuration (defaults filled in, without
     values that only say how a run is carried out); ``parts`` to the number of parts its scattered
-    stages are computed in; ``formats`` are the picture formats.
+    stages are computed in; ``formats`` are the picture formats; ``tournament`` is the
+    configuration's section of that name, which is one for all data sets.
     """
 
     datasets: Mapping[str, Mapping[str, object]]
     parts: Mapping[str, int]
     formats: tuple[str, ...]
     results: str = RESULTS
+    tournament: Mapping[str, object] = field(default_factory=dict)
 
     def stages(self, dataset: str) -> dict[str, Stage]:
         """The stages a data set goes through, in order."""

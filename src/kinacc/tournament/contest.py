@@ -7,6 +7,7 @@ budgets see that world, whatever part of the work it is simulated in.
 
 from __future__ import annotations
 
+import math
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,10 +22,12 @@ from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.streams import key_of
 from kinacc.assess.world import World, drawn_world
 from kinacc.errors import InputError, Problem
+from kinacc.tournament import summary
 from kinacc.tournament.fields import Field
 
 Columns = dict[str, np.ndarray]
 NM_PER_MM = 1_000_000
+CONTESTANTS = (*ASSESSORS, *ADAPTIVE)
 
 
 @dataclass(frozen=True)
@@ -60,95 +63,144 @@ class Cell:
     candidates: int
     noise_mm: float
 
+    def known(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
+        """What an assessor may know of the candidates beside the noise: joints and effects."""
+        return {"q_rad": self.field.q_rad[chosen], "effects": self.field.effects[chosen]}
+
 
 def cells(fields: Sequence[Field], size: Size) -> Iterator[Cell]:
-    """Every cell that the fields are large enough for."""
+    """Every cell that the fields are large enough for; a small field counts as it is."""
     for field in fields:
-        for count in size.budgets:
-            if count <= field.points:
+        for count in sorted({min(each, field.points) for each in size.budgets}):
+            if count in size.budgets or count < min(size.budgets):
                 yield from (Cell(field, count, noise) for noise in size.noise_mm)
 
 
-def part_of(repetitions: int, number: int, of: int) -> range:
-    """Repetitions of part ``number`` (1-based) of ``of``."""
+def _listed(size: Size, candidates: int) -> int:
+    """The candidate count whose budgets are used: the smallest listed for a small field."""
+    return candidates if candidates in size.budgets else min(size.budgets)
+
+
+@dataclass(frozen=True)
+class Job:
+    """All campaigns of one cell with one budget: what a part of the work consists of."""
+
+    cell: Cell
+    budget: int
+
+
+def jobs(fields: Sequence[Field], size: Size) -> list[Job]:
+    """Every job of a tournament, in a fixed order."""
+    return [
+        Job(cell, budget)
+        for cell in cells(fields, size)
+        for budget in size.budgets[_listed(size, cell.candidates)]
+    ]
+
+
+def part_of(work: Sequence[Job], number: int, of: int) -> Sequence[Job]:
+    """Jobs of part ``number`` (1-based) of ``of``."""
     if not 1 <= number <= of:
         raise InputError(Problem("part", f"{number} of {of}", "1 up to the number of parts"))
-    return range(number - 1, repetitions, of)
+    return work[number - 1 :: of]
 
 
-def simulate(
-    fields: Sequence[Field],
-    size: Size,
-    repetitions: Iterable[int],
+def summed(
+    work: Sequence[Job],
+    repetitions: int,
     seed: int,
+    assessors: Sequence[str],
     progress=None,
-    assessors: Sequence[str] = (*ASSESSORS, *ADAPTIVE),
+) -> Columns:
+    """Summary of every job: rows as in :func:`kinacc.tournament.summary.summed`.
+
+    ``progress(iterable, what, total)`` reports. The campaigns themselves are not kept.
+    """
+    parts = []
+    for job in progress(work, "cells", len(work)) if progress else work:
+        rows, _ = campaigns(job, range(repetitions), seed, assessors)
+        parts.append(summary.summed(rows))
+    if not parts:
+        return {name: np.empty(0, kind) for name, kind in summary.KINDS.items()}
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def campaigns(
+    job: Job, repetitions: Iterable[int], seed: int, assessors: Sequence[str] = CONTESTANTS
 ) -> tuple[Columns, Columns]:
-    """Statements and times of all campaigns; ``progress(iterable, what, total)`` reports.
+    """Statements and times of the campaigns of one job.
 
     Statements: one row per campaign and statement, with the truth it is graded against. Times are
     kept apart, for they differ from run to run.
     """
-    jobs = [(cell, each) for cell in cells(fields, size) for each in repetitions]
     rows: list[dict] = []
     times: list[dict] = []
-    for cell, repetition in progress(jobs, "worlds", len(jobs)) if progress else jobs:
-        for budget in size.budgets[cell.candidates]:
-            # A world is drawn anew for every budget, so that a campaign can exhaust one point.
-            place = {
-                "field": cell.field.name,
-                "candidates": cell.candidates,
-                "noise_mm": cell.noise_mm,
-                "budget": budget,
-                "repetition": repetition,
-            }
-            world = world_of(cell, repetition, budget, seed)
-            for name in assessors:
-                own = {**place, "assessor": name}
-                begun = time.perf_counter()
-                campaign = _campaign(name, world, budget)
-                times.append({**own, "time_ms": 1e3 * (time.perf_counter() - begun)})
-                rows += [{**own, **graded} for graded in campaign]
+    cell = job.cell
+    for repetition in repetitions:
+        place = {
+            "field": cell.field.name,
+            "candidates": cell.candidates,
+            "noise_mm": cell.noise_mm,
+            "budget": job.budget,
+            "repetition": repetition,
+        }
+        world, chosen = world_of(cell, repetition, job.budget, seed)
+        for name in assessors:
+            own = {**place, "assessor": name}
+            begun = time.perf_counter()
+            stated = _campaign(name, world, job, chosen)
+            times.append({**own, "time_ms": 1e3 * (time.perf_counter() - begun)})
+            rows += [{**own, **graded} for graded in stated]
     return _columns(rows, ROW_KINDS), _columns(times, TIME_KINDS)
 
 
-def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> World:
-    """The world of one repetition: candidates in random order, ``visits`` readings of each."""
+def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World, np.ndarray]:
+    """The world of one repetition, ``visits`` readings of each point, and its rows of the field.
+
+    A campaign may spend its whole budget on one point; so the budget is what ``visits`` should be.
+    """
     noise_nm = round(cell.noise_mm * NM_PER_MM)
     entropy = (seed, zlib.crc32(cell.field.name.encode()), cell.candidates, noise_nm, repetition)
     chosen = cell.field.candidates(cell.candidates, entropy)
-    return drawn_world(cell.field.error_mm[chosen], cell.noise_mm, key_of(*entropy), visits)
+    error_mm = cell.field.error_mm[chosen]
+    return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits), chosen
 
 
-def _campaign(name: str, world: World, budget: int) -> list[dict]:
+def _campaign(name: str, world: World, job: Job, chosen: np.ndarray) -> list[dict]:
     """The statements of one campaign, each with its truth."""
     size = np.linalg.norm(world.error_mm, axis=1)
+    truths = {CANDIDATES: float(size.max()), MEASURED: math.nan}
     if name in ASSESSORS:
-        found = ASSESSORS[name](measurements=budget).assess(world)
-        said = Statement(CANDIDATES, found.assessed_mm)
-        return [_graded(said, size, float("nan"), found.measurements, found.points_visited)]
-    campaign = conduct(ADAPTIVE[name](measurements=budget), world)
-    taken, visited = campaign.taken()
-    largest = float(size[visited].max())
-    return [_graded(each, size, largest, taken, len(visited)) for each in campaign.statements()]
+        found = ASSESSORS[name](measurements=job.budget).assess(world)
+        taken, visited, said = found.measurements, found.points_visited, [found.assessed_mm]
+        stated = [Statement(CANDIDATES, value) for value in said]
+    else:
+        campaign = conduct(ADAPTIVE[name](measurements=job.budget), world, **job.cell.known(chosen))
+        taken, rows = campaign.taken()
+        visited, stated = len(rows), campaign.statements()
+        truths[MEASURED] = float(size[rows].max())
+    return [
+        {
+            "target": each.target,
+            "true_mm": _truth(each, truths, job.cell.field),
+            "value_mm": each.value_mm,
+            "lower_mm": each.lower_mm,
+            "upper_mm": each.upper_mm,
+            "confidence": each.confidence,
+            "withheld": each.withheld or None,
+            "assumption": _assumption(each, size),
+            "measurements": taken,
+            "points_visited": visited,
+        }
+        for each in stated
+    ]
 
 
-def _graded(said: Statement, size: np.ndarray, measured: float, taken: int, visited: int) -> dict:
-    truth = {CANDIDATES: float(size.max()), MEASURED: measured}.get(said.target)
-    if truth is None:
-        truth = float(np.quantile(size, said.share, method="higher"))
-    return {
-        "target": said.target,
-        "true_mm": truth,
-        "value_mm": said.value_mm,
-        "lower_mm": said.lower_mm,
-        "upper_mm": said.upper_mm,
-        "confidence": said.confidence,
-        "withheld": said.withheld or None,
-        "assumption": _assumption(said, size),
-        "measurements": taken,
-        "points_visited": visited,
-    }
+def _truth(said: Statement, truths: dict[str, float], field: Field) -> float:
+    """What a statement is graded against; of the region: what its share does not exceed."""
+    if said.target in truths:
+        return truths[said.target]
+    return float(np.quantile(field.size_mm, said.share, method="inverted_cdf"))
 
 
 def _assumption(said: Statement, size: np.ndarray) -> str:

@@ -6,12 +6,14 @@ draw their candidates from the pool at random.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from kinacc import robot
+from kinacc.assess.causes import joint_errors
 from kinacc.errors import InputError, Problem
 from kinacc.models import dh
 from kinacc.operating_points import readings_of
@@ -40,6 +42,7 @@ class Field:
     robot: str
     q_rad: np.ndarray
     error_mm: np.ndarray
+    meaning: str = ""
 
     def __post_init__(self) -> None:
         shapes = self.q_rad.shape[:1] + self.error_mm.shape
@@ -57,6 +60,16 @@ class Field:
         """Number of configurations in the pool."""
         return len(self.error_mm)
 
+    @cached_property
+    def size_mm(self) -> np.ndarray:
+        """Sizes of the errors (n,)."""
+        return np.linalg.norm(self.error_mm, axis=1)
+
+    @cached_property
+    def effects(self) -> np.ndarray:
+        """What an error of each joint does at the tool (n, 3, 6 k), see :mod:`causes`."""
+        return joint_errors(robot.load(self.robot), self.q_rad)
+
     def candidates(self, count: int, entropy: tuple[int, ...]) -> np.ndarray:
         """Rows of ``count`` configurations drawn without replacement, in random order."""
         return np.random.default_rng([*entropy, 0]).permutation(self.points)[:count]
@@ -64,7 +77,8 @@ class Field:
 
 def of_points(name: str, robot_name: str, points: Mapping) -> Field:
     """The paper's field: ``assessment_points`` of a modelled space."""
-    return Field(name, "paper", robot_name, _stacked(points, "q"), _vectors(points))
+    meaning = "errors of the DH model at the operating points of the study"
+    return Field(name, "paper", robot_name, _stacked(points, "q"), _vectors(points), meaning)
 
 
 def of_measurements(name: str, robot_name: str, errors: Mapping, measurements: Mapping) -> Field:
@@ -85,7 +99,8 @@ def of_measurements(name: str, robot_name: str, errors: Mapping, measurements: M
     pose_of = {int(each): row for row, each in reversed([*enumerate(measurements["pose"])])}
     first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
     means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
-    return Field(name, "measured", robot_name, q_rad[first], means)
+    meaning = "held-out errors of the DH model at measured configurations"
+    return Field(name, "measured", robot_name, q_rad[first], means, meaning)
 
 
 def synthetic(name: str, draw: int) -> Field:
@@ -111,6 +126,7 @@ def synthetic(name: str, draw: int) -> Field:
         "mh180",
         q_rad[CALIBRATION_POSES:],
         left_mm[CALIBRATION_POSES:],
+        change.meaning,
     )
 
 
@@ -201,3 +217,39 @@ def _stacked(columns: Mapping, letter: str) -> np.ndarray:
 
 def _vectors(columns: Mapping) -> np.ndarray:
     return np.stack([np.asarray(columns[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
+
+
+def described(fields: Sequence[Field]) -> dict[str, np.ndarray]:
+    """``tournament_fields``: name, origin and sizes of every field."""
+    rows = [
+        {
+            "field": field.name,
+            "kind": field.kind,
+            "meaning": field.meaning,
+            "points": field.points,
+            "mean_mm": field.size_mm.mean(),
+            "median_mm": np.median(field.size_mm),
+            "quantile_99_mm": np.quantile(field.size_mm, 0.99, method="inverted_cdf"),
+            "max_mm": field.size_mm.max(),
+        }
+        for field in fields
+    ]
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def of_tables(
+    tables: Mapping[str, Mapping], robots: Mapping[str, str], draws: Sequence[int]
+) -> list[Field]:
+    """Every field: of the data sets, then the synthetic families.
+
+    tables: ``<data set>/<artefact>`` to columns; robots: by data set; draws: accepted draws of
+    which every family is made. A data set with ``pose_errors`` is measured.
+    """
+    found = []
+    for name, arm in robots.items():
+        if f"{name}/pose_errors" in tables:
+            errors, seen = (tables[f"{name}/{which}"] for which in ("pose_errors", "measurements"))
+            found.append(of_measurements(name, arm, errors, seen))
+        else:
+            found.append(of_points(name, arm, tables[f"{name}/assessment_points"]))
+    return found + [synthetic(family, draw) for family in FAMILIES for draw in draws]

@@ -19,7 +19,8 @@ def summed(rows: Mapping[str, np.ndarray]) -> Columns:
 
     ``upper_holds`` and ``lower_holds`` are shares of the statements made; ``upper_low`` and
     ``upper_high`` the exact 95 % interval of the first. ``broken`` counts statements whose
-    assumption is not true of the field: coverage and excess leave them out.
+    assumption is not true of the field: coverage and excess leave them out, and
+    ``broken_holds`` is their coverage alone.
     """
     found = [_cell(rows, key, places) for key, places in _groups(rows).items()]
     return {name: np.array([each[name] for each in found], kind) for name, kind in KINDS.items()}
@@ -46,22 +47,40 @@ def judged(summary: Mapping[str, np.ndarray]) -> Columns:
                 "assessor": assessor,
                 "target": target,
                 "cells": int(mine.sum()),
+                "statements": int(tried.sum()),
                 "rejected": int(holm(chance, FAMILY_ERROR).sum()),
                 "below": int(np.sum(cells["upper_holds"] < cells["confidence"] - MOST_BELOW)),
                 "worst_holds": float(cells["upper_holds"].min()),
                 "mean_holds": float(held.sum() / tried.sum()),
+                "withheld": _withheld(summary, assessor, target),
             }
         )
     kinds = {
         "assessor": object,
         "target": object,
         "cells": np.int64,
+        "statements": np.int64,
         "rejected": np.int64,
         "below": np.int64,
         "worst_holds": float,
         "mean_holds": float,
+        "withheld": float,
     }
     return {name: np.array([each[name] for each in found], kind) for name, kind in kinds.items()}
+
+
+def in_order(summary: Mapping[str, np.ndarray]) -> Columns:
+    """The rows in the order of their keys, so that parts of any number give the same table."""
+    keys = list(zip(*(summary[name].tolist() for name in CELL), strict=True))
+    order = sorted(range(len(keys)), key=keys.__getitem__)
+    return {name: np.asarray(column)[order] for name, column in summary.items()}
+
+
+def _withheld(summary: Mapping[str, np.ndarray], assessor: str, target: str) -> float:
+    """Share of an assessor's campaigns that state no upper bound for a target."""
+    mine = (summary["assessor"] == assessor) & (summary["target"] == target)
+    stated, all_of = (int(summary[name][mine].sum()) for name in ("stated", "repetitions"))
+    return 1.0 - stated / all_of
 
 
 def holm(chances: np.ndarray, error: float) -> np.ndarray:
@@ -100,21 +119,25 @@ def _cell(rows: Mapping[str, np.ndarray], key: tuple, places: list[int]) -> dict
     tried = int(counted.sum())
     excess = (own["upper_mm"] - own["true_mm"])[counted]
     above = (own["lower_mm"] - own["true_mm"])[~np.isnan(own["lower_mm"])]
+    beyond = (own["upper_mm"] >= own["true_mm"])[broken]
     low, high = interval(int(np.sum(excess >= 0)), tried) if tried else (np.nan, np.nan)
     every = np.nanmax(own["confidence"]) if not np.isnan(own["confidence"]).all() else np.nan
     return {
         **dict(zip(CELL, key, strict=True)),
         "repetitions": len(places),
+        "true_mm": own["true_mm"].mean(),
         "bias_mm": miss[valued].mean() if valued.any() else np.nan,
         "rmse_mm": np.sqrt(np.mean(miss[valued] ** 2)) if valued.any() else np.nan,
         "confidence": every,
         "stated": int(stated.sum()),
         "broken": int(broken.sum()),
         "upper_holds": np.mean(excess >= 0) if tried else np.nan,
+        "broken_holds": beyond.mean() if beyond.size else np.nan,
         "upper_low": low,
         "upper_high": high,
         "lower_holds": np.mean(above <= 0) if above.size else np.nan,
         "excess_mm": excess.mean() if tried else np.nan,
+        "width_mm": (own["upper_mm"] - own["lower_mm"])[counted].mean() if tried else np.nan,
         "measurements": own["measurements"].mean(),
         "points_visited": own["points_visited"].mean(),
     }
@@ -128,16 +151,19 @@ KINDS = {
     "noise_mm": float,
     "budget": np.int64,
     "repetitions": np.int64,
+    "true_mm": float,
     "bias_mm": float,
     "rmse_mm": float,
     "confidence": float,
     "stated": np.int64,
     "broken": np.int64,
     "upper_holds": float,
+    "broken_holds": float,
     "upper_low": float,
     "upper_high": float,
     "lower_holds": float,
     "excess_mm": float,
+    "width_mm": float,
     "measurements": float,
     "points_visited": float,
 }

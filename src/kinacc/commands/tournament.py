@@ -1,0 +1,97 @@
+"""``kinacc tournament``: every assessor on every error field, judged against the truth."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command("tournament")
+@click.option("--config", multiple=True, help="Configuration; may be repeated. [config.yaml]")
+@click.option("--results", default="results", show_default=True, help="Results folder.")
+@click.option(
+    "--size", type=click.Choice(["default", "full"]), help="Minutes or hours. [configuration]"
+)
+@click.option("--parts", type=click.IntRange(1), help="Number of parts. [configuration]")
+@click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
+@click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
+@click.option(
+    "--cores", type=click.IntRange(1), default=1, show_default=True, help="Parts at a time."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
+def tournament(config, results, size, parts, part, assessor, cores, as_json) -> None:
+    """Let every assessor assess errors that are known, and hold what it says to the truth.
+
+    The error fields are those of the configuration's data sets, whose tables have to be there
+    already, and families of synthetic arms. Leaves tournament_cells, tournament_verdicts and
+    tournament_fields in RESULTS/tournament. Parts that are there, made from the same inputs and
+    code, are kept: started again, it goes on where it was stopped. The number of parts changes
+    nothing in the results.
+
+    \b
+    Example:
+      kinacc tournament --config config.yaml --config examples/ur10.yaml --cores 2
+      kinacc tournament --size full --parts 200 --part 7-of-200
+    """
+    from kinacc.errors import InputError, Problem
+    from kinacc.stages.plan import planned
+    from kinacc.stages.runner import execute
+    from kinacc.stages.tournament_plan import is_done, tournament_plan
+
+    chosen = planned(config or ("config.yaml",), results=results)
+    contest = tournament_plan(chosen, size, parts, assessor)
+    contest.check()
+    names = contest.part_names
+    if part is not None and part not in names:
+        raise InputError(Problem("--part", repr(part), f"{names[0]} to {names[-1]}"))
+    waiting = [contest.chunk_job(name) for name in ([part] if part else names)]
+    left = [job for job in waiting if not is_done(job)]
+    if len(left) < len(waiting):
+        click.echo(f"{len(waiting) - len(left)} of {len(waiting)} parts are there", err=True)
+    _carry_out(left, cores)
+    if part is not None:
+        return
+    execute(contest.tables_job(), bar=True)
+    _tell(contest.outputs["tournament_verdicts"], as_json)
+
+
+def _carry_out(jobs, cores: int) -> None:
+    from kinacc.stages.runner import execute
+
+    if cores == 1 or len(jobs) < 2:
+        for job in jobs:
+            execute(job, bar=True)
+        return
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+
+    with ProcessPoolExecutor(cores) as pool:
+        started = {pool.submit(execute, job): job for job in jobs}
+        for done, future in enumerate(as_completed(started), 1):
+            if future.exception() is not None:  # said and logged by the part itself
+                pool.shutdown(cancel_futures=True)
+                raise SystemExit(1)
+            click.echo(f"{started[future].label}: done, {done} of {len(jobs)}", err=True)
+
+
+def _tell(path: str, as_json: bool) -> None:
+    """Print the verdicts."""
+    import json
+
+    from kinacc.artifacts.store import read
+
+    table = read(path)
+    rows = [dict(zip(table, each, strict=True)) for each in zip(*_plain(table), strict=True)]
+    if as_json:
+        click.echo(json.dumps({"verdicts": rows, "table": path}, indent=2))
+        return
+    click.echo("assessor              about       statements  held   worst cell  cells below")
+    for row in rows:
+        kept = row["rejected"] + row["below"]
+        click.echo(
+            f"{row['assessor']:20s}  {row['target']:10s}  {row['statements']:10d}  "
+            f"{row['mean_holds']:.3f}  {row['worst_holds']:10.3f}  {kept:4d} of {row['cells']}"
+        )
+    click.echo(f"all of it: {path.rpartition('/')[0]}")
+
+
+def _plain(table) -> list[list]:
+    return [column.tolist() for column in table.values()]

@@ -1,0 +1,16 @@
+"""Campaigns of every assessor in some of the tournament's cells."""
+
+from kinacc.stages.runner import Job, execute
+
+execute(
+    Job(
+        "kinacc.stages.tournament_chunk",
+        inputs=snakemake.params.inputs,
+        outputs=snakemake.params.outputs,
+        settings=snakemake.params.settings,
+        seed=snakemake.params.seed,
+        part=snakemake.params.part,
+        label=f"tournament {snakemake.wildcards.part}",
+        log=snakemake.log[0],
+    )
+)
