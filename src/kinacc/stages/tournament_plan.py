@@ -136,16 +136,17 @@ def tournament_plan(
 
     Raises InputError for an assessor that does not exist.
     """
-    from kinacc.tournament.contest import CONTESTANTS
+    if assessors:
+        from kinacc.tournament.contest import CONTESTANTS
 
-    unknown = [name for name in assessors if name not in CONTESTANTS]
-    if unknown:
-        raise InputError(
-            [Problem(f"assessor {n}", "unknown", ", ".join(CONTESTANTS)) for n in unknown]
-        )
+        allowed = ", ".join(CONTESTANTS)
+        unknown = [name for name in assessors if name not in CONTESTANTS]
+        if unknown:
+            raise InputError([Problem(f"assessor {name}", "unknown", allowed) for name in unknown])
+        assessors = [name for name in CONTESTANTS if name in assessors]
     configured = plan.tournament
-    chosen = tuple(name for name in CONTESTANTS if not assessors or name in assessors)
-    return TournamentPlan(plan, size or configured["size"], parts or configured["chunks"], chosen)
+    size, parts = size or configured["size"], parts or configured["chunks"]
+    return TournamentPlan(plan, size, parts, tuple(assessors))
 
 
 def _fix(role: str) -> str:
