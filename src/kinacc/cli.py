@@ -8,6 +8,7 @@ from collections.abc import Callable
 import click
 
 from kinacc import __version__
+from kinacc.commands.campaign import campaign
 from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
@@ -128,6 +129,7 @@ main.add_command(export)
 main.add_command(compare)
 main.add_command(plan_poses)
 main.add_command(tournament)
+main.add_command(campaign)
 
 
 def run_stage(

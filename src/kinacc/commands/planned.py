@@ -52,7 +52,7 @@ class Answer:
 
 def question(given: Mapping) -> Question:
     """The question of the command's options. Raises InputError listing what is wrong."""
-    settings = _settings(given)
+    settings = settings_of(given)
     robot = robots.load(given["robot"] or settings["robot"])
     problems: list[Problem] = []
     tool = robots.carried(robot)
@@ -65,10 +65,10 @@ def question(given: Mapping) -> Question:
         hayati = tuple(int(value) for value in values)
         if any(not 1 <= joint <= robot.dh.joints for joint in hayati):
             problems.append(Problem("--hayati", given["hayati"], f"joints 1 to {robot.dh.joints}"))
-    box = _ranges("--joints-deg", given["joints_deg"], robot.dh.joints, problems)
+    box = ranges("--joints-deg", given["joints_deg"], robot.dh.joints, problems)
     if box is not None:
         box = tuple(np.where(robot.dh.prismatic, end, np.deg2rad(end)) for end in box)
-    space = _ranges("--inside-mm", given["inside_mm"], 3, problems)
+    space = ranges("--inside-mm", given["inside_mm"], 3, problems)
     start = np.zeros(robot.dh.joints)
     if given["from_deg"] is not None:
         start = rows.of_arguments((given["from_deg"],), "deg", robot, "--from-deg")[0]
@@ -89,7 +89,7 @@ def question(given: Mapping) -> Question:
             raise InputError(found, "Candidates outside the robot's limits")
         joints, label = file.joints, file.label
     else:
-        inside = settings["inside"] if space is None else _inside(space)
+        inside = settings["inside"] if space is None else inside_box(space)
         joints = candidates.spread(
             robot, given["drawn"], settings["box"] if box is None else box, inside, tool
         )
@@ -181,7 +181,7 @@ def draw(asked: Question, found: Answer, picture: str, progress: Callable | None
     write(figure, {path.suffix[1:]: path})
 
 
-def _settings(given: Mapping) -> dict:
+def settings_of(given: Mapping) -> dict:
     """Robot, fit and region of a data set; defaults without one."""
     plain = {"robot": None, "estimated": True, "weight": 500.0, "hayati": (), "box": None}
     plain["inside"] = None
@@ -214,7 +214,8 @@ def _settings(given: Mapping) -> dict:
     return plain
 
 
-def _inside(space: tuple[np.ndarray, np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+def inside_box(space: tuple[np.ndarray, np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    """Test of positions (n, 3) for lying in a box (3,), (3,)."""
     low, high = space
     return lambda position_mm: ((position_mm >= low) & (position_mm <= high)).all(axis=1)
 
@@ -230,9 +231,10 @@ def _numbers(option: str, text: str, count: int | None, problems: list[Problem])
     return values
 
 
-def _ranges(
+def ranges(
     option: str, text: str | None, count: int, problems: list[Problem]
 ) -> tuple[np.ndarray, np.ndarray] | None:
+    """Ends (count,), (count,) of a text such as "-90:90,-60:60"; None where there is none."""
     if text is None:
         return None
     allowed = f"{count} ranges low:high, apart by commas"

@@ -42,7 +42,7 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
     ``x_m`` .., and ``qw`` .. ``qz``, or a rotation vector ``rvx_deg`` .. , or intrinsic XYZ angles
     ``rx_deg`` .. (or rad). Raises InputError listing every problem.
     """
-    table = _load(Path(path))
+    table = open_table(path)
     reader = _Reader(table, [], set())
     slides = robot.dh.prismatic
     q_rad = reader.group(
@@ -181,8 +181,9 @@ class _Reader:
         return Pose(rotation, position)
 
 
-def _load(path: Path) -> RawTable:
+def open_table(path: str | Path) -> RawTable:
     """The file with the delimiter its first line shows: , or ; (decimal comma) or tab."""
+    path = Path(path)
     delimiter, decimal = ",", "."
     if path.is_file() and path.suffix.lower() not in (".parquet", ".pq"):
         with path.open(encoding="utf-8-sig", errors="replace") as file:

@@ -1,0 +1,147 @@
+"""Make a plan: model the candidates, draw their order, route the first visit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.calibrated.record import Calibration
+from kinacc.campaign.instrument import INSTRUMENT, Instrument
+from kinacc.campaign.plan import Limits, Plan, Points, fixed_visit
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import compose, invert
+from kinacc.models.vec import VECModel
+from kinacc.planning import travel
+
+_STEP_RAD, _STEP_MM = 1e-6, 1e-4
+_MM_PER_RAD = 1000.0  # a sliding joint's travel counts like an arc at one metre
+_ROUTED = 400  # points beyond which the route is built in stretches of so many
+
+
+def points_of(
+    arm: Calibration,
+    joints: np.ndarray,
+    label: Sequence[str],
+    directions: np.ndarray | None = None,
+    point: str | None = None,
+) -> Points:
+    """Candidates at reported joints (m, k), modelled in the robot's base.
+
+    Candidates at the same joints become one. Raises InputError where fewer than two are left, or
+    where the model says nothing of a candidate's joints.
+    """
+    places = joints if directions is None else np.hstack([joints, directions])
+    kept = np.sort(np.unique(places, axis=0, return_index=True)[1])
+    if len(kept) < 2:
+        what = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
+        raise InputError(Problem("candidates", what, "at least 2 different points"))
+    joints, label = joints[kept], [str(label[i]) for i in kept]
+    directions = None if directions is None else directions[kept]
+    problems = _outside(arm, joints, label)
+    if doubled := sorted({each for each in label if label.count(each) > 1}):
+        what = f"names given to different joints: {', '.join(doubled[:5])}"
+        problems.append(Problem("candidates", what, "one name per point"))
+    if problems:
+        raise InputError(problems, "These candidates cannot be measured against the model")
+    where = _positions(arm, joints, directions, point)
+    slides = arm.robot.dh.prismatic
+    slope = np.empty((*where.shape, joints.shape[1]))
+    for joint, slide in enumerate(slides):
+        step = np.zeros(joints.shape[1])
+        step[joint] = _STEP_MM if slide else _STEP_RAD
+        apart = _positions(arm, joints + step, directions, point)
+        apart -= _positions(arm, joints - step, directions, point)
+        slope[:, :, joint] = apart / (2.0 * step[joint])
+    return Points(tuple(label), joints, directions, where, slope)
+
+
+def plan_of(
+    arm: Calibration,
+    points: Points,
+    assessor: AdaptiveAssessor,
+    instruments: Sequence[Instrument],
+    limits: Limits,
+    seed: int,
+    start: np.ndarray,
+    about: dict[str, str],
+    by_travel: bool = True,
+) -> Plan:
+    """The plan of a campaign: the candidates' order follows from ``seed`` alone.
+
+    ``start`` (k,): reported joints the arm stands at. Without ``by_travel`` the first visit keeps
+    the random order.
+    """
+    order = np.random.default_rng(seed).permutation(len(points))
+    slides = np.array(arm.robot.dh.prismatic)
+    to_base = compose(arm.robot.base, invert(arm.base))
+    covariance = instruments[0].in_base(to_base.rotation)
+    equal = Candidates(np.tile(covariance, (len(points), 1, 1)), q_rad=points.joints)
+    route = order[: fixed_visit(assessor, equal)]
+    if by_travel:
+        scaled = points.joints[route] / np.where(slides, _MM_PER_RAD, 1.0)
+        route = route[_short_path(scaled, start / np.where(slides, _MM_PER_RAD, 1.0))]
+    return Plan(
+        points, order, route, assessor, tuple(instruments), to_base,
+        tuple(bool(each) for each in slides), limits, seed, about,
+    )  # fmt: skip
+
+
+def plausible_mm(arm: Calibration, instruments: Sequence[Instrument]) -> float:
+    """Size of an error beyond which a reading is more likely to be of another pose, mm.
+
+    Twenty times what the calibration left unexplained, and ten standard deviations of the
+    noisiest instrument; at least 5 mm, and 50 mm for a model that was never fitted.
+    """
+    noise = max(np.sqrt(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in instruments)
+    left = arm.residual.position_mm if arm.residual else np.nan
+    usual = 50.0 if not np.isfinite(left) else max(5.0, 20.0 * left)
+    return float(f"{usual + 10.0 * noise:.3g}")
+
+
+def needs_instrument_frame(instruments: Sequence[Instrument]) -> bool:
+    """Whether any reading comes in the instrument's frame."""
+    return any(each.frame == INSTRUMENT for each in instruments)
+
+
+def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Rows (n,) of places (n, k) in an order with little travel from ``start`` (k,)."""
+    whole = np.concatenate([start[None], places])
+    if len(places) <= _ROUTED:
+        return travel.order(travel.distances(whole))[1:] - 1
+    # Improving a path takes time with the cube of its length: go by nearest neighbour first.
+    left, path, here = list(range(len(places))), [], start
+    while left:
+        nearest = int(np.argmin(np.abs(places[left] - here).max(axis=1)))
+        path.append(left.pop(nearest))
+        here = places[path[-1]]
+    return np.array(path)
+
+
+def _positions(arm, joints, directions, point) -> np.ndarray:
+    return arm.pose(joints @ arm.robot.joint_map.T, directions, "base", point).position_mm
+
+
+def _outside(arm: Calibration, joints: np.ndarray, label: list[str]) -> list[Problem]:
+    robot = arm.robot
+    problems = []
+    for joint in range(joints.shape[1]):
+        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
+        bad = (joints[:, joint] < low - 1e-9) | (joints[:, joint] > high + 1e-9)
+        problems += _said(bad, label, f"joint {joint + 1} outside the limits of {robot.name}")
+    if isinstance(arm.model, VECModel):
+        outside = arm.outside_range(joints @ robot.joint_map.T)
+        for joint in np.flatnonzero(outside.any(axis=0)):
+            words = f"joint {joint + 1} outside the range the data cover: no prediction"
+            problems += _said(outside[:, joint], label, words)
+    return problems
+
+
+def _said(bad: np.ndarray, label: list[str], words: str) -> list[Problem]:
+    rows = np.flatnonzero(bad)
+    if not rows.size:
+        return []
+    shown = ", ".join(label[i] for i in rows[:5])
+    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
+    return [Problem(f"candidates {shown}{more}", words)]

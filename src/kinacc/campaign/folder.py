@@ -1,0 +1,81 @@
+"""A campaign's folder: started once, opened, written to under its lock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from kinacc.campaign import journal, plan, state
+from kinacc.campaign.plan import Plan
+from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import LEAVE_OUT, READINGS, State
+from kinacc.errors import InputError, Problem
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A campaign as read: its folder, plan, journal and the digest both hang on."""
+
+    folder: Path
+    plan: Plan
+    journal: journal.Journal
+    digest: str
+
+    def state(self, watch=None) -> State:
+        """Where it stands; ``watch`` as in ``kinacc.campaign.state.restore``."""
+        return state.restore(self.plan, self.journal.entries, watch)
+
+    def write(self, entry: Mapping) -> None:
+        """Append an entry, with the time; on disk when this returns. Only while ``writing``."""
+        stamped = {**entry, "at": datetime.now(UTC).isoformat(timespec="seconds")}
+        journal.append(self.folder / journal.JOURNAL, self.journal, stamped)
+
+
+def start(folder: Path | str, begun: Plan) -> None:
+    """Put a new campaign on disk. Raises InputError where the folder holds one already."""
+    folder = Path(folder)
+    for name in (journal.PLAN, journal.JOURNAL):
+        if (folder / name).exists():
+            what = "a campaign is there already"
+            raise InputError(Problem(str(folder / name), what, "a new folder"))
+    folder.mkdir(parents=True, exist_ok=True)
+    journal.create(folder / journal.PLAN, plan.to_json(begun))
+
+
+def open_(folder: Path | str) -> Opened:
+    """Read a campaign. Raises InputError where there is none, or it was damaged."""
+    folder = Path(folder)
+    path = folder / journal.PLAN
+    if not path.is_file():
+        fix = "begin one: kinacc campaign start"
+        raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
+    text = path.read_bytes()
+    digest = plan.digest(text)
+    return Opened(
+        folder,
+        plan.from_json(text, str(path)),
+        journal.read(folder / journal.JOURNAL, digest),
+        digest,
+    )
+
+
+@contextmanager
+def writing(folder: Path | str) -> Iterator[Opened]:
+    """The campaign, held for this writer alone."""
+    open_(folder)  # no lock file where there is no campaign
+    with journal.writing(Path(folder)):
+        yield open_(folder)
+
+
+def readings_entry(readings: Sequence[Reading], file: str | None = None) -> dict:
+    """The entry of readings that are taken together; ``file`` is the digest of their file."""
+    entry = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
+    return entry if file is None else {**entry, "file": file}
+
+
+def leave_out_entry(point: int, reason: str) -> dict:
+    """The entry of a point that cannot be measured."""
+    return {"kind": LEAVE_OUT, "point": point, "reason": reason}

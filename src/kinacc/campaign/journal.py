@@ -1,0 +1,134 @@
+"""The journal of a campaign: one line per event, appended, flushed to disk, chained by hashes.
+
+A line that was confirmed is on disk. A last line that was cut off, because the process or the
+machine died while writing it, was never confirmed and is left out; the next line takes its place.
+Each line carries a hash of itself and the line before, the first of the plan: a file that was
+edited, or belongs to another plan, is noticed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from kinacc.errors import InputError, Problem
+
+PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
+_PATIENCE_S = 5.0
+_HASH = 16
+
+
+@dataclass(frozen=True)
+class Journal:
+    """What a journal holds: its entries, the hash of its last line, and where that line ends.
+
+    ``cut_off``: bytes after it, of a line that was not written to its end.
+    """
+
+    entries: tuple[Mapping, ...]
+    last: str
+    end: int
+    cut_off: int
+
+
+def read(path: Path, seed: str) -> Journal:
+    """The journal at ``path``, empty where there is no file; ``seed`` is the digest of the plan.
+
+    Raises InputError where a line does not follow from the one before.
+    """
+    content = path.read_bytes() if path.exists() else b""
+    entries, last, end = [], seed, 0
+    whole = content.split(b"\n")[:-1]
+    for number, line in enumerate(whole, start=1):
+        try:
+            parsed = json.loads(line)
+            entry, chain = parsed["entry"], parsed["chain"]
+        except (ValueError, KeyError, TypeError):
+            if number == len(whole) and b"\0" in line:
+                break  # a machine that lost power may leave zeros where nothing was written yet
+            raise _damaged(path, number, "cannot be read") from None
+        if chain != _chained(last, entry):
+            raise _damaged(path, number, "was changed, or belongs to another campaign") from None
+        entries.append(entry)
+        last, end = chain, end + len(line) + 1
+    return Journal(tuple(entries), last, end, len(content) - end)
+
+
+def append(path: Path, known: Journal, entry: Mapping) -> None:
+    """Add an entry; when this returns, it is on disk. The caller holds the lock."""
+    chain = _chained(known.last, entry)
+    line = json.dumps({"chain": chain, "entry": entry}, sort_keys=True).encode() + b"\n"
+    fresh = not path.exists()
+    with open(path, "ab") as file:
+        if known.cut_off:
+            file.truncate(known.end)
+        file.write(line)
+        file.flush()
+        os.fsync(file.fileno())
+    if fresh:
+        _sync_folder(path.parent)
+
+
+def create(path: Path, content: bytes) -> None:
+    """Write a new file so that it appears whole and on disk, or not at all."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        with open(part, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+        _sync_folder(path.parent)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing(
+    folder: Path, patience_s: float = _PATIENCE_S, sleep: Callable[[float], None] = time.sleep
+) -> Iterator[None]:
+    """Hold the campaign for one writer; the system lets go of it when the process ends.
+
+    Raises InputError where another holds it for longer than ``patience_s``.
+    """
+    import fcntl
+
+    with open(folder / LOCK, "a+") as file:
+        waited = 0.0
+        while True:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except OSError:
+                if waited >= patience_s:
+                    what = "another process is writing to this campaign"
+                    raise InputError(
+                        Problem(str(folder), what, fix="wait until it is done, then try again")
+                    ) from None
+                sleep(0.05)
+                waited += 0.05
+        yield
+
+
+def _chained(before: str, entry: Mapping) -> str:
+    text = before + json.dumps(entry, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:_HASH]
+
+
+def _damaged(path: Path, number: int, what: str) -> InputError:
+    fix = "nothing was done; bring the file back from a copy"
+    return InputError(Problem(f"{path}, line {number}", what, fix=fix))
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,210 @@
+"""What a campaign fixes before its first reading: points and their order, assessor, instruments."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.registry import ADAPTIVE
+from kinacc.campaign.instrument import Instrument
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Points:
+    """The m candidates: reported joints (m, k) rad (mm where a joint slides) and travel (m, k).
+
+    ``modelled_mm`` (m, 3): position in the robot's base as the calibration predicts it;
+    ``slope`` (m, 3, k): its derivative by the reported joints. ``label``: names for people.
+    """
+
+    label: tuple[str, ...]
+    joints: np.ndarray
+    directions: np.ndarray | None
+    modelled_mm: np.ndarray
+    slope: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.label)
+
+    def number(self, label: str) -> int | None:
+        """The point of a name; None where there is none."""
+        return self.label.index(label) if label in self.label else None
+
+    def position_mm(self, point: int, joints: np.ndarray | None) -> np.ndarray:
+        """Modelled position (3,) at the joints reported on the spot, near those of the point."""
+        if joints is None:
+            return self.modelled_mm[point]
+        return self.modelled_mm[point] + self.slope[point] @ (joints - self.joints[point])
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a reading must keep to be taken, and what the campaign is for (None: not stated)."""
+
+    joint_rad: float
+    implausible_mm: float
+    tolerance_mm: float | None = None
+    width_mm: float | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A campaign before any reading.
+
+    ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
+    in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
+    ``slides`` (k,) marks joints that slide. ``about`` names robot, calibration, model and point.
+    """
+
+    points: Points
+    order: np.ndarray
+    route: np.ndarray
+    assessor: AdaptiveAssessor
+    instruments: tuple[Instrument, ...]
+    to_base: Pose
+    slides: tuple[bool, ...]
+    limits: Limits
+    seed: int
+    about: Mapping[str, str]
+
+    def instrument(self, name: str | None) -> Instrument:
+        """An instrument by name, the first where none is named. InputError for another name."""
+        if name is None:
+            return self.instruments[0]
+        found = {each.name: each for each in self.instruments}
+        if name not in found:
+            raise InputError(Problem("instrument", f"{name!r} is not there", ", ".join(found)))
+        return found[name]
+
+    def visiting(self, left_out: frozenset[int]) -> np.ndarray:
+        """Points in the order in which the assessor numbers them, without those left out.
+
+        The points of the first visit are the first of the random order; among themselves they come
+        as the route has them, for all of them are visited before anything is decided.
+        """
+        order = np.array([point for point in self.order if point not in left_out], dtype=int)
+        first = fixed_visit(self.assessor, self.candidates(order))
+        place = np.full(len(self.points), len(self.points))
+        place[self.route] = np.arange(len(self.route))
+        head = order[:first]
+        return np.concatenate([head[np.argsort(place[head], kind="stable")], order[first:]])
+
+    def candidates(self, rows: np.ndarray) -> Candidates:
+        """The candidates in the order of ``rows``, with the noise of the first instrument."""
+        covariance = self.instruments[0].in_base(self.to_base.rotation)
+        return Candidates(np.tile(covariance, (len(rows), 1, 1)), q_rad=self.points.joints[rows])
+
+
+def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:
+    """Number of points that are visited whatever is read: rows 0, 1, .. in order."""
+    begun = assessor.begin(candidates)
+    return int(getattr(begun, "first", getattr(begun, "points", 0)))
+
+
+def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
+    """An assessor by name with its settings. Raises InputError for unknown names and settings."""
+    if name not in ADAPTIVE:
+        raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
+    known = {field.name: field for field in fields(ADAPTIVE[name])}
+    problems = [
+        Problem(f"setting {each} of {name}", "is not there", ", ".join(known))
+        for each in settings
+        if each not in known
+    ]
+    if problems:
+        raise InputError(problems)
+    return ADAPTIVE[name](**settings)
+
+
+def to_json(plan: Plan) -> bytes:
+    """The plan as text; ``from_json`` gives back equal numbers."""
+    points = [
+        {
+            "label": plan.points.label[i],
+            "joints": plan.points.joints[i].tolist(),
+            "directions": None
+            if plan.points.directions is None
+            else plan.points.directions[i].tolist(),
+            "modelled_mm": plan.points.modelled_mm[i].tolist(),
+            "slope": plan.points.slope[i].tolist(),
+        }
+        for i in range(len(plan.points))
+    ]
+    content = {
+        "format": FORMAT,
+        "about": dict(plan.about),
+        "assessor": {"name": plan.assessor.name, "settings": asdict(plan.assessor)},
+        "instruments": [
+            {
+                "name": each.name,
+                "frame": each.frame,
+                "covariance_mm2": each.covariance_mm2.tolist(),
+            }
+            for each in plan.instruments
+        ],
+        "to_base": {
+            "rotation": plan.to_base.rotation.tolist(),
+            "position_mm": plan.to_base.position_mm.tolist(),
+        },
+        "slides": list(plan.slides),
+        "limits": asdict(plan.limits),
+        "seed": plan.seed,
+        "order": plan.order.tolist(),
+        "route": plan.route.tolist(),
+    }
+    lines = [json.dumps({key: content[key]})[1:-1] for key in content]
+    rows = ",\n  ".join(json.dumps(each) for each in points)
+    return ("{" + ",\n ".join(lines) + ',\n "points": [\n  ' + rows + "]}\n").encode()
+
+
+def from_json(text: bytes, where: str) -> Plan:
+    """The plan written by ``to_json``. Raises InputError where it cannot be read."""
+    try:
+        content = json.loads(text)
+        if content["format"] != FORMAT:
+            what = f"format {content['format']!r}"
+            raise InputError(Problem(where, what, f"format {FORMAT}", "use a later kinacc"))
+        return _plan(content)
+    except (ValueError, KeyError, TypeError) as error:
+        what = f"is no campaign: {type(error).__name__}: {error}"
+        raise InputError(Problem(where, what, fix="bring it back from a copy")) from None
+
+
+def _plan(content: Mapping) -> Plan:
+    points = content["points"]
+    directed = points[0]["directions"] is not None
+    return Plan(
+        Points(
+            tuple(each["label"] for each in points),
+            np.array([each["joints"] for each in points]),
+            np.array([each["directions"] for each in points], np.int8) if directed else None,
+            np.array([each["modelled_mm"] for each in points]),
+            np.array([each["slope"] for each in points]),
+        ),
+        np.array(content["order"], dtype=int),
+        np.array(content["route"], dtype=int),
+        assessor_of(content["assessor"]["name"], content["assessor"]["settings"]),
+        tuple(
+            Instrument(each["name"], np.array(each["covariance_mm2"]), each["frame"])
+            for each in content["instruments"]
+        ),
+        Pose(np.array(content["to_base"]["rotation"]), np.array(content["to_base"]["position_mm"])),
+        tuple(content["slides"]),
+        Limits(**content["limits"]),
+        content["seed"],
+        content["about"],
+    )
+
+
+def digest(text: bytes) -> str:
+    """Short content hash of a plan's file."""
+    return hashlib.sha256(text).hexdigest()[:16]

@@ -1,0 +1,103 @@
+"""Where a campaign stands: its plan, and its readings told to the assessor again.
+
+Readings are told in the order in which the assessor asks for them, whatever the order in which
+they were taken. One that it has not asked for yet stays in hand. What it asks never depends on
+readings in hand, so measuring ahead, or importing a whole file, does not bias anything.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kinacc.assess.adaptive import Campaign
+from kinacc.assess.statement import Statement
+from kinacc.campaign.plan import Plan
+from kinacc.campaign.reading import Reading, covariance_mm2, error_mm
+
+READINGS, LEAVE_OUT = "readings", "leave_out"
+
+
+@dataclass(frozen=True)
+class Told:
+    """A reading the assessor was told: its number in the journal (from 1) and its error (3,)."""
+
+    number: int
+    reading: Reading
+    error_mm: np.ndarray
+
+
+@dataclass
+class State:
+    """A campaign with its readings.
+
+    ``rows`` are points in the order in which the assessor numbers them. ``asked`` is the point it
+    wants next, None where it wants none. ``in_hand`` are readings it has not asked for.
+    """
+
+    plan: Plan
+    campaign: Campaign
+    rows: np.ndarray
+    told: list[Told]
+    in_hand: list[Told]
+    asked: int | None
+    left_out: Mapping[int, str]
+    files: frozenset[str] = field(default_factory=frozenset)
+
+    @property
+    def taken(self) -> int:
+        """Number of readings in the journal."""
+        return len(self.told) + len(self.in_hand)
+
+    def statements(self) -> tuple[Statement, ...]:
+        """What may be said now."""
+        return self.campaign.statements()
+
+    def ahead(self) -> list[int]:
+        """Points without a reading that are measured whatever the others read, in order."""
+        first = int(getattr(self.campaign, "first", getattr(self.campaign, "points", 0)))
+        have = {each.reading.point for each in (*self.told, *self.in_hand)}
+        return [int(point) for point in self.rows[:first] if point not in have]
+
+
+def restore(
+    plan: Plan,
+    entries: Iterable[Mapping],
+    watch: Callable[[Campaign, Told], None] | None = None,
+) -> State:
+    """The state after the entries of a journal; ``watch`` sees every reading once it is told."""
+    readings, left_out, files = [], {}, set()
+    for entry in entries:
+        if entry["kind"] == READINGS:
+            readings += [Reading.of_entry(each) for each in entry["readings"]]
+            files |= {entry["file"]} if entry.get("file") else set()
+        elif entry["kind"] == LEAVE_OUT:
+            left_out[int(entry["point"])] = str(entry["reason"])
+    rows = plan.visiting(frozenset(left_out))
+    waiting: dict[int, deque[Told]] = {}
+    for number, each in enumerate(readings, start=1):
+        known = Told(number, each, error_mm(plan, each))
+        waiting.setdefault(each.point, deque()).append(known)
+    campaign = plan.assessor.begin(plan.candidates(rows))
+    told: list[Told] = []
+    asked = None
+    # The assessor is asked before every reading, as it was then: some remember when they were.
+    while (row := campaign.next()) is not None:
+        asked = int(rows[row])
+        if not waiting.get(asked):
+            break
+        known = waiting[asked].popleft()
+        campaign.record(row, known.error_mm, covariance_mm2(plan, known.reading))
+        told.append(known)
+        asked = None
+        if watch is not None:
+            watch(campaign, known)
+    in_hand = sorted((each for queue in waiting.values() for each in queue), key=_number)
+    return State(plan, campaign, rows, told, in_hand, asked, left_out, frozenset(files))
+
+
+def _number(each: Told) -> int:
+    return each.number

@@ -1,0 +1,79 @@
+"""Statements and standing of a campaign, in words."""
+
+from __future__ import annotations
+
+import math
+
+from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.campaign.state import State
+
+CONFORMS, FAILS, OPEN = "conforms", "does not conform", "undecided"
+
+
+def statement(said: Statement, state: State) -> str:
+    """One sentence a person may quote."""
+    about = _about(said, state)
+    if said.withheld and math.isnan(said.upper_mm):
+        seen = ""
+        if not math.isnan(said.value_mm):
+            seen = f"; it is estimated at {said.value_mm:.3f} mm"
+        if not math.isnan(said.lower_mm):
+            seen += f", and at least {said.lower_mm:.3f} mm ({_sure(said)})"
+        return f"No upper bound for {about}: {said.withheld}{seen}."
+    parts = [f"at most {said.upper_mm:.3f} mm"] if not math.isnan(said.upper_mm) else []
+    if not math.isnan(said.lower_mm):
+        parts.append(f"at least {said.lower_mm:.3f} mm")
+    value = f"estimated at {said.value_mm:.3f} mm" if not math.isnan(said.value_mm) else ""
+    if not parts:
+        return f"{about[0].upper()}{about[1:]} is {value}; no bound is stated."
+    each = "each " if len(parts) > 1 else ""
+    text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
+    text += f" ({value})" if value else ""
+    return f"{text}, if {said.assumption}." if said.assumption else f"{text}."
+
+
+def decision(said: Statement, tolerance_mm: float) -> str:
+    """Conformity with a tolerance: decided only where a bound lies on one side of it."""
+    if not math.isnan(said.upper_mm) and said.upper_mm <= tolerance_mm:
+        return CONFORMS
+    if not math.isnan(said.lower_mm) and said.lower_mm > tolerance_mm:
+        return FAILS
+    return OPEN
+
+
+def standing(state: State) -> list[str]:
+    """How far the campaign is, line by line."""
+    budget = state.plan.assessor.measurements
+    visited = len({each.reading.point for each in state.told})
+    points = len(state.plan.points) - len(state.left_out)
+    lines = [
+        f"{state.taken} of {budget} readings taken, at {visited} of {points} points"
+        if not state.in_hand
+        else f"{state.taken} readings taken, {len(state.told)} of {budget} used, at {visited} of "
+        f"{points} points; {len(state.in_hand)} in hand, not asked for yet"
+    ]
+    lines += [
+        f"point {state.plan.points.label[point]} was left out: {reason}"
+        for point, reason in state.left_out.items()
+    ]
+    if state.asked is not None:
+        lines.append(f"measure next: point {state.plan.points.label[state.asked]}")
+    elif len(state.told) >= budget:
+        lines.append("the budget is spent")
+    else:
+        lines.append("no further measurement is wanted")
+    return lines
+
+
+def _about(said: Statement, state: State) -> str:
+    if said.target == MEASURED:
+        visited = len({each.reading.point for each in state.told})
+        return f"the largest error of the {visited} measured points"
+    if said.target == CANDIDATES:
+        points = len(state.plan.points) - len(state.left_out)
+        return f"the largest error of all {points} candidates"
+    return f"the error of {said.share:.1%} of the region"
+
+
+def _sure(said: Statement) -> str:
+    return f"{said.confidence:.0%} confidence"

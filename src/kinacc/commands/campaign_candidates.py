@@ -1,0 +1,93 @@
+"""The candidates of a campaign: rows of a file, or drawn from a region."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.calibrated.record import Calibration
+from kinacc.commands import planned, rows
+from kinacc.commands.choice import CONFIG
+from kinacc.errors import InputError, Problem
+from kinacc.inverse import limits
+from kinacc.planning.candidates import spread
+
+
+@dataclass(frozen=True)
+class Found:
+    """Reported joints (m, k), their names and directions of travel, and where they come from."""
+
+    joints: np.ndarray
+    label: list[str]
+    directions: np.ndarray | None
+    source: str
+
+
+def candidates(given: Mapping, arm: Calibration) -> Found:
+    """The candidates the options ask for. Raises InputError."""
+    if given["candidates"] is not None:
+        file = rows.read(given["candidates"], arm.robot)
+        found = rows.limit_problems(arm.robot, file.joints, file.label, given["candidates"])
+        if found:
+            raise InputError(found, "Candidates outside the robot's limits")
+        label = [str(each) for each in file.label]
+        source = f"rows of {Path(given['candidates']).name}"
+        return Found(file.joints, label, file.directions, source)
+    problems: list[Problem] = []
+    joints = arm.robot.dh.joints
+    box = planned.ranges("--joints-deg", given["joints_deg"], joints, problems)
+    space = planned.ranges("--inside-mm", given["inside_mm"], 3, problems)
+    if problems:
+        raise InputError(problems)
+    slides = arm.robot.dh.prismatic
+    inside, source = None, "drawn evenly from the joint ranges given"
+    if box is not None:
+        box = tuple(np.where(slides, end, np.deg2rad(end)) for end in box)
+    else:
+        box, inside, source = _region(given, arm)
+    if space is not None:
+        inside = planned.inside_box(space)
+        source += ", the tool in the box given"
+    limited = arm.robot.q_min_rad, arm.robot.q_max_rad
+    low, high = limited if given["region"] == "limits" else _covered(arm)
+    if box is not None:
+        low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
+    drawn = spread(arm.robot, given["drawn"], (low, high), inside, arm.point(given["point"]))
+    label = [str(number) for number in range(1, len(drawn) + 1)]
+    return Found(drawn, label, None, source)
+
+
+def _region(given: Mapping, arm: Calibration):
+    """Joint box, test of tool positions and words of the region asked for."""
+    wanted = given["region"]
+    if wanted is None:
+        known = bool(given["config"]) or (given["robot"] is None and Path(CONFIG).is_file())
+        wanted = "configured" if known else "fitted"
+    if wanted == "limits":
+        if arm.choice == "vec":
+            what = "the VEC model says nothing beyond the joints the data cover"
+            raise InputError(Problem("--region limits", what, "fitted"))
+        return None, None, "drawn evenly from the joint limits"
+    if wanted == "fitted":
+        return None, None, "drawn evenly from the joints the calibration covers"
+    settings = planned.settings_of({"dataset": arm.name, "config": given["config"], "robot": None})
+    if settings["inside"] is not None:
+        return settings["box"], settings["inside"], "drawn from the configured evaluation space"
+    if settings["box"] is not None:
+        return settings["box"], None, "drawn evenly from the configured joint box"
+    return None, None, "drawn evenly from the joints the calibration covers"
+
+
+def _covered(arm: Calibration) -> tuple[np.ndarray, np.ndarray]:
+    """Range of the reported joints that the data cover, where a joint is not coupled to others."""
+    robot = arm.robot
+    low, high = robot.q_min_rad.copy(), robot.q_max_rad.copy()
+    if arm.fitted_range_rad is None:
+        return low, high
+    for joint in np.flatnonzero(limits.uncoupled(robot)):
+        ends = [end[joint] / robot.joint_map[joint, joint] for end in arm.fitted_range_rad]
+        low[joint], high[joint] = max(low[joint], min(ends)), min(high[joint], max(ends))
+    return low, high

@@ -1,0 +1,292 @@
+"""What the commands of ``kinacc campaign`` do with their options and how they answer."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+
+import click
+import numpy as np
+
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.assess.statement import Statement
+from kinacc.campaign import begin, folder, instrument, plan, words
+from kinacc.campaign.plan import Limits, Plan
+from kinacc.campaign.state import State
+from kinacc.commands import campaign_candidates, choice, rows
+from kinacc.commands.sheet import Field, Sheet
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import invert
+
+
+def start(given: Mapping) -> None:
+    """Begin a campaign and say what was begun."""
+    problems: list[Problem] = []
+    instruments = _gathered(problems, lambda: _instruments(given), ())
+    assessor = _gathered(problems, lambda: _assessor(given))
+    for name in ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm"):
+        value = given[name]
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            problems.append(Problem(f"--{name.replace('_', '-')}", f"{value:g}", "above 0"))
+    if problems:
+        raise InputError(problems, "The campaign was not begun")
+    arm = choice.calibration_of(
+        given["calibration"], given["model"], given["robot"], given["config"], given["session"]
+    )
+    found = campaign_candidates.candidates(given, arm)
+    points = begin.points_of(arm, found.joints, found.label, found.directions, given["point"])
+    joints_now = np.zeros(arm.robot.dh.joints)
+    if given["from_deg"] is not None:
+        joints_now = rows.of_arguments((given["from_deg"],), "deg", arm.robot, "--from-deg")[0]
+    limits = Limits(
+        math.radians(given["joint_tolerance_deg"]),
+        given["implausible_mm"] or begin.plausible_mm(arm, instruments),
+        given["tolerance_mm"],
+        given["width_mm"],
+    )
+    about = {
+        "robot": arm.robot.name,
+        "calibration": arm.name,
+        "model": arm.choice,
+        "point": given["point"] or arm.default_point,
+        "candidates": found.source,
+    }
+    begun = begin.plan_of(
+        arm, points, assessor, instruments, limits, given["seed"], joints_now, about,
+        by_travel=given["visit"] == "travel",
+    )  # fmt: skip
+    folder.start(given["folder"], begun)
+    merged = len(found.joints) - len(points)
+    _say_begun(given, begun, merged)
+
+
+def _say_begun(given: Mapping, begun: Plan, merged: int) -> None:
+    content = {
+        "folder": str(given["folder"]),
+        **begun.about,
+        "points": len(begun.points),
+        "first_visit": len(begun.route),
+        "assessor": begun.assessor.name,
+        "budget": begun.assessor.measurements,
+        "implausible_mm": begun.limits.implausible_mm,
+        "joint_tolerance_deg": math.degrees(begun.limits.joint_rad),
+    }
+    if given["as_json"]:
+        click.echo(json.dumps(content, indent=1))
+        return
+    named = ", ".join(f"{each.name} ({noise(each)})" for each in begun.instruments)
+    lines = [
+        f"campaign begun in {given['folder']}",
+        f"{len(begun.points)} candidates ({begun.about['candidates']})"
+        + (f"; {merged} rows repeat the joints of others" if merged else ""),
+        f"the {begun.about['point']} of {begun.about['robot']}, {begun.about['model']} model of "
+        f"{begun.about['calibration']}",
+        f"instruments: {named}",
+        f"{begun.assessor.name}: {begun.assessor.measurements} readings, the first at "
+        f"{len(begun.route)} points whatever they say",
+        f"a reading is refused {begin_words(begun)}",
+        f"next: kinacc campaign next {given['folder']}",
+    ]
+    click.echo("\n".join(lines))
+
+
+def begin_words(begun: Plan) -> str:
+    """When a reading is refused."""
+    return (
+        f"more than {math.degrees(begun.limits.joint_rad):g} deg from the joints asked for, or "
+        f"more than {begun.limits.implausible_mm:g} mm from the model"
+    )
+
+
+def noise(each: instrument.Instrument) -> str:
+    """The noise of an instrument in few words."""
+    std = np.sqrt(np.diag(each.covariance_mm2))
+    if np.array_equal(each.covariance_mm2, np.diag(np.diag(each.covariance_mm2))):
+        same = np.all(std == std[0])
+        said = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
+        return f"{said} per axis"
+    return f"{std[0]:.3g}, {std[1]:.3g}, {std[2]:.3g} mm, correlated"
+
+
+def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool) -> None:
+    """Name the next point, or all that are certain."""
+    opened = folder.open_(path)
+    found = opened.state()
+    say_cut_off(opened)
+    if found.asked is None:
+        said = {"point": None, "done": words.standing(found)[-1]}
+        click.echo(json.dumps(said) if as_json else said["done"])
+        return
+    wanted = found.ahead() if every else []
+    wanted = wanted if found.asked in wanted else [found.asked, *wanted]
+    if output is not None or as_json or every:
+        choice.deliver(_visit_sheet(opened.plan, wanted), output, as_json, force)
+        return
+    click.echo(_next_in_words(found))
+
+
+def _next_in_words(found: State) -> str:
+    begun, point = found.plan, found.asked
+    joints = begun.points.joints[point]
+    names, first, second = ["", "", ""], ["", "", ""], []
+    lines = [f"point {begun.points.label[point]}, reading {len(found.told) + 1} of "
+             f"{begun.assessor.measurements}"]  # fmt: skip
+    del names, first, second
+    for joint, value in enumerate(joints):
+        if begun.slides[joint]:
+            shown = f"{value:12.4f} mm"
+        else:
+            shown = f"{math.degrees(value):12.4f} deg  {value:12.7f} rad"
+        arrive = ""
+        if begun.points.directions is not None and begun.points.directions[point, joint]:
+            arrive = "  arriving " + ("up" if begun.points.directions[point, joint] > 0 else "down")
+        lines.append(f"  q{joint + 1} {shown}{arrive}")
+    seen = in_instrument(begun, begun.points.modelled_mm[[point]])[0]
+    frame = begun.instruments[0].frame
+    x, y, z = seen if frame == instrument.INSTRUMENT else begun.points.modelled_mm[point]
+    lines.append(f"expected at {x:.3f}, {y:.3f}, {z:.3f} mm in the {frame} frame")
+    again = sum(each.reading.point == point for each in found.told)
+    if again:
+        lines.append(f"read {again} times before: leave the pose and come back to it")
+    return "\n".join(lines)
+
+
+def _visit_sheet(begun: Plan, points: list[int]) -> Sheet:
+    joints = begun.points.joints[points]
+    seen = in_instrument(begun, begun.points.modelled_mm[points])
+    label = np.array([begun.points.label[each] for each in points], dtype=object)
+    fields = [Field("pose", label, "", "name of the point among the candidates")]
+    for joint, slides in enumerate(begun.slides):
+        name = f"q{joint + 1}"
+        if slides:
+            fields.append(Field(f"{name}_mm", joints[:, joint], "mm", f"joint {joint + 1}"))
+        else:
+            degrees = np.rad2deg(joints[:, joint])
+            fields.append(Field(f"{name}_deg", degrees, "deg", f"joint {joint + 1}"))
+    fields += [
+        Field(f"q{joint + 1}_rad", joints[:, joint], "rad", f"joint {joint + 1}", False)
+        for joint, slides in enumerate(begun.slides)
+        if not slides
+    ]
+    if begun.points.directions is not None:
+        fields += [
+            Field(f"s{joint + 1}", begun.points.directions[points, joint], "1", "travel", False)
+            for joint in range(joints.shape[1])
+        ]
+    fields += [
+        Field(f"expected_{axis}_mm", seen[:, i], "mm", "modelled, in the instrument's frame")
+        for i, axis in enumerate("xyz")
+    ]
+    return Sheet("", dict(begun.about), fields)
+
+
+def in_instrument(begun: Plan, position_mm: np.ndarray) -> np.ndarray:
+    """Positions (n, 3) of the robot's base in the instrument's frame."""
+    back = invert(begun.to_base)
+    return position_mm @ back.rotation.T + back.position_mm
+
+
+def status(path: str, as_json: bool) -> None:
+    """Say where the campaign stands."""
+    opened = folder.open_(path)
+    found = opened.state()
+    if as_json:
+        click.echo(json.dumps(as_facts(found), indent=1))
+        return
+    say_cut_off(opened)
+    lines = words.standing(found)
+    lines += [words.statement(said, found) for said in found.statements()]
+    tolerance = opened.plan.limits.tolerance_mm
+    if tolerance is not None:
+        lines += [
+            f"tolerance {tolerance:g} mm, {said.target}: {words.decision(said, tolerance)}"
+            for said in found.statements()
+        ]
+    click.echo("\n".join(lines))
+
+
+def as_facts(found: State) -> dict[str, object]:
+    """The standing of a campaign for a machine."""
+    label = found.plan.points.label
+    tolerance = found.plan.limits.tolerance_mm
+    return {
+        **found.plan.about,
+        "assessor": found.plan.assessor.name,
+        "budget": found.plan.assessor.measurements,
+        "readings": found.taken,
+        "readings_used": len(found.told),
+        "points": len(label) - len(found.left_out),
+        "points_measured": len({each.reading.point for each in found.told}),
+        "left_out": {label[point]: reason for point, reason in found.left_out.items()},
+        "next": None if found.asked is None else label[found.asked],
+        "statements": [statement_facts(said, found, tolerance) for said in found.statements()],
+    }
+
+
+def statement_facts(said: Statement, found: State, tolerance: float | None) -> dict[str, object]:
+    """A statement for a machine; null for what is not said."""
+
+    def plain(value: float) -> float | None:
+        return None if math.isnan(value) else value
+
+    facts = {
+        "target": said.target,
+        "value_mm": plain(said.value_mm),
+        "lower_mm": plain(said.lower_mm),
+        "upper_mm": plain(said.upper_mm),
+        "confidence": plain(said.confidence),
+        "share": said.share,
+        "assumption": said.assumption or None,
+        "withheld": said.withheld or None,
+        "in_words": words.statement(said, found),
+    }
+    if tolerance is not None:
+        facts |= {"tolerance_mm": tolerance, "decision": words.decision(said, tolerance)}
+    return facts
+
+
+def say_cut_off(opened: folder.Opened) -> None:
+    """Tell of a last line that was not written to its end, on the error stream."""
+    if opened.journal.cut_off:
+        click.echo(
+            "the last entry was cut off while it was written and never confirmed; it is left out: "
+            "look whether the last reading has to be recorded again",
+            err=True,
+        )
+
+
+def _instruments(given: Mapping) -> tuple[instrument.Instrument, ...]:
+    texts = list(given["instrument"])
+    for option in ("noise_mm", "covariance_mm2"):
+        if given[option] is not None:
+            texts.insert(0, f"instrument={given[option]}")
+    if not texts:
+        allowed = "--noise-mm, --covariance-mm2 or --instrument NAME=.."
+        raise InputError(Problem("noise", "is not given", allowed))
+    return instrument.instruments(texts, given["frame"])
+
+
+def _assessor(given: Mapping) -> object:
+    settings: dict[str, object] = {
+        "measurements": given["budget"],
+        "confidence": given["confidence"],
+    }
+    for text in given["settings"]:
+        name, mark, value = text.partition("=")
+        if not mark:
+            raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
+        try:
+            settings[name.strip()] = json.loads(value)
+        except ValueError:
+            settings[name.strip()] = value.strip()
+    return plan.assessor_of(given["assessor"] or RECOMMENDED, settings)
+
+
+def _gathered(problems: list[Problem], make, otherwise=None):
+    """What ``make`` makes; its problems join the others."""
+    try:
+        return make()
+    except InputError as error:
+        problems += error.problems
+        return otherwise

@@ -1,0 +1,66 @@
+"""A campaign on a shipped arm whose true errors are known, and readings of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc import robot as robots
+from kinacc.assess import drawn_world
+from kinacc.assess.streams import key_of
+from kinacc.calibrated.record import nominal
+from kinacc.campaign import begin
+from kinacc.campaign.instrument import instruments
+from kinacc.campaign.plan import Limits, Plan, assessor_of
+from kinacc.planning.candidates import spread
+
+SIGMA_MM = 0.05
+
+
+@pytest.fixture(scope="session")
+def arm():
+    return nominal(robots.load("mh180"))
+
+
+@pytest.fixture(scope="session")
+def make_plan(arm):
+    """A plan of a campaign over ``points`` candidates."""
+
+    def make(
+        assessor="search_and_confirm", points=40, budget=40, texts=("tracker=0.05",), frame="base",
+        seed=3, limits=None, **settings,
+    ) -> Plan:  # fmt: skip
+        joints = spread(arm.robot, points)
+        found = begin.points_of(arm, joints, [f"p{i}" for i in range(points)])
+        chosen = assessor_of(assessor, {"measurements": budget, **settings})
+        used = instruments(texts, frame)
+        limits = limits or Limits(np.deg2rad(0.02), 10.0)
+        about = {"robot": "mh180", "calibration": "none", "model": "nominal", "point": "tool",
+                 "candidates": "drawn"}  # fmt: skip
+        return begin.plan_of(arm, found, chosen, used, limits, seed, np.zeros(6), about)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def errors_mm():
+    """True errors (m, 3) of the candidates, a smooth field with one large error."""
+
+    def make(points: int) -> np.ndarray:
+        errors = np.random.default_rng(11).normal(size=(points, 3)) * 0.2
+        errors[7] = (0.9, -0.6, 0.5)
+        return errors
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def make_world(errors_mm):
+    """All readings one campaign could take, rows as the assessor numbers them."""
+
+    def make(plan: Plan, left_out=frozenset(), seed=5, sigma_mm=SIGMA_MM):
+        order = plan.visiting(left_out)
+        errors = errors_mm(len(plan.points))
+        return drawn_world(errors[order], sigma_mm, key_of(seed), 400)
+
+    return make

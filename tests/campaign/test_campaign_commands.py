@@ -1,0 +1,359 @@
+"""``kinacc campaign`` as a person uses it: a whole campaign, files, instruments, mistakes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kinacc.assess import drawn_world
+from kinacc.assess.adaptive import conduct
+from kinacc.assess.streams import key_of
+from kinacc.campaign import folder as campaigns
+from kinacc.cli import main
+
+SIGMA_MM = 0.05
+COMMANDS = ("start", "next", "record", "leave-out", "status")
+
+
+def call(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    """Results of a small synthetic study, made by the workflow's own stages."""
+    base = tmp_path_factory.mktemp("study")
+    config = base / "small.yaml"
+    config.write_text(
+        "datasets: {mh180: {robot: mh180}}\nmeasurements: {folds: 2, synthetic: {poses: 80}}\n"
+        "calibration: {vec: {order: 1}}\n"
+    )
+    for stage in ("measurements", "vec", "dh", "residuals"):
+        done = call("run", stage, "--config", config, "--results", base / "results")
+        assert done.exit_code == 0, done.output
+    return base / "results" / "mh180"
+
+
+@pytest.fixture
+def begun(calibration, tmp_path):
+    """Start a campaign with further options; its folder."""
+
+    def start(*more, points=20, budget=20):
+        folder = tmp_path / f"campaign {len(list(tmp_path.iterdir()))}"
+        done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+                    "--model", "dh", "--drawn", points, "--budget", budget, *more)  # fmt: skip
+        assert done.exit_code == 0, done.output
+        return folder
+
+    return start
+
+
+class Arm:
+    """The arm at the campaign: its errors are known here, and its readings are those of a world."""
+
+    def __init__(self, folder, sigma_mm=SIGMA_MM):
+        self.plan = campaigns.open_(folder).plan
+        rows = self.plan.visiting(frozenset())
+        errors = np.random.default_rng(11).normal(size=(len(rows), 3)) * 0.2
+        errors[5] = (0.9, -0.6, 0.5)
+        self.world = drawn_world(errors[rows], sigma_mm, key_of(5), 200)
+        self.row = {int(point): row for row, point in enumerate(rows)}
+        self.reads = np.zeros(len(rows), dtype=int)
+
+    def position(self, label):
+        """What the instrument reads next at a point, as text."""
+        point = self.plan.points.number(label)
+        row = self.row[point]
+        seen = self.plan.points.modelled_mm[point] + self.world.reading_mm(row, self.reads[row])
+        self.reads[row] += 1
+        return ",".join(repr(float(each)) for each in seen)
+
+
+def files_of(folder):
+    """Everything in a campaign's folder but the empty lock."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
+
+
+def refused(folder, *words):
+    """The message of a command that must fail and leave the campaign as it was."""
+    before = files_of(folder)
+    done = call("campaign", *words)
+    assert done.exit_code == 2, done.output
+    assert "Traceback" not in done.output
+    assert files_of(folder) == before
+    return done.output
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_an_example(name):
+    shown = call("campaign", name, "--help")
+    assert shown.exit_code == 0
+    assert f"kinacc campaign {name} " in shown.output.split("Example:")[1]
+
+
+def test_a_whole_campaign_ends_as_in_memory(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    asked = []
+    while point := json.loads(call("campaign", "status", folder, "--json").output)["next"]:
+        asked.append(point)
+        done = call("campaign", "record", folder, "--point", point,
+                    "--position-mm", arm.position(point))  # fmt: skip
+        assert done.exit_code == 0, done.output
+    assert len(asked) == 20
+    said = json.loads(call("campaign", "status", folder, "--json").output)
+    wanted = conduct(arm.plan.assessor, arm.world).statements()
+    assert [each["target"] for each in said["statements"]] == [each.target for each in wanted]
+    for mine, theirs in zip(said["statements"], wanted, strict=True):
+        assert mine["withheld"] == (theirs.withheld or None)
+        for name in ("value_mm", "lower_mm", "upper_mm"):
+            given = np.nan if mine[name] is None else mine[name]
+            np.testing.assert_allclose(given, getattr(theirs, name), atol=1e-9)
+    assert "the budget is spent" in call("campaign", "status", folder).output
+    assert call("campaign", "next", folder).output.strip() == "the budget is spent"
+    assert "the budget is spent" in refused(folder, "record", folder, "--position-mm", "1,2,3")
+
+
+def test_next_names_joints_with_units_and_writes_nothing(begun):
+    folder = begun("--noise-mm", SIGMA_MM)
+    before = files_of(folder)
+    shown = call("campaign", "next", folder).output
+    plan = campaigns.open_(folder).plan
+    joints = plan.points.joints[plan.route[0]]
+    for joint, value in enumerate(joints):
+        line = next(line for line in shown.splitlines() if f"q{joint + 1} " in line)
+        assert f"{np.rad2deg(value):.4f} deg" in line
+        assert f"{value:.7f} rad" in line
+    assert files_of(folder) == before
+
+
+def test_the_rest_of_the_first_visit_can_be_written_for_a_robot_program(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM)
+    output = tmp_path / "visit.csv"
+    assert call("campaign", "next", folder, "--all", "-o", output).exit_code == 0
+    lines = output.read_text().splitlines()
+    plan = campaigns.open_(folder).plan
+    assert [line.split(",")[0] for line in lines[1:]] == [plan.points.label[p] for p in plan.route]
+
+
+def test_a_file_of_readings_is_taken_whole(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    names = [arm.plan.points.label[point] for point in arm.plan.route]
+    file = tmp_path / "readings.csv"
+    rows = "".join(f"{name},{arm.position(name)}\n" for name in names)
+    file.write_text("pose,x_mm,y_mm,z_mm\n" + rows)
+    done = call("campaign", "record", folder, file)
+    assert done.exit_code == 0, done.output
+    assert f"recorded: {len(names)} readings" in done.output
+    said = json.loads(call("campaign", "status", folder, "--json").output)
+    assert said["readings_used"] == len(names)
+    assert said["statements"][0]["upper_mm"] is not None
+    assert "was recorded before" in refused(folder, "record", folder, file)
+
+
+def test_a_file_with_bad_rows_is_refused_whole_with_all_of_them_named(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    a, b, c = (arm.plan.points.label[point] for point in arm.plan.route[:3])
+    file = tmp_path / "readings.csv"
+    file.write_text(
+        f"pose,x_mm,y_mm,z_mm,instrument\n{a},{arm.position(a)},\n{b},nan,1,2,\n{c},1,2,3,\n"
+        f"elsewhere,1,2,3,\n{b},{arm.position(b)},sextant\n"
+    )
+    said = refused(folder, "record", folder, file)
+    for words in ("line 3: measured position (nan", "line 4: ", "from where the model has",
+                  "line 5: 'elsewhere' is no candidate", "'sextant' is not there"):  # fmt: skip
+        assert words in said
+    done = call("campaign", "record", folder, file, "--skip-bad")
+    assert done.exit_code == 0, done.output
+    assert "recorded: 1 readings" in done.output
+    assert done.output.count("not taken") == 4
+
+
+def test_rows_of_a_file_find_their_points_by_their_joints(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    point = int(arm.plan.route[0])
+    joints = np.rad2deg(arm.plan.points.joints[point]) + 0.005
+    file = tmp_path / "readings.csv"
+    head = ",".join([*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])
+    cells = ",".join(f"{each:.6f}" for each in joints)
+    file.write_text(f"{head}\n{cells},{arm.position(arm.plan.points.label[point])}\n")
+    assert call("campaign", "record", folder, file).exit_code == 0
+    (told,) = campaigns.open_(folder).state().told
+    assert told.reading.point == point
+
+
+def test_a_reading_at_slightly_other_joints_is_held_to_the_model_there(begun, calibration):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", "--joint-tolerance-deg", "0.05")
+    plan = campaigns.open_(folder).plan
+    point = int(plan.route[0])
+    joints = plan.points.joints[point] + np.deg2rad([0.03, -0.02, 0.04, 0.01, -0.05, 0.02]) * 0.99
+    from kinacc.commands import choice
+
+    arm = choice.calibration_of(calibration, "dh", "mh180", ())
+    there = arm.pose(joints[None] @ arm.robot.joint_map.T).position_mm[0]
+    assert np.linalg.norm(there - plan.points.modelled_mm[point]) > 0.5
+    done = call("campaign", "record", folder,
+                "--joints-rad", ",".join(map(repr, joints.tolist())),
+                "--position-mm", ",".join(map(repr, there.tolist())))  # fmt: skip
+    assert done.exit_code == 0, done.output
+    (told,) = campaigns.open_(folder).state().told
+    assert np.linalg.norm(told.error_mm) < 2e-3
+
+
+def test_readings_in_the_instruments_frame_say_the_same(begun, calibration):
+    folder = begun("--noise-mm", SIGMA_MM)
+    from kinacc.commands import choice
+
+    plan = campaigns.open_(folder).plan
+    arm = choice.calibration_of(calibration, "dh", "mh180", ())
+    point = int(plan.route[0])
+    dh_joints = plan.points.joints[[point]] @ arm.robot.joint_map.T
+    seen = arm.pose(dh_joints, None, "instrument").position_mm[0] + (0.1, 0.2, -0.2)
+    call("campaign", "record", folder, "--position-mm", ",".join(map(repr, seen.tolist())))
+    (told,) = campaigns.open_(folder).state().told
+    assert np.linalg.norm(told.error_mm) == pytest.approx(0.3, abs=1e-9)
+
+
+def test_the_wrong_pose_is_refused_by_joints_and_by_position(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    first, second = (int(point) for point in arm.plan.route[:2])
+    position = arm.position(arm.plan.points.label[first])
+    joints = ",".join(map(repr, arm.plan.points.joints[second].tolist()))
+    said = refused(folder, "record", folder, "--joints-rad", joints, "--position-mm", position)
+    assert f"is not that of point {arm.plan.points.label[first]}" in said
+    assert f"these are the joints of point {arm.plan.points.label[second]}" in said
+    position = arm.position(arm.plan.points.label[second])
+    said = refused(folder, "record", folder, "--position-mm", position)
+    assert "give --accept-implausible" in said
+    done = call("campaign", "record", folder, "--position-mm", position, "--accept-implausible")
+    assert done.exit_code == 0
+
+
+def test_a_point_is_left_out_only_before_it_is_read(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    first, second = (arm.plan.points.label[point] for point in arm.plan.route[:2])
+    call("campaign", "record", folder, "--position-mm", arm.position(first))
+    assert "could hide a large error" in refused(
+        folder, "leave-out", folder, first, "--reason", "hidden"
+    )
+    done = call("campaign", "leave-out", folder, second, "--reason", "hidden")
+    assert done.exit_code == 0, done.output
+    said = json.loads(call("campaign", "status", folder, "--json").output)
+    assert said["left_out"] == {second: "hidden"}
+    assert said["points"] == 19
+    assert said["next"] not in (first, second)
+    refused(folder, "record", folder, "--point", second, "--position-mm", arm.position(second))
+
+
+def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    first, second = (arm.plan.points.label[point] for point in arm.plan.route[:2])
+    call("campaign", "record", folder, "--position-mm", arm.position(first))
+    journal = folder / "readings.jsonl"
+    whole = journal.read_bytes()
+    call("campaign", "record", folder, "--position-mm", arm.position(second))
+    journal.write_bytes(journal.read_bytes()[:-9])
+    shown = call("campaign", "status", folder)
+    assert "was cut off" in shown.output
+    assert "1 of 20 readings taken" in shown.output
+    arm.reads[arm.row[arm.plan.points.number(second)]] = 0
+    done = call("campaign", "record", folder, "--position-mm", arm.position(second))
+    assert done.exit_code == 0
+    assert journal.read_bytes().startswith(whole)
+    assert "cut off" not in call("campaign", "status", folder).output
+    assert len(campaigns.open_(folder).state().told) == 2
+
+
+@pytest.mark.parametrize(
+    ("noise", "words"),
+    [
+        (("--noise-mm", "0"), "no instrument is without noise"),
+        (("--noise-mm", "-0.1"), "no instrument is without noise"),
+        (("--noise-mm", "nan"), "no instrument is without noise"),
+        (("--covariance-mm2", "1,2,3,4,5,6,7,8,9"), "not symmetric"),
+        (("--covariance-mm2", "1,1,0,1,1,0,0,0,1"), "not positive definite"),
+        (("--covariance-mm2", "1,0,0,0,1,0,0,0,-1"), "not positive definite"),
+        (("--instrument", "a=0.1,0.2"), "1 standard deviation, 3"),
+        (("--instrument", "a=0.1", "--instrument", "a=0.2"), "is given twice"),
+        ((), "--noise-mm, --covariance-mm2 or --instrument"),
+        (("--noise-mm", "0.1", "--budget", "0"), "at least 1"),
+        (("--noise-mm", "0.1", "--assessor", "two_stage", "--budget", "4"), "do not cover"),
+        (("--noise-mm", "0.1", "--assessor", "guess"), "search_and_confirm"),
+        (("--noise-mm", "0.1", "--set", "repeats=3"), "setting repeats"),
+        (("--noise-mm", "0.1", "--confidence", "2"), "at least 0.5 and below 1"),
+        (("--noise-mm", "0.1", "--tolerance-mm", "-1"), "--tolerance-mm"),
+        (("--noise-mm", "0.1", "--drawn", "1"), "at least 2 different points"),
+    ],
+)
+def test_what_cannot_be_begun_leaves_no_folder(calibration, tmp_path, noise, words):
+    folder = tmp_path / "campaign"
+    done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+                *noise)  # fmt: skip
+    assert done.exit_code == 2, done.output
+    assert words in done.output
+    assert "Traceback" not in done.output
+    assert not folder.exists()
+
+
+def test_points_that_are_all_equal_are_refused(calibration, tmp_path):
+    file = tmp_path / "points.csv"
+    head = ",".join(f"q{i}_deg" for i in range(1, 7))
+    file.write_text(f"{head}\n" + "0,0,0,0,60,0\n" * 3)
+    done = call("campaign", "start", tmp_path / "c", "--calibration", calibration, "--robot",
+                "mh180", "--noise-mm", "0.1", "--candidates", file)  # fmt: skip
+    assert done.exit_code == 2
+    assert "all 3 are at the same joints" in done.output
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--position-mm", "nan,1,2"), "three numbers, in mm"),
+        (("--position-mm", "inf,1,2"), "three numbers, in mm"),
+        (("--position-mm", "1,2"), "three numbers x,y,z"),
+        (("--position-mm", "a,b,c"), "three numbers x,y,z"),
+        (("--position-mm", "1,2,3", "--point", "none"), "is no candidate"),
+        (("--position-mm", "1,2,3", "--instrument", "none"), "--instrument"),
+        (("--position-mm", "1,2,3", "--joints-deg", "1,2"), "6 numbers"),
+        (("--position-mm", "1,2,3", "--std-mm", "0"), "no instrument is without noise"),
+        ((), "the reading"),
+    ],
+)
+def test_a_bad_reading_leaves_the_campaign_as_it_was(begun, words, said):
+    folder = begun("--noise-mm", SIGMA_MM)
+    assert said in refused(folder, "record", folder, *words)
+
+
+def test_a_second_campaign_does_not_overwrite_the_first(begun, calibration):
+    folder = begun("--noise-mm", SIGMA_MM)
+    said = refused(folder, "start", folder, "--calibration", calibration, "--robot", "mh180",
+                   "--noise-mm", "0.1")  # fmt: skip
+    assert "a campaign is there already" in said
+
+
+def test_a_plan_that_was_edited_is_noticed(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    label = arm.plan.points.label[int(arm.plan.route[0])]
+    call("campaign", "record", folder, "--position-mm", arm.position(label))
+    path = folder / "campaign.json"
+    path.write_text(path.read_text().replace('"seed": 0', '"seed": 1'))
+    assert "belongs to another campaign" in refused(folder, "status", folder)
+
+
+def test_there_is_no_campaign(tmp_path):
+    for name in ("next", "status"):
+        done = call("campaign", name, tmp_path / "nowhere")
+        assert done.exit_code == 2
+        assert "kinacc campaign start" in done.output
+    assert not (tmp_path / "nowhere").exists()

@@ -1,0 +1,141 @@
+"""The journal keeps what it confirmed: through kills, cut-off lines, edits and second writers."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from kinacc.campaign import journal
+from kinacc.errors import InputError
+
+SEED = "0123456789abcdef"
+
+
+def written(path: Path, count: int) -> journal.Journal:
+    for number in range(count):
+        journal.append(path, journal.read(path, SEED), {"kind": "test", "number": number})
+    return journal.read(path, SEED)
+
+
+def test_entries_come_back_in_order(tmp_path):
+    known = written(tmp_path / "j", 5)
+    assert [each["number"] for each in known.entries] == list(range(5))
+    assert known.cut_off == 0
+
+
+def test_a_last_line_cut_anywhere_loses_only_itself(tmp_path):
+    path = tmp_path / "j"
+    written(path, 3)
+    whole = path.read_bytes()
+    end = len(b"\n".join(whole.split(b"\n")[:2])) + 1
+    for size in range(end + 1, len(whole)):
+        path.write_bytes(whole[:size])
+        known = journal.read(path, SEED)
+        assert len(known.entries) == 2
+        assert known.cut_off == size - end
+        journal.append(path, known, {"kind": "test", "number": 2})
+        assert path.read_bytes() == whole
+
+
+def test_zeros_left_by_a_power_cut_are_no_line(tmp_path):
+    path = tmp_path / "j"
+    written(path, 2)
+    whole = path.read_bytes()
+    for tail in (b"\0" * 40, b'{"chain": "\0\0\0\0\0"}\n'):
+        path.write_bytes(whole + tail)
+        known = journal.read(path, SEED)
+        assert len(known.entries) == 2
+        assert known.cut_off == len(tail)
+
+
+@pytest.mark.parametrize("line", [0, 1, 2])
+def test_a_line_that_was_changed_is_noticed(tmp_path, line):
+    path = tmp_path / "j"
+    written(path, 3)
+    lines = path.read_bytes().split(b"\n")
+    lines[line] = lines[line].replace(b'"number": ', b'"number": 1')
+    path.write_bytes(b"\n".join(lines))
+    with pytest.raises(InputError, match=f"line {line + 1}"):
+        journal.read(path, SEED)
+
+
+def test_a_journal_of_another_plan_is_noticed(tmp_path):
+    written(tmp_path / "j", 2)
+    with pytest.raises(InputError, match="line 1: was changed, or belongs to another"):
+        journal.read(tmp_path / "j", "f" * 16)
+
+
+def test_a_missing_line_is_noticed(tmp_path):
+    path = tmp_path / "j"
+    written(path, 3)
+    lines = path.read_bytes().split(b"\n")
+    path.write_bytes(b"\n".join([lines[0], *lines[2:]]))
+    with pytest.raises(InputError, match="line 2"):
+        journal.read(path, SEED)
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from kinacc.campaign import journal
+folder = Path(sys.argv[1])
+number = 0
+while True:
+    with journal.writing(folder):
+        known = journal.read(folder / "j", sys.argv[2])
+        journal.append(folder / "j", known, {"number": len(known.entries), "fill": "x" * 5000})
+    print(len(known.entries), flush=True)
+"""
+
+
+def test_nothing_confirmed_is_lost_when_the_writer_is_killed(tmp_path):
+    for wait in (0.02, 0.05, 0.11):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(tmp_path), SEED], stdout=subprocess.PIPE, text=True
+        )
+        first = writer.stdout.readline()
+        time.sleep(wait)
+        writer.send_signal(signal.SIGKILL)
+        confirmed = [first, *writer.stdout.read().splitlines()]
+        writer.wait()
+        last = max(int(line) for line in confirmed if line.strip())
+        known = journal.read(tmp_path / "j", SEED)
+        assert [each["number"] for each in known.entries][: last + 1] == list(range(last + 1))
+
+
+def test_a_second_writer_waits_and_is_then_refused(tmp_path):
+    slept = []
+    with (
+        journal.writing(tmp_path),
+        pytest.raises(InputError, match="another process is writing"),
+        journal.writing(tmp_path, patience_s=0.2, sleep=slept.append),
+    ):
+        pass
+    assert slept
+    with journal.writing(tmp_path, patience_s=0.0):
+        pass
+
+
+def test_the_lock_goes_with_its_process(tmp_path):
+    code = (
+        "import sys, time\nfrom pathlib import Path\nfrom kinacc.campaign import journal\n"
+        "with journal.writing(Path(sys.argv[1])):\n"
+        "    print('held', flush=True)\n    time.sleep(60)\n"
+    )
+    holder = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    )
+    assert holder.stdout.readline().strip() == "held"
+    with pytest.raises(InputError), journal.writing(tmp_path, patience_s=0.0):
+        pass
+    os.kill(holder.pid, signal.SIGKILL)
+    holder.wait()
+    holder.stdout.close()
+    with journal.writing(tmp_path, patience_s=0.0):
+        pass

@@ -1,0 +1,146 @@
+"""Telling an assessor its readings again: same answers as in memory, whatever order they came in"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc.assess.adaptive import conduct
+from kinacc.assess.registry import ADAPTIVE
+from kinacc.campaign import folder
+from kinacc.campaign.plan import fixed_visit, from_json, to_json
+from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import restore
+
+
+def reading_of(plan, world, state):
+    """What is read next: the world's own next reading of the point that is asked for."""
+    row = int(np.flatnonzero(state.rows == state.asked)[0])
+    visit = sum(each.reading.point == state.asked for each in state.told)
+    position = plan.points.modelled_mm[state.asked] + world.reading_mm(row, visit)
+    return Reading(state.asked, position, plan.instruments[0].name)
+
+
+def entries_of(plan, world):
+    """The journal of a whole campaign, one reading at a time."""
+    entries = []
+    while (state := restore(plan, entries)).asked is not None:
+        entries.append(folder.readings_entry([reading_of(plan, world, state)]))
+    return entries
+
+
+def assert_same(said, wanted):
+    assert [each.target for each in said] == [each.target for each in wanted]
+    for mine, theirs in zip(said, wanted, strict=True):
+        assert mine.withheld == theirs.withheld
+        assert mine.assumption == theirs.assumption
+        for name in ("value_mm", "lower_mm", "upper_mm", "confidence"):
+            np.testing.assert_allclose(getattr(mine, name), getattr(theirs, name), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ADAPTIVE)
+def test_a_campaign_on_disk_ends_as_in_memory(make_plan, make_world, name):
+    plan = make_plan(name)
+    world = make_world(plan)
+    entries = entries_of(plan, world)
+    wanted = conduct(plan.assessor, world)
+    state = restore(from_json(to_json(plan), "here"), entries)
+    assert len(state.told) == wanted.ledger.taken if hasattr(wanted, "ledger") else True
+    assert_same(state.statements(), wanted.statements())
+
+
+@pytest.mark.parametrize("name", ADAPTIVE)
+def test_the_first_visit_takes_the_points_in_row_order_whatever_is_read(make_plan, name):
+    plan = make_plan(name)
+    rows = plan.visiting(frozenset())
+    first = fixed_visit(plan.assessor, plan.candidates(rows))
+    assert first >= 1
+    for scale in (0.0, 0.01, 5.0):
+        campaign = plan.assessor.begin(plan.candidates(rows))
+        draw = np.random.default_rng(1)
+        for row in range(first):
+            assert campaign.next() == row
+            campaign.record(row, scale * draw.normal(size=3))
+
+
+def test_the_route_reorders_the_first_visit_only(make_plan):
+    plan = make_plan(points=60, budget=60)
+    rows, first = plan.visiting(frozenset()), len(plan.route)
+    assert first == 36
+    assert set(rows[:first]) == set(plan.order[:first])
+    np.testing.assert_array_equal(rows[:first], plan.route)
+    np.testing.assert_array_equal(rows[first:], plan.order[first:])
+
+
+def test_the_order_of_the_candidates_knows_the_seed_alone(make_plan):
+    same, other = make_plan(seed=3), make_plan(seed=4)
+    np.testing.assert_array_equal(make_plan(seed=3).order, same.order)
+    assert not np.array_equal(other.order, same.order)
+
+
+def test_readings_taken_ahead_change_nothing(make_plan, make_world):
+    plan = make_plan()
+    world = make_world(plan)
+    entries = entries_of(plan, world)
+    shuffled = [entries[i] for i in np.random.default_rng(0).permutation(len(entries))]
+    # Readings of one point keep their order: they are different readings.
+    for point in range(len(plan.points)):
+        places = [i for i, e in enumerate(shuffled) if e["readings"][0]["point"] == point]
+        own = [e for e in entries if e["readings"][0]["point"] == point]
+        for place, entry in zip(places, own, strict=True):
+            shuffled[place] = entry
+    state, whole = restore(plan, shuffled), restore(plan, entries)
+    assert not state.in_hand
+    assert_same(state.statements(), whole.statements())
+
+
+def test_readings_not_asked_for_stay_in_hand(make_plan, make_world):
+    plan = make_plan()
+    world = make_world(plan)
+    entries = entries_of(plan, world)
+    asked = restore(plan, []).asked
+    others = [e for e in entries if e["readings"][0]["point"] != asked]
+    state = restore(plan, others)
+    assert state.asked == asked
+    assert not state.told
+    assert len(state.in_hand) == len(others)
+    assert state.ahead() == [asked]
+
+
+def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_plan, make_world):
+    plan = make_plan(points=60, budget=60)
+    gone = int(plan.route[4])
+    rows = plan.visiting(frozenset([gone]))
+    first = fixed_visit(plan.assessor, plan.candidates(rows))
+    kept = [point for point in plan.order if point != gone]
+    assert gone not in rows
+    assert set(rows[:first]) == set(kept[:first])
+    np.testing.assert_array_equal(rows[first:], kept[first:])
+    entries = [folder.leave_out_entry(gone, "hidden")]
+    asked = set()
+    world = make_world(plan, frozenset([gone]))
+    while (state := restore(plan, entries)).asked is not None:
+        asked.add(state.asked)
+        entries.append(folder.readings_entry([reading_of(plan, world, state)]))
+    assert gone not in asked
+    assert len(state.told) == 60
+
+
+def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world):
+    plan = make_plan(texts=("tracker=0.05", "camera=0.5"))
+    world = make_world(plan)
+    entries = []
+    for _ in range(24):
+        state = restore(plan, entries)
+        entries.append(folder.readings_entry([reading_of(plan, world, state)]))
+    by_tracker = restore(plan, entries)
+    entries[10]["readings"][0]["instrument"] = "camera"
+    with_camera = restore(plan, entries)
+    place = int(np.flatnonzero(by_tracker.rows == by_tracker.told[10].reading.point)[0])
+    assert by_tracker.campaign.ledger.noise_mm[place] == pytest.approx(0.05)
+    assert with_camera.campaign.ledger.noise_mm[place] == pytest.approx(0.5)
+
+
+def test_a_plan_comes_back_to_the_last_bit(make_plan):
+    plan = make_plan(texts=("a=0.1,0.2,0.3", "b=0.01"), frame="instrument")
+    assert to_json(from_json(to_json(plan), "here")) == to_json(plan)
