@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from kinacc.artifacts import store
+from kinacc.artifacts.conformity import check_file
+from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.assess import drawn_world
 from kinacc.assess.adaptive import conduct
 from kinacc.assess.streams import key_of
 from kinacc.campaign import folder as campaigns
+from kinacc.campaign.reading import Reading
 from kinacc.cli import main
 
 SIGMA_MM = 0.05
-COMMANDS = ("start", "next", "record", "leave-out", "status")
+COMMANDS = ("start", "next", "record", "leave-out", "status", "report")
 
 
 def call(*words):
@@ -357,3 +361,68 @@ def test_there_is_no_campaign(tmp_path):
         assert done.exit_code == 2
         assert "kinacc campaign start" in done.output
     assert not (tmp_path / "nowhere").exists()
+
+
+def recorded(folder, arm, count):
+    """Take the next ``count`` readings through one file per reading of the arm."""
+    for _ in range(count):
+        with campaigns.writing(folder) as opened:
+            state = opened.state()
+            label = arm.plan.points.label[state.asked]
+            seen = [float(each) for each in arm.position(label).split(",")]
+            taken = Reading(state.asked, np.array(seen), arm.plan.instruments[0].name)
+            opened.write(campaigns.readings_entry([taken]))
+
+
+def test_a_report_holds_its_contract_and_says_what_status_says(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", "--tolerance-mm", "2")
+    arm = Arm(folder)
+    assert "no reading was asked for and taken yet" in refused(folder, "report", folder)
+    recorded(folder, arm, 18)
+    call("campaign", "leave-out", folder, next(iter(left_to_visit(folder))), "--reason", "hidden")
+    done = call("campaign", "report", folder)
+    assert done.exit_code == 0, done.output
+    made = folder / "report"
+    for name in ("campaign_points", "campaign_readings", "campaign_bounds"):
+        columns, problems = check_file(made / f"{name}.parquet", ARTEFACTS[name])
+        assert not problems
+        assert len(next(iter(columns.values())))
+    said = json.loads(call("campaign", "status", folder, "--json").output)
+    text = (made / "report.md").read_text()
+    for each in said["statements"]:
+        assert each["in_words"] in text
+    assert "measured points: **conforming**" in text
+    assert "left out: hidden" in text
+    bounds = store.read(made / "campaign_bounds.parquet")
+    last = bounds["readings"] == bounds["readings"].max()
+    upper = bounds["upper_mm"][last & (bounds["target"] == "measured")]
+    assert upper[0] == pytest.approx(said["statements"][0]["upper_mm"])
+    points = store.read(made / "campaign_points.parquet")
+    assert np.nanmax(points["upper_mm"]) == pytest.approx(upper[0])
+    before = {path.name: path.read_bytes() for path in made.iterdir()}
+    assert call("campaign", "report", folder).exit_code == 0
+    assert {path.name: path.read_bytes() for path in made.iterdir()} == before
+
+
+def left_to_visit(folder):
+    """Names of points without readings."""
+    state = campaigns.open_(folder).state()
+    have = {each.reading.point for each in state.told}
+    return [state.plan.points.label[point] for point in state.rows if point not in have]
+
+
+def test_status_forecasts_what_the_wanted_width_takes(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", "--width-mm", "0.25", budget=40)
+    arm = Arm(folder)
+    assert json.loads(call("campaign", "status", folder, "--json").output)["forecast"] is None
+    recorded(folder, arm, 22)
+    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", "8").output)[
+        "forecast"
+    ]
+    assert said["readings_left"] == 18
+    assert said["final_width_mm"]["q05"] <= said["final_width_mm"]["q95"]
+    assert 0.0 <= said["reached_within_budget"] <= 1.0
+    again = call("campaign", "status", folder, "--json", "--simulations", "8").output
+    assert json.loads(again)["forecast"] == said
+    shown = call("campaign", "status", folder, "--simulations", "8").output
+    assert "by 8 simulations from the readings so far" in shown

@@ -13,6 +13,7 @@ from __future__ import annotations
 from kinacc.artifacts import (
     assessment_tables,
     calibration_tables,
+    campaign_tables,
     covariance_tables,
     tournament_tables,
     worth_tables,
@@ -50,5 +51,6 @@ ARTEFACTS: dict[str, Artefact] = {
         assessment_tables.ROBUSTNESS_CHUNK,
         assessment_tables.ROBUSTNESS,
         *tournament_tables.ALL,
+        *campaign_tables.ALL,
     )
 }

@@ -27,6 +27,8 @@ columns named as key. `figures/fig1` to `fig6` are pictures (.svg, .png, .pdf).
 `results/tournament/` holds the tables named `tournament_*`, about all data sets together; they are
 made on request by `kinacc tournament` or `snakemake tournament`.
 
+`kinacc campaign report` leaves the tables named `campaign_*` in the campaign's own folder.
+
 `kinacc check-results results/` holds a folder to all of this.
 
 Written from the contract by `python -m kinacc.artifacts.document`.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
-from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
 from kinacc.campaign.state import State
 
-CONFORMS, FAILS, OPEN = "conforms", "does not conform", "undecided"
+CONFORMS, FAILS, OPEN = "conforming", "not conforming", "undecided"
+TARGETS = {MEASURED: "measured points", CANDIDATES: "all candidates", REGION: "share of the region"}
 
 
 def statement(said: Statement, state: State) -> str:
@@ -72,7 +73,7 @@ def _about(said: Statement, state: State) -> str:
     if said.target == CANDIDATES:
         points = len(state.plan.points) - len(state.left_out)
         return f"the largest error of all {points} candidates"
-    return f"the error of {said.share:.1%} of the region"
+    return f"the largest error of {said.share:.1%} of the region"
 
 
 def _sure(said: Statement) -> str:

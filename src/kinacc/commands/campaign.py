@@ -161,15 +161,44 @@ def leave_out(folder, point, reason) -> None:
 
 @campaign.command("status")
 @click.argument("folder", type=click.Path())
+@click.option("--width-mm", type=float,
+              help="Wanted distance of upper from lower bound. [as begun]")  # fmt: skip
+@click.option("--tolerance-mm", type=float, help="Largest error allowed. [as begun]")
+@click.option("--simulations", default=20, show_default=True, type=click.IntRange(0),
+              help="Simulated ends for the forecast; 0 for none.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
-def status(folder, as_json) -> None:
-    """Say what the readings so far allow to say.
+def status(**given) -> None:
+    """Say what the readings so far allow to say, and what is still needed.
+
+    How many more readings the wanted width should take, or what the tolerance is likely to be
+    decided to, is simulated from what was read so far: a forecast, no bound rests on it.
 
     \b
     Example:
       kinacc campaign status check
-      kinacc campaign status check --json
+      kinacc campaign status check --width-mm 0.15 --json
     """
     from kinacc.commands import campaigns
 
-    campaigns.status(folder, as_json)
+    campaigns.status(given)
+
+
+@campaign.command("report")
+@click.argument("folder", type=click.Path())
+@click.option("--to", type=click.Path(file_okay=False), help="Folder. [report in the campaign's]")
+@click.option("--force", is_flag=True, help="Replace files that are there.")
+@click.option("--json", "as_json", is_flag=True, help="Print what it says as JSON.")
+def report(**given) -> None:
+    """Write what was measured and what may be said of it: tables, picture, text.
+
+    Leaves campaign_points, campaign_readings and campaign_bounds (.parquet), campaign (.svg, .png)
+    and report.md.
+
+    \b
+    Example:
+      kinacc campaign report check
+      kinacc campaign report check --to papers/check --json
+    """
+    from kinacc.commands import campaigns
+
+    campaigns.write_report(given)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 import click
 import numpy as np
 
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.assess.statement import Statement
-from kinacc.campaign import begin, folder, instrument, plan, words
+from kinacc.campaign import begin, folder, forecast, instrument, plan, report, words
 from kinacc.campaign.plan import Limits, Plan
 from kinacc.campaign.state import State
 from kinacc.commands import campaign_candidates, choice, rows
@@ -75,7 +76,7 @@ def _say_begun(given: Mapping, begun: Plan, merged: int) -> None:
     if given["as_json"]:
         click.echo(json.dumps(content, indent=1))
         return
-    named = ", ".join(f"{each.name} ({noise(each)})" for each in begun.instruments)
+    named = ", ".join(f"{each.name} ({report.noise(each)})" for each in begun.instruments)
     lines = [
         f"campaign begun in {given['folder']}",
         f"{len(begun.points)} candidates ({begun.about['candidates']})"
@@ -85,28 +86,18 @@ def _say_begun(given: Mapping, begun: Plan, merged: int) -> None:
         f"instruments: {named}",
         f"{begun.assessor.name}: {begun.assessor.measurements} readings, the first at "
         f"{len(begun.route)} points whatever they say",
-        f"a reading is refused {begin_words(begun)}",
+        f"a reading is refused {refusals(begun)}",
         f"next: kinacc campaign next {given['folder']}",
     ]
     click.echo("\n".join(lines))
 
 
-def begin_words(begun: Plan) -> str:
+def refusals(begun: Plan) -> str:
     """When a reading is refused."""
     return (
         f"more than {math.degrees(begun.limits.joint_rad):g} deg from the joints asked for, or "
         f"more than {begun.limits.implausible_mm:g} mm from the model"
     )
-
-
-def noise(each: instrument.Instrument) -> str:
-    """The noise of an instrument in few words."""
-    std = np.sqrt(np.diag(each.covariance_mm2))
-    if np.array_equal(each.covariance_mm2, np.diag(np.diag(each.covariance_mm2))):
-        same = np.all(std == std[0])
-        said = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
-        return f"{said} per axis"
-    return f"{std[0]:.3g}, {std[1]:.3g}, {std[2]:.3g} mm, correlated"
 
 
 def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool) -> None:
@@ -129,10 +120,8 @@ def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool
 def _next_in_words(found: State) -> str:
     begun, point = found.plan, found.asked
     joints = begun.points.joints[point]
-    names, first, second = ["", "", ""], ["", "", ""], []
     lines = [f"point {begun.points.label[point]}, reading {len(found.told) + 1} of "
              f"{begun.assessor.measurements}"]  # fmt: skip
-    del names, first, second
     for joint, value in enumerate(joints):
         if begun.slides[joint]:
             shown = f"{value:12.4f} mm"
@@ -187,29 +176,95 @@ def in_instrument(begun: Plan, position_mm: np.ndarray) -> np.ndarray:
     return position_mm @ back.rotation.T + back.position_mm
 
 
-def status(path: str, as_json: bool) -> None:
-    """Say where the campaign stands."""
-    opened = folder.open_(path)
+def status(given: Mapping) -> None:
+    """Say where the campaign stands, and what it is likely to need."""
+    from kinacc.stages.progress import reporting
+
+    opened = folder.open_(given["folder"])
     found = opened.state()
-    if as_json:
-        click.echo(json.dumps(as_facts(found), indent=1))
+    aims = opened.plan.limits
+    wanted = given["width_mm"] or aims.width_mm
+    tolerance = given["tolerance_mm"] or aims.tolerance_mm
+    ahead = None
+    if given["simulations"] and found.asked is not None:
+        with reporting("forecast", bar=True) as progress:
+            ahead = forecast.forecast(found, given["simulations"], wanted, tolerance, progress)
+    if given["as_json"]:
+        facts = as_facts(found, tolerance)
+        click.echo(json.dumps({**facts, "forecast": _forecast_facts(ahead)}, indent=1))
         return
     say_cut_off(opened)
     lines = words.standing(found)
     lines += [words.statement(said, found) for said in found.statements()]
-    tolerance = opened.plan.limits.tolerance_mm
     if tolerance is not None:
         lines += [
-            f"tolerance {tolerance:g} mm, {said.target}: {words.decision(said, tolerance)}"
+            f"tolerance {tolerance:g} mm, {words.TARGETS[said.target]}: "
+            f"{words.decision(said, tolerance)}"
             for said in found.statements()
         ]
+    lines += forecast.in_words(ahead) if ahead is not None else []
     click.echo("\n".join(lines))
 
 
-def as_facts(found: State) -> dict[str, object]:
+def _forecast_facts(ahead: forecast.Forecast | None) -> dict[str, object] | None:
+    if ahead is None:
+        return None
+    finite = [value if math.isfinite(value) else None for value in ahead.width_mm]
+    return {
+        "by": "simulation from the readings so far",
+        "simulations": ahead.simulations,
+        "readings_left": ahead.left,
+        "final_width_mm": dict(zip(("q05", "median", "q95"), finite, strict=True)),
+        "wanted_width_mm": ahead.wanted_mm,
+        "reached_within_budget": ahead.reached,
+        "readings_needed": ahead.more,
+        "budget_of_a_new_campaign": ahead.budget,
+        "largest_budget_tried": ahead.tried,
+        "decisions": ahead.decisions,
+    }
+
+
+def write_report(given: Mapping) -> None:
+    """Write tables, picture and text of a campaign."""
+    from kinacc.artifacts.store import TableToWrite, write_all
+    from kinacc.campaign.marks import marks_of
+    from kinacc.commands.sheet import check_output, write_whole
+    from kinacc.figures import campaign as drawing
+    from kinacc.figures.save import write
+    from kinacc.stages.progress import reporting
+
+    opened = folder.open_(given["folder"])
+    say_cut_off(opened)
+    to = Path(given["to"] or opened.folder / "report")
+    text = to / "report.md"
+    pictures = {kind: to / f"campaign.{kind}" for kind in ("svg", "png")}
+    names = ("campaign_points", "campaign_readings", "campaign_bounds")
+    for path in (text, *pictures.values(), *(to / f"{name}.parquet" for name in names)):
+        check_output(path, given["force"] or given["to"] is None, ())
+    with reporting("report", bar=True) as progress:
+        state, tables = report.tables(opened, progress)
+    if not state.told:
+        raise InputError(Problem(str(opened.folder), "no reading was asked for and taken yet"))
+    marks = marks_of(opened)
+    write_all([TableToWrite(to / f"{name}.parquet", name, tables[name], marks) for name in names])
+    figure = drawing.draw(
+        tables["campaign_points"], tables["campaign_bounds"], len(state.plan.route),
+        state.plan.limits.tolerance_mm, state.plan.about["calibration"],
+    )  # fmt: skip
+    write(figure, pictures)
+    write_whole(text, report.markdown(opened, state, tables, "campaign.svg").encode())
+    written = [*(f"{name}.parquet" for name in names), "campaign.svg", "campaign.png", "report.md"]
+    if given["as_json"]:
+        facts = as_facts(state, state.plan.limits.tolerance_mm)
+        click.echo(json.dumps({**facts, "folder": str(to), "files": written}, indent=1))
+        return
+    click.echo("\n".join(words.statement(said, state) for said in state.statements()))
+    click.echo(f"{to}: {', '.join(written)}")
+
+
+def as_facts(found: State, tolerance: float | None) -> dict[str, object]:
     """The standing of a campaign for a machine."""
     label = found.plan.points.label
-    tolerance = found.plan.limits.tolerance_mm
     return {
         **found.plan.about,
         "assessor": found.plan.assessor.name,

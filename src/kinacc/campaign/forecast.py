@@ -1,0 +1,249 @@
+"""What the rest of a campaign is likely to bring, by simulation from what was read so far.
+
+The true errors are taken as vectors drawn from one population: a mixture of normal distributions
+of different widths, whose shares are fitted to the readings by maximum likelihood. That allows for
+heavy tails, but for no dependence between neighbouring poses. It is a forecast: no bound rests on
+it.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinacc.assess.statement import Statement
+from kinacc.campaign import words
+from kinacc.campaign.simulate import Deviates, carry_on, quantiles
+from kinacc.campaign.state import State
+
+FEWEST_POINTS = 8
+_WIDTHS = 24  # of the mixture, in equal ratios
+_ROUNDS = 60
+_PSEUDO = 0.2  # points' worth of mass spread over the widths before any reading
+_LOOKS = 12  # times a simulated campaign is asked for its statement
+_FACTORS = (1.5, 2.0, 3.0, 5.0, 8.0)  # budgets tried where this one will not do
+ENOUGH = 0.8  # share of simulated campaigns that makes a budget sufficient
+
+
+@dataclass(frozen=True)
+class Population:
+    """Mixture of normal error vectors: standard deviations per axis (w,) and their shares (w,)."""
+
+    scale_mm: np.ndarray
+    share: np.ndarray
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What simulated ends of a campaign have in common.
+
+    ``width_mm``: 5, 50 and 95 % quantiles of the final distance between the bounds (infinite: no
+    bound). ``reached``: share that comes as near as wanted within the budget, and ``more``:
+    median number of further readings of those (None where hardly any does). ``budget``: the
+    smallest of some larger budgets of a new campaign that is enough in at least 80 % (None: none
+    was, or none was tried). ``decisions``: share by decision on the tolerance.
+    """
+
+    simulations: int
+    left: int
+    width_mm: tuple[float, float, float]
+    wanted_mm: float | None = None
+    reached: float | None = None
+    more: int | None = None
+    budget: int | None = None
+    tried: int | None = None
+    decisions: dict[str, float] | None = None
+
+
+def population(mean_mm: np.ndarray, noise_mm: np.ndarray) -> Population:
+    """Fit the mixture to mean readings (n, 3) of noise (n,) per axis, by EM."""
+    square = np.sum(mean_mm**2, axis=1)
+    top = math.sqrt(float(square.max()) / 3.0) + 1e-12
+    scale = np.geomspace(0.02 * top, 1.2 * top, _WIDTHS)
+    likelihood = _likelihood(square, noise_mm, scale)
+    share = np.full(_WIDTHS, 1.0 / _WIDTHS)
+    for _ in range(_ROUNDS):
+        part = likelihood * share
+        share = (part / part.sum(axis=1, keepdims=True)).sum(axis=0) + _PSEUDO / _WIDTHS
+        share /= share.sum()
+    return Population(scale, share)
+
+
+def draw_errors(
+    known: Population, mean_mm: np.ndarray, noise_mm: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """True errors (m, 3) the points could have; points without readings have infinite noise."""
+    read = np.isfinite(noise_mm)
+    share = np.tile(known.share, (len(mean_mm), 1))
+    square = np.sum(mean_mm[read] ** 2, axis=1)
+    share[read] *= _likelihood(square, noise_mm[read], known.scale_mm)
+    edges = np.cumsum(share / share.sum(axis=1, keepdims=True), axis=1)
+    chosen = (rng.random((len(mean_mm), 1)) > edges[:, :-1]).sum(axis=1)
+    scale = known.scale_mm[chosen]
+    kept = np.zeros(len(mean_mm))
+    kept[read] = scale[read] ** 2 / (scale[read] ** 2 + noise_mm[read] ** 2)
+    spread = scale * np.sqrt(1.0 - kept)
+    centre = np.where(read[:, None], mean_mm, 0.0) * kept[:, None]
+    return centre + spread[:, None] * rng.normal(size=mean_mm.shape)
+
+
+def forecast(
+    state: State,
+    simulations: int,
+    wanted_mm: float | None = None,
+    tolerance_mm: float | None = None,
+    progress: Callable | None = None,
+) -> Forecast | None:
+    """Simulate the rest of the campaign; None before a few points were read."""
+    mean, noise = _by_row(state)
+    if np.isfinite(noise).sum() < FEWEST_POINTS:
+        return None
+    read = np.isfinite(noise)
+    known = population(mean[read], noise[read])
+    left = state.plan.assessor.measurements - len(state.told)
+    runs = []
+    numbers = range(simulations)
+    for number in progress(numbers, "simulated ends") if progress else numbers:
+        rng = np.random.default_rng([state.plan.seed, state.taken, number])
+        errors = draw_errors(known, mean, noise, rng)
+        runs.append(_one_end(state, errors, left, (1, state.plan.seed, state.taken, number)))
+    last = [run[-1][1] for run in runs]
+    widths = quantiles(map(_width, last), (0.05, 0.5, 0.95))
+    found = Forecast(simulations, left, tuple(widths), wanted_mm)
+    if wanted_mm is not None:
+        needed = [_first_within(run, wanted_mm) for run in runs]
+        reached = float(np.mean([math.isfinite(each) for each in needed]))
+        more = quantiles(needed, (0.5,))[0]
+        found = replace(found, reached=reached, more=int(more) if math.isfinite(more) else None)
+        if reached < ENOUGH:
+            found = _larger(state, found, known, mean, noise, wanted_mm, simulations, progress)
+    if tolerance_mm is not None:
+        said = [words.decision(each, tolerance_mm) for each in last]
+        kinds = (words.CONFORMS, words.FAILS, words.OPEN)
+        found = replace(found, decisions={kind: said.count(kind) / len(said) for kind in kinds})
+    return found
+
+
+def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, progress):
+    """Look for a larger budget of a new campaign that does."""
+    simulations = max(simulations // 2, 1)
+    now = state.plan.assessor.measurements
+    tried = None
+    for factor in progress(_FACTORS, "larger budgets") if progress else _FACTORS:
+        tried = math.ceil(factor * now)
+        assessor = replace(state.plan.assessor, measurements=tried)
+        hits = 0
+        for number in range(simulations):
+            rng = np.random.default_rng([state.plan.seed, state.taken, number])
+            errors = draw_errors(known, mean, noise, rng)
+            entropy = (2, state.plan.seed, state.taken, number)
+            campaign = assessor.begin(state.plan.candidates(state.rows))
+            deviates = Deviates(len(errors), tried, *entropy)
+            carry_on(campaign, errors, _root(state), deviates)
+            hits += _width(campaign.statements()[0]) <= wanted_mm
+        if hits >= ENOUGH * simulations:
+            return replace(found, budget=tried, tried=tried)
+    return replace(found, tried=tried)
+
+
+def _one_end(
+    state: State, errors_mm: np.ndarray, left: int, entropy: tuple[int, ...]
+) -> list[tuple[int, Statement]]:
+    """Main statement of one simulated end after some numbers of further readings."""
+    campaign = copy.deepcopy(state.campaign)
+    looks = [(0, campaign.statements()[0])]
+    pause = max(left // _LOOKS, 1)
+
+    def look(done: int) -> None:
+        if done % pause == 0:
+            looks.append((done, campaign.statements()[0]))
+
+    deviates = Deviates(len(errors_mm), left, *entropy)
+    done = carry_on(campaign, errors_mm, _root(state), deviates, look)
+    if looks[-1][0] != done:
+        looks.append((done, campaign.statements()[0]))
+    return looks
+
+
+def _first_within(looks: Sequence[tuple[int, Statement]], wanted_mm: float) -> float:
+    """Readings after which the bounds are first as near as wanted; infinite where never."""
+    return next((done for done, said in looks if _width(said) <= wanted_mm), math.inf)
+
+
+def _width(said: Statement) -> float:
+    width = said.upper_mm - said.lower_mm
+    return math.inf if math.isnan(width) else width
+
+
+def _by_row(state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Mean readings (m, 3) and their noise (m,) by the assessor's rows; infinite where unread."""
+    from kinacc.assess.adaptive import Ledger
+    from kinacc.campaign.reading import covariance_mm2
+
+    ledger = Ledger(state.plan.candidates(state.rows))
+    row = {int(point): number for number, point in enumerate(state.rows)}
+    for each in (*state.told, *state.in_hand):
+        if each.reading.point in row:
+            covariance = covariance_mm2(state.plan, each.reading)
+            ledger.record(row[each.reading.point], each.error_mm, covariance)
+    return ledger.mean_mm, ledger.noise_mm
+
+
+def _root(state: State) -> np.ndarray:
+    planned = state.plan.instruments[0].in_base(state.plan.to_base.rotation)
+    return np.linalg.cholesky(planned)
+
+
+def _likelihood(square: np.ndarray, noise_mm: np.ndarray, scale_mm: np.ndarray) -> np.ndarray:
+    """Density (n, w) of readings of squared size, each scaled to a peak of 1."""
+    variance = scale_mm**2 + noise_mm[:, None] ** 2
+    log = -1.5 * np.log(variance) - 0.5 * square[:, None] / variance
+    return np.exp(log - log.max(axis=1, keepdims=True))
+
+
+def in_words(found: Forecast) -> list[str]:
+    """The forecast, line by line."""
+    head = f"by {found.simulations} simulations from the readings so far"
+    lines = []
+    if found.left:
+        low, middle, high = found.width_mm
+        lines.append(
+            f"{head}: after the {found.left} readings left the bounds are likely "
+            f"{_mm(middle)} apart (90 % of cases: {_mm(low)} to {_mm(high)})"
+        )
+    if found.wanted_mm is not None:
+        lines += _about_width(found, head)
+    if found.decisions is not None and found.left:
+        said = ", ".join(f"{kind} {share:.0%}" for kind, share in found.decisions.items())
+        lines.append(f"likely decision at the end: {said}")
+    return lines
+
+
+def _about_width(found: Forecast, head: str) -> list[str]:
+    wanted = f"{found.wanted_mm:g} mm apart"
+    if found.more == 0:
+        return [f"the bounds are as near as wanted ({wanted})"]
+    lines = []
+    if found.more is not None and found.left:
+        lines.append(
+            f"{wanted} after about {found.more} more readings; reached within the budget in "
+            f"{found.reached:.0%} of cases"
+        )
+    elif found.left:
+        lines.append(f"{wanted} is reached within the budget in {found.reached:.0%} of cases")
+    if found.budget is not None:
+        lines.append(
+            f"a new campaign of {found.budget} readings would come {wanted} in at least "
+            f"{ENOUGH:.0%} of cases ({head})"
+        )
+    elif found.tried is not None:
+        lines.append(f"not even {found.tried} readings would bring {wanted} with certainty")
+    return lines
+
+
+def _mm(value: float) -> str:
+    return f"{value:.3f} mm" if math.isfinite(value) else "without bound"

@@ -1,0 +1,17 @@
+"""What the tables of a campaign are marked with."""
+
+from __future__ import annotations
+
+from kinacc import __version__, provenance
+from kinacc.campaign.folder import Opened
+
+
+def marks_of(opened: Opened) -> dict[str, object]:
+    """Provenance: the plan counts as the configuration, the journal as the input."""
+    return {
+        "kinacc_version": __version__,
+        "config_hash": opened.digest,
+        "code_hash": provenance.code_hash("kinacc.campaign.report", "kinacc.artifacts.store"),
+        "inputs_hash": opened.journal.last,
+        "seed": opened.plan.seed,
+    }

@@ -1,0 +1,267 @@
+"""Tables and text of a campaign's report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from kinacc.assess.adaptive import Campaign
+from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
+from kinacc.campaign import words
+from kinacc.campaign.folder import Opened
+from kinacc.campaign.instrument import Instrument
+from kinacc.campaign.reading import covariance_mm2
+from kinacc.campaign.state import State
+
+Columns = dict[str, np.ndarray]
+_STATEMENTS = 150  # stated at so many moments of a campaign, at most
+_LARGEST = 10
+
+
+def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dict[str, Columns]]:
+    """The state of a campaign and its tables ``campaign_points``, ``_readings``, ``_bounds``."""
+    total = len(opened.state().told)
+    pause = max(-(-total // _STATEMENTS), 1)
+    rows: list[dict] = []
+    done = iter(progress(range(total), "readings")) if progress else iter(range(total))
+
+    def watch(campaign: Campaign, _) -> None:
+        next(done, None)
+        count, visited = campaign.taken()
+        if count % pause == 0 or count == total:
+            rows.extend(_said(each, count, len(visited)) for each in campaign.statements())
+
+    state = opened.state(watch)
+    for _ in done:
+        pass
+    if not rows:
+        rows = [_said(each, 0, 0) for each in state.statements()]
+    return state, {
+        "campaign_points": _points(state),
+        "campaign_readings": _readings(state),
+        "campaign_bounds": _columns(rows),
+    }
+
+
+def _said(said, count: int, visited: int) -> dict[str, object]:
+    return {
+        "readings": count,
+        "points_measured": visited,
+        "target": said.target,
+        "share": said.share,
+        "value_mm": said.value_mm,
+        "lower_mm": said.lower_mm,
+        "upper_mm": said.upper_mm,
+        "confidence": said.confidence,
+        "assumption": said.assumption or None,
+        "withheld": said.withheld or None,
+    }
+
+
+def _points(state: State) -> Columns:
+    points = state.plan.points
+    order = [*map(int, state.rows), *state.left_out]
+    means, limits = means_of(state), limits_of(state)
+    directions = np.zeros(points.joints.shape, np.int8)
+    if points.directions is not None:
+        directions = points.directions
+    rows = []
+    for place, point in enumerate(order, start=1):
+        mean, noise, count = means.get(point, (np.full(3, math.nan), math.nan, 0))
+        lower, upper = limits.get(point, (math.nan, math.nan))
+        row = {
+            "point": points.label[point],
+            "visit": math.nan if point in state.left_out else place,
+        }
+        row |= {f"q{i + 1}": value for i, value in enumerate(points.joints[point])}
+        row |= {f"s{i + 1}": int(value) for i, value in enumerate(directions[point])}
+        row |= {f"{axis}_mm": points.modelled_mm[point, i] for i, axis in enumerate("xyz")}
+        row |= {"readings": count}
+        row |= {f"e{axis}_mm": mean[i] for i, axis in enumerate("xyz")}
+        row |= {"error_mm": float(np.linalg.norm(mean)), "noise_mm": noise}
+        row |= {"lower_mm": lower, "upper_mm": upper}
+        rows.append({**row, "left_out": state.left_out.get(point)})
+    return _columns(rows)
+
+
+def _readings(state: State) -> Columns:
+    plan = state.plan
+    used = {each.number: place for place, each in enumerate(state.told, start=1)}
+    rows = []
+    for each in sorted((*state.told, *state.in_hand), key=lambda known: known.number):
+        reading = each.reading
+        instrument = plan.instrument(reading.instrument)
+        covariance = covariance_mm2(plan, reading)
+        if covariance is None:
+            covariance = instrument.covariance_mm2
+        row = {
+            "reading": each.number,
+            "point": plan.points.label[reading.point],
+            "used": used.get(each.number, math.nan),
+            "instrument": reading.instrument,
+            "frame": instrument.frame,
+        }
+        row |= {f"{axis}_mm": reading.position_mm[i] for i, axis in enumerate("xyz")}
+        row |= {f"e{axis}_mm": each.error_mm[i] for i, axis in enumerate("xyz")}
+        row |= {
+            "error_mm": float(np.linalg.norm(each.error_mm)),
+            "noise_mm": math.sqrt(float(np.trace(covariance)) / 3.0),
+        }
+        rows.append(row)
+    return _columns(rows)
+
+
+def means_of(state: State) -> dict[int, tuple[np.ndarray, float, int]]:
+    """Mean error (3,), its noise per axis and number of readings of every point used."""
+    found = {}
+    for ledger in _ledgers(state.campaign):
+        for row in ledger.visited:
+            mean = (ledger.mean_mm[row], float(ledger.noise_mm[row]), int(ledger.count[row]))
+            found[int(state.rows[row])] = mean
+    return found
+
+
+def limits_of(state: State) -> dict[int, tuple[float, float]]:
+    """Lower and upper limit on every measured point's size.
+
+    Those the assessor itself works with where it has limits that hold at every look; otherwise
+    those of the mean reading alone, the lower one corrected for the number of points.
+    """
+    looks = getattr(state.campaign, "looks", None)
+    found = {}
+    if looks is not None:
+        for row in looks.ledger.visited:
+            limits = float(looks.lower_mm[row]), float(looks.upper_mm[0, row])
+            found[int(state.rows[row])] = limits
+        return found
+    allowed = 1.0 - float(getattr(state.plan.assessor, "confidence", 0.95))
+    for ledger in _ledgers(state.campaign):
+        each = allowed / max(len(ledger.visited), 1)
+        for row in ledger.visited:
+            mean, noise = ledger.mean_mm[row], ledger.noise(row)
+            found[int(state.rows[row])] = (
+                lower_limit_mm(mean, noise, each),
+                upper_limit_mm(mean, noise, allowed),
+            )
+    return found
+
+
+def _ledgers(campaign: Campaign) -> list:
+    """Ledgers of a campaign; of two stages the later one comes last and counts."""
+    named = (getattr(campaign, name, None) for name in ("ledger", "screen", "again"))
+    return [each for each in named if each is not None]
+
+
+def _columns(rows: list[dict]) -> Columns:
+    return (
+        {name: np.array([row[name] for row in rows], dtype=_kind(rows, name)) for name in rows[0]}
+        if rows
+        else {}
+    )
+
+
+def _kind(rows: list[dict], name: str) -> type:
+    return object if any(isinstance(row[name], (str, type(None))) for row in rows) else float
+
+
+def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: str) -> str:
+    """The report as text."""
+    plan = state.plan
+    about = plan.about
+    said = state.statements()
+    lines = [
+        f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
+        "",
+        *(f"- {words.statement(each, state)}" for each in said),
+        "",
+    ]
+    if plan.limits.tolerance_mm is not None:
+        lines += ["## Conformity", "", *_conformity(state), ""]
+    lines += [f"![sizes of the errors, and the bounds as they grew]({picture})", ""]
+    lines += ["## What was measured", "", *(f"- {each}" for each in _facts(state)), ""]
+    lines += ["## Largest errors", "", *_largest(found["campaign_points"]), ""]
+    lines += ["## What the bounds rest on", "", *(f"- {each}" for each in _grounds(state)), ""]
+    lines += [f"Campaign {opened.digest}, readings {opened.journal.last}."]
+    return "\n".join(lines) + "\n"
+
+
+def _conformity(state: State) -> list[str]:
+    tolerance = state.plan.limits.tolerance_mm
+    lines = [f"Largest error allowed: {tolerance:g} mm.", ""]
+    for said in state.statements():
+        guard = said.upper_mm - said.value_mm
+        band = f" (guard band {guard:.3f} mm)" if math.isfinite(guard) else ""
+        lines.append(f"- {words.TARGETS[said.target]}: **{words.decision(said, tolerance)}**{band}")
+    lines += [
+        "",
+        "They conform where the upper bound is within the tolerance, and do not where the lower "
+        "bound is beyond it; each of the two is wrong with at most the probability the confidence "
+        "leaves. The guard band is how far the estimate has to stay below the tolerance.",
+    ]
+    return lines
+
+
+def _facts(state: State) -> list[str]:
+    plan = state.plan
+    visited = len({each.reading.point for each in state.told})
+    joints = f"{len(plan.points) - len(state.left_out)} candidates ({plan.about['candidates']})"
+    lines = [
+        f"{len(state.told)} readings of {plan.assessor.measurements} at {visited} of {joints}, "
+        f"order drawn with seed {plan.seed}",
+        f"point measured: {plan.about['point']}",
+        *(
+            f"instrument {each.name}: {noise(each)}, {each.frame} frame"
+            for each in plan.instruments
+        ),
+        f"assessor {plan.assessor.name}: {(type(plan.assessor).__doc__ or '').splitlines()[0]}",
+    ]
+    if state.in_hand:
+        lines.append(f"{len(state.in_hand)} readings were taken and not asked for: not used")
+    large = sum(np.linalg.norm(each.error_mm) > plan.limits.implausible_mm for each in state.told)
+    if large:
+        lines.append(
+            f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
+        )
+    label = plan.points.label
+    lines += [f"point {label[p]} left out: {reason}" for p, reason in state.left_out.items()]
+    return lines
+
+
+def _largest(points: Columns) -> list[str]:
+    size = np.asarray(points["error_mm"], dtype=float)
+    order = np.argsort(-np.where(np.isnan(size), -1.0, size), kind="stable")[:_LARGEST]
+    lines = ["| point | readings | error mm | at least mm | at most mm |", "|---|---|---|---|---|"]
+    for row in order:
+        if not math.isnan(size[row]):
+            lower, upper = (float(points[name][row]) for name in ("lower_mm", "upper_mm"))
+            lines.append(
+                f"| {points['point'][row]} | {int(points['readings'][row])} | {size[row]:.3f} | "
+                f"{lower:.3f} | {upper:.3f} |"
+            )
+    return lines
+
+
+def _grounds(state: State) -> list[str]:
+    lines = [
+        "readings are normal about the true position, with the covariance stated: it holds the "
+        "instrument, its target, and how well the arm repeats a pose",
+        "candidates were drawn without regard to their errors, and none was left out for its error",
+        "the error meant is the deterministic one: what stays when a pose is measured again",
+        "readings in the instrument's frame are brought to the robot's base as the calibration "
+        "placed it: the instrument has not moved since, or was set up anew in that frame",
+    ]
+    if all(each.frame == "base" for each in state.plan.instruments):
+        lines.pop()
+    return lines + sorted({each.assumption for each in state.statements() if each.assumption})
+
+
+def noise(each: Instrument) -> str:
+    """The noise of an instrument in few words."""
+    std = np.sqrt(np.diag(each.covariance_mm2))
+    if np.array_equal(each.covariance_mm2, np.diag(np.diag(each.covariance_mm2))):
+        same = np.all(std == std[0])
+        said = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
+        return f"{said} per axis"
+    return f"{std[0]:.3g}, {std[1]:.3g}, {std[2]:.3g} mm, correlated"
