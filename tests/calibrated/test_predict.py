@@ -7,7 +7,8 @@ from small_arms import BASE, TOOL, calibrated, joints, truth
 from kinacc import robot
 from kinacc.calibrated.predict import predict, sensitivity
 from kinacc.calibrated.record import nominal
-from kinacc.calibration.uncertainty import MOTIONS, dh_parameter_names, is_angle
+from kinacc.calibration.frames import MOTIONS
+from kinacc.calibration.uncertainty import dh_parameter_names, is_angle
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.models import dh, vec

@@ -40,7 +40,7 @@ def test_frame_motions_are_the_finite_differences_of_the_frames():
     anchor = frames.known(BASE, TOOL)
     coords = frames.coordinates(observations, anchor, base_free=True, targets_free=True)
     x = np.random.default_rng(1).normal(0.0, 0.3, coords.size)
-    motions, step = uncertainty.frame_motions(coords, x), 1e-6
+    motions, step = coords.motions(x), 1e-6
     here = coords.frames(x)
     for column in range(coords.size):
         moved = [coords.frames(x + sign * step * np.eye(12)[column]) for sign in (-1, 1)]
@@ -60,7 +60,7 @@ def moved_arm(fit, names, direction, size):
     of = dict(zip(names, step, strict=True))
 
     def frame(pose, name):
-        motion = np.array([of[f"{name}.{m}"] for m in uncertainty.MOTIONS])
+        motion = np.array([of[f"{name}.{m}"] for m in frames.MOTIONS])
         return Pose(exp_so3(motion[3:]) @ pose.rotation, pose.position_mm + motion[:3])
 
     vector = dh.to_vector(fit.model).copy()

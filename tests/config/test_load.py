@@ -238,6 +238,18 @@ BAD = {
         "calibration: {dh: {hayati_joints: [2, 7]}}",
         ("hayati_joints", "mh180 has no joint 7", "1 to 6"),
     ),
+    "parameters no joint has": (
+        "calibration: {dh: {parameters: {joint 7 d: fixed, joint 2 e: free}}}",
+        ("parameters.joint 2 e", "no parameter of joints"),
+    ),
+    "parameters of a joint beyond the arm": (
+        "calibration: {dh: {parameters: {joint 7 d: fixed}}}",
+        ("parameters.joint 7 d", "there is no joint 7", "joints 1 to 6"),
+    ),
+    "components of frames nobody estimates": (
+        "calibration: {frames: {base z: fixed}}",
+        ("calibration.frames", "base z", "not estimated"),
+    ),
     "joint range of another arm": (
         "calibration: {vec: {joint_range: [[0, 1], [0, 1], [0, 1], [0, 1]]}}",
         ("joint_range", "4 pairs for the 6 joints of mh180"),

@@ -66,7 +66,7 @@ def test_true_accuracy_is_that_of_all_points_visited_or_not(name):
 
 
 def test_fig2_draws_to_the_fitted_tool_or_else_to_the_configured_one():
-    fig2 = import_module("kinacc.stages.fig2")
+    fig2, arm = import_module("kinacc.stages.fig2"), robot.load("mh180")
     frames = {
         "model": np.array(["vec", "dh", "dh"], dtype=object),
         "frame": np.array(["tool", "base", "tool"], dtype=object),
@@ -74,8 +74,8 @@ def test_fig2_draws_to_the_fitted_tool_or_else_to_the_configured_one():
         "y_mm": np.array([0.0, 0.0, 4.0]),
         "z_mm": np.array([0.0, 0.0, 250.0]),
     } | {name: np.full(3, float(name == "qw")) for name in ("qw", "qx", "qy", "qz")}
-    assert list(fig2._tool_mm(frames, {"tool_mm": [0, 0, 9]})) == [3.0, 4.0, 250.0]
+    assert list(fig2._tool_mm(frames, {"tool_mm": [0, 0, 9]}, arm)) == [3.0, 4.0, 250.0]
     assert problems(fig2.run({**INPUTS["fig2"], "frames": frames}, CYLINDER_SPACE)) == []
     none_fitted = frames | {f"{axis}_mm": np.zeros(3) for axis in "xyz"}
-    assert list(fig2._tool_mm(none_fitted, {"tool_mm": [0, 0, 9]})) == [0, 0, 9]
-    assert list(fig2._tool_mm(None, {})) == [0, 0, 0]
+    assert list(fig2._tool_mm(none_fitted, {"tool_mm": [0, 0, 9]}, arm)) == [0, 0, 9]
+    assert list(fig2._tool_mm(None, {}, arm)) == [0, 0, 0]

@@ -200,6 +200,61 @@ def test_base_and_tool_estimated_and_fitted_to_measurements(plan):
     assert figures["rms"] < 0.05 * np.sqrt(3) * 1.6
 
 
+def test_masks_priors_loss_and_hayati_angles_come_from_the_configuration(plan):
+    base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
+    tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
+    split = measurements.split(columns(base, tool), plan.settings("measurements", "mh180"))
+    found = chain(
+        plan,
+        split,
+        calibration__base_and_tool="estimated",
+        calibration__frames={"base z": {"value_mm": 300.0}, "tool x": {"prior_std_mm": 50.0}},
+        calibration__dh__fit_to="measurements",
+        calibration__dh__hayati_joints="auto",
+        calibration__dh__loss="huber",
+        calibration__dh__parameters={"joint 1 d": "fixed", "joint 4 a": {"value_mm": 0.125}},
+    )
+    table = found["dh_model"]
+    assert table["beta_rad"][1] != 0.0  # axes 2 and 3 are parallel
+    assert np.count_nonzero(table["beta_rad"]) == 1
+    assert (table["d_mm"][0], table["d_mm"][1], table["a_mm"][3]) == (0.0, 0.0, 0.125)
+    assert np.isnan(table["std_d_mm"][:2]).all()
+    for model in ("dh", "nominal"):
+        assert frame(found["frames"], model, "base").position_mm[2] == pytest.approx(300.0)
+    figures = dict(zip(found["dh_fit"]["quantity"], found["dh_fit"]["value"], strict=True))
+    assert 0.05 < figures["loss_scale"] < 1.0
+    assert (
+        row(
+            found["residuals"],
+            comparison="dh_vs_measured",
+            subset="validation",
+            fold=None,
+            quantity="position",
+        )["rms"]
+        < 1.5
+    )
+
+
+def test_a_base_all_of_which_is_fixed_is_held_in_every_model(plan):
+    base = Pose(exp_so3(np.array([0.0, 0.0, 0.3])), np.array([1500.0, -700.0, 300.0]))
+    split = measurements.split(
+        columns(base, Pose(np.eye(3), np.zeros(3))), plan.settings("measurements", "mh180")
+    )
+    stated = {f"base {axis}": {"value_mm": base.position_mm[i]} for i, axis in enumerate("xyz")}
+    stated |= {"base rx": "fixed", "base ry": "fixed", "base rz": {"value_rad": 0.3}}
+    found = chain(
+        plan,
+        split,
+        calibration__base_and_tool="estimated",
+        calibration__frames=stated,
+        calibration__dh__fit_to="measurements",
+    )
+    for model in ("vec", "dh", "nominal"):
+        at = frame(found["frames"], model, "base")
+        np.testing.assert_allclose(at.position_mm, base.position_mm, atol=1e-9)
+        np.testing.assert_allclose(at.rotation, base.rotation, atol=1e-12)
+
+
 def test_without_folds_there_is_nothing_to_cross_validate(plan):
     settings = settings_of(
         plan, "measurements", measurements__folds=None, measurements__validation_fold=None

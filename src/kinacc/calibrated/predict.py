@@ -8,11 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.calibrated.record import FLANGE, Calibration
-from kinacc.calibration.uncertainty import (
-    MOTIONS,
-    dh_parameter_names,
-    vec_parameter_names,
-)
+from kinacc.calibration.frames import MOTIONS
+from kinacc.calibration.uncertainty import dh_parameter_names, vec_parameter_names
 from kinacc.geometry import Pose, compose, skew
 from kinacc.models import dh, vec
 from kinacc.models.vec import VECModel

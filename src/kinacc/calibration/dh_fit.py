@@ -6,12 +6,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinacc.calibration import refined, robust
+from kinacc.calibration.constrained import (
+    ConstrainedFrames,
+    ConstrainedSystem,
+    FrameTerms,
+    constrained,
+)
 from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
 from kinacc.calibration.observations import Observations
+from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.start import closed_form_start
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
-from kinacc.calibration.truncated import minimise_truncated
+from kinacc.calibration.terms import free_parameters  # noqa: F401 (the usual mask of a fit)
 from kinacc.models import dh
 from kinacc.models.dh import DHModel
 
@@ -25,7 +33,7 @@ class DHFit:
     """Fitted ``model`` and ``frames``; ``std`` (k, 5) as ``dh.PARAMETERS``, NaN undetermined.
 
     ``free`` (k, 5) marks the parameters that took part; ``solution`` has the figures of the fit,
-    frame coordinates (``coordinates``) first.
+    frame coordinates (``coordinates``) first. ``weights`` of the rows, where the loss had some.
     """
 
     model: DHModel
@@ -33,20 +41,12 @@ class DHFit:
     std: np.ndarray
     free: np.ndarray
     solution: Solution
-    coordinates: FrameCoordinates
+    coordinates: FrameCoordinates | ConstrainedFrames
+    weights: Weights | None = None
 
     def with_frames(self, frames: Frames) -> DHFit:
         """The same arm seen through other frames."""
         return replace(self, frames=frames)
-
-
-def free_parameters(joints: int, hayati_joints: tuple[int, ...] = ()) -> np.ndarray:
-    """Mask (k, 5): four DH parameters per joint, and beta on ``hayati_joints`` (1-based)."""
-    free = np.ones((joints, 5), dtype=bool)
-    free[:, 4] = False
-    for joint in hayati_joints:
-        free[joint - 1, 4] = True
-    return free
 
 
 def fit(
@@ -58,44 +58,53 @@ def fit(
     threshold: float,
     frames: Frames | None = None,
     start: DHModel | None = None,
+    std: np.ndarray | None = None,
+    frame_terms: FrameTerms | None = None,
+    loss: str = robust.SQUARES,
 ) -> DHFit:
     """DH model of the ``free`` (k, 5) parameters closest to ``observations``.
 
-    ``frames`` given: base and targets are known. None: both are estimated, from a closed form.
-    Directions of singular value below ``threshold`` times the largest stay nominal.
+    ``frames`` given: base and targets are known. None: both are estimated, from a closed form and
+    under ``frame_terms``. ``std`` (k, 5): of priors about ``nominal``, inf for none.
+    Directions of singular value below ``threshold`` times the largest stay nominal, where no prior
+    speaks of them. ``loss``: see ``robust``.
     Raises FitError, and InputError where there are fewer residuals than parameters.
     """
     start = start or nominal
     held = dh.to_vector(nominal)
     mask = free.ravel()
-    known = frames is not None
     require_enough(observations, int(mask.sum()), "DH fit", DH_FIX)
-    anchor = frames if known else _start_frames(observations, start)
-    coords = coordinates(observations, anchor, base_free=not known, targets_free=not known)
+    coords = _frame_coordinates(observations, start, frames, frame_terms)
     flange = flange_model(nominal, free)
     require_enough(observations, coords.size + flange.size, "DH fit", DH_FIX)
-    system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
-    zeros = np.zeros(coords.size)
+    system = _system(observations, flange, coords, rotation_weight_mm_per_rad)
     scale = np.concatenate([_units(coords.is_angle()), _units(np.tile(_ANGLES, len(free))[mask])])
-    solution = minimise_truncated(
-        system,
-        start=np.concatenate([zeros, dh.to_vector(start)[mask]]),
-        nominal=np.concatenate([zeros, held[mask]]),
+    expected, frame_std = np.zeros(coords.size), np.full(coords.size, np.inf)
+    if isinstance(coords, ConstrainedFrames):
+        expected, frame_std = coords.known()
+    arm_std = np.full(mask.sum(), np.inf) if std is None else std.ravel()[mask]
+    task = refined.Task(
+        system=system,
+        start=np.concatenate([np.zeros(coords.size), dh.to_vector(start)[mask]]),
+        nominal=np.concatenate([expected, held[mask]]),
+        prior_std=np.concatenate([frame_std, arm_std]),
         scale=scale,
         threshold=threshold,
         frames=coords.size,
         name="DH fit",
     )
-    vector, std = held.copy(), np.full(held.size, np.nan)
+    solution, weights = refined.minimise(task, observations, loss)
+    vector, found = held.copy(), np.full(held.size, np.nan)
     vector[mask] = solution.x[coords.size :]
-    std[mask] = solution.std[coords.size :]
+    found[mask] = solution.std[coords.size :]
     return DHFit(
         model=dh.with_vector(nominal, vector),
         frames=coords.frames(solution.x[: coords.size]),
-        std=std.reshape(free.shape),
+        std=found.reshape(free.shape),
         free=free,
         solution=solution,
         coordinates=coords,
+        weights=weights,
     )
 
 
@@ -105,6 +114,7 @@ def fit_frames(
     *,
     rotation_weight_mm_per_rad: float,
     frames: Frames | None = None,
+    frame_terms: FrameTerms | None = None,
 ) -> DHFit:
     """Base and targets alone (as in ``fit``), the arm held at ``model``. Raises FitError."""
     nothing = np.zeros((model.joints, 5), dtype=bool)
@@ -115,7 +125,33 @@ def fit_frames(
         rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
         threshold=0.0,
         frames=frames,
+        frame_terms=frame_terms,
     )
+
+
+def _frame_coordinates(
+    observations: Observations,
+    start: DHModel,
+    frames: Frames | None,
+    terms: FrameTerms | None,
+) -> FrameCoordinates | ConstrainedFrames:
+    if frames is not None:
+        return coordinates(observations, frames, base_free=False, targets_free=False)
+    begin = closed_form_start(observations, dh.forward(start, observations.q_rad))
+    if terms is not None:
+        return constrained(observations, begin, terms)
+    return coordinates(observations, begin, base_free=True, targets_free=True)
+
+
+def _system(
+    observations: Observations,
+    flange: FlangeModel,
+    coords: FrameCoordinates | ConstrainedFrames,
+    weight: float,
+) -> PoseSystem | ConstrainedSystem:
+    if isinstance(coords, ConstrainedFrames):
+        return ConstrainedSystem(PoseSystem(observations, flange, coords.inner, weight), coords)
+    return PoseSystem(observations, flange, coords, weight)
 
 
 def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
@@ -132,10 +168,6 @@ def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
         return full.reshape(len(full), 6, -1)[:, :, mask]
 
     return FlangeModel(int(mask.sum()), lambda x, q, s: dh.forward(model(x), q), jacobian)
-
-
-def _start_frames(observations: Observations, model: DHModel) -> Frames:
-    return closed_form_start(observations, dh.forward(model, observations.q_rad))
 
 
 def _units(is_angle: np.ndarray) -> np.ndarray:

@@ -15,6 +15,8 @@ import numpy as np
 from kinacc.calibration.observations import Observations
 from kinacc.geometry import IDENTITY, Pose, exp_so3, invert, skew
 
+MOTIONS = ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")
+BASE = "base"
 _SMALL_ANGLE_RAD = 1e-3
 
 
@@ -135,6 +137,40 @@ class FrameCoordinates:
             bases.append(invert(Pose(inverse.rotation, offset)))
         return Frames(stacked(bases), self.targets(x))
 
+    def motion_names(self, target_names: tuple[str, ...]) -> list[str]:
+        """Names of the parameters, in the order of the rows of ``motions``."""
+        names = []
+        for session in range(self.anchor.sessions if self.base_free else 0):
+            base = BASE if session == 0 else f"{BASE}{session + 1}"
+            names += [f"{base}.{motion}" for motion in MOTIONS]
+        if self.targets_free:
+            for name, turns in zip(target_names, self.turns, strict=True):
+                names += [f"{name}.{motion}" for motion in (MOTIONS if turns else MOTIONS[:3])]
+        return names
+
+    def motions(self, x: np.ndarray) -> np.ndarray:
+        """Derivative (F, F) of the named motions of base and targets in the coordinates at x."""
+        motions = np.zeros((self.size, self.size))
+        for session in range(self.anchor.sessions if self.base_free else 0):
+            inverse = self.inverse_base(x, session)
+            place = self.base_columns(session)
+            shift, turned = slice(place.start, place.start + 3), slice(place.start + 3, place.stop)
+            base = inverse.rotation.T
+            turn = base @ left_jacobian(x[turned])
+            # m = c - R'p, R' turning by exp(-R'J dw): see inverse_base.
+            motions[shift, shift] = -base
+            motions[shift, turned] = -skew(base @ inverse.position_mm) @ turn
+            motions[turned, turned] = -turn
+        if self.targets_free:
+            for target, turns in enumerate(self.turns):
+                columns = self.target_columns(target)
+                begin = columns.start
+                motions[begin : begin + 3, begin : begin + 3] = np.eye(3)
+                if turns:
+                    turned = left_jacobian(x[begin + 3 : begin + 6])
+                    motions[begin + 3 : begin + 6, begin + 3 : begin + 6] = turned
+        return motions
+
 
 def stacked(poses: Sequence[Pose]) -> Pose:
     """Single poses as one with a leading axis."""
@@ -156,6 +192,11 @@ def coordinates(
     for session in np.unique(observations.session):
         centroid[session] = observations.position_mm[observations.session == session].mean(axis=0)
     return FrameCoordinates(anchor, base_free, targets_free, turns, centroid)
+
+
+def both(free: bool | tuple[bool, bool]) -> tuple[bool, bool]:
+    """Whether base and targets are estimated, from one answer for both or one for each."""
+    return (free, free) if isinstance(free, bool) else free
 
 
 def left_jacobian(w_rad: np.ndarray) -> np.ndarray:

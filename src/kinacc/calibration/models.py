@@ -7,11 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.calibration import dh_fit, selection, vec_fit
+from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.dh_fit import DHFit
-from kinacc.calibration.frames import Frames, coordinates, known
+from kinacc.calibration.frames import BASE, Frames, coordinates, known
+from kinacc.calibration.mask import Rule
 from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.robust import SQUARES
 from kinacc.calibration.selection import Choice, Grid
 from kinacc.calibration.solve import Spectrum
+from kinacc.calibration.terms import ArmTerms, arm_terms, frame_terms, free_parameters
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.models import vec
@@ -23,9 +27,13 @@ from kinacc.models.vec import VECModel
 class Options:
     """How models are fitted; see the ``calibration`` section of the configuration.
 
-    ``frames_estimated``: base and tool are unknown; else both are the identity. ``dh_to_vec``: the
-    DH model follows the VEC at the measured joints instead of the measurements. ``grid``: orders
-    and priors to choose from; None where ``order`` and ``prior`` are stated.
+    ``frames_estimated``: base and tool are unknown; else they are ``base`` and ``tool``, the
+    robot's own. ``frame_rules``: what is known of them beforehand, by DH and nominal fit; the VEC
+    model holds a base or target they leave nothing free of. ``dh_to_vec``: the DH model follows the
+    VEC at the measured joints instead of the measurements. ``grid``: orders and priors to choose
+    from; None where ``order`` and ``prior`` are stated. ``hayati_instead``: beta in place of d at
+    ``hayati_joints``, else beside it. ``arm_rules``: parameters of the DH fit that are fixed or
+    known beforehand.
     """
 
     rotation_weight_mm_per_rad: float
@@ -36,7 +44,41 @@ class Options:
     travel_direction: bool = False
     dh_to_vec: bool = True
     hayati_joints: tuple[int, ...] = ()
+    hayati_instead: bool = False
+    arm_rules: tuple[Rule, ...] = ()
+    frame_rules: tuple[Rule, ...] = ()
+    loss: str = SQUARES
     threshold: float = 1e-3
+    base: Pose = IDENTITY
+    tool: Pose = IDENTITY
+
+    def stated(self, observations: Observations) -> Frames:
+        """Every base and every target where the robot's description has them."""
+        return known(
+            self.base,
+            self.tool,
+            sessions=len(observations.session_names),
+            targets=len(observations.target_names),
+        )
+
+    def arm(self, nominal: DHModel) -> ArmTerms:
+        """What the DH fit takes for granted of the arm."""
+        free = free_parameters(nominal.joints, self.hayati_joints, self.hayati_instead)
+        return arm_terms(nominal, free, self.arm_rules)
+
+    def frames(self, observations: Observations) -> FrameTerms:
+        """What the fits take for granted of base and targets, where these are estimated."""
+        return frame_terms(observations, self.stated(observations), self.frame_rules)
+
+    def frames_free(self, observations: Observations) -> tuple[bool, bool]:
+        """Whether base and targets are estimated with the VEC model."""
+        if not self.frames_estimated:
+            return False, False
+        terms = self.frames(observations)
+        count = len(observations.session_names)
+        bases = {BASE, *(f"{BASE}{number}" for number in range(2, count + 1))}
+        of_base = np.array([name.partition(".")[0] in bases for name in terms.names])
+        return bool(terms.free[of_base].any()), bool(terms.free[~of_base].any())
 
 
 def fit_vec(
@@ -50,7 +92,7 @@ def fit_vec(
 
     ``start``: a model of the same order near the solution, which saves steps and changes nothing.
     """
-    frames = _stated(observations)
+    frames = options.stated(observations)
     if options.frames_estimated:
         frames = fit_nominal(observations, nominal, options).frames
     return vec_fit.fit(
@@ -59,7 +101,7 @@ def fit_vec(
         prior=options.prior,
         rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
         frames=frames,
-        frames_free=options.frames_estimated,
+        frames_free=options.frames_free(observations),
         start=start,
     )
 
@@ -73,7 +115,8 @@ def choose_vec(
 ) -> list[Choice]:
     """Order and prior chosen from ``options.grid``; see ``selection.choices``. Raises FitError."""
     frames = fit_nominal(observations, nominal, options).frames
-    size = coordinates(observations, frames, *[options.frames_estimated] * 2).size
+    frames_free = options.frames_free(observations)
+    size = coordinates(observations, frames, *frames_free).size
     # A choice trains on three blocks of five at least; every fit of the chosen order on more.
     count = observations.select(observations.fold >= 0).components * 3 // 5
     grid = options.grid.within(count, nominal.joints, size)
@@ -81,7 +124,7 @@ def choose_vec(
         _with_wanted_directions(observations, options),
         vec.without_errors(nominal, *joint_range_rad, max(grid.orders)),
         frames,
-        options.frames_estimated,
+        frames_free,
         options.rotation_weight_mm_per_rad,
         grid,
         progress,
@@ -109,7 +152,7 @@ def fit_dh(
 
     Following the VEC, base and targets are the VEC's. Raises FitError.
     """
-    frames = None if options.frames_estimated else _stated(observations)
+    frames, terms = _of_frames(observations, options)
     if options.dh_to_vec:
         at_target = compose(
             vec.pose(vec_model, observations.q_rad, observations.s),
@@ -117,31 +160,41 @@ def fit_dh(
         )
         followed = full_poses(observations.q_rad, at_target)
         observations = followed.with_targets_of(observations)
-        frames = Frames(IDENTITY, vec_frames.targets)
+        frames, terms = Frames(IDENTITY, vec_frames.targets), None
+    arm = options.arm(nominal)
     fitted = dh_fit.fit(
         observations,
-        nominal,
-        free=dh_fit.free_parameters(nominal.joints, options.hayati_joints),
+        arm.nominal,
+        free=arm.free,
+        std=arm.std,
         rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
         threshold=options.threshold,
         frames=frames,
+        frame_terms=terms,
+        loss=options.loss,
     )
     return fitted.with_frames(vec_frames) if options.dh_to_vec else fitted
 
 
 def fit_nominal(observations: Observations, nominal: DHModel, options: Options) -> DHFit:
     """Base and targets of the nominal arm; nothing to fit where they are known. Raises FitError."""
+    frames, terms = _of_frames(observations, options)
     return dh_fit.fit_frames(
         observations,
         nominal,
         rotation_weight_mm_per_rad=options.rotation_weight_mm_per_rad,
-        frames=None if options.frames_estimated else _stated(observations),
+        frames=frames,
+        frame_terms=terms,
     )
 
 
-def _stated(observations: Observations) -> Frames:
-    """Frames nobody estimates: every base and every target at the identity."""
-    return known(sessions=len(observations.session_names), targets=len(observations.target_names))
+def _of_frames(
+    observations: Observations, options: Options
+) -> tuple[Frames | None, FrameTerms | None]:
+    """Frames nobody estimates, or what the fits take for granted of those they estimate."""
+    if options.frames_estimated:
+        return None, options.frames(observations)
+    return options.stated(observations), None
 
 
 def _with_wanted_directions(observations: Observations, options: Options) -> Observations:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.calibration import vec_fit
-from kinacc.calibration.frames import Frames, coordinates
+from kinacc.calibration.frames import Frames, both, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.spread import gram
 from kinacc.calibration.system import PoseSystem
@@ -94,7 +94,7 @@ def choices(
     observations: Observations,
     empty: VECModel,
     frames: Frames,
-    frames_free: bool,
+    frames_free: bool | tuple[bool, bool],
     rotation_weight_mm_per_rad: float,
     grid: Grid,
     progress=None,
@@ -159,10 +159,10 @@ class _Sums:
         block: np.ndarray,
         empty: VECModel,
         frames: Frames,
-        frames_free: bool,
+        frames_free: bool | tuple[bool, bool],
         weight: float,
     ) -> _Sums:
-        coords = coordinates(observations, frames, base_free=frames_free, targets_free=frames_free)
+        coords = coordinates(observations, frames, *both(frames_free))
         free, flange = vec_fit.flange_model(observations, empty)
         position, everything, rows, components = {}, {}, {}, {}
         for number in np.unique(block[block >= 0]):

@@ -150,6 +150,12 @@ def chosen_order(columns: Mapping, fold: int | None) -> tuple[int, float, float]
 def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
     """``dh_fit``: figures of the fit, singular values, directions the data do not determine."""
     rows = [*_solution_rows(fit.solution), *_spectrum_rows(fit.solution.spectrum)]
+    if fit.weights is not None:
+        rows += [
+            ("loss_scale", None, None, fit.weights.scale_mm, "mm"),
+            ("rows_below_half_weight", None, None, int(np.sum(fit.weights.row < 0.5)), "1"),
+            ("rows_without_weight", None, None, int(np.sum(fit.weights.row == 0.0)), "1"),
+        ]
     for number, direction in enumerate(uncertainty.undetermined, 1):
         rows += [
             ("undetermined_direction", number, name, value, "mrad" if is_angle(name) else "mm")

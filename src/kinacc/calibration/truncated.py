@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import qr
 
 from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, Spectrum, System
@@ -24,6 +25,7 @@ def minimise_truncated(
     threshold: float,
     frames: int = 0,
     name: str = "fit",
+    prior: np.ndarray | None = None,
 ) -> Solution:
     """Gauss-Newton with truncated SVD, from ``start`` (P,), leaning on ``nominal`` (P,).
 
@@ -32,26 +34,41 @@ def minimise_truncated(
     whose singular value is below a share of the block's largest (``FRAME_THRESHOLD``, then
     ``threshold``) keep their nominal value; ``scale`` (P,) is the unit in which displacement is
     measured (mm, and rad of one mrad).
+    ``prior`` (P,): residual standard deviation over prior standard deviation of every parameter, 0
+    for none. It adds ``prior (x - nominal)`` to the residuals, and a direction that the data leave
+    open is determined where a prior speaks of it. ``cost`` stays that of the data.
     Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
-    cost, ranks, last = system.cost(x), None, np.inf
+    weight = np.zeros(system.size) if prior is None else prior
+    held = _Held(nominal, scale, weight * scale, frames)
+
+    def objective(at: np.ndarray) -> float:
+        return system.cost(at) + held.cost(at)
+
+    cost, ranks, last = objective(x), None, np.inf
     iterations = 0
     while last > solve.STEP_TOLERANCE and iterations < solve.MAX_ITERATIONS:
         iterations += 1
         factor, count = solve.triangle(system, x, scale)
         # A rank that has been lost is not taken back, so the iteration cannot swing between two.
-        split = _Split.of(factor, frames, threshold, ranks if iterations > 3 else None)
+        split = _Split.of(
+            held.joined(factor, x), held, threshold, ranks if iterations > 3 else None
+        )
         ranks = split.ranks
-        step = scale * split.step((x - nominal) / scale)
-        x, cost, last = solve.advance(system.cost, x, step, cost, scale, name, TRUNCATED_GROWTH)
+        step = scale * split.step(held.displacement(x))
+        x, cost, last = solve.advance(objective, x, step, cost, scale, name, TRUNCATED_GROWTH)
     solve.require_converged(name, iterations, last, cost, count)
     factor, count = solve.triangle(system, x, scale)
-    split = _Split.of(factor, frames, threshold, ranks)
+    split = _Split.of(held.joined(factor, x), held, threshold, ranks)
     cost = float(np.sum(factor[:, -1] ** 2))
-    freedom = count - sum(split.ranks)
+    root = split.root()
+    fitted = sum(split.ranks)
+    if weight.any():
+        fitted = float(np.sum((factor[:, :-1] @ root) ** 2))  # what the data, not the prior, decide
+    freedom = count - fitted
     variance = cost / freedom if freedom > 0 else np.nan
-    covariance = variance * split.inverse_gram() * np.outer(scale, scale)
+    covariance = variance * (root @ root.T) * np.outer(scale, scale)
     return Solution(
         x=x,
         std=np.where(split.touched(), np.nan, np.sqrt(np.diag(covariance))),
@@ -69,36 +86,93 @@ def minimise_truncated(
 
 
 @dataclass(frozen=True)
+class _Held:
+    """Rows ``weight (x - nominal) / scale`` of the prior, in scaled parameters; frames first."""
+
+    nominal: np.ndarray
+    scale: np.ndarray
+    weight: np.ndarray
+    frames: int
+
+    def displacement(self, x: np.ndarray) -> np.ndarray:
+        return (x - self.nominal) / self.scale
+
+    def cost(self, x: np.ndarray) -> float:
+        return float(np.sum((self.weight * self.displacement(x)) ** 2))
+
+    def joined(self, factor: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Triangular factor of the data and of the prior on the frames."""
+        chosen = np.flatnonzero(self.weight[: self.frames])
+        if not chosen.size:
+            return factor
+        rows = np.zeros((chosen.size, len(factor)))
+        rows[np.arange(chosen.size), chosen] = self.weight[chosen]
+        rows[:, -1] = (self.weight * self.displacement(x))[chosen]
+        stacked = np.concatenate([factor, rows])
+        return qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
+
+    @property
+    def of_others(self) -> np.ndarray:
+        """Rows (p, P - frames) of the prior on the parameters after the frames."""
+        weight = self.weight[self.frames :]
+        return np.diag(weight)[weight > 0.0]
+
+
+@dataclass(frozen=True)
 class _Truncated:
-    """SVD ``left values right`` of a block of columns of which ``rank`` directions are kept."""
+    """A block of columns cut into ``kept`` (r, P) and ``lost`` directions, orthonormal rows.
+
+    ``root`` (P, r): its product with its transpose inverts the Gram matrix of block and prior on
+    the kept directions. ``left`` (m, r): orthonormal columns, root' times the block's. ``prior``
+    (p, P): rows that follow those of the block. ``rank`` counts what the block alone determines.
+    """
 
     left: np.ndarray
-    right: np.ndarray
+    root: np.ndarray
+    lost: np.ndarray
+    prior: np.ndarray
     spectrum: Spectrum
+    unused: np.ndarray
 
     @classmethod
-    def of(cls, block: np.ndarray, threshold: float, most: int | None) -> _Truncated:
+    def of(
+        cls, block: np.ndarray, threshold: float, most: int | None, prior: np.ndarray | None = None
+    ) -> _Truncated:
         left, values, right = np.linalg.svd(block)
         values = np.concatenate([values, np.zeros(len(right) - values.size)])
-        return cls(left, right, Spectrum.of(values, threshold, most))
+        spectrum = Spectrum.of(values, threshold, most)
+        rank = spectrum.rank
+        kept, lost = right[:rank], right[rank:]
+        root, unused = kept.T / values[:rank], left[:, rank:]
+        if prior is None or not len(prior):
+            return cls(left[:, :rank], root, lost, np.zeros((0, len(right))), spectrum, unused)
+        told, lost = _told_by(prior, lost)
+        kept = np.concatenate([kept, told])
+        both, upper = np.linalg.qr(np.concatenate([block, prior]) @ kept.T)
+        return cls(both, kept.T @ np.linalg.inv(upper), lost, prior, spectrum, unused)
 
     @property
     def rank(self) -> int:
         return self.spectrum.rank
 
-    @property
-    def root(self) -> np.ndarray:
-        """Matrix (P, rank) whose product with its transpose inverts the block's Gram matrix."""
-        return self.right[: self.rank].T / self.spectrum.values[: self.rank]
-
     def step(self, rhs: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Least squares in the kept directions, back to nominal in the others."""
-        lost = self.right[self.rank :]
-        kept = self.root @ (self.left[:, : self.rank].T @ rhs)
-        return -kept - lost.T @ (lost @ displacement)
+        rhs = np.concatenate([rhs, self.prior @ displacement])
+        kept = self.root @ (self.left.T @ rhs)
+        return -kept - self.lost.T @ (self.lost @ displacement)
 
     def touched(self) -> np.ndarray:
-        return np.sum(self.right[self.rank :] ** 2, axis=0) > TOUCH_SQUARED
+        return np.sum(self.lost**2, axis=0) > TOUCH_SQUARED
+
+
+def _told_by(prior: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The directions ``lost`` (m, P) turned into those ``prior`` speaks of, and the rest."""
+    if not len(lost):
+        return lost, lost
+    # Which parameters have a prior counts here, not how tight it is.
+    _, values, turn = np.linalg.svd(np.sign(prior) @ lost.T)
+    told = int(np.sum(values**2 > TOUCH_SQUARED))
+    return turn[:told] @ lost, turn[told:] @ lost
 
 
 @dataclass(frozen=True)
@@ -113,14 +187,14 @@ class _Split:
 
     @classmethod
     def of(
-        cls, factor: np.ndarray, count: int, threshold: float, most: tuple[int, int] | None
+        cls, factor: np.ndarray, held: _Held, threshold: float, most: tuple[int, int] | None
     ) -> _Split:
+        count = held.frames
         upper, lower = factor[:count], factor[count:]
         frames = _Truncated.of(upper[:, :count], FRAME_THRESHOLD, most and most[0])
         # Rows of truncated frame directions are equations the frames do not take up.
-        unused = frames.left[:, frames.rank :].T @ upper
-        rows = np.concatenate([lower, unused])
-        others = _Truncated.of(rows[:, count:-1], threshold, most and most[1])
+        rows = np.concatenate([lower, frames.unused.T @ upper])
+        others = _Truncated.of(rows[:, count:-1], threshold, most and most[1], held.of_others)
         return cls(frames, others, upper[:, count:-1], upper[:, -1], rows[:, -1])
 
     @property
@@ -133,21 +207,18 @@ class _Split:
         frames = self.frames.step(self.frames_rhs + self.coupling @ others, displacement[:count])
         return np.concatenate([frames, others])
 
-    def inverse_gram(self) -> np.ndarray:
-        """Inverse (P, P) of J'J on the kept directions."""
-        kept = self.frames.left[:, : self.frames.rank]
-        seen = -self.frames.root @ (kept.T @ self.coupling @ self.others.root)
-        blank = np.zeros((len(self.others.right), self.frames.rank))
-        full = np.block([[self.frames.root, seen], [blank, self.others.root]])
-        return full @ full.T
+    def root(self) -> np.ndarray:
+        """Matrix (P, r) whose product with its transpose inverts J'J on the kept directions."""
+        seen = -self.frames.root @ (self.frames.left.T @ self.coupling @ self.others.root)
+        blank = np.zeros((len(self.others.root), self.frames.rank))
+        return np.block([[self.frames.root, seen], [blank, self.others.root]])
 
     def undetermined(self) -> np.ndarray:
         """Truncated directions (m, P), frames first; those of the others carry the frames along."""
-        alone = self.frames.right[self.frames.rank :]
-        lost = self.others.right[self.others.rank :]
-        kept = self.frames.left[:, : self.frames.rank]
+        alone, lost = self.frames.lost, self.others.lost
+        kept = self.frames.left
         followed = -(self.frames.root @ (kept.T @ (self.coupling @ lost.T))).T
-        blank = np.zeros((len(alone), len(self.others.right)))
+        blank = np.zeros((len(alone), len(self.others.root)))
         return np.block([[alone, blank], [followed, lost]])
 
     def touched(self) -> np.ndarray:

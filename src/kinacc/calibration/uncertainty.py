@@ -14,15 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD, DHFit
-from kinacc.calibration.frames import FrameCoordinates, left_jacobian
 from kinacc.calibration.truncated import TOUCH_SQUARED
 from kinacc.calibration.vec_fit import VECFit
-from kinacc.geometry import skew
 from kinacc.models.dh import PARAMETERS
 from kinacc.models.vec import ERRORS, VECModel
-
-MOTIONS = ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")
-BASE = "base"
 
 
 @dataclass(frozen=True)
@@ -84,54 +79,20 @@ def is_angle(name: str) -> bool:
     return name.endswith("_rad") or ".eps_" in name
 
 
-def frame_motion_names(coordinates: FrameCoordinates, target_names: tuple[str, ...]) -> list[str]:
-    """Names of the frame parameters, in the order of the rows of ``frame_motions``."""
-    names = []
-    for session in range(coordinates.anchor.sessions if coordinates.base_free else 0):
-        base = BASE if session == 0 else f"{BASE}{session + 1}"
-        names += [f"{base}.{motion}" for motion in MOTIONS]
-    if coordinates.targets_free:
-        for name, turns in zip(target_names, coordinates.turns, strict=True):
-            names += [f"{name}.{motion}" for motion in (MOTIONS if turns else MOTIONS[:3])]
-    return names
-
-
-def frame_motions(coordinates: FrameCoordinates, x: np.ndarray) -> np.ndarray:
-    """Derivative (F, F) of the named motions of base and targets in the frame coordinates at x."""
-    motions = np.zeros((coordinates.size, coordinates.size))
-    for session in range(coordinates.anchor.sessions if coordinates.base_free else 0):
-        inverse = coordinates.inverse_base(x, session)
-        place = coordinates.base_columns(session)
-        shift, turned = slice(place.start, place.start + 3), slice(place.start + 3, place.stop)
-        base = inverse.rotation.T
-        turn = base @ left_jacobian(x[turned])
-        # m = c - R'p, R' turning by exp(-R'J dw): see FrameCoordinates.inverse_base.
-        motions[shift, shift] = -base
-        motions[shift, turned] = -skew(base @ inverse.position_mm) @ turn
-        motions[turned, turned] = -turn
-    if coordinates.targets_free:
-        for target, turns in enumerate(coordinates.turns):
-            columns = coordinates.target_columns(target)
-            begin = columns.start
-            motions[begin : begin + 3, begin : begin + 3] = np.eye(3)
-            if turns:
-                turned = left_jacobian(x[begin + 3 : begin + 6])
-                motions[begin + 3 : begin + 6, begin + 3 : begin + 6] = turned
-    return motions
-
-
 def _uncertainty(
     fit: DHFit | VECFit, target_names: tuple[str, ...], free: list[str]
 ) -> Uncertainty:
-    frames = fit.coordinates.size
-    names = (*frame_motion_names(fit.coordinates, target_names), *free)
-    change = np.eye(len(names))
-    change[:frames, :frames] = frame_motions(fit.coordinates, fit.solution.x[:frames])
+    frames, moving = fit.coordinates.size, fit.coordinates.motion_names(target_names)
+    names = (*moving, *free)
+    change = np.zeros((len(names), len(fit.solution.x)))
+    change[: len(moving), :frames] = fit.coordinates.motions(fit.solution.x[:frames])
+    change[len(moving) :, frames:] = np.eye(len(free))
     undetermined = np.zeros((0, len(names)))
     if fit.solution.undetermined is not None:
-        units = _units(names)
         # The fit's own scale has the same units: frame coordinates are mm and rad as well.
-        undetermined = (fit.solution.undetermined * units) @ change.T / units
+        angle = [*fit.coordinates.is_angle(), *(is_angle(name) for name in free)]
+        own = np.where(angle, ANGLE_UNIT_RAD, 1.0)
+        undetermined = (fit.solution.undetermined * own) @ change.T / _units(names)
     return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
 
 

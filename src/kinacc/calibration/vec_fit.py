@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
-from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
+from kinacc.calibration.frames import FrameCoordinates, Frames, both, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.ridge import minimise_with_prior
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
@@ -75,12 +75,13 @@ def fit(
     prior: Prior,
     rotation_weight_mm_per_rad: float,
     frames: Frames,
-    frames_free: bool,
+    frames_free: bool | tuple[bool, bool],
     start: VECModel | None = None,
 ) -> VECFit:
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
-    Base and targets are ``frames``, or start there if ``frames_free``; coefficients start at those
+    Base and targets are ``frames``, or start there if ``frames_free`` (both, or base and
+    targets apart); coefficients start at those
     of ``start``, a model like ``empty``, or at zero. Direction offsets that no
     observation shows are left at zero, std NaN; the two of a joint that always travelled sum to
     zero, so that the model at an unknown direction is the mean of both.
@@ -88,7 +89,7 @@ def fit(
     """
     free, flange = flange_model(observations, empty)
     require_enough(observations, flange.size, "VEC fit", VEC_FIX)
-    coords = coordinates(observations, frames, base_free=frames_free, targets_free=frames_free)
+    coords = coordinates(observations, frames, *both(frames_free))
     require_enough(observations, coords.size + flange.size, "VEC fit", VEC_FIX)
     system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
     prior_std = prior.std(empty)

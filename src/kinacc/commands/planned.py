@@ -189,6 +189,7 @@ def settings_of(given: Mapping) -> dict:
         if given["robot"] is None:
             raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
         return plain
+    from kinacc.stages.calibration_settings import hayati_joints
     from kinacc.stages.plan import planned
 
     datasets = planned(given["config"] or (CONFIG,)).datasets
@@ -201,7 +202,7 @@ def settings_of(given: Mapping) -> dict:
         "robot": config["robot"],
         "estimated": calibration["base_and_tool"] == "estimated",
         "weight": float(calibration["rotation_weight_mm_per_rad"]),
-        "hayati": tuple(calibration["dh"]["hayati_joints"]),
+        "hayati": hayati_joints(calibration["dh"], robots.load(config["robot"])),
     }
     box = evaluation["joint_box"]["joints_deg"]
     if evaluation["space"] == "joint_box" and box is not None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from kinacc.calibration.mask import JOINTS, rules, strangers
 from kinacc.config.validate import ROBOTS
 from kinacc.config.values import shown
 from kinacc.errors import InputError, Problem
@@ -29,6 +30,7 @@ def contradictions(
     measurements = full["measurements"]
     yield from _folds(measurements, place)
     yield from _choice(full, place)
+    yield from _frames(full["calibration"], place)
     if measurements["source"] == "file":
         yield from _file(name, measurements["file"], place, folder)
     else:
@@ -92,10 +94,12 @@ def _study(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
 
 def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Iterator[Problem]:
     """Settings that speak of joints the robot has not; faults of a robot file are its reader's."""
-    hayati = full["calibration"]["dh"]["hayati_joints"]
+    section = full["calibration"]["dh"]
+    hayati = [] if section["hayati_joints"] == "auto" else section["hayati_joints"]
+    told = rules(section["parameters"], JOINTS)[0]
     ranges = (("calibration", "vec", "joint_range"), ("evaluation", "joint_box", "joints_deg"))
     given = {keys: full[keys[0]][keys[1]][keys[2]] for keys in ranges}
-    if not hayati and not any(isinstance(pairs, list) for pairs in given.values()):
+    if not hayati and not told and not any(isinstance(pairs, list) for pairs in given.values()):
         return
     from kinacc.robot import load, shipped
 
@@ -108,6 +112,8 @@ def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Ite
     if beyond:
         what = f"{robot} has no joint {', '.join(map(str, beyond))}"
         yield Problem(place("calibration", "dh", "hayati_joints"), what, f"1 to {joints}")
+    for rule, what, allowed in strangers(told, joints):
+        yield Problem(place("calibration", "dh", "parameters", rule.name), what, allowed)
     for keys, pairs in given.items():
         if isinstance(pairs, list) and len(pairs) != joints:
             what = f"{len(pairs)} pairs for the {joints} joints of {robot}"
@@ -139,6 +145,15 @@ def _folds(measurements: Mapping[str, Any], place) -> Iterator[Problem]:
             place("measurements", "validation_fold"),
             f"there is no fold {held_out} among {folds}, counted from 0",
             f"0 to {folds - 1}, or null",
+        )
+
+
+def _frames(calibration: Mapping[str, Any], place) -> Iterator[Problem]:
+    if calibration["frames"] and calibration["base_and_tool"] == "fixed":
+        yield Problem(
+            place("calibration", "frames"),
+            f"{', '.join(calibration['frames'])}, but base and tool are not estimated",
+            "{} where calibration.base_and_tool is fixed",
         )
 
 

@@ -76,7 +76,9 @@ def _entry(entry: Key | Section, indent: str) -> list[str]:
 def _note(key: Key) -> str:
     unit = f"[{key.unit}] " if key.unit else ""
     words = (
-        f" ({' | '.join(map(_word, key.choices))})" if key.choices and key.kind != "names" else ""
+        f" ({' | '.join(map(_word, key.choices))})"
+        if key.choices and key.kind not in ("names", "parameters")
+        else ""
     )
     return f"{unit}{key.about}{words}"
 

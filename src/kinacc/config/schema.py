@@ -10,6 +10,7 @@ from typing import Any
 
 DATASET_NAME = "[A-Za-z0-9_-]+"
 KINDS = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair", "pairs", "names")
+KINDS += ("parameters",)
 NUMERIC = {
     "int": "a whole number",
     "float": "a number",
@@ -46,6 +47,12 @@ class Key:
         parts = []
         if self.kind == "names":
             parts.append(f"a mapping of {self.names} to text")
+        elif self.kind == "parameters":
+            names = {"joints": "d, joint 3, joint 3 d", "frames": "base, base rz, tool x"}
+            parts.append(
+                f"a mapping of names ({names[self.choices[0]]}) to free, fixed or "
+                "{value_mm: .., prior_std_mm: ..}, with mm, mrad, rad or deg"
+            )
         elif self.kind == "texts" and self.choices:
             parts.append("a list of " + ", ".join(self.choices))
         elif self.choices:

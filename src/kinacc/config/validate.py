@@ -13,6 +13,11 @@ from kinacc.config.values import INVALID, Place, check, nearest, shown, unknown_
 from kinacc.errors import Problem
 
 ROBOTS = Path(__file__).parents[1] / "robots"
+_MAPPINGS = (
+    ("measurements", "file", "columns"),
+    ("calibration", "dh", "parameters"),
+    ("calibration", "frames"),
+)
 ROBOT = Key("robot", "text", None, "name of a shipped robot, or path of a robot file")
 
 
@@ -84,7 +89,10 @@ def overlay(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
 def complete(shared: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     """Full settings of a data set: defaults, then the top level, then its own."""
     full = overlay(overlay(defaults(), shared), own)
-    columns = own.get("measurements", {}).get("file", {}).get("columns")
-    if columns is not None:  # a mapping of names is one value, not a section
-        full["measurements"]["file"]["columns"] = dict(columns)
+    for keys in _MAPPINGS:  # one value each, not a section
+        given, at = own, full
+        for key in keys[:-1]:
+            given, at = given.get(key, {}), at[key]
+        if given.get(keys[-1]) is not None:
+            at[keys[-1]] = dict(given[keys[-1]])
     return full

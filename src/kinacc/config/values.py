@@ -235,6 +235,15 @@ def _names(key, value, path, place):
     return (INVALID if problems else dict(value)), problems
 
 
+def _parameters(key, value, path, place):
+    from kinacc.calibration import mask
+
+    if not isinstance(value, dict):
+        return _refuse(key, path, place, f"{shown(value)} is not a mapping")
+    problems = mask.rules(value, key.choices[0], lambda name: place((*path, name)))[1]
+    return (INVALID if problems else dict(value)), problems
+
+
 _CHECKS = {
     "int": _int,
     "float": _float,
@@ -246,4 +255,5 @@ _CHECKS = {
     "pair": _pair,
     "pairs": lambda key, value, path, place: _list(key, value, path, place, _pair),
     "names": _names,
+    "parameters": _parameters,
 }

@@ -13,12 +13,8 @@ import numpy as np
 from kinacc.calibrated.blind import in_words
 from kinacc.calibrated.predict import sensitivity
 from kinacc.calibrated.record import TOOL, nominal
-from kinacc.calibration.uncertainty import (
-    BASE,
-    MOTIONS,
-    Uncertainty,
-    dh_parameter_names,
-)
+from kinacc.calibration.frames import BASE, MOTIONS
+from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
 from kinacc.geometry import Pose
 from kinacc.robot import Robot
 

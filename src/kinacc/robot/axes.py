@@ -15,7 +15,7 @@ import numpy as np
 from kinacc.geometry import Pose, compose, invert, rotation_x, rotation_y, rotation_z
 from kinacc.models.dh import DHModel
 
-_NEARLY_PARALLEL = 0.02  # sine of the angle between two axes below which a Hayati angle is used
+NEARLY_PARALLEL = 0.02  # sine of the angle between two axes below which a Hayati angle is used
 _ON_AXIS_MM = 1e-10
 _TIE = 1e-9
 _ROUND_OFF_RAD = 1e-15
@@ -63,7 +63,7 @@ def _row(frame: Pose, point: np.ndarray, direction: np.ndarray) -> tuple[float, 
     w = frame.rotation.T @ direction
     p = frame.rotation.T @ (point - frame.position_mm)
     sine = np.hypot(w[0], w[1])
-    if sine < _NEARLY_PARALLEL:
+    if sine < NEARLY_PARALLEL:
         at = p - p[2] / w[2] * w
         theta, a = _theta_and_length(at[0], at[1])
         return (theta, 0.0, a, *_tilt(theta, w))
@@ -77,7 +77,7 @@ def _last_row(frame: Pose, flange: Pose) -> tuple[float, ...]:
     """The row from the last axis to the flange: all of it where their z axes are parallel."""
     w = frame.rotation.T @ flange.rotation[:, 2]
     p = frame.rotation.T @ (flange.position_mm - frame.position_mm)
-    if np.hypot(w[0], w[1]) >= _NEARLY_PARALLEL:
+    if np.hypot(w[0], w[1]) >= NEARLY_PARALLEL:
         return _row(frame, flange.position_mm, flange.rotation[:, 2])
     theta, a = _theta_and_length(p[0], p[1])
     if a == 0.0:

@@ -7,30 +7,34 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinacc.calibration import selection, tables
-from kinacc.calibration.dh_fit import DH_FIX, free_parameters
-from kinacc.calibration.frames import coordinates, known
+from kinacc.calibration import mask, selection, tables
+from kinacc.calibration.dh_fit import DH_FIX
 from kinacc.calibration.models import Options
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.selection import Grid
 from kinacc.calibration.system import require_enough
+from kinacc.calibration.terms import parallel_joints, require_known
 from kinacc.calibration.vec_fit import VEC_FIX, Prior
-from kinacc.robot import Robot
+from kinacc.robot import Robot, carried
 
+AUTO = "auto"
 TRAIN = "train"
 
 
-def options(calibration: Mapping) -> Options:
+def options(calibration: Mapping, arm: Robot) -> Options:
     """Options of the ``calibration`` settings; a stage that lacks a section gets its defaults."""
     given: dict = {
+        "base": arm.base,
+        "tool": carried(arm),
         "rotation_weight_mm_per_rad": float(calibration["rotation_weight_mm_per_rad"]),
         "frames_estimated": calibration["base_and_tool"] == "estimated",
+        "frame_rules": tuple(mask.rules(calibration["frames"], mask.FRAMES)[0]),
     }
     if "vec" in calibration:
         section = calibration["vec"]
         angle_rad = 1e-3 * float(section["prior_std_mrad"])
         given |= {
-            "order": 1 if section["order"] == "auto" else int(section["order"]),
+            "order": 1 if section["order"] == AUTO else int(section["order"]),
             "grid": _grid(section, angle_rad),
             "travel_direction": bool(section["travel_direction"]),
             "prior": Prior(
@@ -41,15 +45,25 @@ def options(calibration: Mapping) -> Options:
         section = calibration["dh"]
         given |= {
             "dh_to_vec": section["fit_to"] == "vec",
-            "hayati_joints": tuple(int(joint) for joint in section["hayati_joints"]),
+            "hayati_joints": hayati_joints(section, arm),
+            "hayati_instead": section["hayati_joints"] == AUTO,
+            "arm_rules": tuple(mask.rules(section["parameters"], mask.JOINTS)[0]),
+            "loss": section["loss"],
             "threshold": float(section["truncation"]),
         }
     return Options(**given)
 
 
+def hayati_joints(section: Mapping, arm: Robot) -> tuple[int, ...]:
+    """Joints (1-based) with a Hayati angle, by the ``calibration.dh`` settings."""
+    if section["hayati_joints"] == AUTO:
+        return parallel_joints(arm.dh)
+    return tuple(int(joint) for joint in section["hayati_joints"])
+
+
 def _grid(section: Mapping, offset_rad: float) -> Grid | None:
     """The orders and priors to choose from; None where both are stated."""
-    by_order, by_prior = section["order"] == "auto", section["prior"] == "chosen"
+    by_order, by_prior = section["order"] == AUTO, section["prior"] == "chosen"
     if not by_order and not by_prior:
         return None
     stated = Prior(
@@ -111,12 +125,12 @@ def require_enough_rows(inputs: Mapping, robot: Robot, calibration: Mapping) -> 
     The fits ask themselves as well; asked beforehand, nothing is remade from data that cannot do.
     """
     seen, train = observed(inputs, robot)
-    seen, chosen, joints = seen.select(train), options(calibration), robot.dh.joints
+    seen, chosen, joints = seen.select(train), options(calibration, robot), robot.dh.joints
     frames = 0
     if chosen.frames_estimated and len(seen):
-        start = known(sessions=int(seen.session.max()) + 1, targets=len(seen.target_names))
-        frames = coordinates(seen, start, base_free=True, targets_free=True).size
+        require_known(chosen.frame_rules, seen)
+        frames = int(chosen.frames(seen).free.sum())
     errors = 6 * joints * (chosen.order + 1)
     require_enough(seen, errors + frames, "VEC fit", VEC_FIX)
-    parameters = int(free_parameters(joints, chosen.hayati_joints).sum())
+    parameters = int(chosen.arm(robot.dh).free.sum())
     require_enough(seen, parameters + frames, "DH fit", DH_FIX)

@@ -15,7 +15,7 @@ from kinacc.stages import calibration_settings as shared
 def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     """``dh_model``, its covariance, ``frames`` of all models and ``dh_fit``, from training rows."""
     arm = robot.load(settings["robot"])
-    options = shared.options(settings["calibration"])
+    options = shared.options(settings["calibration"], arm)
     every, train = shared.observed(inputs, arm)
     observations = every.select(train)
     vec_frames = tables.frames_of(

@@ -8,10 +8,12 @@ import numpy as np
 
 from kinacc import region, robot
 from kinacc.accuracy_map import ModelPair
-from kinacc.geometry import IDENTITY, Pose, compose, invert
+from kinacc.geometry import Pose, compose, invert
 from kinacc.models import tables
 from kinacc.region import Cylinder
 from kinacc.robot import Robot
+
+_ROUNDING = 1e-9
 
 
 def cylinder(evaluation: Mapping) -> Cylinder:
@@ -40,11 +42,11 @@ def orientations(evaluation: Mapping) -> region.Orientations:
 
 def models(inputs: Mapping, evaluation: Mapping, arm: Robot) -> ModelPair:
     """VEC and DH model with their bases and tools, joints travelling as the settings say."""
-    vec = tables.vec_model(inputs["vec_model"])
+    vec = tables.vec_model(inputs["vec_model"], arm.dh.prismatic)
     direction = int(evaluation["travel_direction"])
     return ModelPair(
         vec,
-        tables.dh_model(inputs["dh_model"]),
+        tables.dh_model(inputs["dh_model"], arm.dh.prismatic),
         _tool(inputs, evaluation, arm, "vec"),
         _tool(inputs, evaluation, arm, "dh"),
         np.full(vec.joints, direction) if direction else None,
@@ -63,11 +65,12 @@ def _vec_base(inputs: Mapping) -> Pose | None:
 
 def _tool(inputs: Mapping, evaluation: Mapping, arm: Robot, model: str) -> Pose:
     """The tool fitted with a model; the configured one, on the arm's flange, where none was."""
+    own = robot.carried(arm)
     if "frames" in inputs:
         names = np.asarray(inputs["frames"]["frame"])
         if (names == "tool").any():
             fitted = tables.frame(inputs["frames"], model, "tool")
-            if any(np.abs(a - b).max() > 0.0 for a, b in zip(fitted, IDENTITY, strict=True)):
+            apart = max(np.abs(a - b).max() for a, b in zip(fitted, own, strict=True))
+            if apart > _ROUNDING:  # a tool that is not estimated is the arm's own
                 return fitted
-    configured = Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float))
-    return compose(robot.carried(arm), configured)
+    return compose(own, Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float)))

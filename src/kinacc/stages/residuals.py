@@ -33,7 +33,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
     """
     arm = robot.load(settings["robot"])
-    options = shared.options(settings["calibration"])
+    options = shared.options(settings["calibration"], arm)
     every, train = shared.observed(inputs, arm)
     delivered = _delivered(inputs, arm.dh, every)
     joint_range = delivered.vec.q_min_rad, delivered.vec.q_max_rad

@@ -17,7 +17,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict[str
     ``vec_orders`` says how order and prior were chosen, where they were not stated.
     """
     arm, calibration = robot.load(settings["robot"]), settings["calibration"]
-    options = shared.options(calibration)
+    options = shared.options(calibration, arm)
     every, train = shared.observed(inputs, arm)
     joint_range = shared.joint_range_rad(calibration["vec"], arm, every.q_rad)
     choices = []

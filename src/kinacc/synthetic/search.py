@@ -64,7 +64,7 @@ def bench_of(config: Mapping) -> Bench:
     fitted = tables.vec_model(made["vec_model"])
     empty = vec.without_errors(TABLE_II, fitted.q_min_rad, fitted.q_max_rad, fitted.order)
     seen = made["measurements"]
-    options = calibration_settings.options(config["calibration"])
+    options = calibration_settings.options(config["calibration"], bench.robot)
     weight = options.rotation_weight_mm_per_rad
     response = linearise(
         empty,

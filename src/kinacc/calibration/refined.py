@@ -1,0 +1,119 @@
+"""A truncated fit repeated until its priors and its loss agree with the residuals it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinacc.calibration import robust
+from kinacc.calibration.observations import Observations
+from kinacc.calibration.robust import Weights
+from kinacc.calibration.solve import Solution, System
+from kinacc.calibration.truncated import minimise_truncated
+from kinacc.errors import FitError
+
+MAX_PASSES = 100
+SETTLED = 1e-4  # mm and mrad by which a pass may still move a parameter
+SCALE_PASSES = 20  # after these the scale of a loss is held, so that no cycle can form
+
+
+@dataclass(frozen=True)
+class Task:
+    """What ``truncated.minimise_truncated`` is asked, with priors by their standard deviation.
+
+    ``prior_std`` (P,) in the parameters' own units about ``nominal``, inf for none.
+    """
+
+    system: System
+    start: np.ndarray
+    nominal: np.ndarray
+    prior_std: np.ndarray
+    scale: np.ndarray
+    threshold: float
+    frames: int
+    name: str
+
+    def solved(
+        self, start: np.ndarray, variance: float, weights: Weights | None = None
+    ) -> Solution:
+        """One pass from ``start`` with residuals of ``variance``."""
+        known = np.isfinite(self.prior_std)
+        system = self.system if weights is None else _Weighted(self.system, weights.root)
+        return minimise_truncated(
+            system,
+            start=start,
+            nominal=self.nominal,
+            scale=self.scale,
+            threshold=self.threshold,
+            frames=self.frames,
+            name=self.name,
+            prior=np.sqrt(variance) / self.prior_std if known.any() else None,
+        )
+
+
+def minimise(task: Task, observations: Observations, loss: str) -> tuple[Solution, Weights | None]:
+    """The fit of ``task`` and, with another loss than squares, the weights of the rows.
+
+    Squares without a prior take one pass. A prior is weighed by the variance of the residuals,
+    which the fit estimates: the first pass leans on no prior, so none can pass for truth before
+    the data have spoken. A robust loss is minimised by reweighted squares (see ``robust``);
+    ``variance`` is then that of its scale.
+    Raises FitError where the passes do not settle.
+    """
+    solution, weights = task.solved(task.start, 0.0), None
+    if loss == robust.SQUARES and np.isinf(task.prior_std).all():
+        return solution, None
+    for number in range(MAX_PASSES):
+        before = solution.x
+        if loss != robust.SQUARES:
+            scale = weights.scale_mm if weights and number >= SCALE_PASSES else None
+            residual = task.system.residual(before)
+            weights = robust.weights(loss, residual, observations, scale)
+        variance = solution.variance if weights is None else weights.scale_mm**2
+        if not np.isfinite(variance):
+            raise FitError(f"{task.name}: no residuals are left over to weigh a prior by")
+        solution = task.solved(before, variance, weights)
+        if np.all(np.abs(solution.x - before) <= SETTLED * task.scale):
+            return _scaled(solution, weights), weights
+    moved = np.max(np.abs(solution.x - before) / task.scale)
+    raise FitError(
+        f"{task.name}: loss {loss} and priors have not settled after {MAX_PASSES} passes; the last "
+        f"one moved a parameter by {moved:.3g} mm or mrad (wanted {SETTLED:g})"
+    )
+
+
+def _scaled(solution: Solution, weights: Weights | None) -> Solution:
+    """Standard deviations for the residual variance of a robust loss's scale."""
+    if weights is None or not solution.variance > 0.0:
+        return solution
+    factor = weights.scale_mm**2 / solution.variance
+    return replace(
+        solution,
+        variance=weights.scale_mm**2,
+        covariance=factor * solution.covariance,
+        std=np.sqrt(factor) * solution.std,
+    )
+
+
+@dataclass(frozen=True)
+class _Weighted:
+    """A system whose residuals (m,) are multiplied by ``root``."""
+
+    system: System
+    root: np.ndarray
+
+    @property
+    def size(self) -> int:
+        return self.system.size
+
+    def cost(self, x: np.ndarray) -> float:
+        return float(np.sum((self.root * self.system.residual(x)) ** 2))
+
+    def blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        begin = 0
+        for residual, jacobian in self.system.blocks(x):
+            root = self.root[begin : begin + len(residual)]
+            begin += len(residual)
+            yield root * residual, root[:, None] * jacobian

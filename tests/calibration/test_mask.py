@@ -1,0 +1,114 @@
+"""Rules about parameters: what they cover, which one holds, every fault at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc.calibration import mask
+from kinacc.calibration.mask import FRAMES, JOINTS
+from kinacc.calibration.terms import arm_terms, free_parameters, parallel_joints
+from kinacc.robot import load, shipped
+
+
+def joint_rules(content):
+    found, problems = mask.rules(content, JOINTS)
+    assert not problems
+    return found
+
+
+def test_the_rule_that_says_most_holds_in_any_order():
+    content = {"d": "fixed", "joint 3": "free", "joint 3 d": {"prior_std_mm": 0.5}}
+    nominal = load("mh180").dh
+    for names in (list(content), list(content)[::-1]):
+        rules = joint_rules({name: content[name] for name in names})
+        terms = arm_terms(nominal, free_parameters(6), rules)
+        np.testing.assert_array_equal(terms.free[:, 1], [False, False, True, False, False, False])
+        assert terms.std[2, 1] == 0.5
+        assert np.isinf(np.delete(terms.std, 2, axis=0)).all()
+        assert terms.free[:, [0, 2, 3]].all()
+
+
+def test_a_rule_for_a_joint_leaves_beta_to_the_hayati_joints():
+    terms = arm_terms(load("mh180").dh, free_parameters(6), joint_rules({"joint 2": "free"}))
+    assert not terms.free[1, 4]
+    terms = arm_terms(load("mh180").dh, free_parameters(6), joint_rules({"joint 2 beta": "free"}))
+    assert terms.free[1, 4]
+
+
+def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
+    rules = joint_rules(
+        {
+            "j2.alpha_rad": {"value_deg": 90.0},
+            "joint 4 d": {"value_mm": -1224.0, "prior_std_mm": 2.0},
+            "joint 1 theta": {"prior_std_mrad": 3.0},
+        }
+    )
+    nominal = load("mh180").dh
+    terms = arm_terms(nominal, free_parameters(6), rules)
+    assert terms.nominal.alpha_rad[1] == pytest.approx(np.pi / 2)
+    assert not terms.free[1, 3]
+    assert (terms.nominal.d_mm[3], terms.std[3, 1]) == (-1224.0, 2.0)
+    assert terms.free[3, 1]
+    assert terms.std[0, 0] == pytest.approx(3e-3)
+    assert terms.nominal.theta_offset_rad[0] == nominal.theta_offset_rad[0]
+
+
+def test_every_fault_is_named_at_once():
+    content = {
+        "joint 3 e": "free",
+        "base z": "fixed",
+        "d": "loose",
+        "a": {"prior_std_mrad": 1.0},
+        "alpha": {"prior_std_deg": -1.0, "prior_std_mrad": 1.0},
+        "joint 1": {"value_mm": 3.0},
+        "joint 2 d": {"prior_std_mm": True, "std_mm": 1.0},
+        "j2.d_mm": "free",
+    }
+    _, problems = mask.rules(content, JOINTS)
+    text = "\n".join(str(each) for each in problems)
+    for words in (
+        "joint 3 e: 'joint 3 e' is no parameter of joints",
+        "base z: 'base z' is no parameter of joints",
+        "it belongs in calibration.frames",
+        "'loose' is not understood",
+        "a_mm is in mm",
+        "-1.0 is not positive",
+        "stated in two units",
+        "a value needs the name of one parameter",
+        "True is not a number",
+        "unknown key 'std_mm'",
+        "is said again; first as 'joint 2 d'",
+    ):
+        assert words in text, words
+    assert len(problems) == 10
+
+
+def test_frames_are_named_as_in_the_tables():
+    content = {"base": "fixed", "tool.rz_rad": {"prior_std_deg": 1.0}, "mA x": {"value_mm": 3}}
+    found, problems = mask.rules(content, FRAMES)
+    assert not problems
+    assert [(rule.frame, rule.parameter) for rule in found] == [
+        ("base", None),
+        ("tool", "rz_rad"),
+        ("mA", "x_mm"),
+    ]
+    _, problems = mask.rules({"joint 3 d": "fixed", "base q": "fixed"}, FRAMES)
+    assert "it belongs in calibration.dh.parameters" in str(problems[0])
+    assert len(problems) == 2
+
+
+def test_parallel_axes_of_every_shipped_arm():
+    found = {name: parallel_joints(load(name).dh) for name in shipped()}
+    expected = dict.fromkeys(found, (2,)) | {"ur10": (2, 3), "iiwa14": ()}
+    assert {name: found[name] for name in found if "iiwa" not in name} == {
+        name: expected[name] for name in found if "iiwa" not in name
+    }
+    assert all(found[name] == () for name in found if "iiwa" in name)
+
+
+def test_beta_takes_the_place_of_d_where_asked():
+    beside, instead = (free_parameters(6, (2, 3), each) for each in (False, True))
+    assert beside.sum() == 26
+    assert instead.sum() == 24
+    assert not instead[[1, 2], 1].any()

@@ -1,0 +1,212 @@
+"""Fits with parameters that are fixed or known beforehand, and with losses that forgive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulated import POINT, POSE, THREE, disturbed, joints, measure
+
+from kinacc import robot
+from kinacc.calibration import dh_fit, frames, mask, robust, terms, uncertainty
+from kinacc.calibration.constrained import ConstrainedFrames
+from kinacc.errors import InputError
+from kinacc.geometry import compose, log_so3
+from kinacc.models import dh
+
+ARM = robot.load("mh180")
+FREE = dh_fit.free_parameters(6)
+WEIGHT = 500.0
+
+
+def seen(kind=POSE, count=60, seed=0, noise_mm=0.05, sessions=1):
+    rng = np.random.default_rng(seed)
+    true = disturbed(ARM.dh, FREE, rng)
+    return true, measure(true, joints(ARM, count, rng), kind, rng, noise_mm, sessions)
+
+
+def fitted(observations, arm_rules=None, frame_rules=None, **given):
+    arm = terms.arm_terms(ARM.dh, FREE, mask.rules(arm_rules or {}, mask.JOINTS)[0])
+    stated = frames.known(
+        ARM.base,
+        robot.carried(ARM),
+        sessions=len(observations.session_names),
+        targets=len(observations.target_names),
+    )
+    of_frames = terms.frame_terms(
+        observations, stated, mask.rules(frame_rules or {}, mask.FRAMES)[0]
+    )
+    return dh_fit.fit(
+        observations,
+        arm.nominal,
+        free=arm.free,
+        std=arm.std,
+        rotation_weight_mm_per_rad=WEIGHT,
+        threshold=1e-3,
+        frame_terms=of_frames,
+        **given,
+    )
+
+
+def test_no_rule_is_the_plain_fit_to_the_bit():
+    _, data = seen()
+    plain = dh_fit.fit(data, ARM.dh, free=FREE, rotation_weight_mm_per_rad=WEIGHT, threshold=1e-3)
+    np.testing.assert_array_equal(dh.to_vector(fitted(data).model), dh.to_vector(plain.model))
+
+
+def test_fixed_parameters_stay_where_they_are_said_to_be():
+    _, data = seen()
+    rules = {"joint 3": "fixed", "joint 5 a": {"value_mm": 0.25}, "alpha": "fixed"}
+    found = fitted(data, rules)
+    table, nominal = dh.to_vector(found.model).reshape(6, 5), dh.to_vector(ARM.dh).reshape(6, 5)
+    np.testing.assert_array_equal(table[2], nominal[2])
+    np.testing.assert_array_equal(table[:, 3], nominal[:, 3])
+    assert table[4, 2] == 0.25
+    assert np.isnan(found.std[2]).all()
+    assert np.isfinite(found.std[3, 0])
+
+
+@pytest.mark.parametrize("kind", [POINT, THREE, POSE])
+@pytest.mark.parametrize("sessions", [1, 2])
+def test_fixed_frames_stay_and_the_rest_fits_as_well(kind, sessions):
+    """With every component fixed where the plain fit found it, the same optimum is reached."""
+    _, data = seen(kind, sessions=sessions)
+    plain = fitted(data)
+    first = data.target_names[0]
+    names = [f"base {axis}" for axis in "xyz"] + [f"{first} {axis}" for axis in "xyz"]
+    at = [*plain.frames.base.position_mm, *plain.frames.tool.position_mm]
+    if sessions == 2:
+        names.append("base2 y")
+        at.append(plain.frames.bases.position_mm[1, 1])
+    rules = {name: {"value_mm": float(value)} for name, value in zip(names, at, strict=True)}
+    found = fitted(data, frame_rules=rules)
+    np.testing.assert_allclose(found.frames.base.position_mm, at[:3], atol=1e-9)
+    np.testing.assert_allclose(found.frames.tool.position_mm, at[3:6], atol=1e-9)
+    if sessions == 2:
+        assert found.frames.bases.position_mm[1, 1] == pytest.approx(at[6], abs=1e-9)
+    assert found.solution.cost == pytest.approx(plain.solution.cost, rel=1e-5)
+
+
+def test_one_angle_of_a_tool_can_be_fixed():
+    _, data = seen()
+    found = fitted(data, frame_rules={"t0 rz": {"value_deg": 20.0}, "base rx": {"value_mrad": 3}})
+    turned = found.frames.tool.rotation @ robot.carried(ARM).rotation.T
+    assert log_so3(turned[None])[0][2] == pytest.approx(np.deg2rad(20.0), abs=1e-9)
+    based = found.frames.base.rotation @ ARM.base.rotation.T
+    assert log_so3(based[None])[0][0] == pytest.approx(3e-3, abs=1e-9)
+    known = uncertainty.of_dh(found, data.target_names)
+    at = known.names.index("t0.rz_rad")
+    assert known.covariance[at, at] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_the_derivative_of_constrained_frames_is_that_of_finite_differences():
+    _, data = seen(THREE, sessions=2)
+    found = fitted(data, frame_rules={"base2 x": "fixed", "t1 y": {"prior_std_mm": 1.0}})
+    coords = found.coordinates
+    assert isinstance(coords, ConstrainedFrames)
+    y = found.solution.x[: coords.size] + 1e-3
+    change, step = coords.change(y), 1e-5
+    for column in range(coords.size):
+        moved = step * np.eye(coords.size)[column]
+        ahead, behind = coords.inner_coordinates(y + moved), coords.inner_coordinates(y - moved)
+        np.testing.assert_allclose(
+            change[:, column], (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-5
+        )
+
+
+def test_a_prior_weighs_as_its_standard_deviation_says():
+    """Posterior of one parameter by the formula for independent Gaussian knowledge."""
+    _, data = seen()
+    plain = fitted(data)
+    std, at = plain.std[3, 0], plain.model.theta_offset_rad[3]
+    value = at + 4 * std
+    rule = {"joint 4 theta": {"value_rad": float(value), "prior_std_rad": float(std)}}
+    found = fitted(data, rule)
+    assert found.model.theta_offset_rad[3] == pytest.approx(0.5 * (at + value), abs=0.1 * std)
+    assert found.std[3, 0] == pytest.approx(std / np.sqrt(2), rel=0.05)
+
+
+def test_a_prior_determines_what_the_data_leave_open():
+    """Axes 2 and 3 are antiparallel: d2 and d3 only show as their difference."""
+    _, data = seen()
+    plain = fitted(data)
+    assert np.isnan(plain.std[1, 1])
+    rules = {"joint 2 d": {"value_mm": 5.0, "prior_std_mm": 0.2}}
+    found = fitted(data, rules)
+    assert found.model.d_mm[1] == pytest.approx(5.0, abs=0.01)
+    assert found.std[1, 1] == pytest.approx(0.2, rel=1e-2)
+    difference = plain.model.d_mm[1] - plain.model.d_mm[2]
+    assert found.model.d_mm[1] - found.model.d_mm[2] == pytest.approx(difference, abs=0.02)
+    assert found.solution.cost == pytest.approx(plain.solution.cost, rel=1e-3)
+
+
+def test_a_prior_on_a_frame_settles_the_base_against_joint_one():
+    _, data = seen()
+    plain = fitted(data)
+    known = uncertainty.of_dh(plain, data.target_names)
+    assert not known.determined[known.names.index("base.z_mm")]
+    at = float(plain.frames.base.position_mm[2])
+    found = fitted(data, {"joint 1": "fixed"}, {"base z": {"value_mm": at, "prior_std_mm": 0.01}})
+    known = uncertainty.of_dh(found, data.target_names)
+    place = known.names.index("base.z_mm")
+    assert known.determined[place]
+    assert np.sqrt(known.covariance[place, place]) == pytest.approx(0.01, rel=0.5)
+
+
+def test_frames_that_are_not_estimated_are_all_named():
+    _, data = seen(POINT)
+    with pytest.raises(InputError) as caught:
+        fitted(data, frame_rules={"mA": "fixed", "t0 rz": "fixed", "base3 x": "fixed"})
+    assert [problem.where for problem in caught.value.problems] == [
+        "calibration.frames, 'mA'",
+        "calibration.frames, 't0 rz'",
+        "calibration.frames, 'base3 x'",
+    ]
+
+
+@pytest.mark.parametrize("loss", [robust.HUBER, robust.TUKEY])
+def test_a_robust_loss_forgives_rows_far_off(loss):
+    _, clean = seen(count=150, seed=4)
+    position = clean.position_mm.copy()
+    position[:12] += np.random.default_rng(1).normal(size=(12, 3)) * 8.0
+    spoiled = replace(clean, position_mm=position)
+    reference, new = fitted(clean), joints(ARM, 200, np.random.default_rng(9))
+
+    def off(fit):
+        got, wanted = (
+            compose(each.frames.base, compose(dh.forward(each.model, new), each.frames.tool))
+            for each in (fit, reference)
+        )
+        return np.sqrt(np.mean(np.sum((got.position_mm - wanted.position_mm) ** 2, axis=1)))
+
+    squares, found = fitted(spoiled), fitted(spoiled, loss=loss)
+    assert off(squares) > 0.3
+    assert off(found) < 0.05
+    assert (found.weights.row[:12] < 0.5).all()
+    assert found.weights.scale_mm == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_robust_loss_changes_little_without_outliers():
+    _, data = seen(count=150, seed=5)
+    plain, found = fitted(data), fitted(data, loss=robust.HUBER)
+    determined = np.isfinite(plain.std)
+    apart = np.abs(dh.to_vector(found.model) - dh.to_vector(plain.model)).reshape(6, 5)
+    assert (apart[determined] < 1.0 * plain.std[determined]).all()
+    assert np.sqrt(found.solution.variance) == pytest.approx(
+        np.sqrt(plain.solution.variance), rel=0.15
+    )
+
+
+def test_weights_have_a_twin_in_plain_python():
+    _, data = seen(THREE, count=4)
+    residual = np.random.default_rng(2).normal(size=data.components)
+    for loss in (robust.HUBER, robust.TUKEY):
+        found = robust.weights(loss, residual, data)
+        length = np.linalg.norm(residual.reshape(-1, 3), axis=1)
+        scale = np.median(length) / np.sqrt(2.3659738843753377)  # chi-square of 3, median
+        bend = {"huber": np.sqrt(4.90838), "tukey": np.sqrt(28.53853)}[loss] * scale
+        for row, size in enumerate(length):
+            share = size / bend
+            wanted = min(1.0, 1 / share) if loss == "huber" else max(0.0, 1 - share**2) ** 2
+            assert found.row[row] == pytest.approx(wanted, abs=3e-3)
