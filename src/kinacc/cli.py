@@ -12,6 +12,7 @@ from kinacc.commands.campaign import campaign
 from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
+from kinacc.commands.plan_campaign import plan_campaign
 from kinacc.commands.plan_poses import plan_poses
 from kinacc.commands.predict import predict
 from kinacc.commands.tournament import tournament
@@ -129,6 +130,7 @@ main.add_command(export)
 main.add_command(compare)
 main.add_command(plan_poses)
 main.add_command(tournament)
+main.add_command(plan_campaign)
 main.add_command(campaign)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kinacc.assess.adaptive import conduct
+from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign import folder
 from kinacc.campaign.forecast import draw_errors, forecast, population
 from kinacc.campaign.reading import Reading
@@ -52,7 +53,8 @@ def test_a_forecast_contains_what_then_happens(make_plan, make_world):
         where = plan.points.modelled_mm[state.asked] + world.reading_mm(row, visit)
         entries.append(folder.readings_entry([Reading(state.asked, where, "tracker")]))
     ahead = forecast(restore(plan, entries), 20, wanted_mm=5.0, tolerance_mm=10.0)
-    said = conduct(plan.assessor, world).statements()[0]
+    said = conduct(plan.assessor, world).statements()[1]
+    assert said.target == ahead.target == CANDIDATES
     low, _, high = ahead.width_mm
     assert 0.8 * low <= said.upper_mm - said.lower_mm <= 1.25 * high
     assert ahead.more == 0

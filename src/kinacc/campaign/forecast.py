@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.assess.statement import Statement
+from kinacc.assess.adaptive import Campaign
+from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.campaign import words
 from kinacc.campaign.simulate import Deviates, carry_on, quantiles
 from kinacc.campaign.state import State
@@ -54,6 +55,7 @@ class Forecast:
     wanted_mm: float | None = None
     reached: float | None = None
     more: int | None = None
+    target: str = CANDIDATES
     budget: int | None = None
     tried: int | None = None
     decisions: dict[str, float] | None = None
@@ -96,9 +98,13 @@ def forecast(
     simulations: int,
     wanted_mm: float | None = None,
     tolerance_mm: float | None = None,
+    target: str = CANDIDATES,
     progress: Callable | None = None,
 ) -> Forecast | None:
-    """Simulate the rest of the campaign; None before a few points were read."""
+    """Simulate the rest of the campaign; None before a few points were read.
+
+    Where the assessor makes no statement on ``target``, its main one is taken.
+    """
     mean, noise = _by_row(state)
     if np.isfinite(noise).sum() < FEWEST_POINTS:
         return None
@@ -110,10 +116,11 @@ def forecast(
     for number in progress(numbers, "simulated ends") if progress else numbers:
         rng = np.random.default_rng([state.plan.seed, state.taken, number])
         errors = draw_errors(known, mean, noise, rng)
-        runs.append(_one_end(state, errors, left, (1, state.plan.seed, state.taken, number)))
+        entropy = (1, state.plan.seed, state.taken, number)
+        runs.append(_one_end(state, errors, left, target, entropy))
     last = [run[-1][1] for run in runs]
     widths = quantiles(map(_width, last), (0.05, 0.5, 0.95))
-    found = Forecast(simulations, left, tuple(widths), wanted_mm)
+    found = Forecast(simulations, left, tuple(widths), wanted_mm, target=last[0].target)
     if wanted_mm is not None:
         needed = [_first_within(run, wanted_mm) for run in runs]
         reached = float(np.mean([math.isfinite(each) for each in needed]))
@@ -144,34 +151,40 @@ def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, 
             campaign = assessor.begin(state.plan.candidates(state.rows))
             deviates = Deviates(len(errors), tried, *entropy)
             carry_on(campaign, errors, _root(state), deviates)
-            hits += _width(campaign.statements()[0]) <= wanted_mm
+            hits += _width(_main(campaign, found.target)) <= wanted_mm
         if hits >= ENOUGH * simulations:
             return replace(found, budget=tried, tried=tried)
     return replace(found, tried=tried)
 
 
 def _one_end(
-    state: State, errors_mm: np.ndarray, left: int, entropy: tuple[int, ...]
+    state: State, errors_mm: np.ndarray, left: int, target: str, entropy: tuple[int, ...]
 ) -> list[tuple[int, Statement]]:
-    """Main statement of one simulated end after some numbers of further readings."""
+    """Statement on the target in one simulated end after some numbers of further readings."""
     campaign = copy.deepcopy(state.campaign)
-    looks = [(0, campaign.statements()[0])]
+    looks = [(0, _main(campaign, target))]
     pause = max(left // _LOOKS, 1)
 
     def look(done: int) -> None:
         if done % pause == 0:
-            looks.append((done, campaign.statements()[0]))
+            looks.append((done, _main(campaign, target)))
 
     deviates = Deviates(len(errors_mm), left, *entropy)
     done = carry_on(campaign, errors_mm, _root(state), deviates, look)
     if looks[-1][0] != done:
-        looks.append((done, campaign.statements()[0]))
+        looks.append((done, _main(campaign, target)))
     return looks
 
 
 def _first_within(looks: Sequence[tuple[int, Statement]], wanted_mm: float) -> float:
     """Readings after which the bounds are first as near as wanted; infinite where never."""
     return next((done for done, said in looks if _width(said) <= wanted_mm), math.inf)
+
+
+def _main(campaign: Campaign, target: str) -> Statement:
+    """The statement on a target; the first where there is none."""
+    said = campaign.statements()
+    return next((each for each in said if each.target == target), said[0])
 
 
 def _width(said: Statement) -> float:
@@ -212,7 +225,8 @@ def in_words(found: Forecast) -> list[str]:
     if found.left:
         low, middle, high = found.width_mm
         lines.append(
-            f"{head}: after the {found.left} readings left the bounds are likely "
+            f"{head}: after the {found.left} readings left the bounds on "
+            f"{words.TARGETS[found.target]} are likely "
             f"{_mm(middle)} apart (90 % of cases: {_mm(low)} to {_mm(high)})"
         )
     if found.wanted_mm is not None:

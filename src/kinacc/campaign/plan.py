@@ -11,6 +11,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
+from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign.instrument import Instrument
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
@@ -48,12 +49,16 @@ class Points:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a reading must keep to be taken, and what the campaign is for (None: not stated)."""
+    """What a reading must keep to be taken, and what the campaign is for (None: not stated).
+
+    ``width_mm`` is wanted of the bounds on ``target``.
+    """
 
     joint_rad: float
     implausible_mm: float
     tolerance_mm: float | None = None
     width_mm: float | None = None
+    target: str = CANDIDATES
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,10 @@ class Pool:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One simulated campaign: what it said of one target, and the truth it is graded against."""
+    """One simulated campaign: what it said of one target, and the truth it is graded against.
+
+    ``broken``: what the statement rests on is not true of these errors.
+    """
 
     pool: str
     budget: int
@@ -81,6 +84,7 @@ class Outcome:
     readings: int
     said: Statement
     truth_mm: float
+    broken: bool = False
 
     @property
     def width_mm(self) -> float:
@@ -128,8 +132,18 @@ def outcomes(
             truth = {MEASURED: float(measured.max()), CANDIDATES: float(sizes.max())}
             for said in campaign.statements():
                 true_mm = truth.get(said.target, math.nan)
-                budget = assessor.measurements
-                found.append(Outcome(pool.name, budget, repetition, readings, said, true_mm))
+                company = int(np.sum(sizes >= sizes.max() / said.isolation))
+                found.append(
+                    Outcome(
+                        pool.name,
+                        assessor.measurements,
+                        repetition,
+                        readings,
+                        said,
+                        true_mm,
+                        broken=company < said.crowd,
+                    )
+                )
     return found
 
 

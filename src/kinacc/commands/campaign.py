@@ -59,6 +59,8 @@ def campaign() -> None:
 @click.option("--confidence", default=0.95, show_default=True, type=float)
 @click.option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have.")
 @click.option("--width-mm", type=float, help="Wanted distance of upper from lower bound.")
+@click.option("--target", type=click.Choice(["candidates", "measured"]), default="candidates",
+              show_default=True, help="Which largest error the width is wanted of.")  # fmt: skip
 @click.option("--joint-tolerance-deg", default=0.02, show_default=True, type=float,
               help="How far reported joints may be from those asked for.")  # fmt: skip
 @click.option("--implausible-mm", type=float, help="Error beyond which a reading is refused.")
@@ -164,6 +166,8 @@ def leave_out(folder, point, reason) -> None:
 @click.option("--width-mm", type=float,
               help="Wanted distance of upper from lower bound. [as begun]")  # fmt: skip
 @click.option("--tolerance-mm", type=float, help="Largest error allowed. [as begun]")
+@click.option("--target", type=click.Choice(["candidates", "measured"]),
+              help="Which largest error the forecast is about. [as begun]")  # fmt: skip
 @click.option("--simulations", default=20, show_default=True, type=click.IntRange(0),
               help="Simulated ends for the forecast; 0 for none.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")

@@ -10,12 +10,11 @@ from pathlib import Path
 import click
 import numpy as np
 
-from kinacc.assess.registry import RECOMMENDED
 from kinacc.assess.statement import Statement
-from kinacc.campaign import begin, folder, forecast, instrument, plan, report, words
+from kinacc.campaign import begin, folder, forecast, instrument, report, words
 from kinacc.campaign.plan import Limits, Plan
 from kinacc.campaign.state import State
-from kinacc.commands import campaign_candidates, choice, rows
+from kinacc.commands import campaign_candidates, campaign_options, choice, rows
 from kinacc.commands.sheet import Field, Sheet
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import invert
@@ -24,12 +23,12 @@ from kinacc.geometry import invert
 def start(given: Mapping) -> None:
     """Begin a campaign and say what was begun."""
     problems: list[Problem] = []
-    instruments = _gathered(problems, lambda: _instruments(given), ())
-    assessor = _gathered(problems, lambda: _assessor(given))
+    instruments = campaign_options.gathered(
+        problems, lambda: campaign_options.instruments(given), ()
+    )
+    assessor = campaign_options.gathered(problems, lambda: campaign_options.assessor(given))
     for name in ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm"):
-        value = given[name]
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            problems.append(Problem(f"--{name.replace('_', '-')}", f"{value:g}", "above 0"))
+        problems += campaign_options.not_positive(given, name)
     if problems:
         raise InputError(problems, "The campaign was not begun")
     arm = choice.calibration_of(
@@ -45,6 +44,7 @@ def start(given: Mapping) -> None:
         given["implausible_mm"] or begin.plausible_mm(arm, instruments),
         given["tolerance_mm"],
         given["width_mm"],
+        given["target"],
     )
     about = {
         "robot": arm.robot.name,
@@ -185,10 +185,13 @@ def status(given: Mapping) -> None:
     aims = opened.plan.limits
     wanted = given["width_mm"] or aims.width_mm
     tolerance = given["tolerance_mm"] or aims.tolerance_mm
+    target = given["target"] or aims.target
     ahead = None
     if given["simulations"] and found.asked is not None:
         with reporting("forecast", bar=True) as progress:
-            ahead = forecast.forecast(found, given["simulations"], wanted, tolerance, progress)
+            ahead = forecast.forecast(
+                found, given["simulations"], wanted, tolerance, target, progress
+            )
     if given["as_json"]:
         facts = as_facts(found, tolerance)
         click.echo(json.dumps({**facts, "forecast": _forecast_facts(ahead)}, indent=1))
@@ -215,6 +218,7 @@ def _forecast_facts(ahead: forecast.Forecast | None) -> dict[str, object] | None
         "simulations": ahead.simulations,
         "readings_left": ahead.left,
         "final_width_mm": dict(zip(("q05", "median", "q95"), finite, strict=True)),
+        "target": ahead.target,
         "wanted_width_mm": ahead.wanted_mm,
         "reached_within_budget": ahead.reached,
         "readings_needed": ahead.more,
@@ -309,39 +313,3 @@ def say_cut_off(opened: folder.Opened) -> None:
             "look whether the last reading has to be recorded again",
             err=True,
         )
-
-
-def _instruments(given: Mapping) -> tuple[instrument.Instrument, ...]:
-    texts = list(given["instrument"])
-    for option in ("noise_mm", "covariance_mm2"):
-        if given[option] is not None:
-            texts.insert(0, f"instrument={given[option]}")
-    if not texts:
-        allowed = "--noise-mm, --covariance-mm2 or --instrument NAME=.."
-        raise InputError(Problem("noise", "is not given", allowed))
-    return instrument.instruments(texts, given["frame"])
-
-
-def _assessor(given: Mapping) -> object:
-    settings: dict[str, object] = {
-        "measurements": given["budget"],
-        "confidence": given["confidence"],
-    }
-    for text in given["settings"]:
-        name, mark, value = text.partition("=")
-        if not mark:
-            raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
-        try:
-            settings[name.strip()] = json.loads(value)
-        except ValueError:
-            settings[name.strip()] = value.strip()
-    return plan.assessor_of(given["assessor"] or RECOMMENDED, settings)
-
-
-def _gathered(problems: list[Problem], make, otherwise=None):
-    """What ``make`` makes; its problems join the others."""
-    try:
-        return make()
-    except InputError as error:
-        problems += error.problems
-        return otherwise

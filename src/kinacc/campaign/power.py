@@ -1,0 +1,112 @@
+"""What budgets bring: widths, and how often a wanted width or a decision is reached."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.campaign import words
+from kinacc.campaign.simulate import Outcome, binomial_interval, quantiles
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What is wanted of a campaign: bounds on ``target`` no further apart than ``width_mm``, or a
+    decision on ``tolerance_mm`` (None: not asked for), with probability ``power``."""
+
+    target: str
+    width_mm: float | None = None
+    tolerance_mm: float | None = None
+    power: float = 0.8
+
+
+@dataclass(frozen=True)
+class Row:
+    """Simulated campaigns of one budget on one kind of errors.
+
+    ``width_mm``: 5, 50 and 95 % quantiles of upper minus lower bound (infinite: no bound).
+    ``stated``: share with an upper bound; ``broken``: share whose upper bound rests on an
+    assumption that is not true of the errors simulated. Of the upper bounds stated, those left out:
+    ``excess_mm``, mean of bound minus truth, and ``holds``, share at or above the truth (NaN where
+    there are none).
+    ``within``: share whose width is as wanted, ``interval`` its exact 95 % limits.
+    ``decisions``: share by decision on the tolerance.
+    """
+
+    errors: str
+    budget: int
+    readings: float
+    repetitions: int
+    truth_mm: float
+    width_mm: tuple[float, float, float]
+    excess_mm: float
+    holds: float
+    stated: float
+    broken: float
+    within: float
+    interval: tuple[float, float]
+    decisions: dict[str, float]
+
+    def reaches(self, aim: Aim) -> float:
+        """Share of campaigns that do what is wanted: the width, the right decision, or both."""
+        shares = []
+        if aim.width_mm is not None:
+            shares.append(self.within)
+        if aim.tolerance_mm is not None:
+            shares.append(self.decisions[words.CONFORMS] + self.decisions[words.FAILS])
+        return min(shares, default=self.stated)
+
+
+def rows(found: Sequence[Outcome], aim: Aim) -> list[Row]:
+    """Summary of simulated campaigns, by errors and budget in the order they came."""
+    groups: dict[tuple[str, int], list[Outcome]] = {}
+    for each in found:
+        if each.said.target == aim.target:
+            groups.setdefault((each.pool, each.budget), []).append(each)
+    return [_row(errors, budget, group, aim) for (errors, budget), group in groups.items()]
+
+
+def smallest_budget(found: Sequence[Row], aim: Aim) -> int | None:
+    """The smallest budget that reaches the aim with the wanted power on all errors; None if none.
+
+    A larger budget that was simulated must reach it as well.
+    """
+    enough = None
+    for budget in sorted({row.budget for row in found}, reverse=True):
+        if any(row.reaches(aim) < aim.power for row in found if row.budget == budget):
+            break
+        enough = budget
+    return enough
+
+
+def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
+    count = len(group)
+    stated = [each for each in group if not math.isnan(each.said.upper_mm)]
+    sound = [each for each in stated if not each.broken]
+    wanted = math.inf if aim.width_mm is None else aim.width_mm
+    within = sum(each.width_mm <= wanted for each in stated)
+    tolerance = math.nan if aim.tolerance_mm is None else aim.tolerance_mm
+    said = [words.decision(each.said, tolerance) for each in group]
+    kinds = (words.CONFORMS, words.FAILS, words.OPEN)
+    return Row(
+        errors,
+        budget,
+        float(np.mean([each.readings for each in group])),
+        count,
+        float(np.mean([each.truth_mm for each in group])),
+        tuple(quantiles([each.width_mm for each in group], (0.05, 0.5, 0.95))),
+        _mean([each.said.upper_mm - each.truth_mm for each in sound]),
+        _mean([each.said.upper_mm >= each.truth_mm for each in sound]),
+        len(stated) / count,
+        (len(stated) - len(sound)) / count,
+        within / count,
+        binomial_interval(within, count),
+        {kind: said.count(kind) / count for kind in kinds},
+    )
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else math.nan

@@ -1,0 +1,63 @@
+"""Options that beginning and planning a campaign share: noise, assessor, aims."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import TypeVar
+
+from kinacc.assess.adaptive import AdaptiveAssessor
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.campaign import instrument, plan
+from kinacc.errors import InputError, Problem
+
+Made = TypeVar("Made")
+
+
+def instruments(given: Mapping) -> tuple[instrument.Instrument, ...]:
+    """Instruments of ``--noise-mm``, ``--covariance-mm2`` and ``--instrument``."""
+    texts = list(given["instrument"])
+    for option in ("noise_mm", "covariance_mm2"):
+        if given[option] is not None:
+            texts.insert(0, f"instrument={given[option]}")
+    if not texts:
+        allowed = "--noise-mm, --covariance-mm2 or --instrument NAME=.."
+        raise InputError(Problem("noise", "is not given", allowed))
+    return instrument.instruments(texts, given["frame"])
+
+
+def assessor(given: Mapping) -> AdaptiveAssessor:
+    """The assessor of ``--assessor``, ``--budget``, ``--confidence`` and ``--set``."""
+    settings: dict[str, object] = {
+        "measurements": given["budget"],
+        "confidence": given["confidence"],
+    }
+    for text in given["settings"]:
+        name, mark, value = text.partition("=")
+        if not mark:
+            raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
+        try:
+            settings[name.strip()] = json.loads(value)
+        except ValueError:
+            settings[name.strip()] = value.strip()
+    return plan.assessor_of(given["assessor"] or RECOMMENDED, settings)
+
+
+def not_positive(given: Mapping, name: str) -> list[Problem]:
+    """A problem where an option is given and not above 0."""
+    value = given[name]
+    if value is None or (math.isfinite(value) and value > 0.0):
+        return []
+    return [Problem(f"--{name.replace('_', '-')}", f"{value:g}", "above 0")]
+
+
+def gathered(
+    problems: list[Problem], make: Callable[[], Made], otherwise: Made | None = None
+) -> Made | None:
+    """What ``make`` makes; its problems join the others."""
+    try:
+        return make()
+    except InputError as error:
+        problems += error.problems
+        return otherwise

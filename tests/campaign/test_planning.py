@@ -1,0 +1,153 @@
+"""``kinacc plan-campaign``: simulated widths and power are those of campaigns run one by one."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kinacc.assess.adaptive import conduct
+from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.single_shot import SingleShot
+from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.streams import key_of
+from kinacc.assess.world import drawn_world
+from kinacc.campaign.power import Aim, Row, rows, smallest_budget
+from kinacc.campaign.simulate import Outcome, Pool, outcomes
+from kinacc.cli import main
+from kinacc.errors import InputError
+
+
+def call(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def pool(count=100, seed=0):
+    return Pool("normal", np.random.default_rng(seed).normal(size=(count, 3)) * 0.2)
+
+
+def test_a_simulated_campaign_is_one_run_in_memory():
+    errors, sigma = pool(), 0.05
+    budgets = (SearchAndConfirm(measurements=30), SearchAndConfirm(measurements=50))
+    found = outcomes([errors], 40, sigma**2 * np.eye(3), budgets, 3, 9)
+    assert len(found) == 2 * 3 * 2
+    for each in found:
+        chosen = np.random.default_rng([9, 0, each.repetition]).permutation(100)[:40]
+        world = drawn_world(errors.error_mm[chosen], sigma, key_of(9, 0, each.repetition), 60)
+        campaign = conduct(SearchAndConfirm(measurements=each.budget), world)
+        wanted = next(s for s in campaign.statements() if s.target == each.said.target)
+        np.testing.assert_allclose(each.said.upper_mm, wanted.upper_mm, rtol=1e-9)
+        np.testing.assert_allclose(each.said.lower_mm, wanted.lower_mm, rtol=1e-9)
+        assert each.readings == campaign.ledger.taken
+        sizes = np.linalg.norm(errors.error_mm[chosen], axis=1)
+        if each.said.target == CANDIDATES:
+            assert each.truth_mm == sizes.max()
+        else:
+            assert each.truth_mm == sizes[campaign.ledger.visited].max()
+
+
+def test_the_single_shot_bound_holds_as_often_as_it_says():
+    noise = 0.1**2 * np.eye(3)
+    found = outcomes([pool()], 30, noise, [SingleShot(measurements=30)], 200, 4)
+    (row,) = rows(found, Aim(MEASURED))
+    assert row.holds >= 0.95 - 3.0 * math.sqrt(0.95 * 0.05 / 200)
+    assert row.stated == 1.0
+
+
+def outcome(budget, lower, upper, repetition=0, truth=1.0, crowd=0, broken=False):
+    said = Statement(CANDIDATES, lower_mm=lower, upper_mm=upper, confidence=0.95, crowd=crowd)
+    return Outcome("x", budget, repetition, budget, said, truth, broken)
+
+
+def test_rows_count_what_is_stated_wanted_held_and_decided():
+    found = [
+        outcome(10, 0.9, 1.1, 0),
+        outcome(10, 0.5, 0.9, 1),
+        outcome(10, 1.3, 2.0, 2, truth=1.5, broken=True),
+        outcome(10, 0.9, math.nan, 3),
+    ]
+    (row,) = rows(found, Aim(CANDIDATES, width_mm=0.5, tolerance_mm=1.2))
+    assert row.stated == 0.75
+    assert row.broken == 0.25
+    assert row.within == 0.5
+    assert row.holds == 0.5
+    assert row.excess_mm == pytest.approx(0.0)
+    assert row.decisions == {"conforming": 0.5, "not conforming": 0.25, "undecided": 0.25}
+    assert row.width_mm[0] == pytest.approx(0.2)
+    assert row.width_mm[2] == math.inf
+
+
+def test_the_budget_named_is_enough_on_all_errors_and_beyond():
+    aim = Aim(CANDIDATES, width_mm=0.5, power=0.8)
+
+    def row(errors, budget, within):
+        return Row(errors, budget, 1.0, 10, 1.0, (0.1, 0.2, 0.3), 0.0, 1.0, 1.0, 0.0, within,
+                   (0.0, 1.0), {})  # fmt: skip
+
+    a = [row("a", 10, 0.9), row("a", 20, 0.9), row("a", 30, 0.9)]
+    assert smallest_budget([*a, row("b", 10, 0.1), row("b", 20, 0.8), row("b", 30, 1.0)], aim) == 20
+    assert smallest_budget([*a, row("b", 10, 0.9), row("b", 20, 0.1), row("b", 30, 1.0)], aim) == 30
+    assert smallest_budget([row("b", 10, 0.9), row("b", 20, 0.7)], aim) is None
+
+
+def test_fewer_errors_than_poses_are_refused():
+    with pytest.raises(InputError, match="only 100"):
+        outcomes([pool()], 101, np.eye(3), [SingleShot()], 1, 0)
+
+
+@pytest.fixture
+def errors_file(tmp_path):
+    path = tmp_path / "errors.csv"
+    np.savetxt(path, pool(60).error_mm, delimiter=",", header="ex_mm,ey_mm,ez_mm", comments="")
+    return path
+
+
+def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path):
+    picture = tmp_path / "width.svg"
+    words = ("plan-campaign", "--noise-mm", "0.05", "--poses", 30, "--errors", errors_file,
+             "--width-mm", "0.2", "--repetitions", 6, "--budget", 15, "--budget", 60)  # fmt: skip
+    shown = call(*words, "--picture", picture)
+    assert shown.exit_code == 0, shown.output
+    assert (
+        "60 readings give bounds at most 0.2 mm apart in at least 80% of campaigns" in shown.output
+    )
+    assert picture.stat().st_size > 1000
+    content = json.loads(call(*words, "--json").stdout)
+    assert content["budget"] == 60
+    assert content["noise_mm"] == [0.05] * 3
+    assert [row["budget"] for row in content["rows"]] == [15, 60]
+    assert content["units"]["width_median_mm"] == "mm"
+    assert call(*words, "--json").stdout == call(*words, "--json").stdout
+
+
+def test_errors_can_be_scaled(errors_file):
+    words = ("plan-campaign", "--noise-mm", "0.01", "--poses", 60, "--errors", errors_file,
+             "--largest-mm", "3", "--repetitions", 2, "--budget", 60, "--json")  # fmt: skip
+    content = json.loads(call(*words).stdout)
+    assert content["rows"][0]["true_mm"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--noise-mm", "0"), "no instrument is without noise"),
+        ((), "--noise-mm, --covariance-mm2"),
+        (("--covariance-mm2", "1,2,0,2,1,0,0,0,1"), "not positive definite"),
+        (("--noise-mm", "0.1", "--errors", "nowhere"), "smooth, gravity"),
+        (("--noise-mm", "0.1", "--width-mm", "-1"), "--width-mm"),
+        (("--noise-mm", "0.1", "--assessor", "two_stage", "--budget", "3"), "do not cover"),
+        (("--noise-mm", "0.1", "--largest-mm", "nan"), "--largest-mm"),
+    ],
+)
+def test_what_cannot_be_simulated_is_said(words, said):
+    done = call("plan-campaign", *words)
+    assert done.exit_code == 2
+    assert said in done.output
+    assert "Traceback" not in done.output
+
+
+def test_help_has_an_example():
+    assert "kinacc plan-campaign " in call("plan-campaign", "--help").output.split("Example:")[1]
