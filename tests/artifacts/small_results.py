@@ -183,6 +183,14 @@ def _models() -> dict:
         "frames": _frame_table(("vec", "dh", "nominal")),
         "dh_fit": fit,
         "dh_covariance": covariance,
+        "dh_identified": {
+            "parameter": ["j1.d_mm", "j2.d_mm"],
+            "status": ["identified", "undetermined"],
+            "std": [0.01, np.nan],
+            "unit": ["mm", "mm"],
+            "undetermined_share": [0.0, 0.7],
+            "statement": [None, "d of joint 2 and d of joint 3 appear only as their difference"],
+        },
     }
 
 

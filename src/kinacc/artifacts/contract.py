@@ -35,6 +35,7 @@ ARTEFACTS: dict[str, Artefact] = {
         calibration_tables.DH_FIT,
         covariance_tables.VEC_COVARIANCE,
         covariance_tables.DH_COVARIANCE,
+        covariance_tables.DH_IDENTIFIED,
         calibration_tables.RESIDUALS,
         calibration_tables.POSE_ERRORS,
         worth_tables.MODEL_SELECTION,

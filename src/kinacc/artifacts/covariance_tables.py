@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.columns import Artefact, real, text
+from kinacc.artifacts.columns import Artefact, magnitude, real, text
 
 _NAMES = (
     "base.x_mm .. base.rz_rad (base in the instrument's frame), tool.x_mm .. (target in the flange "
@@ -30,4 +30,30 @@ DH_COVARIANCE = Artefact(
     "others are the undetermined_direction rows of dh_fit.",
     _COLUMNS,
     ("parameter", "other"),
+)
+DH_IDENTIFIED = Artefact(
+    "dh_identified",
+    "Which parameters of the DH fit the training rows determine, and in words which they cannot "
+    "tell apart. Undetermined: directions whose singular value, base and targets projected out, is "
+    "below calibration.dh.truncation of the largest hold more than 1 % of the parameter.",
+    (
+        text("parameter", f"a parameter: {_NAMES}"),
+        text(
+            "status",
+            "identified; prior: known beforehand; undetermined; fixed: not fitted",
+            ("identified", "prior", "undetermined", "fixed"),
+        ),
+        magnitude(
+            "std", "see unit", "standard deviation, null if undetermined or fixed", 1e6, True
+        ),
+        text("unit", "unit of std", ("mm", "rad")),
+        magnitude(
+            "undetermined_share",
+            "1",
+            "length of its part in undetermined directions of unit length (mm and mrad)",
+            1e6,
+        ),
+        text("statement", "why it is not identified; null where it is", nullable=True),
+    ),
+    ("parameter",),
 )

@@ -14,17 +14,21 @@ from kinacc.calibration.constrained import (
     constrained,
 )
 from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
-from kinacc.calibration.observations import Observations
+from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.start import closed_form_start
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.calibration.terms import free_parameters  # noqa: F401 (the usual mask of a fit)
+from kinacc.calibration.truncated import unseen
+from kinacc.geometry import Pose, compose
 from kinacc.models import dh
 from kinacc.models.dh import DHModel
 
 ANGLE_UNIT_RAD = 1e-3  # one mrad counts as much displacement as one mm
 DH_FIX = "measure more poses"
+UNSEEN_POSES = 60
+UNSEEN_WEIGHT = 500.0  # mm per rad; what is null is so by any weight
 _ANGLES = np.array([True, False, False, True, True])  # of dh.PARAMETERS
 
 
@@ -33,7 +37,8 @@ class DHFit:
     """Fitted ``model`` and ``frames``; ``std`` (k, 5) as ``dh.PARAMETERS``, NaN undetermined.
 
     ``free`` (k, 5) marks the parameters that took part; ``solution`` has the figures of the fit,
-    frame coordinates (``coordinates``) first. ``weights`` of the rows, where the loss had some.
+    frame coordinates (``coordinates``) first. ``weights`` of the rows, where the loss had some;
+    ``prior_std`` (k, 5) of free parameters, inf without a prior.
     """
 
     model: DHModel
@@ -43,6 +48,7 @@ class DHFit:
     solution: Solution
     coordinates: FrameCoordinates | ConstrainedFrames
     weights: Weights | None = None
+    prior_std: np.ndarray | None = None
 
     def with_frames(self, frames: Frames) -> DHFit:
         """The same arm seen through other frames."""
@@ -105,6 +111,7 @@ def fit(
         solution=solution,
         coordinates=coords,
         weights=weights,
+        prior_std=np.full(free.shape, np.inf) if std is None else np.where(free, std, np.inf),
     )
 
 
@@ -152,6 +159,49 @@ def _system(
     if isinstance(coords, ConstrainedFrames):
         return ConstrainedSystem(PoseSystem(observations, flange, coords.inner, weight), coords)
     return PoseSystem(observations, flange, coords, weight)
+
+
+def unseen_anywhere(fit: DHFit, observations: Observations, threshold: float) -> np.ndarray:
+    """Directions (m, P) of a fit's coordinates that no pose shows, whatever the joints.
+
+    ``observations`` say which targets were seen in which sessions, and how. Poses all over the
+    joints' turns (prismatic ones: a metre) are put where the model has them: without residuals what
+    cannot be seen is null to rounding.
+    """
+    seen = _everywhere(fit, observations)
+    flange = flange_model(fit.model, fit.free)
+    system = _system(seen, flange, fit.coordinates, UNSEEN_WEIGHT)
+    mask = np.tile(_ANGLES, len(fit.free))[fit.free.ravel()]
+    scale = np.concatenate([_units(fit.coordinates.is_angle()), _units(mask)])
+    return unseen(system, fit.solution.x, scale, fit.coordinates.size, threshold)
+
+
+def _everywhere(fit: DHFit, observations: Observations) -> Observations:
+    """Poses at joints of all kinds, by the model: every kind of row of ``observations`` in each."""
+    kinds = np.unique(
+        np.stack([observations.session, observations.target, observations.has_rotation], axis=1),
+        axis=0,
+    )
+    reach = np.where(fit.model.prismatic, 1e3, np.pi)
+    q_rad = np.random.default_rng(0).uniform(-reach, reach, (UNSEEN_POSES, fit.model.joints))
+    pose, kind = np.repeat(np.arange(len(q_rad)), len(kinds)), np.tile(kinds.T, len(q_rad))
+    session, target, turned = kind
+    frames = fit.frames
+    at = compose(
+        dh.forward(fit.model, q_rad[pose]),
+        Pose(frames.targets.rotation[target], frames.targets.position_mm[target]),
+    )
+    at = compose(Pose(frames.bases.rotation[session], frames.bases.position_mm[session]), at)
+    made = full_poses(q_rad[pose], at)
+    return replace(
+        made,
+        rotation=np.where(turned.astype(bool)[:, None, None], at.rotation, np.nan),
+        pose=pose,
+        target=target,
+        session=session,
+        target_names=observations.target_names,
+        session_names=observations.session_names,
+    )
 
 
 def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:

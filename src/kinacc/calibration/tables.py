@@ -8,6 +8,7 @@ import numpy as np
 
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import Frames, stacked
+from kinacc.calibration.identified import IDENTIFIED, PRIOR, Parameter
 from kinacc.calibration.selection import Choice
 from kinacc.calibration.solve import Solution, Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, is_angle, vec_parameter_names
@@ -162,6 +163,25 @@ def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
             for name, value in zip(uncertainty.names, direction, strict=True)
         ]
     return _long(rows)
+
+
+def identified_columns(found: Sequence[Parameter], uncertainty: Uncertainty) -> Columns:
+    """``dh_identified``: status of every parameter, and in words why it is not identified."""
+    variance = dict(zip(uncertainty.names, np.diag(uncertainty.covariance), strict=True))
+    known = {IDENTIFIED, PRIOR}
+    return {
+        "parameter": np.array([each.name for each in found], dtype=object),
+        "status": np.array([each.status for each in found], dtype=object),
+        "std": np.array(
+            [
+                np.sqrt(max(variance[each.name], 0.0)) if each.status in known else np.nan
+                for each in found
+            ]
+        ),
+        "unit": np.array(["rad" if is_angle(each.name) else "mm" for each in found], dtype=object),
+        "undetermined_share": np.array([each.share for each in found]),
+        "statement": np.array([each.statement or None for each in found], dtype=object),
+    }
 
 
 def covariance_columns(uncertainty: Uncertainty) -> Columns:

@@ -85,6 +85,15 @@ def minimise_truncated(
     )
 
 
+def unseen(
+    system: System, x: np.ndarray, scale: np.ndarray, frames: int, threshold: float
+) -> np.ndarray:
+    """Directions (m, P) that ``system`` linearised at ``x`` does not show, as in ``Solution``."""
+    factor, _ = solve.triangle(system, x, scale)
+    held = _Held(x, scale, np.zeros(system.size), frames)
+    return _Split.of(factor, held, threshold, None).undetermined()
+
+
 @dataclass(frozen=True)
 class _Held:
     """Rows ``weight (x - nominal) / scale`` of the prior, in scaled parameters; frames first."""

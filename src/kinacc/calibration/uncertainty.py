@@ -82,18 +82,42 @@ def is_angle(name: str) -> bool:
 def _uncertainty(
     fit: DHFit | VECFit, target_names: tuple[str, ...], free: list[str]
 ) -> Uncertainty:
+    names, change = _named(fit, target_names, free)
+    undetermined = np.zeros((0, len(names)))
+    if fit.solution.undetermined is not None:
+        undetermined = _directions(fit, fit.solution.undetermined, names, change)
+    return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
+
+
+def named_directions(
+    fit: DHFit, target_names: tuple[str, ...], directions: np.ndarray
+) -> np.ndarray:
+    """Directions (m, P) of a fit's own coordinates, in units of its scale, as of its names."""
+    names = dh_parameter_names(len(fit.free))
+    free = [name for name, chosen in zip(names, fit.free.ravel(), strict=True) if chosen]
+    return _directions(fit, directions, *_named(fit, target_names, free))
+
+
+def _named(
+    fit: DHFit | VECFit, target_names: tuple[str, ...], free: list[str]
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names of motions and parameters, and their derivative in the fit's own coordinates."""
     frames, moving = fit.coordinates.size, fit.coordinates.motion_names(target_names)
     names = (*moving, *free)
     change = np.zeros((len(names), len(fit.solution.x)))
     change[: len(moving), :frames] = fit.coordinates.motions(fit.solution.x[:frames])
     change[len(moving) :, frames:] = np.eye(len(free))
-    undetermined = np.zeros((0, len(names)))
-    if fit.solution.undetermined is not None:
-        # The fit's own scale has the same units: frame coordinates are mm and rad as well.
-        angle = [*fit.coordinates.is_angle(), *(is_angle(name) for name in free)]
-        own = np.where(angle, ANGLE_UNIT_RAD, 1.0)
-        undetermined = (fit.solution.undetermined * own) @ change.T / _units(names)
-    return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
+    return names, change
+
+
+def _directions(
+    fit: DHFit | VECFit, directions: np.ndarray, names: tuple[str, ...], change: np.ndarray
+) -> np.ndarray:
+    # The fit's own scale has the same units: frame coordinates are mm and rad as well.
+    free = names[len(names) - (change.shape[1] - fit.coordinates.size) :]
+    angle = [*fit.coordinates.is_angle(), *(is_angle(name) for name in free)]
+    own = np.where(angle, ANGLE_UNIT_RAD, 1.0)
+    return (directions * own) @ change.T / _units(names)
 
 
 def _units(names: tuple[str, ...]) -> np.ndarray:

@@ -75,7 +75,7 @@ STAGES: dict[str, Stage] = {
             "dh",
             "fitting the DH model by least squares (Table II)",
             ("measurements", "vec_model", "vec_frames"),
-            ("dh_model", "frames", "dh_fit", "dh_covariance"),
+            ("dh_model", "frames", "dh_fit", "dh_covariance", "dh_identified"),
             (
                 "robot",
                 "calibration.rotation_weight_mm_per_rad",

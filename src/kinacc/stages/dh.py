@@ -7,13 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinacc import robot
-from kinacc.calibration import models, tables, uncertainty
+from kinacc.calibration import identified, models, tables, uncertainty
 from kinacc.models.tables import vec_model
 from kinacc.stages import calibration_settings as shared
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
-    """``dh_model``, its covariance, ``frames`` of all models and ``dh_fit``, from training rows."""
+    """``dh_model``, its covariance, ``frames`` of all models and ``dh_fit``, from training rows.
+
+    ``dh_identified`` says which parameters these rows determine.
+    """
     arm = robot.load(settings["robot"])
     options = shared.options(settings["calibration"], arm)
     every, train = shared.observed(inputs, arm)
@@ -28,6 +31,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     others = tables.frames_columns(frames, every.target_names, every.session_names)
     kept = inputs["vec_frames"]
     known = uncertainty.of_dh(fitted, every.target_names)
+    told = identified.parameters(fitted, known, observations)
     return {
         "dh_model": tables.dh_model_columns(fitted),
         "frames": {
@@ -36,4 +40,5 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
         },
         "dh_fit": tables.dh_fit_columns(fitted, known),
         "dh_covariance": tables.covariance_columns(known),
+        "dh_identified": tables.identified_columns(told, known),
     }
