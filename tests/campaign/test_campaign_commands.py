@@ -19,7 +19,7 @@ from kinacc.campaign.reading import Reading
 from kinacc.cli import main
 
 SIGMA_MM = 0.05
-COMMANDS = ("start", "next", "record", "leave-out", "status", "report")
+COMMANDS = ("start", "next", "record", "leave-out", "strike", "status", "report")
 
 
 def call(*words):
@@ -255,6 +255,29 @@ def test_a_point_is_left_out_only_before_it_is_read(begun):
     assert said["points"] == 19
     assert said["next"] not in (first, second)
     refused(folder, "record", folder, "--point", second, "--position-mm", arm.position(second))
+
+
+def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    recorded(folder, arm, 3)
+    first = arm.plan.points.label[arm.plan.route[0]]
+    assert "reading 4: is not there" in refused(folder, "strike", folder, 4, "--reason", "x")
+    assert "--reason" in refused(folder, "strike", folder, 1, "--reason", " ")
+    done = call("campaign", "strike", folder, 1, "--reason", "reflector not seated")
+    assert done.exit_code == 0, done.output
+    assert "was struck: reflector not seated" in done.output
+    said = json.loads(call("campaign", "status", folder, "--json").output)
+    assert said["next"] == first
+    assert said["readings"] == 2
+    assert said["struck"] == {"1": "reflector not seated"}
+    assert "was struck before" in refused(folder, "strike", folder, 1, "--reason", "x")
+    recorded(folder, arm, 1)
+    assert call("campaign", "report", folder).exit_code == 0
+    readings = store.read(folder / "report" / "campaign_readings.parquet")
+    assert list(readings["struck"]) == ["reflector not seated", None, None, None]
+    np.testing.assert_array_equal(readings["used"], [np.nan, 2, 3, 1])
+    assert "reflector not seated" in (folder / "report" / "report.md").read_text()
 
 
 def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):

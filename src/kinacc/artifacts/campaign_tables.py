@@ -44,13 +44,20 @@ CAMPAIGN_READINGS = Artefact(
     (
         whole("reading", "number of the reading, from 1", 1),
         text("point", "name of the candidate"),
-        whole("used", "place among the readings used, from 1; null where in hand", 1, None, True),
+        whole(
+            "used",
+            "place among the readings used, from 1; null where in hand or void",
+            1,
+            None,
+            True,
+        ),
         text("instrument", "instrument that measured"),
         text("frame", "frame of the measured position", ("base", "instrument")),
         *(length(f"{axis}_mm", f"{axis} as measured, in that frame", REACH_MM) for axis in "xyz"),
         *error_vector("measured minus modelled position"),
         magnitude("error_mm", "mm", "size of the error", ERROR_MM),
         magnitude("noise_mm", "mm", "standard deviation per axis, root mean square", ERROR_MM),
+        text("struck", "why the reading is void; null where it is not", nullable=True),
     ),
     ("reading",),
 )

@@ -11,7 +11,7 @@ from pathlib import Path
 from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import LEAVE_OUT, READINGS, State
+from kinacc.campaign.state import LEAVE_OUT, READINGS, STRIKE, State
 from kinacc.errors import InputError, Problem
 
 
@@ -74,6 +74,11 @@ def readings_entry(readings: Sequence[Reading], file: str | None = None) -> dict
     """The entry of readings that are taken together; ``file`` is the digest of their file."""
     entry = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
     return entry if file is None else {**entry, "file": file}
+
+
+def strike_entry(number: int, reason: str) -> dict:
+    """The entry of a reading declared void, by its number from 1."""
+    return {"kind": STRIKE, "reading": number, "reason": reason}
 
 
 def leave_out_entry(point: int, reason: str) -> dict:

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.campaign import words
+from kinacc.campaign import consistency, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.reading import covariance_mm2
@@ -90,7 +90,9 @@ def _readings(state: State) -> Columns:
     plan = state.plan
     used = {each.number: place for place, each in enumerate(state.told, start=1)}
     rows = []
-    for each in sorted((*state.told, *state.in_hand), key=lambda known: known.number):
+    void = {each.number: reason for each, reason in state.struck}
+    struck = (each for each, _ in state.struck)
+    for each in sorted((*state.told, *state.in_hand, *struck), key=lambda known: known.number):
         reading = each.reading
         instrument = plan.instrument(reading.instrument)
         covariance = covariance_mm2(plan, reading)
@@ -108,6 +110,7 @@ def _readings(state: State) -> Columns:
         row |= {
             "error_mm": float(np.linalg.norm(each.error_mm)),
             "noise_mm": math.sqrt(float(np.trace(covariance)) / 3.0),
+            "struck": void.get(each.number),
         }
         rows.append(row)
     return _columns(rows)
@@ -226,7 +229,13 @@ def _facts(state: State) -> list[str]:
         )
     label = plan.points.label
     lines += [f"point {label[p]} left out: {reason}" for p, reason in state.left_out.items()]
-    return lines
+    lines += [
+        f"reading {each.number}, {np.linalg.norm(each.error_mm):.3f} mm at point "
+        f"{label[each.reading.point]}, was struck: {reason}"
+        for each, reason in state.struck
+    ]
+    found = consistency.scatter(state)
+    return lines if found is None else [*lines, consistency.in_words(found)]
 
 
 def _largest(points: Columns) -> list[str]:

@@ -18,7 +18,7 @@ from kinacc.assess.statement import Statement
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading, covariance_mm2, error_mm
 
-READINGS, LEAVE_OUT = "readings", "leave_out"
+READINGS, LEAVE_OUT, STRIKE = "readings", "leave_out", "strike"
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,8 @@ class State:
     """A campaign with its readings.
 
     ``rows`` are points in the order in which the assessor numbers them. ``asked`` is the point it
-    wants next, None where it wants none. ``in_hand`` are readings it has not asked for.
+    wants next, None where it wants none. ``in_hand`` are readings it has not asked for. ``struck``
+    are readings declared void, and why; ``files`` the digests of the files that were taken.
     """
 
     plan: Plan
@@ -45,12 +46,18 @@ class State:
     in_hand: list[Told]
     asked: int | None
     left_out: Mapping[int, str]
+    struck: list[tuple[Told, str]] = field(default_factory=list)
     files: frozenset[str] = field(default_factory=frozenset)
 
     @property
     def taken(self) -> int:
-        """Number of readings in the journal."""
+        """Number of readings taken, without those struck."""
         return len(self.told) + len(self.in_hand)
+
+    @property
+    def numbered(self) -> int:
+        """Number of the last reading in the journal."""
+        return self.taken + len(self.struck)
 
     def statements(self) -> tuple[Statement, ...]:
         """What may be said now."""
@@ -69,17 +76,23 @@ def restore(
     watch: Callable[[Campaign, Told], None] | None = None,
 ) -> State:
     """The state after the entries of a journal; ``watch`` sees every reading once it is told."""
-    readings, left_out, files = [], {}, set()
+    readings, left_out, void, files = [], {}, {}, set()
     for entry in entries:
         if entry["kind"] == READINGS:
             readings += [Reading.of_entry(each) for each in entry["readings"]]
             files |= {entry["file"]} if entry.get("file") else set()
         elif entry["kind"] == LEAVE_OUT:
             left_out[int(entry["point"])] = str(entry["reason"])
+        elif entry["kind"] == STRIKE:
+            void[int(entry["reading"])] = str(entry["reason"])
     rows = plan.visiting(frozenset(left_out))
     waiting: dict[int, deque[Told]] = {}
+    struck = []
     for number, each in enumerate(readings, start=1):
         known = Told(number, each, error_mm(plan, each))
+        if number in void:
+            struck.append((known, void[number]))
+            continue
         waiting.setdefault(each.point, deque()).append(known)
     campaign = plan.assessor.begin(plan.candidates(rows))
     told: list[Told] = []
@@ -96,7 +109,7 @@ def restore(
         if watch is not None:
             watch(campaign, known)
     in_hand = sorted((each for queue in waiting.values() for each in queue), key=_number)
-    return State(plan, campaign, rows, told, in_hand, asked, left_out, frozenset(files))
+    return State(plan, campaign, rows, told, in_hand, asked, left_out, struck, frozenset(files))
 
 
 def _number(each: Told) -> int:

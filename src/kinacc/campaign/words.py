@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
+from kinacc.campaign import consistency
 from kinacc.campaign.state import State
 
 CONFORMS, FAILS, OPEN = "conforming", "not conforming", "undecided"
@@ -57,6 +60,14 @@ def standing(state: State) -> list[str]:
         f"point {state.plan.points.label[point]} was left out: {reason}"
         for point, reason in state.left_out.items()
     ]
+    lines += [
+        f"reading {each.number}, {np.linalg.norm(each.error_mm):.3f} mm at point "
+        f"{state.plan.points.label[each.reading.point]}, was struck: {reason}"
+        for each, reason in state.struck
+    ]
+    found = consistency.scatter(state)
+    if found is not None:
+        lines.append(consistency.in_words(found))
     if state.asked is not None:
         lines.append(f"measure next: point {state.plan.points.label[state.asked]}")
     elif len(state.told) >= budget:

@@ -161,6 +161,25 @@ def leave_out(folder, point, reason) -> None:
     campaigns_record.leave_out(folder, point, reason)
 
 
+@campaign.command("strike")
+@click.argument("folder", type=click.Path())
+@click.argument("number", type=click.IntRange(1))
+@click.option("--reason", required=True, help="What went wrong with it.")
+def strike(folder, number, reason) -> None:
+    """Declare reading NUMBER void, because something went wrong that has nothing to do with its size.
+
+    The reading stays in the journal and in every report, with the reason. A reading that is struck
+    for being large makes the bounds wrong.
+
+    \b
+    Example:
+      kinacc campaign strike check 31 --reason "reflector was not seated"
+    """
+    from kinacc.commands import campaigns_record
+
+    campaigns_record.strike(folder, number, reason)
+
+
 @campaign.command("status")
 @click.argument("folder", type=click.Path())
 @click.option("--width-mm", type=float,

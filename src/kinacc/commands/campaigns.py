@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from kinacc.assess.statement import Statement
-from kinacc.campaign import begin, folder, forecast, instrument, report, words
+from kinacc.campaign import begin, consistency, folder, forecast, instrument, report, words
 from kinacc.campaign.plan import Limits, Plan
 from kinacc.campaign.state import State
 from kinacc.commands import campaign_candidates, campaign_options, choice, rows
@@ -104,7 +104,7 @@ def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool
     """Name the next point, or all that are certain."""
     opened = folder.open_(path)
     found = opened.state()
-    say_cut_off(opened)
+    say_doubts(opened)
     if found.asked is None:
         said = {"point": None, "done": words.standing(found)[-1]}
         click.echo(json.dumps(said) if as_json else said["done"])
@@ -196,7 +196,7 @@ def status(given: Mapping) -> None:
         facts = as_facts(found, tolerance)
         click.echo(json.dumps({**facts, "forecast": _forecast_facts(ahead)}, indent=1))
         return
-    say_cut_off(opened)
+    say_doubts(opened)
     lines = words.standing(found)
     lines += [words.statement(said, found) for said in found.statements()]
     if tolerance is not None:
@@ -238,7 +238,7 @@ def write_report(given: Mapping) -> None:
     from kinacc.stages.progress import reporting
 
     opened = folder.open_(given["folder"])
-    say_cut_off(opened)
+    say_doubts(opened)
     to = Path(given["to"] or opened.folder / "report")
     text = to / "report.md"
     pictures = {kind: to / f"campaign.{kind}" for kind in ("svg", "png")}
@@ -278,8 +278,23 @@ def as_facts(found: State, tolerance: float | None) -> dict[str, object]:
         "points": len(label) - len(found.left_out),
         "points_measured": len({each.reading.point for each in found.told}),
         "left_out": {label[point]: reason for point, reason in found.left_out.items()},
+        "struck": {str(each.number): reason for each, reason in found.struck},
+        "scatter": _scatter_facts(found),
         "next": None if found.asked is None else label[found.asked],
         "statements": [statement_facts(said, found, tolerance) for said in found.statements()],
+    }
+
+
+def _scatter_facts(found: State) -> dict[str, object] | None:
+    """Scatter of repeated readings for a machine."""
+    seen = consistency.scatter(found)
+    if seen is None:
+        return None
+    return {
+        "ratio": seen.ratio,
+        "degrees_of_freedom": seen.freedom,
+        "probability": seen.probability,
+        "in_words": consistency.in_words(seen),
     }
 
 
@@ -305,7 +320,7 @@ def statement_facts(said: Statement, found: State, tolerance: float | None) -> d
     return facts
 
 
-def say_cut_off(opened: folder.Opened) -> None:
+def say_doubts(opened: folder.Opened) -> None:
     """Tell of a last line that was not written to its end, on the error stream."""
     if opened.journal.cut_off:
         click.echo(

@@ -28,7 +28,7 @@ def record(given: Mapping) -> None:
         raise InputError(Problem("the reading", what, "--position-mm, or a FILE"))
     with folder.writing(given["folder"]) as opened:
         before = opened.state()
-        campaigns.say_cut_off(opened)
+        campaigns.say_doubts(opened)
         if one:
             taken, skipped, mark = [_single(given, before)], [], None
         else:
@@ -58,6 +58,25 @@ def leave_out(path: str, name: str, reason: str) -> None:
         if problems:
             raise InputError(problems, "Nothing was left out")
         opened.write(folder.leave_out_entry(point, reason.strip()))
+        after = folder.open_(path).state()
+    click.echo("\n".join(words.standing(after)))
+
+
+def strike(path: str, number: int, reason: str) -> None:
+    """Declare a reading void."""
+    with folder.writing(path) as opened:
+        before = opened.state()
+        there = {each.number for each in (*before.told, *before.in_hand)}
+        problems = []
+        if number in {each.number for each, _ in before.struck}:
+            problems.append(Problem(f"reading {number}", "was struck before"))
+        elif number not in there:
+            problems.append(Problem(f"reading {number}", "is not there", f"1 to {before.numbered}"))
+        if not reason.strip():
+            problems.append(Problem("--reason", "is empty", "what went wrong"))
+        if problems:
+            raise InputError(problems, "Nothing was struck")
+        opened.write(folder.strike_entry(number, reason.strip()))
         after = folder.open_(path).state()
     click.echo("\n".join(words.standing(after)))
 
@@ -226,6 +245,7 @@ def _say_taken(given, taken, skipped, before: State, after: State) -> None:
             "skipped": [str(each) for each in skipped],
             "next": None if after.asked is None else label[after.asked],
             "readings": after.taken,
+            "last_reading": after.numbered,
         }
         click.echo(json.dumps(content, indent=1))
         return
@@ -234,7 +254,10 @@ def _say_taken(given, taken, skipped, before: State, after: State) -> None:
     if given["file"] is None:
         found = taken[0]
         size = float(np.linalg.norm(reading.error_mm(after.plan, found)))
-        click.echo(f"recorded: point {label[found.point]}, {size:.3f} mm from the model")
+        click.echo(
+            f"recorded: reading {after.numbered}, point {label[found.point]}, {size:.3f} mm from "
+            "the model"
+        )
         if before.asked is not None and found.point != before.asked:
             click.echo(f"point {label[before.asked]} was asked for: this reading is kept in hand")
     else:

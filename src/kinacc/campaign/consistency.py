@@ -1,0 +1,85 @@
+"""Whether repeated readings scatter as the stated noise says: what every bound rests on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.campaign.reading import covariance_mm2
+from kinacc.campaign.state import State, Told
+
+SUSPICIOUS = 1e-3
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Root of chi-square over its degrees of freedom (1 on average where the noise is as stated),
+    the degrees, and the probability of so much scatter or more by chance."""
+
+    ratio: float
+    freedom: int
+    probability: float
+
+    @property
+    def too_large(self) -> bool:
+        """Whether the readings contradict the noise stated: the bounds cannot be relied on."""
+        return self.probability < SUSPICIOUS
+
+    @property
+    def too_small(self) -> bool:
+        """Whether the noise is stated larger than it is: the bounds hold, wider than needed."""
+        return 1.0 - self.probability < SUSPICIOUS
+
+
+def scatter(state: State) -> Scatter | None:
+    """Scatter of repeated readings about their means by point, with the covariances stated.
+
+    The first reading of a point is left out, because a point is read again for being large there.
+    None without a point that was read at least three times.
+    """
+    groups: dict[int, list[Told]] = {}
+    for each in (*state.told, *state.in_hand):
+        groups.setdefault(each.reading.point, []).append(each)
+    square, freedom = 0.0, 0
+    for group in groups.values():
+        if len(group) < 3:
+            continue
+        later = sorted(group, key=lambda each: each.number)[1:]
+        square += _square(state, later)
+        freedom += 3 * (len(later) - 1)
+    if not freedom:
+        return None
+    from scipy.special import chdtrc
+
+    return Scatter(math.sqrt(square / freedom), freedom, float(chdtrc(freedom, square)))
+
+
+def _square(state: State, readings: list[Told]) -> float:
+    """Chi-square of readings of one point about their weighted mean."""
+    planned = state.plan.instruments[0].in_base(state.plan.to_base.rotation)
+    weights = []
+    for each in readings:
+        own = covariance_mm2(state.plan, each.reading)
+        weights.append(np.linalg.inv(planned if own is None else own))
+    values = [each.error_mm for each in readings]
+    sums = sum(w @ x for w, x in zip(weights, values, strict=True))
+    mean = np.linalg.solve(sum(weights), sums)
+    return float(sum((x - mean) @ w @ (x - mean) for w, x in zip(weights, values, strict=True)))
+
+
+def in_words(found: Scatter) -> str:
+    """The finding as a sentence."""
+    said = (
+        f"repeated readings scatter {found.ratio:.2f} times as much as the noise stated "
+        f"({found.freedom} degrees of freedom)"
+    )
+    if found.too_large:
+        return (
+            f"{said}: more than chance allows. The noise is stated too small, or something moved: "
+            "the bounds cannot be relied on"
+        )
+    if found.too_small:
+        return f"{said}: the noise is stated too large, the bounds are wider than they need be"
+    return f"{said}, as chance allows"

@@ -1,0 +1,59 @@
+"""Repeated readings are held to the noise stated: true noise passes, understated noise is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc.campaign import folder
+from kinacc.campaign.consistency import in_words, scatter
+from kinacc.campaign.instrument import instruments
+from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import restore
+
+SPREAD = np.diag([0.05, 0.05, 0.15])
+
+
+def read(plan, factor, repeats=6, points=4, seed=0):
+    """A campaign whose first points were read often, with noise ``factor`` times the stated one."""
+    rng = np.random.default_rng(seed)
+    readings = [
+        Reading(point, plan.points.modelled_mm[point] + 0.3 + factor * SPREAD @ rng.normal(size=3),
+                "camera")
+        for point in map(int, plan.route[:points]) for _ in range(repeats)
+    ]  # fmt: skip
+    return restore(plan, [folder.readings_entry(readings)])
+
+
+@pytest.fixture
+def plan(make_plan):
+    return make_plan(texts=("camera=0.05,0.05,0.15",))
+
+
+def test_the_chi_square_is_calibrated(plan):
+    found = [scatter(read(plan, 1.0, seed=seed)) for seed in range(60)]
+    assert {each.freedom for each in found} == {4 * 4 * 3}
+    assert np.mean([each.probability for each in found]) == pytest.approx(0.5, abs=0.12)
+    assert not any(each.too_large or each.too_small for each in found)
+
+
+def test_noise_stated_too_small_or_too_large_is_told(plan):
+    assert scatter(read(plan, 2.0)).too_large
+    assert "cannot be relied on" in in_words(scatter(read(plan, 2.0)))
+    assert scatter(read(plan, 0.4)).too_small
+    assert "wider than they need be" in in_words(scatter(read(plan, 0.4)))
+
+
+def test_a_point_read_twice_says_nothing_for_the_first_reading_chose_it(plan):
+    assert scatter(read(plan, 1.0, repeats=2)) is None
+    assert scatter(restore(plan, [])) is None
+
+
+def test_readings_count_with_their_own_noise(make_plan):
+    plan = make_plan(texts=("camera=0.05,0.05,0.15", "rough=1"))
+    assert len(instruments(("camera=0.05,0.05,0.15", "rough=1"), "base")) == 2
+    state = read(plan, 1.0)
+    rough = [each.reading.as_entry() | {"instrument": "rough"} for each in state.in_hand]
+    rough += [each.reading.as_entry() | {"instrument": "rough"} for each in state.told]
+    found = scatter(restore(plan, [{"kind": "readings", "readings": rough}]))
+    assert found.too_small

@@ -1,0 +1,121 @@
+"""A campaign on a measured series of a UR10: held-out poses, the calibration's own frame."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kinacc.artifacts import store
+from kinacc.assess import drawn_world, measured_world
+from kinacc.assess.adaptive import conduct
+from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.single_shot import SingleShot
+from kinacc.assess.streams import key_of
+from kinacc.campaign import folder as campaigns
+from kinacc.campaign.reading import Reading
+from kinacc.cli import main
+from kinacc.geometry import invert
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "ur10_tmac" / "series_D.csv"
+pytestmark = pytest.mark.skipif(not DATA.is_file(), reason=f"no measured series at {DATA}")
+SIGMA_MM = 0.05
+
+
+def call(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def ur10_d(tmp_path_factory):
+    """Results of the series with one fold in five held out, and the file of the held-out rows."""
+    base = tmp_path_factory.mktemp("ur10")
+    config = base / "ur10.yaml"
+    config.write_text(
+        "datasets: {ur10_d: {robot: ur10}}\n"
+        f"measurements: {{source: file, folds: 5, file: {{path: '{DATA}'}}}}\n"
+        "calibration: {base_and_tool: estimated, vec: {order: 1},"
+        " dh: {fit_to: measurements, hayati_joints: [2, 3]}}\nevaluation: {space: measured}\n"
+    )
+    for stage in ("measurements", "vec", "dh", "residuals"):
+        done = call("run", stage, "--config", config, "--results", base / "results")
+        assert done.exit_code == 0, done.output
+    results = base / "results" / "ur10_d"
+    seen = store.read(results / "measurements.parquet")
+    held = np.flatnonzero(seen["subset"] == "validation")
+    head = ["pose", *(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
+    columns = [seen["pose"], *(seen[f"q{i}"] for i in range(1, 7)),
+               *(seen[f"{axis}_mm"] for axis in "xyz")]  # fmt: skip
+    lines = [",".join(repr(each[row].item()) for each in columns) for row in held]
+    file = base / "held_out.csv"
+    file.write_text("\n".join([",".join(head), *lines]) + "\n")
+    return results, file, len(held)
+
+
+def begun(ur10_d, folder, *more):
+    results, file, points = ur10_d
+    done = call("campaign", "start", folder, "--calibration", results, "--robot", "ur10", "--model",
+                "dh", "--candidates", file, "--noise-mm", SIGMA_MM, "--budget", points,
+                *more)  # fmt: skip
+    assert done.exit_code == 0, done.output
+    return campaigns.open_(folder).plan
+
+
+def same(said, wanted):
+    assert [each["target"] for each in said] == [each.target for each in wanted]
+    for mine, theirs in zip(said, wanted, strict=True):
+        for name in ("value_mm", "lower_mm", "upper_mm"):
+            given = np.nan if mine[name] is None else mine[name]
+            np.testing.assert_allclose(given, getattr(theirs, name), atol=1e-7)
+
+
+def test_the_series_itself_imported_whole_says_what_it_says_in_memory(ur10_d, tmp_path):
+    folder = tmp_path / "campaign"
+    plan = begun(ur10_d, folder, "--assessor", "single_shot")
+    done = call("campaign", "record", folder, ur10_d[1])
+    assert done.exit_code == 0, done.output
+    state = campaigns.open_(folder).state()
+    assert len(state.told) == len(plan.points)
+    errors = np.array([each.error_mm for each in state.told])
+    # These are the held-out residuals of the calibration itself, in another frame.
+    columns = store.read(ur10_d[0] / "residuals.parquet")
+    row = (columns["comparison"] == "dh_vs_measured") & (columns["subset"] == "validation")
+    row &= (columns["quantity"] == "position") & (columns["fold"] == 0)
+    sizes = np.linalg.norm(errors, axis=1)
+    assert sizes.max() == pytest.approx(columns["max"][row][0], rel=1e-6)
+    assert np.sqrt(np.mean(sizes**2)) == pytest.approx(columns["rms"][row][0], rel=1e-6)
+    wanted = conduct(SingleShot(measurements=len(errors)), measured_world(
+        errors, np.zeros((len(errors), 0, 3)), SIGMA_MM))  # fmt: skip
+    said = json.loads(call("campaign", "status", folder, "--json").output)["statements"]
+    same(said, wanted.statements())
+
+
+def test_a_simulated_campaign_on_its_residuals_ends_as_in_memory(ur10_d, tmp_path):
+    whole, folder = tmp_path / "whole", tmp_path / "campaign"
+    plan = begun(ur10_d, whole, "--assessor", "single_shot")
+    call("campaign", "record", whole, ur10_d[1])
+    errors = np.zeros((len(plan.points), 3))
+    for each in campaigns.open_(whole).state().told:
+        errors[each.reading.point] = each.error_mm
+    plan = begun(ur10_d, folder)
+    rows = plan.visiting(frozenset())
+    row = {int(point): number for number, point in enumerate(rows)}
+    world = drawn_world(errors[rows], SIGMA_MM, key_of(8), 200)
+    back = invert(plan.to_base)
+    while True:
+        with campaigns.writing(folder) as opened:
+            state = opened.state()
+            if state.asked is None:
+                break
+            visit = sum(each.reading.point == state.asked for each in state.told)
+            seen = plan.points.modelled_mm[state.asked] + world.reading_mm(row[state.asked], visit)
+            seen = back.rotation @ seen + back.position_mm
+            opened.write(campaigns.readings_entry([Reading(state.asked, seen, "instrument")]))
+    said = json.loads(call("campaign", "status", folder, "--json").output)["statements"]
+    wanted = conduct(SearchAndConfirm(measurements=len(rows)), world)
+    same(said, wanted.statements())
+    measured = np.linalg.norm(errors[rows[wanted.ledger.visited]], axis=1).max()
+    assert said[0]["lower_mm"] <= measured <= said[0]["upper_mm"]
