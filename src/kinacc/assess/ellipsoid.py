@@ -83,3 +83,40 @@ def largest_size(mean_mm: np.ndarray, covariance_mm2: np.ndarray, deviations: fl
         step += along * math.sqrt(left * top / float(along @ along))
     x = y + step
     return math.sqrt(float(x @ x))
+
+
+class BallDistances:
+    """Mahalanobis distances from many readings to balls of any radius, computed together.
+
+    means_mm: (n, 3); covariances_mm2: (n, 3, 3). As :func:`mahalanobis_beyond`, for all rows.
+    """
+
+    def __init__(self, means_mm: np.ndarray, covariances_mm2: np.ndarray) -> None:
+        self.variance, axes = np.linalg.eigh(covariances_mm2)
+        self.y = np.einsum("nji,nj->ni", axes, means_mm)
+        self.size_mm = np.sqrt(np.sum(self.y**2, axis=1))
+
+    def beyond(self, radius_mm: float) -> np.ndarray:
+        """Distances (n,) to the ball of this radius; 0 inside."""
+        distance = np.zeros(len(self.y))
+        outside = np.flatnonzero(self.size_mm > radius_mm)
+        if not outside.size:
+            return distance
+        y, variance = self.y[outside], self.variance[outside]
+        if radius_mm <= 0.0:
+            distance[outside] = np.sqrt(np.sum(y * y / variance, axis=1))
+            return distance
+        t = np.zeros(outside.size)
+        for _ in range(_STEPS):
+            factor = 1.0 / (1.0 + t[:, None] * variance)
+            shrunk = y * factor
+            square = np.sum(shrunk**2, axis=1)
+            slope = np.sum(shrunk**2 * variance * factor, axis=1)
+            step = np.maximum(square / slope * (np.sqrt(square) - radius_mm) / radius_mm, 0.0)
+            t += step
+            if np.all(step <= 1e-13 * t):
+                break
+        # y - x = t S x, so the squared distance is t^2 x' S x.
+        shrunk = y / (1.0 + t[:, None] * variance)
+        distance[outside] = t * np.sqrt(np.sum(shrunk**2 * variance, axis=1))
+        return distance

@@ -18,8 +18,8 @@ from kinacc.errors import InputError, Problem
 FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything decides
 MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
 _ALONE = 0.1  # chance of so little company below which the assumption counts as broken
-_WORTH = 3  # times the readings the suspects have: what confirming them is expected to take
-_RESERVE = 0.05  # of the budget, kept for confirming whatever is found last
+_WORTH = 1.5  # times the readings the suspects have: what confirming them is expected to take
+_RESERVE = 0.04  # of the budget, kept for confirming whatever is found last
 _RECONSIDER = 0.06  # of the budget, between two estimates of the likely largest size
 
 
@@ -28,8 +28,8 @@ class SearchAndConfirm:
     """Visit new points while the suspects can still be paid for, else re-measure the suspects.
 
     A suspect is a point whose mean reading plus one standard deviation exceeds the likely largest
-    size. While the readings left cover reading every suspect three times as often again as it was,
-    and a twentieth of the budget, a new point is visited; otherwise the point with the largest
+    size. While the readings left cover reading every suspect one and a half times as often again as
+    it was, and 4 % of the budget, a new point is visited; otherwise the point with the largest
     upper limit is measured until its next look. So little noise or one outstanding error lead to
     many points, much noise to fewer.
 

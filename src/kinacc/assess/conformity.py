@@ -1,0 +1,51 @@
+"""Is the error within a tolerance? Decided with a guard band: accept, reject or undecided."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from kinacc.assess.statement import Statement
+from kinacc.errors import InputError, Problem
+
+ACCEPT, REJECT, UNDECIDED = "accept", "reject", "undecided"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Verdict against a tolerance.
+
+    ``guard_band_mm``: how far the value has to stay below the tolerance to be accepted (upper
+    bound minus value); ``acceptance_limit_mm``: tolerance minus guard band. ``risk``: probability
+    of accepting what is beyond the tolerance, and likewise of rejecting what is within.
+    """
+
+    verdict: str
+    tolerance_mm: float
+    guard_band_mm: float
+    acceptance_limit_mm: float
+    risk: float
+    reason: str
+
+
+def decide(said: Statement, tolerance_mm: float) -> Decision:
+    """Hold a statement to a tolerance.
+
+    Accept where the upper bound is at most the tolerance, reject where the lower bound exceeds it,
+    otherwise undecided. Guarded acceptance and guarded rejection of JCGM 106:2012 (8.3.2 and
+    8.3.3), guard band by the bounds; as each bound holds with the statement's confidence by itself,
+    each wrong decision has at most the remaining probability. Without bounds: undecided.
+    Raises InputError for a tolerance that is not positive.
+    """
+    if not (tolerance_mm > 0.0 and math.isfinite(tolerance_mm)):
+        raise InputError(Problem("tolerance", f"{tolerance_mm}", "above 0, in mm"))
+    band = said.upper_mm - said.value_mm
+    verdict, reason = UNDECIDED, "the tolerance lies between lower and upper bound: measure more"
+    if said.upper_mm <= tolerance_mm:
+        verdict, reason = ACCEPT, "the upper bound is within the tolerance"
+    elif said.lower_mm > tolerance_mm:
+        verdict, reason = REJECT, "the lower bound exceeds the tolerance"
+    elif math.isnan(said.upper_mm):
+        reason = said.withheld or "no upper bound is stated"
+    risk = 1.0 - said.confidence
+    return Decision(verdict, tolerance_mm, band, tolerance_mm - band, risk, reason)

@@ -1,0 +1,176 @@
+"""Kinematic Gaussian process: what single joints explain, and who could be the largest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.kinematic_model import (
+    Basis,
+    Posterior,
+    Scales,
+    fitted_scales,
+    largest_draws,
+    posterior,
+)
+from kinacc.assess.sequential import first_points
+from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.errors import InputError, Problem
+
+_DRAWS = 400
+_BATCH = 0.08  # of the budget: readings between two looks at who could be the largest
+_DOUBTED = 0.25  # of a batch, spent on the readings the model explains worst
+_CONTRADICTED = 0.01  # chance of the worst reading under the model, all points considered
+_EXPLAINED = 0.5  # least share of the mean square error that joints have to explain
+
+
+@dataclass(frozen=True)
+class Kinematic:
+    """Errors as what smooth errors of single joints do at the tool, learned while measuring.
+
+    :mod:`kinacc.assess.kinematic_model` is fitted to the points of a first visit (``visited`` of
+    the budget); then readings go where draws from its posterior have their largest error, measured
+    before or not, a quarter of them to the readings it explains worst. Value and bounds are
+    quantiles of the largest error in draws from the posterior. Source: error parameters of eq. 5
+    with Gaussian process priors over the joints (Rasmussen and Williams, Gaussian Processes for
+    Machine Learning, 2006), scales by marginal likelihood; local errors as a scale mixture.
+
+    Assumes that single joints cause the errors smoothly, but for local errors of one population:
+    the bounds are the model's, not guaranteed. Says "no statement" where readings contradict it: a
+    reading farther off than one in a hundred campaigns would show (a local defect, a heavy tail),
+    joints that explain less than half of the mean square error, or candidates without joints and
+    effects.
+    """
+
+    measurements: int = 200
+    visited: float = 0.6
+    confidence: float = 0.95
+    name: ClassVar[str] = "kinematic"
+    is_slow: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        problems = check_budget(self.measurements, self.confidence)
+        if not 0.0 < self.visited <= 1.0:
+            problems.append(Problem("visited", f"{self.visited}", "above 0 and at most 1"))
+        if problems:
+            raise InputError(problems, f"{self.name} cannot work with these settings")
+
+    def begin(self, candidates: Candidates) -> KinematicCampaign:
+        """A new campaign. InputError without joints and effects of the candidates."""
+        missing = [
+            Problem(f"candidates, {name}", "not given", "joints and what their errors do at them")
+            for name in ("q_rad", "effects")
+            if getattr(candidates, name) is None
+        ]
+        if missing:
+            raise InputError(missing, f"{self.name} needs to know the arm")
+        return KinematicCampaign(self, candidates)
+
+
+class KinematicCampaign:
+    """See :class:`Kinematic`."""
+
+    def __init__(self, settings: Kinematic, candidates: Candidates) -> None:
+        self.settings = settings
+        self.ledger = Ledger(candidates)
+        self.first = first_points(settings.measurements, candidates.points, settings.visited)
+        self._batch = max(round(_BATCH * settings.measurements), 1)
+        self._basis: Basis | None = None
+        self._scales: Scales | None = None
+        self._planned: list[int] = []
+
+    def next(self) -> int | None:
+        """New points in order, then whoever could be the largest."""
+        taken, left = self.ledger.taken, self.settings.measurements - self.ledger.taken
+        if taken < self.first:
+            return taken
+        if left <= 0:
+            return None
+        if not self._planned:
+            self._planned = self._plan(min(self._batch, left))
+        return self._planned[0]
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take a reading."""
+        self.ledger.record(point, reading_mm, covariance_mm2)
+        if point in self._planned:
+            self._planned.remove(point)
+
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings, and the rows read."""
+        return self.ledger.taken, self.ledger.visited
+
+    def statements(self) -> tuple[Statement, ...]:
+        """The largest error of the measured points, and of all candidates."""
+        if self.ledger.taken < self.first:
+            left = f"{self.first - self.ledger.taken} points of the first visit are left"
+            return Statement(CANDIDATES, withheld=left), Statement(MEASURED, withheld=left)
+        known = self._posterior()
+        measured, everywhere, _ = self._draws(known)
+        withheld = self._contradiction(known)
+        return (
+            self._said(CANDIDATES, everywhere, withheld),
+            self._said(MEASURED, measured, withheld),
+        )
+
+    def _said(self, target: str, draws: np.ndarray, withheld: str) -> Statement:
+        confidence = self.settings.confidence
+        low, value, high = np.quantile(draws, [1.0 - confidence, 0.5, confidence])
+        if withheld:
+            return Statement(target, float(value), confidence=confidence, withheld=withheld)
+        assumption = "smooth errors of single joints cause the errors, but for local ones"
+        return Statement(
+            target, float(value), float(low), float(high), confidence, assumption=assumption
+        )
+
+    def _contradiction(self, known: Posterior) -> str:
+        """Why the model is not believed; empty if it is."""
+        from scipy.special import chdtrc
+
+        worst = float(known.odd.max())
+        chance = -math.expm1(known.odd.size * math.log1p(-float(chdtrc(3, worst))))
+        if chance < _CONTRADICTED:
+            return "a reading is farther from what joints explain than local errors are"
+        visited = self.ledger.visited
+        square = np.sum(self.ledger.mean_mm[visited] ** 2, axis=1)
+        size = float(np.mean(square - 3.0 * self.ledger.noise_mm[visited] ** 2))
+        if 3.0 * self._scales.local_mm2 > (1.0 - _EXPLAINED) * size:
+            return "smooth errors of single joints explain less than half of the errors"
+        return ""
+
+    def _plan(self, count: int) -> list[int]:
+        """The next ``count`` points, by how often they are the largest in draws."""
+        known = self._posterior()
+        _, _, winners = self._draws(known)
+        doubted = min(round(_DOUBTED * count), len(self.ledger.visited))
+        order = np.argsort(-known.odd, kind="stable")[:doubted]
+        plan = [self.ledger.visited[row] for row in order]
+        reads = self.ledger.count.astype(float)
+        for _ in range(count - len(plan)):
+            # Each reading goes where it lowers the most variance among likely winners.
+            point = int(np.argmax(winners / ((reads + 1.0) * np.maximum(reads, 0.5))))
+            plan.append(point)
+            reads[point] += 1.0
+        return plan
+
+    def _posterior(self) -> Posterior:
+        candidates, visited = self.ledger.candidates, self.ledger.visited
+        if self._basis is None:
+            self._basis = Basis.of(candidates.q_rad, candidates.effects)
+            rows = visited[: self.first]
+            means, noise = self.ledger.mean_mm[rows], self.ledger.noise_mm[rows]
+            self._scales = fitted_scales(self._basis, rows, means, noise)
+        return posterior(self._basis, self._scales, visited, *self._readings())
+
+    def _draws(self, known: Posterior) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        rng = np.random.default_rng([self.ledger.taken, len(self.ledger.visited)])
+        visited = self.ledger.visited
+        return largest_draws(self._basis, known, visited, *self._readings(), _DRAWS, rng)
+
+    def _readings(self) -> tuple[np.ndarray, np.ndarray]:
+        visited = self.ledger.visited
+        return self.ledger.mean_mm[visited], self.ledger.noise_mm[visited]

@@ -1,0 +1,251 @@
+"""The assessors beyond the first: each against a slow or independent way to the same answer."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binom, gamma
+
+from kinacc import robot
+from kinacc.assess import drawn_world
+from kinacc.assess.adaptive import Candidates, conduct
+from kinacc.assess.causes import joint_errors
+from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.ellipsoid import BallDistances, mahalanobis_beyond
+from kinacc.assess.gamma_quantile import GammaQuantile
+from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, boundary
+from kinacc.assess.invalidation_full import ModelInvalidationFull
+from kinacc.assess.kinematic import Kinematic
+from kinacc.assess.kinematic_model import Basis, fitted_scales
+from kinacc.assess.paper_methods import InvalidationAt
+from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
+from kinacc.assess.streams import key_of
+from kinacc.errors import InputError
+from kinacc.models import dh
+
+ARM = robot.load("mh180")
+
+
+def joints(points: int, seed: int = 2) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-0.9, 0.9, (points, 6))
+
+
+def smooth_errors(q_rad: np.ndarray, seed: int = 3) -> np.ndarray:
+    """Errors (m, 3) of about 0.5 mm by two waves in every error of every joint."""
+    rng = np.random.default_rng(seed)
+    effects = joint_errors(ARM, q_rad)
+    angle = np.repeat(q_rad, 6, axis=1)
+    causes = rng.normal(size=36) * np.sin(1.5 * angle) + rng.normal(size=36) * np.cos(2.5 * angle)
+    errors = np.einsum("nic,nc->ni", effects, causes)
+    return 0.5 * errors / np.sqrt(np.mean(np.sum(errors**2, axis=1)))
+
+
+def known(q_rad: np.ndarray) -> dict[str, np.ndarray]:
+    return {"q_rad": q_rad, "effects": joint_errors(ARM, q_rad)}
+
+
+def test_effects_are_the_derivatives_of_the_arm():
+    """Errors about and along z behind joint j act as theta and d of the next transform do."""
+    q_rad = joints(4)
+    effects = joint_errors(ARM, q_rad, tool_mm=np.array([10.0, 20.0, 30.0])).reshape(4, 3, 6, 6)
+    step = 1e-4
+    angles = robot.dh_angles(ARM, q_rad)
+    for joint in range(5):
+        for name, cause, unit in (("d_mm", 2, 1.0), ("theta_offset_rad", 5, 1e3)):
+            moved = []
+            for sign in (-1, 1):
+                values = getattr(ARM.dh, name).copy()
+                values[joint + 1] += sign * step
+                pose = dh.forward(dh.DHModel(**{**vars(ARM.dh), name: values}), angles)
+                moved.append(pose.position_mm + pose.rotation @ np.array([10.0, 20.0, 30.0]))
+            slope = (moved[1] - moved[0]) / (2 * step) / unit
+            assert effects[:, :, joint, cause] == pytest.approx(slope, abs=1e-6)
+
+
+def test_gamma_quantile_is_that_of_the_best_fit():
+    sizes = gamma.rvs(5.0, scale=0.1, size=150, random_state=1)
+    errors = sizes[:, None] * np.array([0.0, 0.6, 0.8])
+    (said,) = conduct(GammaQuantile(150), drawn_world(errors, 1e-6, key_of(1), 1)).statements()
+    shape, _, scale = gamma.fit(sizes, floc=0)
+    assert said.target == REGION
+    assert said.value_mm == pytest.approx(gamma.ppf(0.99, shape, scale=scale), rel=1e-3)
+    assert not said.withheld
+
+
+def test_gamma_quantile_says_when_noise_or_a_lone_error_spoil_it():
+    sizes = gamma.rvs(5.0, scale=0.1, size=100, random_state=2)
+    errors = sizes[:, None] * np.array([1.0, 0.0, 0.0])
+    (noisy,) = conduct(GammaQuantile(100), drawn_world(errors, 0.5, key_of(1), 1)).statements()
+    assert "noise" in noisy.withheld
+    errors[7] *= 20.0
+    (lone,) = conduct(GammaQuantile(100), drawn_world(errors, 0.01, key_of(1), 1)).statements()
+    assert "does not belong" in lone.withheld
+
+
+@pytest.mark.parametrize(("count", "probability"), [(50, 0.084), (200, 0.05), (20, 0.1)])
+def test_ranks_are_the_last_that_the_binomial_allows(count, probability):
+    rank = largest_rank(count, probability, 0.05)
+    assert binom.cdf(rank - 1, count, probability) <= 0.05 or rank == 0
+    assert binom.cdf(rank, count, probability) > 0.05
+    rank = smallest_rank(count, probability, 0.05)
+    assert binom.sf(rank - 1, count, probability) <= 0.05
+    assert binom.sf(rank - 2, count, probability) > 0.05
+
+
+@pytest.mark.parametrize("sigma", [0.001, 0.1, 0.5])
+def test_the_share_of_the_region_keeps_its_confidence(sigma):
+    rng = np.random.default_rng(4)
+    pool = rng.normal(size=(4000, 3)) * rng.uniform(0.1, 0.5, (4000, 1))
+    truth = np.quantile(np.linalg.norm(pool, axis=1), 0.9)
+    held = np.zeros(2)
+    for draw in range(400):
+        errors = pool[rng.integers(0, 4000, 80)]
+        (said,) = conduct(RegionShare(80), drawn_world(errors, sigma, key_of(draw), 1)).statements()
+        held += said.upper_mm >= truth, said.lower_mm <= truth
+    assert held.min() >= 400 * (0.95 - 3.5 * math.sqrt(0.05 * 0.95 / 400))
+
+
+def test_too_few_points_for_a_share_are_told_how_many_it_takes():
+    (said,) = conduct(RegionShare(20), drawn_world(np.eye(3), 0.1, key_of(1), 1)).statements()
+    assert said.withheld == "3 points read; 90% of the region needs 35"
+
+
+def test_distances_of_many_points_are_those_of_each():
+    rng = np.random.default_rng(5)
+    roots = rng.normal(size=(60, 3, 3))
+    covariances = roots @ np.swapaxes(roots, 1, 2) + 1e-6 * np.eye(3)
+    readings = 2.0 * rng.normal(size=(60, 3))
+    distances = BallDistances(readings, covariances)
+    for radius in (0.0, 0.3, 1.5, 20.0):
+        each = [
+            mahalanobis_beyond(*pair, radius) for pair in zip(readings, covariances, strict=True)
+        ]
+        assert distances.beyond(radius) == pytest.approx(each, rel=1e-9, abs=1e-12)
+
+
+def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():
+    readings = drawn_world(smooth_errors(joints(20)), 0.1, key_of(6), 40)
+    full = conduct(ModelInvalidationFull(40), readings)
+    paper = InvalidationAt(1.0, 40).begin(Candidates.with_equal_noise(np.full(20, 0.1)))
+    for point in range(20):
+        for visit in range(int(full.ledger.count[point])):
+            paper.record(point, readings.reading_mm(point, visit))
+    assert full.statements()[0].value_mm == pytest.approx(paper.statements()[0].value_mm, rel=1e-5)
+
+
+def rejected_at_the_truth(eq21: bool) -> float:
+    """Share of readings of an error on the bound that a 5 % test of the bound rejects."""
+    rng = np.random.default_rng(7)
+    spread = np.diag([0.2, 0.05, 0.05]) ** 2
+    error = np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0)
+    readings = error + rng.multivariate_normal(np.zeros(3), spread, 4000)
+    if eq21:
+        gap = readings - readings / np.maximum(np.linalg.norm(readings, axis=1), 1.0)[:, None]
+        square = np.einsum("ni,ij,nj->n", gap, np.linalg.inv(spread), gap)
+    else:
+        many = np.broadcast_to(spread, (4000, 3, 3))
+        square = BallDistances(readings, many).beyond(1.0) ** 2
+    return float(np.mean(square > 2.705543))  # one-sided 5 % along one direction
+
+
+def test_the_nearest_point_keeps_the_error_rate_that_eq_21_breaks():
+    assert rejected_at_the_truth(eq21=False) <= 0.06
+    assert rejected_at_the_truth(eq21=True) > 0.15
+
+
+def test_the_calibrated_boundary_against_an_independent_walk():
+    width = boundary(6, 0.05)
+    rng = np.random.default_rng(8)
+    steps = np.cumsum(rng.normal(size=(100_000, 32)), axis=1)
+    counts = 2 ** np.arange(6)
+    lowest = (steps[:, counts - 1] / np.sqrt(counts)).min(axis=1)
+    missed = np.mean(lowest < -width)
+    assert missed == pytest.approx(0.05, abs=4 * math.sqrt(0.05 * 0.95 / 100_000))
+    assert width < boundary(6, 0.05, is_even=False)
+    assert boundary(1, 0.05) == pytest.approx(1.6448536)
+
+
+def test_a_reading_with_a_covariance_of_its_own_widens_the_calibrated_bound():
+    candidates = Candidates.with_equal_noise(np.full(5, 0.1))
+    bounds = []
+    for given in (None, 0.01 * np.eye(3)):
+        campaign = InvalidationCalibrated(40).begin(candidates)
+        while (point := campaign.next()) is not None:
+            campaign.record(point, np.array([0.5, 0.0, 0.0]), given)
+        bounds.append(campaign.statements()[0].upper_mm)
+    assert bounds[0] < bounds[1]
+
+
+def test_smooth_errors_of_joints_are_told_from_local_ones():
+    q_rad = joints(150)
+    errors = smooth_errors(q_rad)
+    local = 0.15 * np.random.default_rng(9).normal(size=errors.shape)
+    basis = Basis.of(**known(q_rad))
+    noise = np.full(150, 0.01)
+    assert fitted_scales(basis, np.arange(150), errors, noise).local_mm2 < 0.03**2
+    found = fitted_scales(basis, np.arange(150), errors + local, noise).local_mm2
+    assert 0.1**2 < found < 0.2**2
+
+
+def test_the_kinematic_process_finds_and_bounds_the_largest_of_smooth_errors():
+    q_rad = joints(120)
+    errors = smooth_errors(q_rad)
+    readings = drawn_world(errors, 0.1, key_of(10), 80)
+    campaign = conduct(Kinematic(80), readings, **known(q_rad))
+    everywhere, measured = campaign.statements()
+    truth = np.linalg.norm(errors, axis=1).max()
+    assert (everywhere.target, measured.target) == (CANDIDATES, MEASURED)
+    assert everywhere.lower_mm <= truth <= everywhere.upper_mm
+    assert everywhere.upper_mm - truth < 0.15
+    assert len(campaign.taken()[1]) < 80
+
+
+def test_the_kinematic_process_withholds_what_joints_do_not_explain():
+    q_rad = joints(100)
+    defect = smooth_errors(q_rad)
+    defect[:3] += [1.5, 0.0, 0.0]
+    said = conduct(Kinematic(100), drawn_world(defect, 0.05, key_of(11), 100), **known(q_rad))
+    assert "farther from what joints explain" in said.statements()[0].withheld
+    chance = 0.4 * np.random.default_rng(12).normal(size=(100, 3))
+    said = conduct(Kinematic(100), drawn_world(chance, 0.05, key_of(11), 100), **known(q_rad))
+    assert said.statements()[0].withheld
+
+
+def test_the_kinematic_process_asks_for_what_it_needs():
+    with pytest.raises(InputError) as caught:
+        Kinematic(20).begin(Candidates.with_equal_noise(np.full(5, 0.1)))
+    assert [each.where for each in caught.value.problems] == [
+        "candidates, q_rad",
+        "candidates, effects",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "verdict"), [(1.2, ACCEPT), (1.3, ACCEPT), (1.0, UNDECIDED), (0.7, REJECT)]
+)
+def test_a_tolerance_is_held_to_both_bounds(tolerance, verdict):
+    found = decide(Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), tolerance)
+    assert found.verdict == verdict
+    assert found.guard_band_mm == pytest.approx(0.3)
+    assert found.acceptance_limit_mm == pytest.approx(tolerance - 0.3)
+    assert found.risk == pytest.approx(0.05)
+
+
+def test_no_bound_is_no_decision_and_no_tolerance_an_error():
+    found = decide(Statement(CANDIDATES, 0.9, withheld="half the points are missing"), 1.0)
+    assert (found.verdict, found.reason) == (UNDECIDED, "half the points are missing")
+    for wrong in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="tolerance"):
+            decide(Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), wrong)
+
+
+def test_accepting_what_is_beyond_the_tolerance_is_as_rare_as_stated():
+    accepted = 0
+    for draw in range(400):
+        errors = np.vstack([[[1.01, 0.0, 0.0]], np.zeros((9, 3)) + 1e-3])
+        campaign = conduct(InvalidationCalibrated(30), drawn_world(errors, 0.1, key_of(draw), 30))
+        accepted += decide(campaign.statements()[0], 1.0).verdict == ACCEPT
+    assert accepted <= 400 * (0.05 + 3.5 * math.sqrt(0.05 * 0.95 / 400))
