@@ -6,6 +6,11 @@ from kinacc import __version__, provenance
 from kinacc.campaign.folder import Opened
 
 
+def assessor_code() -> str:
+    """Hash of the code that chooses points and makes bounds."""
+    return provenance.code_hash("kinacc.assess.registry")
+
+
 def marks_of(opened: Opened) -> dict[str, object]:
     """Provenance: the plan counts as the configuration, the journal as the input."""
     return {

@@ -166,7 +166,7 @@ def leave_out(folder, point, reason) -> None:
 @click.argument("number", type=click.IntRange(1))
 @click.option("--reason", required=True, help="What went wrong with it.")
 def strike(folder, number, reason) -> None:
-    """Declare reading NUMBER void, because something went wrong that has nothing to do with its size.
+    """Declare reading NUMBER void: something went wrong that has nothing to do with its size.
 
     The reading stays in the journal and in every report, with the reason. A reading that is struck
     for being large makes the bounds wrong.

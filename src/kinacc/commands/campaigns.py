@@ -10,8 +10,9 @@ from pathlib import Path
 import click
 import numpy as np
 
+from kinacc import __version__
 from kinacc.assess.statement import Statement
-from kinacc.campaign import begin, consistency, folder, forecast, instrument, report, words
+from kinacc.campaign import begin, consistency, folder, forecast, instrument, marks, report, words
 from kinacc.campaign.plan import Limits, Plan
 from kinacc.campaign.state import State
 from kinacc.commands import campaign_candidates, campaign_options, choice, rows
@@ -52,6 +53,8 @@ def start(given: Mapping) -> None:
         "model": arm.choice,
         "point": given["point"] or arm.default_point,
         "candidates": found.source,
+        "kinacc_version": __version__,
+        "assessor_code": marks.assessor_code(),
     }
     begun = begin.plan_of(
         arm, points, assessor, instruments, limits, given["seed"], joints_now, about,
