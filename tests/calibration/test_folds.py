@@ -81,3 +81,27 @@ def test_fewer_configurations_than_folds_leave_folds_empty():
     fold = folds.assign(np.array([0, 0, 1]), 5, 0)
     assert len(set(fold.tolist())) == 2
     assert fold[0] == fold[1]
+
+
+@settings(max_examples=60, deadline=None)
+@given(plans(), st.integers(2, 7))
+def test_time_blocks_are_runs_of_first_visits(plan, count):
+    _, q, pose, _ = plan
+    configuration = folds.configurations(pose, q, 0.1 * DEGREE)
+    fold = folds.blocks(configuration, count)
+    first = [np.flatnonzero(configuration == label)[0] for label in np.unique(configuration)]
+    assert (np.diff(fold[np.sort(first)]) >= 0).all()
+    for label in np.unique(configuration):
+        assert len(set(fold[configuration == label])) == 1
+
+
+def test_time_blocks_are_even_and_contiguous_without_revisits():
+    fold = folds.blocks(np.repeat(np.arange(40), 3), 5)
+    np.testing.assert_array_equal(fold, np.repeat(np.arange(5), 24))
+
+
+def test_a_label_of_one_fold_alone_must_train():
+    fold = np.array([0, 0, 0, 1, 1, 1, 1, 1, 1])
+    label = np.array(["a", "a", "a", "a", "a", "a", "b", "b", "b"])
+    assert folds.always_trained(fold, label, 3) == ["b"]
+    assert folds.always_trained(fold, label, 4) == ["a", "b"]

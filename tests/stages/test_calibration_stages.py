@@ -266,6 +266,58 @@ def test_without_folds_there_is_nothing_to_cross_validate(plan):
     assert set(found["pose_errors"]["estimate"]) == {"train"}
 
 
+def test_time_blocks_hold_out_runs_of_the_measurement(plan):
+    settings = settings_of(plan, "measurements", measurements__fold_by="time_block")
+    split = measurements.split(columns(), settings)
+    fresh = POSES - POSES // 10  # the rows after these visit the first ones again
+    assert (np.diff(split["fold"][:fresh]) >= 0).all()
+    np.testing.assert_array_equal(split["fold"][fresh:], split["fold"][: POSES // 10])
+    assert set(split["fold"]) == {0, 1, 2, 3, 4}
+
+
+def test_a_session_that_one_fold_holds_alone_always_trains_and_is_named(plan):
+    base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
+    measured = columns(base, Pose(np.eye(3), np.array([20.0, 30.0, 150.0])))
+    session = np.full(POSES, "morning", dtype=object)
+    session[40:44] = "noon"
+    measured["session"] = session
+    settings = settings_of(plan, "measurements", measurements__fold_by="time_block")
+    with pytest.warns(UserWarning, match="session noon has fewer than 3 rows outside"):
+        split = measurements.split(measured, settings)
+    assert np.isnan(split["fold"][40:44]).all()
+    assert (split["subset"][40:44] == "train").all()
+    assert np.isfinite(np.delete(split["fold"], slice(40, 44))).all()
+    found = chain(
+        plan,
+        split,
+        calibration__base_and_tool="estimated",
+        calibration__dh__fit_to="measurements",
+    )
+    errors = found["pose_errors"]
+    held_out = errors["estimate"] == "cross_validated"
+    assert not np.isin(np.arange(40, 44), errors["row"][held_out]).any()
+    assert np.abs(errors["ex_mm"][held_out]).max() < 3.0
+
+
+def test_a_target_seen_in_one_configuration_always_trains(plan):
+    measured = {name: np.concatenate([values, values[:1]]) for name, values in columns().items()}
+    measured["target"] = np.array(["tool"] * POSES + ["rare"], dtype=object)
+    with pytest.warns(UserWarning, match="target rare has fewer than 3 rows"):
+        split = measurements.split(measured, plan.settings("measurements", "mh180"))
+    again = POSES - POSES // 10  # the first configuration is visited again here
+    assert np.isnan(split["fold"][[0, again, POSES]]).all()
+    assert np.isnan(split["fold"]).sum() == 3
+
+
+def test_order_and_prior_cannot_be_chosen_without_folds_that_hold_rows(plan):
+    one = {name: values[:30] for name, values in columns().items()}
+    one["pose"] = np.zeros(30, dtype=int)  # one configuration, in one fold
+    split = measurements.split(one, plan.settings("measurements", "mh180"))
+    given = settings_of(plan, "vec", calibration__vec__order="auto")
+    with pytest.raises(InputError, match="no order or prior can be tried"):
+        vec.run({"measurements": split}, given)
+
+
 def test_too_few_poses_for_the_order_is_bad_input(plan):
     few = {name: values[:20] for name, values in columns().items()}
     split = measurements.split(few, plan.settings("measurements", "mh180"))

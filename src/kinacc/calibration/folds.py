@@ -46,6 +46,34 @@ def assign(configuration: np.ndarray, folds: int, seed: int) -> np.ndarray:
     return fold_of[inverse]
 
 
+def blocks(configuration: np.ndarray, folds: int) -> np.ndarray:
+    """Fold (n,) of each row by blocks of time: rows are in the order they were measured.
+
+    Whole configurations in the order of their first rows, cut into ``folds`` runs of sizes as even
+    as they allow; a configuration that is visited again stays in the block of its first visit.
+    """
+    _, inverse, sizes = np.unique(
+        _by_appearance(configuration), return_inverse=True, return_counts=True
+    )
+    middle = np.cumsum(sizes) - 0.5 * sizes
+    fold_of = np.minimum((middle * folds / len(configuration)).astype(np.int64), folds - 1)
+    return fold_of[inverse]
+
+
+def always_trained(fold: np.ndarray, label: np.ndarray, least: int) -> list:
+    """Values of ``label`` (n,) that leave fewer than ``least`` rows outside one of their folds.
+
+    A fold that holds out all rows of a session or target leaves nothing to place it by.
+    """
+    names, number = np.unique(label, return_inverse=True)
+    total = np.bincount(number)
+    found = set()
+    for each in np.unique(fold):
+        inside = np.bincount(number[fold == each], minlength=len(names))
+        found |= set(np.flatnonzero((inside > 0) & (total - inside < least)))
+    return [names[i] for i in sorted(found)]
+
+
 def _ranks(values: np.ndarray) -> np.ndarray:
     return np.unique(values, return_inverse=True)[1]
 

@@ -19,6 +19,7 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.spread import gram
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
+from kinacc.errors import InputError, Problem
 from kinacc.models.vec import VECModel
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40)
@@ -26,6 +27,7 @@ PRIOR_STD = (0.01, 0.03, 0.1, 0.3, 1.0)  # mm and mrad
 PRIOR_DECAY = (0.7, 0.85, 1.0)
 CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
 MOST_BLOCKS = 5
+_FIX = "measure more configurations, or state calibration.vec.order and prior"
 _VARIANCE_STEPS = 40
 _VARIANCE_TOLERANCE = 1e-4
 _LEAST_SHARE = 1e-6  # of the mean squared misfit, where the residual variance starts
@@ -105,6 +107,9 @@ def choices(
     """
     block = blocks(observations.fold)
     numbers = [int(each) for each in np.unique(block) if each >= 0]
+    if len(numbers) < 2:
+        what = f"{len(numbers)} folds hold rows: no order or prior can be tried on held-out ones"
+        raise InputError(Problem("measurements", what, "rows in two folds or more", _FIX))
     sums = _Sums.of(observations, block, empty, frames, frames_free, rotation_weight_mm_per_rad)
     held_out = [*numbers, None]
     if len(numbers) < 3:
