@@ -9,6 +9,7 @@ import click
 
 from kinacc import __version__
 from kinacc.commands.campaign import campaign
+from kinacc.commands.check_data import check_data
 from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
@@ -124,6 +125,7 @@ def _help(stage: Stage) -> str:
 
 for _stage in STAGES.values():
     run.add_command(_stage_command(_stage))
+main.add_command(check_data)
 main.add_command(predict)
 main.add_command(compensate)
 main.add_command(export)

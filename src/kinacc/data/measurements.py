@@ -49,7 +49,8 @@ def read(section: Mapping, robot: Robot, strict: bool = True) -> Reading:
     """Measurements of the file that ``section`` (``measurements.file``) names.
 
     ``strict``: values that cannot be meant (joints outside their limits, metres taken for
-    millimetres) are refused too. Raises InputError listing everything that is wrong with the file.
+    millimetres) are refused too, and so are readings that are there twice. Raises InputError
+    listing everything that is wrong with the file.
     """
     table = load(
         section["path"],
@@ -91,7 +92,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     order, turns = order[by_row], turns[by_row]
     if "repeat" not in found.single:
         columns["repeat"] = _count_within(columns)
-    elif "pose" in found.single:
+    elif "pose" in found.single and strict:
         problems += _doubled(table, columns, order)
     if strict and not problems:
         problems += faults.scale_problems(table, columns, robot)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from kinacc.geometry import rotation_from_quaternion
+from kinacc.inspection import tails
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,8 @@ class Cells:
 
     ``q`` (n, k) reported joints (rad, mm where one slides); ``position_mm`` (n, 3) and ``rotation``
     (n, 3, 3), NaN where not measured, in the instrument's frame; ``target``, ``session``, ``pose``,
-    ``repeat`` (n,) indices; ``line`` (n,) of the file.
+    ``repeat`` (n,) indices; ``line`` (n,) of the file, the first where readings were drawn
+    together, ``drawn`` (n,) tuples of all their lines.
     """
 
     q: np.ndarray
@@ -27,6 +29,7 @@ class Cells:
     pose: np.ndarray
     repeat: np.ndarray
     line: np.ndarray
+    drawn: np.ndarray
     target_names: tuple[str, ...]
     session_names: tuple[str, ...]
 
@@ -37,6 +40,10 @@ class Cells:
     def turned(self) -> np.ndarray:
         """True (n,) where the orientation was measured."""
         return np.isfinite(self.rotation[:, 0, 0])
+
+    def lines(self, rows: np.ndarray) -> list[int]:
+        """All lines of the file the cells ``rows`` were read from, each once, in order."""
+        return sorted({line for lines in self.drawn[rows] for line in lines})
 
     def select(self, rows: np.ndarray) -> Cells:
         """The readings of ``rows`` (mask or indices)."""
@@ -62,6 +69,7 @@ def of_columns(columns: Mapping[str, np.ndarray], joints: int) -> Cells:
         pose=np.asarray(columns["pose"]),
         repeat=np.asarray(columns["repeat"]),
         line=np.asarray(columns["row"]),
+        drawn=_tuples([(line,) for line in columns["row"].tolist()]),
         target_names=target_names,
         session_names=session_names,
     )
@@ -70,26 +78,53 @@ def of_columns(columns: Mapping[str, np.ndarray], joints: int) -> Cells:
 def merged(cells: Cells, tolerance: float = 1e-4) -> tuple[Cells, np.ndarray]:
     """One cell per pose and target, the median of its readings, and the cell (n,) of each reading.
 
-    Readings of a pose whose joints differ by more than ``tolerance`` (rad) stay apart.
+    Readings of a pose whose joints differ by more than ``tolerance`` (rad) stay apart, and so do
+    readings far from the others of their pose.
     """
     joints = np.round(cells.q / tolerance).astype(np.int64)
     label = np.column_stack([cells.session, cells.pose, cells.target, joints])
-    _, first, cell = np.unique(label, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    cell = rank[cell.ravel()]
-    one = cells.select(first[order])
+    cell = _numbers(label)
+    alone = _far_from_others(cells, cell)
+    cell = _numbers(np.where(alone, cell.max() + 1 + np.arange(len(cell)), cell)[:, None])
+    one = cells.select(np.unique(cell, return_index=True)[1])
     if len(one) == len(cells):
         return one, cell
     position, rotation = one.position_mm.copy(), one.rotation.copy()
+    drawn = one.drawn.copy()
     for number in np.flatnonzero(np.bincount(cell) > 1):
         rows = np.flatnonzero(cell == number)
+        drawn[number] = tuple(cells.line[rows].tolist())
         position[number] = np.median(cells.position_mm[rows], axis=0)
         turned = rows[cells.turned[rows]]
         if turned.size:
             rotation[number] = nearest_rotation(np.median(cells.rotation[turned], axis=0))
-    return replace(one, position_mm=position, rotation=rotation), cell
+    return replace(one, position_mm=position, rotation=rotation, drawn=drawn), cell
+
+
+def _tuples(items: list[tuple]) -> np.ndarray:
+    """Objects (n,) of tuples, which would otherwise become rows."""
+    objects = np.empty(len(items), dtype=object)
+    objects[:] = items
+    return objects
+
+
+def _numbers(label: np.ndarray) -> np.ndarray:
+    """Number (n,) of each row of ``label``, equal ones alike, in order of first appearance."""
+    _, first, inverse = np.unique(label, axis=0, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[inverse.ravel()]
+
+
+def _far_from_others(cells: Cells, cell: np.ndarray) -> np.ndarray:
+    """True (n,) where a reading is too far from the median of its cell to be a repeat."""
+    away = np.full(len(cells), np.nan)
+    for number in np.flatnonzero(np.bincount(cell) > 2):
+        rows = np.flatnonzero(cell == number)
+        middle = np.median(cells.position_mm[rows], axis=0)
+        away[rows] = np.linalg.norm(cells.position_mm[rows] - middle, axis=1)
+    repeated = np.isfinite(away)
+    return repeated & (away > tails.limit(away[repeated], 3))
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:

@@ -11,49 +11,40 @@ _CHANCE = 0.01  # expected number of coincidences above which equal readings say
 
 
 def found(cells: Cells, noise_mm: float) -> list[Suspicion]:
-    """Rows equal in joints and all readings, and readings equal to those of other joints.
+    """Rows equal to an earlier one in every joint and reading.
 
     Readings are written to a limited number of digits: where repeats scatter by ``noise_mm`` per
     axis (NaN if unknown) so little that equal digits are no surprise, they raise no suspicion.
     """
     rows, reading = _by_line(cells)
-    if len(rows) < 2:
+    both = np.column_stack([cells.q[rows], np.nan_to_num(reading, nan=np.inf)])
+    twice = _earlier_equal(both)
+    again = np.flatnonzero(twice >= 0)
+    if not again.size or not _unlikely(cells, noise_mm):
         return []
-    joints = cells.q[rows]
-    twice = _earlier_equal(np.column_stack([joints, np.nan_to_num(reading, nan=np.inf)]))
-    same_reading = _earlier_equal(np.nan_to_num(reading, nan=np.inf))
-    stale = (same_reading >= 0) & (twice < 0)
-    # Of two rows with equal joints only equal digits are noteworthy; other joints must differ.
-    stale[stale] = ~np.isclose(joints[stale], joints[same_reading[stale]], atol=1e-6).all(axis=1)
-    stale[np.flatnonzero(stale)] &= _unlikely(cells, np.inf)
     line = cells.line[rows]
-    suspicions = []
-    if (twice >= 0).any() and _unlikely(cells, noise_mm):
-        again = np.flatnonzero(twice >= 0)
-        suspicions.append(
-            suspicion(
-                "duplicate_rows",
-                f"{again.size} row{'s are' if again.size > 1 else ' is'} equal to an earlier one "
-                f"in every joint and reading, the first to line {line[twice[again[0]]]}",
-                line[again],
-                "take the copies out: they count as measurements that were never made",
-                first_copied_line=int(line[twice[again[0]]]),
-            )
+    first = int(line[twice[again[0]]])
+    return [
+        suspicion(
+            "duplicate_rows",
+            f"{again.size} row{'s are' if again.size > 1 else ' is'} equal to an earlier one in "
+            f"every joint and reading, the first of them to line {first}",
+            line[again],
+            "take the copies out: they count as measurements that were never made",
+            first_copied_line=first,
         )
-    if stale.any():
-        again = np.flatnonzero(stale)
-        suspicions.append(
-            suspicion(
-                "repeated_reading",
-                f"{again.size} reading{'s' if again.size > 1 else ''} equal to an earlier one in "
-                f"every digit although the joints differ, the first to line "
-                f"{line[same_reading[again[0]]]}",
-                line[again],
-                "the instrument was not read anew, or the rows were copied",
-                first_copied_line=int(line[same_reading[again[0]]]),
-            )
-        )
-    return suspicions
+    ]
+
+
+def earlier(cells: Cells) -> np.ndarray:
+    """Line (n,) of an earlier row of other joints whose readings are equal in every digit, or 0."""
+    rows, reading = _by_line(cells)
+    same = _earlier_equal(np.nan_to_num(reading, nan=np.inf))
+    joints = cells.q[rows]
+    moved = ~np.isclose(joints, joints[np.maximum(same, 0)], rtol=0.0, atol=1e-6).all(axis=1)
+    line = np.where((same >= 0) & moved, cells.line[rows][np.maximum(same, 0)], 0)
+    number = np.unique(cells.line, return_inverse=True)[1].ravel()
+    return line[number]
 
 
 def _by_line(cells: Cells) -> tuple[np.ndarray, np.ndarray]:

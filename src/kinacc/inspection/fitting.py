@@ -15,15 +15,16 @@ from kinacc.models.dh import DHModel
 _FITTED_ROWS = 900
 _COARSE_ROWS = 240
 _MOST_SPLITS = 8
-_TRIED = 5  # places tried for one split
-_FEWEST = 5  # readings on either side of a split
+_TRIED = 3  # places tried for one split
+_FEWEST = 5  # poses on either side of a split
+_FEW = 30  # poses: with fewer, two more frames explain noise
 _RUN = 6  # readings in a row that are far off
 _RUN_SHARE = 0.8
 _OFF = 8.0  # sigma
 _CAP = 10.0  # sigma
 _BETTER = 0.85  # of what is left overall: a split of a good file leaves all but a few per cent
 _BETTER_THERE = 0.55  # of what is left of the readings after the split
-_SURE = 12.0  # excess of a step that needs no such proof
+_PLAIN = 0.5  # share at which no other place need be tried
 
 Progress = Callable[[Iterable, str], Iterable]
 
@@ -101,8 +102,9 @@ def with_jumps(seen: Seen, model: DHModel, progress: Progress) -> Fitted:
 
 def _next(fitted: Fitted, model: DHModel) -> tuple[Jump, Fitted] | None:
     """The next jump and the fit without it; None where there is none."""
+    few = np.unique(fitted.seen.cells.pose).size < _FEW
     best, least = None, 1.0
-    for row, target, sure in _places(fitted):
+    for row, target in _places(fitted):
         again = fit(_split(fitted.seen, row, target)[0], model)
         row = _refined(again, row, target)
         if row is None:
@@ -110,8 +112,10 @@ def _next(fitted: Fitted, model: DHModel) -> tuple[Jump, Fitted] | None:
         seen, rows = _split(fitted.seen, row, target)
         again = fit(seen, model)
         share = _share_left(fitted, again, rows)
-        if (sure or share < 1.0) and share < least:
+        if share < min(least, _PLAIN if few else 1.0):
             best, least = (Jump(target, row, rows, np.zeros(3), 0.0), again), share
+            if share < _PLAIN:
+                break
     return best
 
 
@@ -128,27 +132,24 @@ def _share_left(before: Fitted, after: Fitted, rows: np.ndarray) -> float:
     return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere))
 
 
-def _places(fitted: Fitted) -> list[tuple[int, int | None, bool]]:
-    """Where to try a split: reading, target or None, and whether the step itself proves it."""
+def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
+    """Where to try a split: reading, and target or None; likely places first."""
     seen = fitted.seen
     far = fitted.left_mm > _OFF * fitted.trial.sigma_mm
-    tried: list[tuple[float, int, int | None, bool]] = []
+    tried: list[tuple[float, int, int | None]] = []
     for base in np.unique(seen.base):
         rows = np.flatnonzero(seen.base == base)
         kinds = [None, *(int(each) for each in np.unique(seen.target[rows]))]
         for begin, size in _runs(far[rows]):
             for row in (begin, begin + size):
                 if _FEWEST <= row <= len(rows) - _FEWEST:
-                    tried += [(1e3 + size, int(rows[row]), kind, False) for kind in kinds]
+                    tried += [(1e3 + size, int(rows[row]), kind) for kind in kinds]
         for step in steps.candidates(seen, fitted.left, rows):
             if step.excess > 2.0:
-                tried.append((step.excess, step.row, step.target, step.excess > _SURE))
+                tried.append((step.excess, step.row, step.target))
         tried += _coarse(fitted, rows, kinds)
     tried.sort(key=lambda place: -place[0])
-    best: dict[tuple[int, int | None], bool] = {}
-    for _, row, kind, sure in tried:
-        best.setdefault((row, kind), sure)
-    return [(row, kind, sure) for (row, kind), sure in list(best.items())[:_TRIED]]
+    return list(dict.fromkeys((row, kind) for _, row, kind in tried))[:_TRIED]
 
 
 def _coarse(fitted: Fitted, rows: np.ndarray, kinds: list) -> list[tuple]:
@@ -172,7 +173,7 @@ def _coarse(fitted: Fitted, rows: np.ndarray, kinds: list) -> list[tuple]:
             arm = start.found(split, nominal, draws=0, stretches=())
             left = _typical(split, trial.fit(split, arm, nominal, strength, huber=True))
             if left < 0.9 * here:
-                found.append((here / left, int(chosen[row]), kind, False))
+                found.append((here / left, int(chosen[row]), kind))
             if kind is not None:
                 break
     return found
@@ -203,9 +204,8 @@ def _refined(fitted: Fitted, row: int, target: int | None) -> int | None:
     before = np.concatenate([[0.0], np.cumsum(costs[0])])
     after = np.concatenate([[0.0], np.cumsum(costs[1][::-1])])[::-1]
     place = int(np.argmin(before + after))
-    if not _FEWEST <= place <= len(rows) - _FEWEST:
-        return None
-    return int(rows[place])
+    poses = [np.unique(seen.cells.pose[side]).size for side in (rows[:place], rows[place:])]
+    return int(rows[place]) if min(poses) >= _FEWEST else None
 
 
 def _runs(bad: np.ndarray) -> list[tuple[int, int]]:

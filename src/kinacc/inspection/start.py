@@ -16,6 +16,7 @@ _KEPT = 0.5  # share of the readings a refinement trusts
 _JUDGED = 0.4  # share of the readings that must fit: the rest may be of another base
 _STRETCHES = (2, 3, 5)
 _REFINEMENTS = 4
+_ASTRAY = 5.0  # times what the others leave: a target whose place was not found
 _ROWS = 600  # readings judged by
 _RCOND = 1e-3  # weaker directions of the start are left at zero for the fit to find
 
@@ -61,7 +62,26 @@ def _one_base(part: Seen, model: DHModel, draws: int, stretches, targets: int) -
                 break
             best, least = arm, middle
             rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), _DRAWN)]
-    return best
+    return best if targets == 1 else _placed(best, part, flange, least)
+
+
+def _placed(arm: Arm, part: Seen, flange: Pose, usual_mm: float) -> Arm:
+    """The arm with targets that were in none of the readings chosen put where theirs have them."""
+    misfit = _misfit(arm, part)
+    there = (part.cells.position_mm - arm.base.position_mm[0]) @ arm.base.rotation[0]
+    there = np.einsum("nji,nj->ni", flange.rotation, there - flange.position_mm)
+    points, turns = arm.targets.position_mm.copy(), arm.targets.rotation.copy()
+    for each in np.unique(part.target):
+        of = part.target == each
+        if np.median(misfit[of]) <= _ASTRAY * usual_mm:
+            continue
+        points[each] = np.median(there[of], axis=0)
+        of &= part.cells.turned
+        if of.any():
+            turned = arm.base.rotation[0] @ flange.rotation[of]
+            seen = np.swapaxes(turned, 1, 2) @ part.cells.rotation[of]
+            turns[each] = nearest_rotation(np.median(seen, axis=0))
+    return Arm(arm.model, arm.base, Pose(turns, points))
 
 
 def _draws(part: Seen, draws: int, stretches: tuple[int, ...]):

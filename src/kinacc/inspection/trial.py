@@ -19,16 +19,18 @@ from kinacc.models.dh import DHModel
 
 BIWEIGHT = 7.0  # readings beyond this many sigma (of a 3-D magnitude) have no weight in the end
 HUBER = 3.0  # beyond this many sigma a reading pulls no harder, while the strength is sought
-STRENGTHS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)  # mm and mrad the corrections may have
+STRENGTHS = (0.0, 0.3, 3.0, 30.0, 100.0)  # mm and mrad the corrections may have
 # Sigma from a quantile below the median: two fifths of the readings may be wrong together.
 _QUANTILE, _QUANTILE_3D = 0.35, 1.2797  # of the norm of three standard normal numbers
 _LEAST_SIGMA = 1e-7  # of what is fitted exactly: rounding
+_GROSS = 100.0  # sigma: beyond this a reading has no weight at all
 _ITERATIONS = 20
 _SETTLED = 0.03  # of sigma: finer steps tell no reading from another
-_OFF_ZERO = 1e-6
+_OFF_ZERO = 1e-3
 # An arm whose parameters are further off than this is another arm, or its joints are misread.
 _FAR_RAD, _FAR_MM = 0.25, 150.0
 _CAP = 10.0  # sigma: what is left of a configuration counts no more than this
+_READ_PER_PARAMETER = 2.0  # with fewer numbers than this the redescending loss is not used
 
 
 @dataclass(frozen=True)
@@ -128,8 +130,17 @@ def best(seen: Seen, start: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Tr
             chosen, least = trial, score
         elif score > 1.5 * least:
             break
+    if _few(seen, chosen):
+        return chosen
     final = fit(seen, chosen.arm, start.model, chosen.strength)
     return chosen if _far(final.arm.model, start.model) else final
+
+
+def _few(seen: Seen, trial: Trial) -> bool:
+    """Whether so little was read that a loss without a say for gross errors could fit any of it."""
+    corrections = 5 * trial.nominal.joints if trial.strength > 0.0 else 0
+    frames = 6 * int(seen.base.max() + 1) + 3 * int(seen.target.max() + 1)
+    return 3 * len(seen.q) < _READ_PER_PARAMETER * (frames + corrections)
 
 
 def fit(seen: Seen, start: Arm, nominal: DHModel, strength: float, huber: bool = False) -> Trial:
@@ -205,8 +216,11 @@ class _Step:
             moved = (dh.to_vector(arm.model) - dh.to_vector(nominal)) / units
             gram[range(frames, len(gram)), range(frames, len(gram))] += strength**-2.0
             rhs[frames:] += moved / strength**2
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
         # What no reading shows (a target's turn, a base nobody sees) stays where it is.
+        diagonal = np.diag(gram)
+        scale = np.where(
+            diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 0.0
+        )
         inverse = np.linalg.pinv(gram * np.outer(scale, scale), rcond=1e-12, hermitian=True)
         inverse *= np.outer(scale, scale)
         step = -inverse @ rhs
@@ -246,8 +260,8 @@ class _Step:
             block = self.design[rows].reshape(len(rows), 6 * size, -1)
             weight = self.weights[rows].reshape(len(rows), -1)
             hat = block @ self.inverse @ np.swapaxes(block, 1, 2) * weight[:, None, :]
-            # A direction that one configuration alone determines has nothing left to tell.
-            rest = np.linalg.pinv(np.eye(6 * size) - hat, rcond=_OFF_ZERO)
+            # What one configuration alone determines is unknown without it: far, not infinite.
+            rest = np.linalg.pinv((1.0 + _OFF_ZERO) * np.eye(6 * size) - hat, rcond=1e-12)
             found = rest @ self.residual[rows].reshape(len(rows), -1, 1)
             result[rows.ravel()] = found.reshape(-1, 6)
         turn = np.where(seen.cells.turned[:, None], result[:, 3:], np.nan)
@@ -294,6 +308,9 @@ def _weight(vectors: np.ndarray, sigma: float, huber: bool) -> np.ndarray:
     """Weights (n, 1) of vectors (n, 3); 0 where not measured."""
     length = np.linalg.norm(np.nan_to_num(vectors, nan=np.inf), axis=1)
     if huber:
-        return (HUBER * sigma / np.maximum(length, HUBER * sigma))[:, None]
+        weight = HUBER * sigma / np.maximum(length, HUBER * sigma)
+        # Where a quarter or more is that far off, the start is to blame and not the readings.
+        usual = np.quantile(length[np.isfinite(length)], 0.75) if np.isfinite(sigma) else 0.0
+        return np.where(length < max(_GROSS * sigma, 3.0 * usual), weight, 0.0)[:, None]
     share = np.minimum(length / (BIWEIGHT * sigma), 1.0)
     return ((1.0 - share**2) ** 2)[:, None]

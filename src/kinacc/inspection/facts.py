@@ -1,0 +1,122 @@
+"""What is in a file: poses, targets, repeats, coverage of the joints, noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinacc.data.measurements import Reading
+from kinacc.inspection.cells import Cells
+from kinacc.inspection.changes import Meaning
+from kinacc.inspection.fitting import Fitted
+from kinacc.inspection.noise import Distance, Repeats
+from kinacc.robot import Robot
+
+_WEAK = 0.1  # of a joint's range: less cannot tell its parameters well
+
+
+def facts_of(
+    every: Cells,
+    robot: Robot,
+    repeats: Repeats,
+    distances: list[Distance],
+    fitted: Fitted | None,
+    meaning: Meaning,
+) -> dict[str, object]:
+    """What is there, by name; units stand in the names."""
+    facts: dict[str, object] = {
+        "robot": robot.name,
+        "rows": int(np.unique(every.line).size),
+        "poses": int(np.unique(every.pose).size),
+        "readings": len(every),
+        "orientations": int(every.turned.sum()),
+        "targets": {
+            name: f"{int(np.sum(every.target == i))} readings"
+            for i, name in enumerate(every.target_names)
+        },
+    }
+    if len(every.session_names) > 1:
+        facts["sessions"] = {
+            name: f"{int(np.sum(every.session == i))} readings"
+            for i, name in enumerate(every.session_names)
+        }
+    facts["joint_coverage"] = _coverage(every, robot)
+    if repeats.groups:
+        facts["noise_from_repeats"] = {
+            "std_mm": [float(value) for value in repeats.std_mm],
+            "readings": repeats.readings,
+            "configurations_and_targets": repeats.groups,
+        }
+    if distances:
+        facts["target_distances"] = [
+            {
+                "from": every.target_names[each.one],
+                "to": every.target_names[each.other],
+                "mm": each.middle_mm,
+                "std_mm": each.std_mm,
+                "noise_per_target_mm": each.std_mm / np.sqrt(2.0),
+            }
+            for each in distances
+        ]
+    if fitted is not None:
+        facts["quick_fit"] = {
+            "left_per_axis_mm": fitted.trial.sigma_mm,
+            "most_expected_mm": fitted.limit_mm,
+        }
+        if np.isfinite(fitted.trial.sigma_rad):
+            facts["quick_fit"]["left_per_axis_mrad"] = 1e3 * fitted.trial.sigma_rad
+    return facts
+
+
+def _coverage(every: Cells, robot: Robot) -> list[dict[str, object]]:
+    found = []
+    for joint in range(robot.dh.joints):
+        slides = robot.dh.prismatic[joint]
+        unit, word = (1.0, "mm") if slides else (np.pi / 180.0, "deg")
+        low, high = every.q[:, joint].min() / unit, every.q[:, joint].max() / unit
+        least, most = robot.q_min_rad[joint] / unit, robot.q_max_rad[joint] / unit
+        found.append(
+            {
+                "joint": joint + 1,
+                f"from_{word}": float(low),
+                f"to_{word}": float(high),
+                "limits": f"{least:g}..{most:g}",
+                "share": float((high - low) / (most - least)),
+            }
+        )
+    return found
+
+
+def remarks_of(
+    every: Cells,
+    reading: Reading,
+    repeats: Repeats,
+    distances: list[Distance],
+    earlier: np.ndarray,
+) -> tuple[str, ...]:
+    """What to know about the file, in words."""
+    remarks = list(reading.left_out())
+    if len(every.target_names) > 1:
+        how = (
+            f": their repeats go together (correlation {repeats.common:.2f})"
+            if np.isfinite(repeats.common)
+            else ""
+        )
+        remarks.append(
+            f"targets of one pose share the arm's error and are no independent samples{how}"
+        )
+    if repeats.groups and distances:
+        between = float(np.median([each.std_mm for each in distances])) / np.sqrt(2.0)
+        whole = float(np.mean(repeats.std_mm))
+        if between < 0.5 * whole:
+            remarks.append(
+                f"repeats scatter by {whole:.3g} mm, targets against each other by only "
+                f"{between:.3g} mm: the scatter is the arm's or the set-up's, not the instrument's"
+            )
+    same = np.unique(every.line[earlier > 0])
+    if same.size:
+        lines = ", ".join(str(line) for line in same[:6])
+        more = f" and {same.size - 6} more" if same.size > 6 else ""
+        remarks.append(
+            f"readings equal to an earlier one in every digit, at other joints: line {lines}{more}"
+        )
+    return tuple(remarks)

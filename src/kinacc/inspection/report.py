@@ -1,0 +1,110 @@
+"""The report of a file: what is there, and every suspicion, for people and for machines."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.inspection.suspicion import Suspicion
+
+CLEAN, SUSPICIOUS, UNUSABLE = 0, 1, 2
+VERDICTS = ("clean", "suspicions", "unusable")
+
+
+@dataclass(frozen=True)
+class Report:
+    """What ``kinacc check-data`` says of one data set.
+
+    ``facts`` are what is there, ``remarks`` what to know about it, in words.
+    """
+
+    dataset: str
+    path: str
+    facts: Mapping[str, object]
+    remarks: tuple[str, ...]
+    suspicions: tuple[Suspicion, ...]
+
+    @property
+    def code(self) -> int:
+        """0 clean, 1 with suspicions."""
+        return SUSPICIOUS if self.suspicions else CLEAN
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON: every suspicion with all its lines."""
+        return {
+            "dataset": self.dataset,
+            "path": self.path,
+            "verdict": VERDICTS[self.code],
+            "facts": plain(self.facts),
+            "remarks": list(self.remarks),
+            "suspicions": [
+                {
+                    "kind": each.kind,
+                    "what": each.what,
+                    "fix": each.fix,
+                    "lines": list(each.lines),
+                    **plain(each.values),
+                }
+                for each in self.suspicions
+            ],
+        }
+
+    def as_text(self) -> str:
+        """For people."""
+        lines = [f"{self.dataset}: {self.path}", ""]
+        for name, value in self.facts.items():
+            lines += _fact(name.replace("_", " "), value)
+        lines += ["", *(f"note: {remark}" for remark in self.remarks)]
+        if not self.suspicions:
+            return "\n".join([*lines, "", "nothing suspicious"])
+        count = len(self.suspicions)
+        lines += ["", f"{count} suspicion{'s' if count > 1 else ''}"]
+        for each in self.suspicions:
+            lines.append(f"  - {each.kind}: {each.what}")
+            lines.append(f"    {each.where}")
+            if each.fix:
+                lines.append(f"    {each.fix}")
+        return "\n".join(lines)
+
+
+def _fact(name: str, value: object) -> list[str]:
+    if isinstance(value, Mapping):
+        return [f"  {name}", *(f"    {key}: {_word(each)}" for key, each in value.items())]
+    if isinstance(value, list) and value and isinstance(value[0], Mapping):
+        rows = [", ".join(f"{k} {_word(v)}" for k, v in row.items()) for row in value]
+        return [f"  {name}", *(f"    {row}" for row in rows)]
+    return [f"  {name}: {_word(value)}"]
+
+
+def _word(value: object) -> str:
+    if value is None or (isinstance(value, float) and not np.isfinite(value)):
+        return "unknown"
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    if isinstance(value, (list, tuple)):
+        return " ".join(_word(each) for each in value)
+    return str(value)
+
+
+def plain(value: object) -> object:
+    """Plain numbers, texts and lists for JSON; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(each) for each in value]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    return value
+
+
+def to_json(reports: list[dict]) -> str:
+    """All data sets in one object, with the worst verdict."""
+    worst = max((VERDICTS.index(each["verdict"]) for each in reports), default=0)
+    return json.dumps({"verdict": VERDICTS[worst], "datasets": reports}, indent=1)
