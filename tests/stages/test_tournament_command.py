@@ -13,7 +13,7 @@ from kinacc.artifacts.store import read, write
 from kinacc.cli import main
 from kinacc.tournament import contest, fields
 
-TINY = contest.Size((0.1, 0.3), {20: (10, 30)}, 2, (0,))
+TINY = contest.Size((0.1, 0.3), {20: (10, 30)}, 2, 1, (0,))
 MARKS = {"kinacc_version": "0", "config_hash": "", "code_hash": "", "inputs_hash": "", "seed": 1}
 ASSESSORS = ("--assessor", "maximum", "--assessor", "single_shot")
 

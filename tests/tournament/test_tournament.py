@@ -14,7 +14,7 @@ from kinacc.errors import InputError
 from kinacc.tournament import contest, summary
 from kinacc.tournament.fields import FAMILIES, Field, of_measurements, of_points, synthetic
 
-SMALL = contest.Size((0.1, 0.3), {20: (10, 40)}, 3, (0,))
+SMALL = contest.Size((0.1, 0.3), {20: (10, 40)}, 3, 2, (0,))
 
 
 @pytest.fixture(scope="module")
@@ -94,11 +94,13 @@ def test_every_assessor_is_in_every_cell(rows):
 
 
 def test_parts_of_any_number_give_the_same_table(field):
+    names = ("maximum", "single_shot")
+
     def table(parts):
         found = []
         for number in range(1, parts + 1):
             work = contest.part_of(contest.jobs([field], SMALL), number, parts)
-            found.append(contest.summed(work, 2, 5, ("maximum", "single_shot")))
+            found.append(contest.summed(work, replace(SMALL, repetitions=2), 5, names))
         joined = {name: np.concatenate([each[name] for each in found]) for name in found[0]}
         return summary.in_order(joined)
 

@@ -109,7 +109,10 @@ class Campaign(Protocol):
 
 
 class AdaptiveAssessor(Protocol):
-    """A method of assessment: ``name`` in tables, ``measurements`` it may spend."""
+    """A method of assessment: ``name`` in tables, ``measurements`` it may spend.
+
+    ``is_slow``, where there is one, says that a campaign of 200 takes more than 50 ms.
+    """
 
     name: ClassVar[str]
     measurements: int

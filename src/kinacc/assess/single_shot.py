@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from kinacc.assess.adaptive import Candidates, Ledger, check_budget
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
@@ -63,7 +65,7 @@ class SingleShotCampaign:
             return (Statement(MEASURED, withheld="nothing measured yet"),)
         error = 1.0 - self.settings.confidence
         each = error / self.points
-        means = [(ledger.mean_mm[point], ledger.noise(point)) for point in ledger.visited]
+        means = _outstanding(ledger)
         said = Statement(
             MEASURED,
             value_mm=float(ledger.sizes_mm().max()),
@@ -72,6 +74,19 @@ class SingleShotCampaign:
             confidence=self.settings.confidence,
         )
         return about_all_if_all_measured(said, ledger)
+
+
+def _outstanding(ledger: Ledger) -> list[tuple[np.ndarray, float | np.ndarray]]:
+    """Means with their noise, of points with equal noise only the largest: limits rise with it."""
+    largest: dict[float, tuple[float, int]] = {}
+    uneven = []
+    for point, size in zip(ledger.visited, ledger.sizes_mm(), strict=True):
+        noise = ledger.noise(point)
+        if not isinstance(noise, float):
+            uneven.append((ledger.mean_mm[point], noise))
+        elif noise not in largest or size > largest[noise][0]:
+            largest[noise] = (size, point)
+    return uneven + [(ledger.mean_mm[point], noise) for noise, (_, point) in largest.items()]
 
 
 def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statement, ...]:

@@ -9,16 +9,19 @@ import click
 @click.option("--config", multiple=True, help="Configuration; may be repeated. [config.yaml]")
 @click.option("--results", default="results", show_default=True, help="Results folder.")
 @click.option(
-    "--size", type=click.Choice(["default", "full"]), help="Minutes or hours. [configuration]"
+    "--size",
+    type=click.Choice(["default", "coverage", "full"]),
+    help="Minutes, hours for coverage alone, or a day and more. [configuration]",
 )
 @click.option("--parts", type=click.IntRange(1), help="Number of parts. [configuration]")
 @click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
 @click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
+@click.option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")
 @click.option(
     "--cores", type=click.IntRange(1), default=1, show_default=True, help="Parts at a time."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
-def tournament(config, results, size, parts, part, assessor, cores, as_json) -> None:
+def tournament(config, results, size, parts, part, assessor, noise_mm, cores, as_json) -> None:
     """Let every assessor assess errors that are known, and hold what it says to the truth.
 
     The error fields are those of the configuration's data sets, whose tables have to be there
@@ -38,7 +41,7 @@ def tournament(config, results, size, parts, part, assessor, cores, as_json) -> 
     from kinacc.stages.tournament_plan import is_done, tournament_plan
 
     chosen = planned(config or ("config.yaml",), results=results)
-    contest = tournament_plan(chosen, size, parts, assessor)
+    contest = tournament_plan(chosen, size, parts, assessor, noise_mm)
     contest.check()
     names = contest.part_names
     if part is not None and part not in names:

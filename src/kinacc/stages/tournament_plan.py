@@ -29,13 +29,14 @@ class TournamentPlan:
 
     ``size`` is a name of the sizes of :mod:`kinacc.tournament.contest`; ``parts`` the number of
     parts, which has no influence on the results; ``assessors`` those that take part, all if
-    empty.
+    empty; ``noise_mm`` the only noise simulated, all of the size if empty.
     """
 
     plan: Plan
     size: str
     parts: int
     assessors: tuple[str, ...]
+    noise_mm: tuple[float, ...] = ()
 
     @property
     def inputs(self) -> dict[str, str]:
@@ -77,6 +78,7 @@ class TournamentPlan:
             "seed": self.seed,
             "size": self.size,
             "assessors": list(self.assessors),
+            "noise_mm": list(self.noise_mm),
             "robots": robots,
         }
 
@@ -131,6 +133,7 @@ def tournament_plan(
     size: str | None = None,
     parts: int | None = None,
     assessors: Sequence[str] = (),
+    noise_mm: Sequence[float] = (),
 ) -> TournamentPlan:
     """The tournament of a plan; what is not given is as configured, assessors are all there are.
 
@@ -146,7 +149,7 @@ def tournament_plan(
         assessors = [name for name in CONTESTANTS if name in assessors]
     configured = plan.tournament
     size, parts = size or configured["size"], parts or configured["chunks"]
-    return TournamentPlan(plan, size, parts, tuple(assessors))
+    return TournamentPlan(plan, size, parts, tuple(assessors), tuple(noise_mm))
 
 
 def _fix(role: str) -> str:

@@ -11,7 +11,7 @@ import math
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,25 +34,38 @@ CONTESTANTS = (*ASSESSORS, *ADAPTIVE)
 class Size:
     """How large a tournament is.
 
-    ``budgets`` by number of candidates; ``repetitions`` of every cell; ``draws``: accepted draws
-    of which every synthetic family is made.
+    ``budgets`` by number of candidates; ``repetitions`` of every cell, and ``repetitions_slow`` for
+    assessors that take more than 50 ms; ``draws``: accepted draws of which every synthetic family
+    is made.
     """
 
     noise_mm: tuple[float, ...]
     budgets: dict[int, tuple[int, ...]]
     repetitions: int
+    repetitions_slow: int
     draws: tuple[int, ...]
+
+    def only(self, noise_mm: Sequence[float]) -> Size:
+        """The same with this noise alone, of its own; with all of it where none is given."""
+        unknown = [each for each in noise_mm if each not in self.noise_mm]
+        if unknown:
+            allowed = ", ".join(f"{each:g}" for each in self.noise_mm)
+            raise InputError([Problem("noise_mm", f"{each:g}", allowed) for each in unknown])
+        return replace(self, noise_mm=tuple(noise_mm) or self.noise_mm)
 
 
 SIZES = {
-    "default": Size((0.05, 0.1, 0.2, 0.3), {200: (50, 200), 1000: (200,)}, 20, (0,)),
+    "default": Size((0.05, 0.1, 0.2, 0.3), {200: (50, 200), 1000: (200,)}, 20, 6, (0,)),
+    "coverage": Size((0.05, 0.1, 0.2, 0.3), {200: (120, 200)}, 1000, 200, (0,)),
     "full": Size(
         (0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
         {200: (50, 100, 200, 500, 1000), 1000: (50, 200, 500, 1000)},
         1000,
+        200,
         (0, 1, 2),
     ),
 }
+SLOW = tuple(name for name, each in ADAPTIVE.items() if getattr(each, "is_slow", False))
 
 
 @dataclass(frozen=True)
@@ -106,11 +119,7 @@ def part_of(work: Sequence[Job], number: int, of: int) -> Sequence[Job]:
 
 
 def summed(
-    work: Sequence[Job],
-    repetitions: int,
-    seed: int,
-    assessors: Sequence[str],
-    progress=None,
+    work: Sequence[Job], size: Size, seed: int, assessors: Sequence[str], progress=None
 ) -> Columns:
     """Summary of every job: rows as in :func:`kinacc.tournament.summary.summed`.
 
@@ -118,8 +127,10 @@ def summed(
     """
     parts = []
     for job in progress(work, "cells", len(work)) if progress else work:
-        rows, _ = campaigns(job, range(repetitions), seed, assessors)
-        parts.append(summary.summed(rows))
+        for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
+            own = [name for name in assessors if (name in SLOW) == is_slow]
+            if own:
+                parts.append(summary.summed(campaigns(job, range(count), seed, own)[0]))
     if not parts:
         return {name: np.empty(0, kind) for name, kind in summary.KINDS.items()}
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
