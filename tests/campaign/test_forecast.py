@@ -58,7 +58,7 @@ def test_a_forecast_contains_what_then_happens(make_plan, make_world):
     low, _, high = ahead.width_mm
     assert 0.8 * low <= said.upper_mm - said.lower_mm <= 1.25 * high
     assert ahead.more == 0
-    assert ahead.decisions["conforming"] == 1.0
+    assert ahead.decisions["accept"] == 1.0
 
 
 def test_there_is_no_forecast_from_nearly_nothing(make_plan):

@@ -75,7 +75,7 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
     assert row.within == 0.5
     assert row.holds == 0.5
     assert row.excess_mm == pytest.approx(0.0)
-    assert row.decisions == {"conforming": 0.5, "not conforming": 0.25, "undecided": 0.25}
+    assert row.decisions == {"accept": 0.5, "reject": 0.25, "undecided": 0.25}
     assert row.width_mm[0] == pytest.approx(0.2)
     assert row.width_mm[2] == math.inf
 

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.calibrated.record import Calibration
+from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import INSTRUMENT, Instrument
-from kinacc.campaign.plan import Limits, Plan, Points, fixed_visit
+from kinacc.campaign.plan import Limits, Plan, Points, candidates_of, fixed_visit
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose, invert
 from kinacc.models.vec import VECModel
@@ -74,17 +75,17 @@ def plan_of(
     the random order.
     """
     order = np.random.default_rng(seed).permutation(len(points))
-    slides = np.array(arm.robot.dh.prismatic)
+    slides, kept = arm.robot.dh.prismatic, Arm.of(arm, about.get("point"))
     to_base = compose(arm.robot.base, invert(arm.base))
     covariance = instruments[0].in_base(to_base.rotation)
-    equal = Candidates(np.tile(covariance, (len(points), 1, 1)), q_rad=points.joints)
+    equal = candidates_of(covariance, points.joints, kept)
     route = order[: fixed_visit(assessor, equal)]
     if by_travel:
         scaled = points.joints[route] / np.where(slides, _MM_PER_RAD, 1.0)
         route = route[_short_path(scaled, start / np.where(slides, _MM_PER_RAD, 1.0))]
     return Plan(
         points, order, route, assessor, tuple(instruments), to_base,
-        tuple(bool(each) for each in slides), limits, seed, about,
+        kept, limits, seed, about,
     )  # fmt: skip
 
 

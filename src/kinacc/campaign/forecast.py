@@ -16,10 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.assess.adaptive import Campaign
+from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.campaign import words
+from kinacc.campaign.plan import Plan
 from kinacc.campaign.simulate import Deviates, carry_on, quantiles
-from kinacc.campaign.state import State
+from kinacc.campaign.state import State, sayable
 
 FEWEST_POINTS = 8
 _WIDTHS = 24  # of the mixture, in equal ratios
@@ -129,8 +131,8 @@ def forecast(
         if reached < ENOUGH:
             found = _larger(state, found, known, mean, noise, wanted_mm, simulations, progress)
     if tolerance_mm is not None:
-        said = [words.decision(each, tolerance_mm) for each in last]
-        kinds = (words.CONFORMS, words.FAILS, words.OPEN)
+        said = [decide(each, tolerance_mm).verdict for each in last]
+        kinds = (ACCEPT, REJECT, UNDECIDED)
         found = replace(found, decisions={kind: said.count(kind) / len(said) for kind in kinds})
     return found
 
@@ -151,7 +153,7 @@ def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, 
             campaign = assessor.begin(state.plan.candidates(state.rows))
             deviates = Deviates(len(errors), tried, *entropy)
             carry_on(campaign, errors, _root(state), deviates)
-            hits += _width(_main(campaign, found.target)) <= wanted_mm
+            hits += _width(_main(state.plan, campaign, found.target)) <= wanted_mm
         if hits >= ENOUGH * simulations:
             return replace(found, budget=tried, tried=tried)
     return replace(found, tried=tried)
@@ -162,17 +164,17 @@ def _one_end(
 ) -> list[tuple[int, Statement]]:
     """Statement on the target in one simulated end after some numbers of further readings."""
     campaign = copy.deepcopy(state.campaign)
-    looks = [(0, _main(campaign, target))]
+    looks = [(0, _main(state.plan, campaign, target))]
     pause = max(left // _LOOKS, 1)
 
     def look(done: int) -> None:
         if done % pause == 0:
-            looks.append((done, _main(campaign, target)))
+            looks.append((done, _main(state.plan, campaign, target)))
 
     deviates = Deviates(len(errors_mm), left, *entropy)
     done = carry_on(campaign, errors_mm, _root(state), deviates, look)
     if looks[-1][0] != done:
-        looks.append((done, _main(campaign, target)))
+        looks.append((done, _main(state.plan, campaign, target)))
     return looks
 
 
@@ -181,9 +183,9 @@ def _first_within(looks: Sequence[tuple[int, Statement]], wanted_mm: float) -> f
     return next((done for done, said in looks if _width(said) <= wanted_mm), math.inf)
 
 
-def _main(campaign: Campaign, target: str) -> Statement:
+def _main(plan: Plan, campaign: Campaign, target: str) -> Statement:
     """The statement on a target; the first where there is none."""
-    said = campaign.statements()
+    said = sayable(plan, campaign)
     return next((each for each in said if each.target == target), said[0])
 
 

@@ -9,9 +9,10 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES
+from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import Instrument
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
@@ -67,7 +68,7 @@ class Plan:
 
     ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
     in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
-    ``slides`` (k,) marks joints that slide. ``about`` names robot, calibration, model and point.
+    ``arm`` tells what errors of its joints do. ``about`` names robot, calibration, model and point.
     """
 
     points: Points
@@ -76,10 +77,20 @@ class Plan:
     assessor: AdaptiveAssessor
     instruments: tuple[Instrument, ...]
     to_base: Pose
-    slides: tuple[bool, ...]
+    arm: Arm
     limits: Limits
     seed: int
     about: Mapping[str, str]
+
+    @property
+    def slides(self) -> np.ndarray:
+        """Which joints (k,) slide."""
+        return self.arm.dh.prismatic
+
+    @property
+    def by_travel(self) -> bool:
+        """Whether the first visit is made in order of travel."""
+        return not np.array_equal(self.route, self.order[: len(self.route)])
 
     def instrument(self, name: str | None) -> Instrument:
         """An instrument by name, the first where none is named. InputError for another name."""
@@ -106,13 +117,24 @@ class Plan:
     def candidates(self, rows: np.ndarray) -> Candidates:
         """The candidates in the order of ``rows``, with the noise of the first instrument."""
         covariance = self.instruments[0].in_base(self.to_base.rotation)
-        return Candidates(np.tile(covariance, (len(rows), 1, 1)), q_rad=self.points.joints[rows])
+        joints = self.points.joints[rows]
+        return candidates_of(covariance, joints, self.arm)
+
+
+def candidates_of(covariance_mm2: np.ndarray, joints: np.ndarray, arm: Arm) -> Candidates:
+    """Candidates at joints (m, k) with equal covariances (3, 3)."""
+    noise = np.tile(covariance_mm2, (len(joints), 1, 1))
+    return Candidates(noise, q_rad=joints, effects=arm.effects(joints))
 
 
 def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:
     """Number of points that are visited whatever is read: rows 0, 1, .. in order."""
-    begun = assessor.begin(candidates)
-    return int(getattr(begun, "first", getattr(begun, "points", 0)))
+    return fixed_length(assessor.begin(candidates))
+
+
+def fixed_length(campaign: Campaign) -> int:
+    """As ``fixed_visit``, of a campaign that was begun; 0 where it does not say."""
+    return int(getattr(campaign, "first", getattr(campaign, "points", 0)))
 
 
 def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
@@ -160,7 +182,7 @@ def to_json(plan: Plan) -> bytes:
             "rotation": plan.to_base.rotation.tolist(),
             "position_mm": plan.to_base.position_mm.tolist(),
         },
-        "slides": list(plan.slides),
+        "arm": plan.arm.as_entry(),
         "limits": asdict(plan.limits),
         "seed": plan.seed,
         "order": plan.order.tolist(),
@@ -203,7 +225,7 @@ def _plan(content: Mapping) -> Plan:
             for each in content["instruments"]
         ),
         Pose(np.array(content["to_base"]["rotation"]), np.array(content["to_base"]["position_mm"])),
-        tuple(content["slides"]),
+        Arm.of_entry(content["arm"]),
         Limits(**content["limits"]),
         content["seed"],
         content["about"],

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.campaign import words
+from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.campaign.simulate import Outcome, binomial_interval, quantiles
+
+VERDICTS = (ACCEPT, REJECT, UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Row:
         if aim.width_mm is not None:
             shares.append(self.within)
         if aim.tolerance_mm is not None:
-            shares.append(self.decisions[words.CONFORMS] + self.decisions[words.FAILS])
+            shares.append(1.0 - self.decisions[UNDECIDED])
         return min(shares, default=self.stated)
 
 
@@ -88,9 +90,9 @@ def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
     sound = [each for each in stated if not each.broken]
     wanted = math.inf if aim.width_mm is None else aim.width_mm
     within = sum(each.width_mm <= wanted for each in stated)
-    tolerance = math.nan if aim.tolerance_mm is None else aim.tolerance_mm
-    said = [words.decision(each.said, tolerance) for each in group]
-    kinds = (words.CONFORMS, words.FAILS, words.OPEN)
+    said = []
+    if aim.tolerance_mm is not None:
+        said = [decide(each.said, aim.tolerance_mm).verdict for each in group]
     return Row(
         errors,
         budget,
@@ -104,7 +106,7 @@ def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
         (len(stated) - len(sound)) / count,
         within / count,
         binomial_interval(within, count),
-        {kind: said.count(kind) / count for kind in kinds},
+        {kind: said.count(kind) / count for kind in VERDICTS} if said else {},
     )
 
 

@@ -8,12 +8,13 @@ from collections.abc import Callable
 import numpy as np
 
 from kinacc.assess.adaptive import Campaign
+from kinacc.assess.conformity import decide
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.campaign import consistency, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.reading import covariance_mm2
-from kinacc.campaign.state import State
+from kinacc.campaign.state import State, sayable
 
 Columns = dict[str, np.ndarray]
 _STATEMENTS = 150  # stated at so many moments of a campaign, at most
@@ -31,7 +32,7 @@ def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dic
         next(done, None)
         count, visited = campaign.taken()
         if count % pause == 0 or count == total:
-            rows.extend(_said(each, count, len(visited)) for each in campaign.statements())
+            rows.extend(_said(each, count, len(visited)) for each in sayable(opened.plan, campaign))
 
     state = opened.state(watch)
     for _ in done:
@@ -134,7 +135,7 @@ def limits_of(state: State) -> dict[int, tuple[float, float]]:
     """
     looks = getattr(state.campaign, "looks", None)
     found = {}
-    if looks is not None:
+    if looks is not None and len(looks.upper_mm):
         for row in looks.ledger.visited:
             limits = float(looks.lower_mm[row]), float(looks.upper_mm[0, row])
             found[int(state.rows[row])] = limits
@@ -194,14 +195,19 @@ def _conformity(state: State) -> list[str]:
     tolerance = state.plan.limits.tolerance_mm
     lines = [f"Largest error allowed: {tolerance:g} mm.", ""]
     for said in state.statements():
-        guard = said.upper_mm - said.value_mm
-        band = f" (guard band {guard:.3f} mm)" if math.isfinite(guard) else ""
-        lines.append(f"- {words.TARGETS[said.target]}: **{words.decision(said, tolerance)}**{band}")
+        found = decide(said, tolerance)
+        line = f"- {words.TARGETS[said.target]}: **{found.verdict}**; {found.reason}"
+        if math.isfinite(found.guard_band_mm):
+            line += (
+                f" (guard band {found.guard_band_mm:.3f} mm, acceptance limit "
+                f"{found.acceptance_limit_mm:.3f} mm, risk at most {found.risk:.1%})"
+            )
+        lines.append(line)
     lines += [
         "",
-        "They conform where the upper bound is within the tolerance, and do not where the lower "
-        "bound is beyond it; each of the two is wrong with at most the probability the confidence "
-        "leaves. The guard band is how far the estimate has to stay below the tolerance.",
+        "Accepted where the upper bound is within the tolerance, rejected where the lower bound is "
+        "beyond it (JCGM 106:2012, guarded acceptance and rejection). The guard band is how far "
+        "the estimate has to stay below the tolerance; the risk is that of either being wrong.",
     ]
     return lines
 

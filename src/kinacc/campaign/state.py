@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kinacc.assess.adaptive import Campaign
-from kinacc.assess.statement import Statement
-from kinacc.campaign.plan import Plan
+from kinacc.assess.statement import MEASURED, Statement
+from kinacc.campaign.plan import Plan, fixed_length
 from kinacc.campaign.reading import Reading, covariance_mm2, error_mm
 
 READINGS, LEAVE_OUT, STRIKE = "readings", "leave_out", "strike"
@@ -61,13 +61,32 @@ class State:
 
     def statements(self) -> tuple[Statement, ...]:
         """What may be said now."""
-        return self.campaign.statements()
+        return sayable(self.plan, self.campaign)
 
     def ahead(self) -> list[int]:
         """Points without a reading that are measured whatever the others read, in order."""
-        first = int(getattr(self.campaign, "first", getattr(self.campaign, "points", 0)))
+        first = fixed_length(self.campaign)
         have = {each.reading.point for each in (*self.told, *self.in_hand)}
         return [int(point) for point in self.rows[:first] if point not in have]
+
+
+def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
+    """The statements of a campaign, without those that its visit does not support yet.
+
+    Part of a visit made in order of travel is no random sample: until it is complete, nothing is
+    said of points that were not measured.
+    """
+    said = campaign.statements()
+    left = fixed_length(campaign) - len(campaign.taken()[1])
+    if left <= 0 or not plan.by_travel:
+        return said
+    words = f"{left} points of the first visit, made in order of travel, are left"
+    return tuple(
+        each
+        if each.target == MEASURED or each.withheld
+        else Statement(each.target, share=each.share, withheld=words)
+        for each in said
+    )
 
 
 def restore(

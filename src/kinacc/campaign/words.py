@@ -10,7 +10,6 @@ from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
 from kinacc.campaign import consistency
 from kinacc.campaign.state import State
 
-CONFORMS, FAILS, OPEN = "conforming", "not conforming", "undecided"
 TARGETS = {MEASURED: "measured points", CANDIDATES: "all candidates", REGION: "share of the region"}
 
 
@@ -34,15 +33,6 @@ def statement(said: Statement, state: State) -> str:
     text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
     return f"{text}, if {said.assumption}." if said.assumption else f"{text}."
-
-
-def decision(said: Statement, tolerance_mm: float) -> str:
-    """Conformity with a tolerance: decided only where a bound lies on one side of it."""
-    if not math.isnan(said.upper_mm) and said.upper_mm <= tolerance_mm:
-        return CONFORMS
-    if not math.isnan(said.lower_mm) and said.lower_mm > tolerance_mm:
-        return FAILS
-    return OPEN
 
 
 def standing(state: State) -> list[str]:

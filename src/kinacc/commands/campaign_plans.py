@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor
-from kinacc.campaign import power, simulate, words
+from kinacc.campaign import power, simulate
 from kinacc.campaign.power import Aim, Row
 from kinacc.campaign.simulate import Pool
 from kinacc.commands import campaign_options, rows
@@ -160,9 +160,8 @@ def as_sheet(asked: Question, found: list[Row]) -> Sheet:
         ]
     if aim.tolerance_mm is not None:
         fields += [
-            Field(name, column(lambda row, kind=kind: row.decisions[kind]), "1", f"share {kind}")
-            for name, kind in (("conforming", words.CONFORMS), ("not_conforming", words.FAILS),
-                               ("undecided", words.OPEN))
+            Field(verdict, column(lambda row, at=verdict: row.decisions[at]), "1", "share decided so")
+            for verdict in power.VERDICTS
         ]  # fmt: skip
     std = np.sqrt(np.diag(asked.covariance_mm2))
     facts = {

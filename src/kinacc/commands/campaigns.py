@@ -11,6 +11,7 @@ import click
 import numpy as np
 
 from kinacc import __version__
+from kinacc.assess.conformity import decide
 from kinacc.assess.statement import Statement
 from kinacc.campaign import begin, consistency, folder, forecast, instrument, marks, report, words
 from kinacc.campaign.plan import Limits, Plan
@@ -203,11 +204,12 @@ def status(given: Mapping) -> None:
     lines = words.standing(found)
     lines += [words.statement(said, found) for said in found.statements()]
     if tolerance is not None:
-        lines += [
-            f"tolerance {tolerance:g} mm, {words.TARGETS[said.target]}: "
-            f"{words.decision(said, tolerance)}"
-            for said in found.statements()
-        ]
+        for said in found.statements():
+            verdict = decide(said, tolerance)
+            lines.append(
+                f"tolerance {tolerance:g} mm, {words.TARGETS[said.target]}: {verdict.verdict}, "
+                f"{verdict.reason}"
+            )
     lines += forecast.in_words(ahead) if ahead is not None else []
     click.echo("\n".join(lines))
 
@@ -319,12 +321,31 @@ def statement_facts(said: Statement, found: State, tolerance: float | None) -> d
         "in_words": words.statement(said, found),
     }
     if tolerance is not None:
-        facts |= {"tolerance_mm": tolerance, "decision": words.decision(said, tolerance)}
+        facts |= {"tolerance_mm": tolerance, "decision": _decision_facts(said, tolerance)}
     return facts
 
 
+def _decision_facts(said: Statement, tolerance: float) -> dict[str, object]:
+    """A decision for a machine."""
+    found = decide(said, tolerance)
+    known = math.isfinite(found.guard_band_mm)
+    return {
+        "verdict": found.verdict,
+        "reason": found.reason,
+        "guard_band_mm": found.guard_band_mm if known else None,
+        "acceptance_limit_mm": found.acceptance_limit_mm if known else None,
+        "risk": None if math.isnan(found.risk) else found.risk,
+    }
+
+
 def say_doubts(opened: folder.Opened) -> None:
-    """Tell of a last line that was not written to its end, on the error stream."""
+    """Tell of a last line that was not written to its end, and of other code, on the error stream.
+
+    Other code may choose other points than were measured, and say other bounds of equal readings.
+    """
+    if opened.plan.about.get("assessor_code") != marks.assessor_code():
+        begun = opened.plan.about.get("kinacc_version", "an earlier state")
+        click.echo(f"begun with other code of the assessors, of kinacc {begun}", err=True)
     if opened.journal.cut_off:
         click.echo(
             "the last entry was cut off while it was written and never confirmed; it is left out: "

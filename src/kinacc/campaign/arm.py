@@ -1,0 +1,54 @@
+"""What a plan keeps of the arm: enough to say what an error of a joint does at the tool."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.assess.causes import joint_errors
+from kinacc.calibrated.record import Calibration
+from kinacc.models.dh import PARAMETERS, DHModel
+from kinacc.robot import Robot
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Nominal ``dh``, ``joint_map`` (k, k), turn (3, 3) of its first frame in the robot's base, and
+    the measured point (3,) in the last DH frame."""
+
+    dh: DHModel
+    joint_map: np.ndarray
+    turn: np.ndarray
+    point_mm: np.ndarray
+
+    @classmethod
+    def of(cls, calibration: Calibration, point: str | None) -> Arm:
+        """The arm of a calibration."""
+        robot = calibration.robot
+        tool = calibration.point(point).position_mm
+        return cls(robot.dh, robot.joint_map, robot.base.rotation, tool)
+
+    def effects(self, joints: np.ndarray) -> np.ndarray:
+        """Motion (m, 3, 6 k) of the point per mm and mrad of a joint's error, robot's base."""
+        limits = np.zeros(self.dh.joints)
+        robot = Robot("", self.dh, limits, limits, self.joint_map, "")
+        return self.turn @ joint_errors(robot, joints, self.point_mm)
+
+    def as_entry(self) -> dict:
+        """The arm in plain numbers."""
+        return {
+            **{name: getattr(self.dh, name).tolist() for name in PARAMETERS},
+            "prismatic": self.dh.prismatic.tolist(),
+            "joint_map": self.joint_map.tolist(),
+            "turn": self.turn.tolist(),
+            "point_mm": self.point_mm.tolist(),
+        }
+
+    @classmethod
+    def of_entry(cls, entry: Mapping) -> Arm:
+        """The arm that ``as_entry`` wrote."""
+        parameters = {name: np.array(entry[name]) for name in (*PARAMETERS, "prismatic")}
+        names = ("joint_map", "turn", "point_mm")
+        return cls(DHModel(**parameters), *(np.array(entry[name]) for name in names))
