@@ -76,6 +76,11 @@ class Arm:
         return ",".join(repr(float(each)) for each in seen)
 
 
+def standing(folder):
+    """What status says, without a forecast."""
+    return json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).output)
+
+
 def files_of(folder):
     """Everything in a campaign's folder but the empty lock."""
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
@@ -110,7 +115,7 @@ def test_a_whole_campaign_ends_as_in_memory(begun):
                     "--position-mm", arm.position(point))  # fmt: skip
         assert done.exit_code == 0, done.output
     assert len(asked) == 20
-    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).output)
+    said = standing(folder)
     wanted = conduct(arm.plan.assessor, arm.world).statements()
     assert [each["target"] for each in said["statements"]] == [each.target for each in wanted]
     for mine, theirs in zip(said["statements"], wanted, strict=True):
@@ -155,7 +160,7 @@ def test_a_file_of_readings_is_taken_whole(begun, tmp_path):
     done = call("campaign", "record", folder, file)
     assert done.exit_code == 0, done.output
     assert f"recorded: {len(names)} readings" in done.output
-    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).output)
+    said = standing(folder)
     assert said["readings_used"] == len(names)
     assert said["statements"][0]["upper_mm"] is not None
     assert "was recorded before" in refused(folder, "record", folder, file)
@@ -252,7 +257,7 @@ def test_a_point_is_left_out_only_before_it_is_read(begun):
     )
     done = call("campaign", "leave-out", folder, second, "--reason", "hidden")
     assert done.exit_code == 0, done.output
-    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).output)
+    said = standing(folder)
     assert said["left_out"] == {second: "hidden"}
     assert said["points"] == 19
     assert said["next"] not in (first, second)
@@ -269,7 +274,7 @@ def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(begun):
     done = call("campaign", "strike", folder, 1, "--reason", "reflector not seated")
     assert done.exit_code == 0, done.output
     assert "was struck: reflector not seated" in done.output
-    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).output)
+    said = standing(folder)
     assert said["next"] == first
     assert said["readings"] == 2
     assert said["struck"] == {"1": "reflector not seated"}
@@ -412,7 +417,7 @@ def test_a_report_holds_its_contract_and_says_what_status_says(begun):
         columns, problems = check_file(made / f"{name}.parquet", ARTEFACTS[name])
         assert not problems
         assert len(next(iter(columns.values())))
-    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).output)
+    said = standing(folder)
     text = (made / "report.md").read_text()
     for each in said["statements"]:
         assert each["in_words"] in text

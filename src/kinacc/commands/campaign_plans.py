@@ -159,10 +159,9 @@ def as_sheet(asked: Question, found: list[Row]) -> Sheet:
             Field("within_high", column(lambda row: row.interval[1]), "1", "95 % limits", False),
         ]
     if aim.tolerance_mm is not None:
-        fields += [
-            Field(verdict, column(lambda row, at=verdict: row.decisions[at]), "1", "share decided so")
-            for verdict in power.VERDICTS
-        ]  # fmt: skip
+        for verdict in power.VERDICTS:
+            shares = np.array([row.decisions[verdict] for row in found])
+            fields.append(Field(verdict, shares, "1", "share decided so"))
     std = np.sqrt(np.diag(asked.covariance_mm2))
     facts = {
         "assessor": asked.assessors[0].name,
