@@ -76,6 +76,28 @@ def test_what_only_these_poses_hide_is_said_to_be_so():
     assert "too little" not in found["j1.d_mm"].statement
 
 
+def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
+    """Seen on a measured arm: the tool's length and the base's place go together."""
+    arm, rng = robot.load("ur10"), np.random.default_rng(1)
+    q = np.zeros((80, 6))
+    q[:, 1:3] = rng.uniform([-1.5, 0.5], [-0.5, 1.5], (80, 2))
+    q[:, 0] = rng.uniform(-1.0, 1.0, 80)
+    q[:, 4] = q[:, 0]  # the last axis keeps its direction
+    q[:, 3] = -q[:, 1] - q[:, 2]
+    q[:, 5] = rng.uniform(-1.0, 1.0, 80)
+    free = terms.free_parameters(6, (2, 3))
+    data = measure(disturbed(arm.dh, free, rng), q, POSE, rng)
+    fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
+    told = uncertainty.of_dh(fit, data.target_names)
+    said = [text for text, _ in identified.statements(fit, told, data)]
+    assert (
+        "a shift of the base along y of the robot's base cannot be told from a shift of the tool "
+        "along z of the last frame (these poses show it too little; others may)"
+    ) in said
+    found = {each.name: each for each in identified.parameters(fit, told, data)}
+    assert found["t0.z_mm"].status == "undetermined"
+
+
 @pytest.mark.parametrize("name", ["mh180", "iiwa14", "meca500"])
 def test_every_undetermined_parameter_has_a_statement_and_no_other(name):
     found, fit, _ = asked(name, THREE)

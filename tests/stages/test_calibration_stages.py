@@ -15,7 +15,7 @@ from kinacc.geometry import Pose, compose, exp_so3, quaternion_from_rotation
 from kinacc.models import dh as dh_kinematics
 from kinacc.models import vec as vec_kinematics
 from kinacc.models.tables import dh_model, frame, vec_model
-from kinacc.stages import dh, measurements, residuals, vec
+from kinacc.stages import assessment_points, dh, measurements, residuals, vec
 from kinacc.stages.plan import planned
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -233,6 +233,44 @@ def test_masks_priors_loss_and_hayati_angles_come_from_the_configuration(plan):
         )["rms"]
         < 1.5
     )
+
+
+def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(plan):
+    base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
+    tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
+    split = measurements.split(columns(base, tool), plan.settings("measurements", "mh180"))
+    found = chain(
+        plan,
+        split,
+        calibration__base_and_tool="estimated",
+        calibration__dh__fit_to="measurements",
+    )
+    changes = {
+        "evaluation__space": "cylinder",
+        "evaluation__points_in": "joints",
+        "evaluation__points": 30,
+        "evaluation__cylinder": {
+            "inner_radius_mm": 1200.0,
+            "radial_span_mm": 900.0,
+            "bottom_mm": 800.0,
+            "height_mm": 1000.0,
+            "angle_deg": [-25.0, 25.0],
+        },
+    }
+    made = assessment_points.run(found, settings_of(plan, "assessment_points", **changes))
+    points = made["assessment_points"]
+    q = np.stack([points[f"q{i}"] for i in range(1, 7)], axis=1)
+    seen = {}
+    for name, pose in (
+        ("vec", vec_kinematics.pose(vec_model(found["vec_model"]), q)),
+        ("dh", dh_kinematics.forward(dh_model(found["dh_model"]), q)),
+    ):
+        ends = (frame(found["frames"], name, which) for which in ("base", "tool"))
+        at, carried = ends
+        seen[name] = compose(at, compose(pose, carried)).position_mm  # in the instrument's frame
+    apart = np.linalg.norm(seen["vec"] - seen["dh"], axis=1)
+    np.testing.assert_allclose(points["true_error_mm"], apart, rtol=1e-9, atol=1e-9)
+    assert apart.max() < 5.0
 
 
 def test_a_base_all_of_which_is_fixed_is_held_in_every_model(plan):

@@ -96,24 +96,24 @@ def groups(fit: DHFit, known: Uncertainty, seen: Observations) -> list[tuple[np.
     simple = _simple(exact[of_arm], arm)
     found = [(each[None], True) for each in _simple(exact[~of_arm], ~arm)]
     found += [(each, True) for each in _gathered(simple, ~arm)]
-    weak = _beside(known.undetermined, exact, arm)
+    rows = known.undetermined
+    moving = np.abs(rows[:, arm]).max(axis=1, initial=0.0) > 0.0
+    weak = _beside(rows[~moving], exact[~of_arm], ~arm)
+    found += [(each[None], False) for each in _simple(weak, ~arm)]
+    weak = _beside(rows[moving], exact[of_arm], arm)
     return found + [(each[None], False) for each in _simple(weak, arm)]
 
 
-def _beside(rows: np.ndarray, exact: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """The directions in the span of ``rows`` that ``exact`` do not explain, on the arm's side."""
-    if not len(rows):
+def _beside(rows: np.ndarray, exact: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """The directions in the span of ``rows`` that ``exact`` do not explain, by parts ``among``."""
+    if not len(rows) or not len(exact):
         return rows
-    spanned = np.linalg.svd(exact[:, arm], full_matrices=False)[1:] if len(exact) else None
-    own = rows[:, arm]
-    if spanned is not None:
-        basis = spanned[1][spanned[0] > _RANK * spanned[0].max(initial=0.0)]
-        own = own - own @ basis.T @ basis
-    left, values, _ = np.linalg.svd(own, full_matrices=False)
+    _, values, right = np.linalg.svd(exact[:, among], full_matrices=False)
+    basis = right[values > _RANK * values[0]]
+    of_each = rows[:, among] / np.linalg.norm(rows[:, among], axis=1, keepdims=True)
+    left, values, _ = np.linalg.svd(of_each - of_each @ basis.T @ basis, full_matrices=False)
     rest = left[:, values > _OWN].T @ rows
-    if spanned is None or not len(rest):
-        return rest
-    return rest - rest[:, arm] @ np.linalg.pinv(exact[:, arm], rcond=_RANK) @ exact
+    return rest - rest[:, among] @ np.linalg.pinv(exact[:, among], rcond=_RANK) @ exact
 
 
 def _simple(rows: np.ndarray, among: np.ndarray) -> np.ndarray:

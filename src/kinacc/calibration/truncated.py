@@ -32,8 +32,9 @@ def minimise_truncated(
     Two blocks are judged one after the other: the first ``frames`` parameters (base and targets),
     then the others after what the frames can express is projected out of them. In each, directions
     whose singular value is below a share of the block's largest (``FRAME_THRESHOLD``, then
-    ``threshold``) keep their nominal value; ``scale`` (P,) is the unit in which displacement is
-    measured (mm, and rad of one mrad).
+    ``threshold``) keep their nominal value; frame directions between the two are fitted, but count
+    as undetermined in what is said of the solution; ``scale`` (P,) is the unit in which
+    displacement is measured (mm, and rad of one mrad).
     ``prior`` (P,): residual standard deviation over prior standard deviation of every parameter, 0
     for none. It adds ``prior (x - nominal)`` to the residuals, and a direction that the data leave
     open is determined where a prior speaks of it. ``cost`` stays that of the data.
@@ -68,10 +69,14 @@ def minimise_truncated(
         fitted = float(np.sum((factor[:, :-1] @ root) ** 2))  # what the data, not the prior, decide
     freedom = count - fitted
     variance = cost / freedom if freedom > 0 else np.nan
+    told = split
+    if threshold > FRAME_THRESHOLD:  # fitted as they are, weak frames still count as undetermined
+        told = _Split.of(held.joined(factor, x), held, threshold, None, threshold)
+        root = told.root()
     covariance = variance * (root @ root.T) * np.outer(scale, scale)
     return Solution(
         x=x,
-        std=np.where(split.touched(), np.nan, np.sqrt(np.diag(covariance))),
+        std=np.where(told.touched(), np.nan, np.sqrt(np.diag(covariance))),
         covariance=covariance,
         cost=cost,
         count=count,
@@ -81,7 +86,7 @@ def minimise_truncated(
         last_step=last,
         converged=True,
         spectrum=split.others.spectrum,
-        undetermined=split.undetermined(),
+        undetermined=told.undetermined(),
     )
 
 
@@ -196,11 +201,16 @@ class _Split:
 
     @classmethod
     def of(
-        cls, factor: np.ndarray, held: _Held, threshold: float, most: tuple[int, int] | None
+        cls,
+        factor: np.ndarray,
+        held: _Held,
+        threshold: float,
+        most: tuple[int, int] | None,
+        frame_threshold: float = FRAME_THRESHOLD,
     ) -> _Split:
         count = held.frames
         upper, lower = factor[:count], factor[count:]
-        frames = _Truncated.of(upper[:, :count], FRAME_THRESHOLD, most and most[0])
+        frames = _Truncated.of(upper[:, :count], frame_threshold, most and most[0])
         # Rows of truncated frame directions are equations the frames do not take up.
         rows = np.concatenate([lower, frames.unused.T @ upper])
         others = _Truncated.of(rows[:, count:-1], threshold, most and most[1], held.of_others)

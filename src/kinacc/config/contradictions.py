@@ -61,12 +61,6 @@ def _space(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
     evaluation = full["evaluation"]
     if evaluation["space"] != "cylinder":
         return
-    if full["calibration"]["base_and_tool"] == "estimated":
-        yield Problem(
-            place("evaluation", "space"),
-            "cylinder, but base and tool are estimated",
-            "measured or joint_box where calibration.base_and_tool is estimated",
-        )
     low, high = evaluation["cylinder"]["angle_deg"]
     outside = [f"{each:g}" for each in full["map"]["slices_deg"] if not low <= each <= high]
     if outside:
