@@ -13,6 +13,7 @@ from kinacc.commands.check_data import check_data
 from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
+from kinacc.commands.init import init
 from kinacc.commands.plan_campaign import plan_campaign
 from kinacc.commands.plan_poses import plan_poses
 from kinacc.commands.predict import predict
@@ -125,6 +126,7 @@ def _help(stage: Stage) -> str:
 
 for _stage in STAGES.values():
     run.add_command(_stage_command(_stage))
+main.add_command(init)
 main.add_command(check_data)
 main.add_command(predict)
 main.add_command(compensate)

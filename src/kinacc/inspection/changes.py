@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,12 +18,16 @@ SCALES = {
 
 @dataclass(frozen=True)
 class Change:
-    """One change: ``kind`` as in suspicions, in words, and what to do about it."""
+    """One change: ``kind`` as in suspicions, in words, and what to do about it.
+
+    ``setting`` is what of ``measurements.file`` would undo it, where that alone can.
+    """
 
     kind: str
     words: str
     fix: str
     joints: tuple[int, ...] = ()
+    setting: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,7 @@ def of_units(
             "joint_units",
             "the joints are in radians, not in degrees",
             "name the columns q1_rad .., or set measurements.file.joint_unit: rad",
+            setting={"joint_unit": "rad"},
         )
         yield meaning.changed(change, unit=np.where(turning, 180.0 / np.pi, 1.0))
     if turning.any() and largest > most_rad:
@@ -83,6 +88,7 @@ def of_units(
             "joint_units",
             "the joints are in degrees, not in radians",
             "name the columns q1_deg .., or set measurements.file.joint_unit: deg",
+            setting={"joint_unit": "deg"},
         )
         yield meaning.changed(change, unit=np.where(turning, np.pi / 180.0, 1.0))
     if prismatic.any():
@@ -105,6 +111,7 @@ def of_scale(meaning: Meaning, ratio: float) -> Iterator[Meaning]:
                 "name the columns x_m .., or set measurements.file.length_unit"
                 if name == "metres"
                 else "convert them to millimetres or metres",
+                setting={"length_unit": "m"} if name == "metres" else {},
             )
             yield meaning.changed(change, scale=factor)
     if 0.2 < ratio / 1000.0 < 5.0:
@@ -112,6 +119,7 @@ def of_scale(meaning: Meaning, ratio: float) -> Iterator[Meaning]:
             "length_units",
             "the positions are in millimetres, not in metres",
             "name the columns x_mm .., or set measurements.file.length_unit: mm",
+            setting={"length_unit": "mm"},
         )
         yield meaning.changed(change, scale=1e-3)
 

@@ -136,6 +136,7 @@ def _of_all(one: Cells, change: changes.Change, finding: meaning.Finding) -> Sus
         as_written_mm=finding.as_written_mm,
         found_mm=finding.found_mm,
         joints=[joint + 1 for joint in change.joints],
+        setting=change.setting,
     )
 
 
@@ -148,6 +149,7 @@ def _turn(one: Cells, change: changes.Change, least: float, before: float, there
         change.fix,
         as_written_deg=float(np.rad2deg(before)),
         found_deg=float(np.rad2deg(least)),
+        setting=change.setting,
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.data.layout import Layout, in_order_of
+from kinacc.data.layout import ANGLES, Layout, in_order_of
 from kinacc.data.orientation import rotations
 from kinacc.inspection.cells import nearest_rotation
 from kinacc.inspection.changes import Change
@@ -120,15 +120,16 @@ def _units(layout: Layout, raw: np.ndarray) -> Iterator[Turn]:
     if np.rad2deg(largest) <= 4.0 * np.pi:
         words = "the orientation angles are in radians, not in degrees"
         fix = "name the columns rx_rad .., or set measurements.file.orientation.unit: rad"
-        yield _scaled(layout, 180.0 / np.pi, words, fix)
+        yield _scaled(layout, 180.0 / np.pi, words, fix, "rad")
     if largest > 2.0 * np.pi:
         words = "the orientation angles are in degrees, not in radians"
         fix = "name the columns rx_deg .., or set measurements.file.orientation.unit: deg"
-        yield _scaled(layout, np.pi / 180.0, words, fix)
+        yield _scaled(layout, np.pi / 180.0, words, fix, "deg")
 
 
-def _scaled(layout: Layout, factor: float, words: str, fix: str) -> Turn:
-    return Turn(Change("angle_units", words, fix), lambda raw: rotations(raw * factor, layout))
+def _scaled(layout: Layout, factor: float, words: str, fix: str, unit: str) -> Turn:
+    change = Change("angle_units", words, fix, setting={"orientation": {"unit": unit}})
+    return Turn(change, lambda raw: rotations(raw * factor, layout))
 
 
 def _readings(layout: Layout, raw: np.ndarray) -> Iterator[Turn]:
@@ -162,6 +163,7 @@ def _readings(layout: Layout, raw: np.ndarray) -> Iterator[Turn]:
                 "euler_convention",
                 "the orientations are rotation vectors, not Euler angles",
                 "set measurements.file.orientation.kind: rotation_vector",
+                setting={"orientation": {"kind": "rotation_vector"}},
             ),
             lambda r: rotations(r[:, by_axis], vector),
         )
@@ -179,8 +181,17 @@ def _euler(layout: Layout, convention: str, order: list[int], words: str) -> Tur
         "euler_convention",
         f"the orientations are Euler angles {words}, not {stated}",
         f"set measurements.file.orientation.convention: {convention}",
+        setting=_setting(layout, convention, order),
     )
     return Turn(change, lambda raw: rotations(raw[:, order], other))
+
+
+def _setting(layout: Layout, convention: str, order: list[int]) -> dict[str, object]:
+    """What makes the file be read so; ``e`` are the columns of the angles where names mislead."""
+    here = in_order_of(layout.convention) if layout.orientation == "euler" else ANGLES
+    columns = [here[number] for number in order]
+    setting: dict[str, object] = {"orientation": {"kind": "euler", "convention": convention}}
+    return setting if columns == list(in_order_of(convention)) else setting | {"e": columns}
 
 
 def _angles(turns: np.ndarray) -> np.ndarray:

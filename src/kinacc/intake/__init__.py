@@ -1,0 +1,1 @@
+"""A first look at a measurement file nobody has described: its text, its columns, its units."""
