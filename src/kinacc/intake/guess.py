@@ -119,10 +119,8 @@ def _mapping(found: Columns, joint_unit: str, length_unit: str, angle_unit: str)
     mapping: dict[str, str] = {}
 
     def put(ours: str, name: Name, unit: str) -> None:
-        if name.column not in (
-            ours,
-            *(f"{ours}_{each}" for each in _NATIVE_UNIT.get(unit, (unit,))),
-        ):
+        own = [f"{ours}_{each}" for each in _NATIVE_UNIT.get(unit, (unit,))] if unit else [ours]
+        if name.column not in own:
             mapping[ours] = name.column
 
     for number, name in enumerate(found.joints, 1):
