@@ -114,7 +114,8 @@ def _measured() -> dict:
         "subset": ["validation", "train", "train", "train"],
         "fold": [0, 1, 1, 1],
     }
-    return {"measurements": measurements}
+    described = {"name": ["mh180"], "source": [None], "date": [None], "description": ["dh: []"]}
+    return {"measurements": measurements, "robot": described}
 
 
 def _dh(count: int) -> dict:

@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
+from kinacc import robot
 from kinacc.cli import main
 
 HELP = ("predict", "compensate", "export", "compare", "plan-poses")
@@ -119,14 +120,10 @@ def test_every_mistake_in_a_file_is_named(folder, tmp_path):
     assert "Traceback" not in done.output
 
 
-def test_the_robot_is_asked_for_or_must_be_the_same(folder, tmp_path, monkeypatch):
+def test_another_robot_is_refused(folder):
     done = call("predict", folder, "--robot", "ur10", "--joints-deg", "0,0,0,0,0,0")
     assert done.exit_code == 2
     assert "another robot than ur10" in done.output
-    monkeypatch.chdir(tmp_path)
-    done = call("predict", folder, "--joints-deg", "0,0,0,0,0,0")
-    assert done.exit_code == 2
-    assert "--robot" in done.output
 
 
 def test_export_writes_every_form(folder, tmp_path):
@@ -170,3 +167,22 @@ def test_every_wrong_option_of_plan_poses_is_named():
     assert done.exit_code == 2
     for name in ("--tool-mm", "--joints-deg", "--hayati"):
         assert name in done.output
+
+
+def test_results_say_which_robot_they_were_made_with(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # no configuration here
+    words = ("predict", folder.resolve(), "--joints-deg", "0,0,0,0,60,0")
+    told = call(*words)
+    assert told.exit_code == 0, told.output
+    assert told.output == call(*words, "--robot", "mh180").output
+    other = tmp_path / "signs.yaml"
+    text = robot.as_yaml(robot.load("mh180")).replace("limits_rad", "sign: -1, limits_rad", 1)
+    other.write_text(text)
+    refused = call(*words, "--robot", other)
+    assert refused.exit_code == 2
+    assert "joint_map or signs" in refused.output
+    (folder / "robot.parquet").rename(tmp_path / "robot.parquet")
+    try:
+        assert "--robot" in call(*words).output
+    finally:
+        (tmp_path / "robot.parquet").rename(folder / "robot.parquet")

@@ -15,6 +15,7 @@ from kinacc.artifacts import (
     calibration_tables,
     campaign_tables,
     covariance_tables,
+    robot_table,
     tournament_tables,
     worth_tables,
 )
@@ -26,6 +27,7 @@ ARTEFACTS: dict[str, Artefact] = {
     artefact.name: artefact
     for artefact in (
         calibration_tables.MEASUREMENTS,
+        robot_table.ROBOT,
         calibration_tables.VEC_MODEL,
         calibration_tables.VEC_FRAMES,
         calibration_tables.VEC_FIT,

@@ -11,6 +11,7 @@ import numpy as np
 from kinacc.calibrated.record import MODELS, Calibration, Residual
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose
 from kinacc.models import tables as model_tables
 from kinacc.models.dh import PARAMETERS
 from kinacc.robot import Robot
@@ -38,6 +39,20 @@ def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
     names = [*_NEEDED, *_WANTED, *_COVARIANCE.values()]
     present = [name for name in names if (folder / f"{name}.parquet").is_file()]
     return {name: store.read(folder / f"{name}.parquet") for name in present}
+
+
+def recorded_robot(folder: Path | str) -> Robot | None:
+    """The robot a results folder was made with; None where it does not say.
+
+    Raises InputError where what it says cannot be read.
+    """
+    from kinacc import robot
+    from kinacc.artifacts import store
+
+    path = Path(folder) / "robot.parquet"
+    if not path.is_file():
+        return None
+    return robot.of_text(str(store.read(path)["description"][0]), str(path))
 
 
 def calibration(
@@ -160,6 +175,32 @@ def _undetermined(tables: Tables, choice: str, place: Mapping[str, int]) -> np.n
 def in_own_units(directions: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
     """Directions (m, P) in mm and mrad as displacements in mm and rad."""
     return directions * np.where([is_angle(name) for name in names], 1e-3, 1.0)
+
+
+def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
+    """InputError where a robot given is not the one results were made with.
+
+    Limits and tool may differ: they are no part of what was fitted.
+    """
+    _require_same_arm(recorded.dh, given, place)
+    differs = {
+        "which joints slide": recorded.dh.prismatic != given.dh.prismatic,
+        "joint_map or signs": np.abs(recorded.joint_map - given.joint_map) > _SAME,
+        "base": ~_close(recorded.base, given.base),
+        "flange": ~_close(recorded.flange, given.flange),
+    }
+    problems = [
+        Problem(place, f"{given.name} differs from the recorded {recorded.name} in {what}")
+        for what, there in differs.items()
+        if np.any(there)
+    ]
+    if problems:
+        raise InputError(problems, f"The results were made with another robot than {given.name}")
+
+
+def _close(one: Pose, other: Pose) -> np.ndarray:
+    pairs = zip(one, other, strict=True)
+    return np.array([np.allclose(a, b, rtol=_SAME, atol=_SAME) for a, b in pairs])
 
 
 def _require_same_arm(nominal, robot: Robot, name: str) -> None:

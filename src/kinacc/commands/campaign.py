@@ -32,7 +32,7 @@ def campaign() -> None:
 @click.option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
 @click.option("--model", type=click.Choice(["dh", "vec", "nominal"]),
               help="Model to judge. [the one selected]")  # fmt: skip
-@click.option("--robot", help="Robot of the results. [as the configuration]")
+@click.option("--robot", help="Robot of the results. [as the results say]")
 @click.option("--config", multiple=True, help=f"Configuration naming it. [{choice.CONFIG}]")
 @click.option("--session", help="Session whose instrument placement is meant. [the first]")
 @click.option("--point", help="Target that is measured, or flange. [the tool]")

@@ -22,9 +22,9 @@ def calibration_options(command: Callable) -> Callable:
     """Which calibration: its folder, the model, and the robot or the configuration naming it."""
     for option in (
         click.option(
-            "--robot", help="Robot of the results: a shipped name or file. [as the configuration]"
+            "--robot", help="Robot of the results: a shipped name or file. [as the results say]"
         ),
-        click.option("--config", multiple=True, help=f"Configuration naming the robot. [{CONFIG}]"),
+        click.option("--config", multiple=True, help="Configuration naming the robot."),
         click.option(
             "--model",
             type=click.Choice(["dh", "vec", "nominal"]),
@@ -67,11 +67,24 @@ def point_options(command: Callable) -> Callable:
 
 
 def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> Robot:
-    """The robot a results folder belongs to: as given, or as the configuration names it."""
-    from kinacc import robot as robots
+    """The robot a results folder belongs to: as given, as it says itself, or as configured.
 
-    if robot is not None:
-        return robots.load(robot)
+    Raises InputError for a robot given that is not the one the results were made with.
+    """
+    from kinacc import robot as robots
+    from kinacc.calibrated import folder as results
+
+    recorded = results.recorded_robot(folder)
+    if robot is None and not config and recorded is not None:
+        return recorded
+    given = robots.load(robot if robot is not None else _configured(folder, config))
+    if recorded is not None:
+        results.require_same_robot(recorded, given, str(folder))
+    return given
+
+
+def _configured(folder: str | Path, config: tuple[str, ...]) -> str:
+    """What the configuration calls the robot of a results folder."""
     from kinacc.stages.plan import planned
 
     if not config and not Path(CONFIG).is_file():
@@ -83,7 +96,7 @@ def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> 
         what = f"data set {name} is not in the configuration"
         allowed = ", ".join(plan.datasets)
         raise InputError(Problem(str(folder), what, allowed, "give --config or --robot"))
-    return robots.load(plan.datasets[name]["robot"])
+    return plan.datasets[name]["robot"]
 
 
 def calibration_of(

@@ -20,8 +20,8 @@ PICTURES = (".svg", ".png", ".pdf")
 @click.option(
     "--model", type=click.Choice(["dh", "vec", "nominal"]), default="dh", show_default=True
 )
-@click.option("--robot", help="Robot of both. [as the configuration]")
-@click.option("--config", multiple=True, help=f"Configuration naming it. [{choice.CONFIG}]")
+@click.option("--robot", help="Robot of both. [as the results say]")
+@click.option("--config", multiple=True, help="Configuration naming it.")
 @choice.output_options
 def compare(
     first, second, joints, count, picture, model, robot, config, output, as_json, force
@@ -35,7 +35,7 @@ def compare(
 
     \b
     Example:
-      kinacc compare results/ur10_b results/ur10_d --robot ur10 --picture moved.svg
+      kinacc compare results/ur10_b results/ur10_d --picture moved.svg
       kinacc compare before.yaml after.yaml --json
     """
     from kinacc.calibrated.compare import compare as compared

@@ -20,8 +20,8 @@ FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 @click.option("--base-link", help="Link of that file the arm starts at. [its root]")
 @click.option("--tip-link", help="Link of that file the arm ends at. [the only one it can]")
 @click.option("--dh-joints", is_flag=True, help="URDF in the joints of the DH table.")
-@click.option("--robot", help="Robot of the results. [as the configuration]")
-@click.option("--config", multiple=True, help=f"Configuration naming the robot. [{choice.CONFIG}]")
+@click.option("--robot", help="Robot of the results. [as the results say]")
+@click.option("--config", multiple=True, help="Configuration naming the robot.")
 @click.option("--json", "as_json", is_flag=True, help="List the files as JSON.")
 @click.option("--force", is_flag=True, help="Replace files that are there.")
 def export(
@@ -43,7 +43,7 @@ def export(
     \b
     Example:
       kinacc export results/mh180 --to exported
-      kinacc export results/ur10_b --robot ur10 --format urdf --urdf my_ur10.urdf --to exported
+      kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --to exported
     """
     from kinacc.export.files import contents, note, write
 

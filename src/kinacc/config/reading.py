@@ -72,6 +72,11 @@ def read(path: Path | str) -> tuple[Document, list[Problem]]:
         return Document(name, {}), [Problem(name, what, "a YAML file")]
     except OSError as error:
         return Document(name, {}), [Problem(name, f"cannot be read: {error.strerror}")]
+    return parsed(text, name)
+
+
+def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
+    """YAML text, as ``read``; ``name`` is what problems call it."""
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)(text)
     try:
         node = loader.get_single_node()

@@ -6,13 +6,15 @@ import csv
 import io
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from kinacc.calibrated.blind import in_words
 from kinacc.calibrated.record import TOOL, Calibration
-from kinacc.geometry import IDENTITY, Pose, compose, invert, quaternion_from_rotation
+from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
 from kinacc.models.dh import PARAMETERS, DHModel
+from kinacc.robot import as_yaml
 
 CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
 SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a joint slides"
@@ -26,38 +28,23 @@ def robot_name(arm: Calibration) -> str:
 
 def robot_yaml(arm: Calibration) -> str:
     """A robot file that ``kinacc.robot.load`` reads back to the same arm, bit by bit."""
-    robot, dh = arm.robot, _dh_of(arm)
-    lines = [
-        f"# {robot.name} as calibrated by data set {arm.name} ({arm.choice} model).",
-        f"# {CONVENTION}; angles in rad, lengths in mm.",
-        f"name: {_text(robot_name(arm))}",
-        f"source: {_text(f'calibrated from {robot.name} with data set {arm.name}')}",
-        "dh:",
-    ]
-    signs = np.diag(robot.joint_map)
-    simple = np.array_equal(robot.joint_map, np.diag(signs)) and (np.abs(signs) == 1.0).all()
-    for joint in range(dh.joints):
-        entries = [f"{name}: {float(getattr(dh, name)[joint])!r}" for name in PARAMETERS]
-        low, high = float(robot.q_min_rad[joint]), float(robot.q_max_rad[joint])
-        if robot.joint_names and robot.joint_names[joint] != f"joint {joint + 1}":
-            entries.insert(0, f"name: {_text(robot.joint_names[joint])}")
-        if dh.prismatic[joint]:
-            entries += ["joint: prismatic", f"limits_mm: [{low!r}, {high!r}]"]
-        else:
-            entries.append(f"limits_rad: [{low!r}, {high!r}]")
-        if simple and signs[joint] < 0.0:
-            entries.append("sign: -1")
-        lines.append(f"  - {{{', '.join(entries)}}}")
-    if not simple:
-        lines.append("joint_map: # DH joints = joint_map times reported joints")
-        lines += [f"  - {[float(value) for value in row]}" for row in robot.joint_map]
-    frames = {"base": robot.base, "flange": robot.flange}
+    robot = arm.robot
+    tool = robot.tool
     if TOOL in arm.targets:
-        frames["tool"] = compose(invert(robot.flange), arm.targets[TOOL])
-    for name, pose in frames.items():
-        if not _is_identity(pose):
-            lines += _frame_lines(name, pose)
-    return "\n".join(lines) + "\n"
+        tool = compose(invert(robot.flange), arm.targets[TOOL])
+    calibrated = replace(
+        robot,
+        name=robot_name(arm),
+        source=f"calibrated from {robot.name} with data set {arm.name}",
+        date="",
+        dh=_dh_of(arm),
+        tool=tool,
+    )
+    heading = (
+        f"{robot.name} as calibrated by data set {arm.name} ({arm.choice} model).",
+        f"{CONVENTION}; angles in rad, lengths in mm.",
+    )
+    return as_yaml(calibrated, heading)
 
 
 def robot_json(
@@ -137,10 +124,6 @@ def _dh_of(arm: Calibration) -> DHModel:
     return arm.model
 
 
-def _text(text: str) -> str:
-    return json.dumps(text)
-
-
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
@@ -150,12 +133,3 @@ def _frame_record(pose: Pose) -> dict[str, list[float]]:
         "position_mm": [float(value) for value in pose.position_mm],
         "quaternion_wxyz": [float(value) for value in quaternion_from_rotation(pose.rotation)],
     }
-
-
-def _frame_lines(name: str, pose: Pose) -> list[str]:
-    record = _frame_record(pose)
-    return [f"{name}:", *(f"  {key}: {value}" for key, value in record.items())]
-
-
-def _is_identity(pose: Pose) -> bool:
-    return all(np.array_equal(a, b) for a, b in zip(pose, IDENTITY, strict=True))

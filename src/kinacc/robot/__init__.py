@@ -3,7 +3,18 @@
 A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
 """
 
-from kinacc.robot.description import files, load, shipped
+from kinacc.robot.description import files, load, of_text, shipped
 from kinacc.robot.record import Robot, carried, dh_angles, forward
+from kinacc.robot.written import as_yaml
 
-__all__ = ["Robot", "carried", "dh_angles", "files", "forward", "load", "shipped"]
+__all__ = [
+    "Robot",
+    "as_yaml",
+    "carried",
+    "dh_angles",
+    "files",
+    "forward",
+    "load",
+    "of_text",
+    "shipped",
+]

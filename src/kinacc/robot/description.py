@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.config.reading import read
+from kinacc.config.reading import Document, parsed, read
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import (
     IDENTITY,
@@ -78,6 +78,18 @@ def load(name_or_path: str | Path) -> Robot:
     document, problems = read(path)
     if path.parent == _SHIPPED:
         document = replace(document, name=path.name)
+    return _described(document, problems, path)
+
+
+def of_text(text: str, name: str) -> Robot:
+    """Robot of the text of a robot YAML, as ``as_yaml`` writes it; ``name`` is for messages.
+
+    Raises InputError as ``load`` does.
+    """
+    return _described(*parsed(text, name), Path(name))
+
+
+def _described(document: Document, problems: list[Problem], path: Path) -> Robot:
     title = f"The robot description {document.name} cannot be used"
     if problems:
         raise InputError(problems, title)

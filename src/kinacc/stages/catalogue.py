@@ -53,7 +53,7 @@ STAGES: dict[str, Stage] = {
             "measurements",
             "reading or synthesising the measured poses",
             (),
-            ("measurements",),
+            ("measurements", "robot"),
             ("seed", "robot", "measurements"),
             files=("robot", "measurements.file.path"),
         ),

@@ -1,4 +1,4 @@
-"""Read or synthesise the measured poses and deal them into folds."""
+"""Read or synthesise the measured poses, deal them into folds, and write down the robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAME_CONFIGURATION_DEG = 0.1  # joints this close are one configuration visited 
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
-    """``measurements`` of the configured source, with fold and subset."""
+    """``measurements`` of the configured source, with fold and subset, and ``robot``."""
     arm, section = robot.load(settings["robot"]), settings["measurements"]
     if section["source"] == "synthetic":
         from kinacc import synthetic
@@ -31,7 +31,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
         for words in reading.left_out():
             warnings.warn(words, stacklevel=1)
         seen = reading.columns
-    return {"measurements": split(seen, settings)}
+    return {"measurements": split(seen, settings), "robot": _robot(arm)}
 
 
 def split(columns: Mapping, settings: Mapping) -> Columns:
@@ -83,3 +83,13 @@ def _not_stated(count: int) -> Columns:
     """Null columns of all that a source of measurements need not state."""
     null = {name: np.full(count, np.nan) for name in ("row", "temperature_c", *UNCERTAINTY)}
     return null | {"session": np.full(count, None, dtype=object)}
+
+
+def _robot(arm: robot.Robot) -> Columns:
+    words = {
+        "name": arm.name,
+        "source": arm.source or None,
+        "date": arm.date or None,
+        "description": robot.as_yaml(arm),
+    }
+    return {name: np.array([value], dtype=object) for name, value in words.items()}
