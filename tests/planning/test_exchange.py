@@ -109,3 +109,12 @@ def test_what_cannot_be_chosen_is_said_all_at_once():
     assert len(caught.value.problems) == 2
     with pytest.raises(InputError, match="at least 2"):
         exchange.choose(tiny(0), 1, "O1")
+
+
+@pytest.mark.parametrize("seed", range(20, 32))
+def test_the_fewest_poses_that_tell_everything(seed):
+    """Without any one of them a direction is lost, which rounding may hide or not."""
+    rows = np.random.default_rng(seed).integers(-2, 3, (30, 3, 7)).astype(float)
+    found = exchange.choose(rows, 3, "O1")
+    flat = rows[found.chosen].reshape(-1, 7)
+    assert np.linalg.matrix_rank(flat) == 7

@@ -12,6 +12,7 @@ from kinacc.planning import observability
 
 _REGULAR = 1e-9  # of the largest eigenvalue: makes the first few poses comparable
 _BETTER = 1e-9  # relative gain below which a swap is rounding
+_LOST = 1e-13  # of the largest eigenvalue: what rounding leaves of a direction nothing shows
 _MOST_SWEEPS = 100
 
 
@@ -88,7 +89,8 @@ def _exchange(rows: np.ndarray, chosen: list[int], index: str, progress) -> int:
             others = chosen[:place] + chosen[place + 1 :]
             flat = rows[others].reshape(-1, rows.shape[2])
             rest = flat.T @ flat
-            if np.linalg.eigvalsh(rest)[0] <= 0.0:
+            values = np.linalg.eigvalsh(rest)
+            if values[0] <= _LOST * values[-1]:
                 continue  # without this pose a direction is lost: it stays
             free = np.setdiff1d(everyone, others)
             best, _ = observability.best_addition(index, rest, rows, free, count)
