@@ -48,7 +48,7 @@ class Options:
     arm_rules: tuple[Rule, ...] = ()
     frame_rules: tuple[Rule, ...] = ()
     loss: str = SQUARES
-    threshold: float = 1e-3
+    threshold: float = 1e-2
     base: Pose = IDENTITY
     tool: Pose = IDENTITY
 
