@@ -104,7 +104,7 @@ def programmed(calibration: Calibration, q_rad: np.ndarray, point: str | None = 
     """Where the nominal arm would put ``point`` in its base at reported joints (n, k)."""
     robot = calibration.robot
     end = dh.forward(robot.dh, np.atleast_2d(q_rad) @ robot.joint_map.T)
-    return compose(robot.base, compose(end, calibration.point(point)))
+    return compose(robot.base, compose(end, calibration.programmed_point(point)))
 
 
 class _Judged(NamedTuple):

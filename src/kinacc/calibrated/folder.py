@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from kinacc.calibrated.record import MODELS, Calibration, Residual
+from kinacc.calibrated.record import MODELS, Anchor, Calibration, Residual
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
@@ -90,11 +90,21 @@ def calibration(
         model=made[choice],
         base=model_tables.frame(frames, choice, "base", session),
         base_name="base" if number == 0 else f"base{number + 1}",
+        anchor=_anchor(frames, targets, session) if choice == "vec" else None,
         targets={each: model_tables.frame(frames, choice, each) for each in targets},
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
         fitted_range_rad=(volumetric.q_min_rad, volumetric.q_max_rad),
     )
+
+
+def _anchor(frames: Mapping, targets: Sequence[str], session: str | None) -> Anchor | None:
+    """Base and targets of the DH model; None where the VEC model has the very same base."""
+    bases = [model_tables.frame(frames, each, "base", session) for each in ("dh", "vec")]
+    if all(np.array_equal(one, other) for one, other in zip(*bases, strict=True)):
+        return None
+    tools = {each: model_tables.frame(frames, "dh", each) for each in targets}
+    return Anchor(bases[0], tools)
 
 
 def _session_number(frames: Mapping, of_model: np.ndarray, session: str | None) -> int:

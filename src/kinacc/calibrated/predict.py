@@ -117,10 +117,11 @@ def sensitivity(
         _fill(slopes, place, name, end.rotation, np.zeros_like(arm))
     slopes[:, :3] = origin.rotation @ slopes[:, :3]
     slopes[:, 3:] = origin.rotation @ slopes[:, 3:]
-    if frame == "instrument":
+    if frame == "instrument" or calibration.anchor is not None:
+        # Motions of the base are about the instrument's axes, seen here in ``frame``.
+        turn = origin.rotation @ calibration.base.rotation.T
         seen = compose(origin, compose(end, carried)).position_mm - origin.position_mm
-        identity = np.broadcast_to(np.eye(3), end.rotation.shape)
-        _fill(slopes, place, calibration.base_name, identity, seen)
+        _fill(slopes, place, calibration.base_name, np.broadcast_to(turn, end.rotation.shape), seen)
     return slopes
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import IDENTITY, Pose, compose
+from kinacc.geometry import IDENTITY, Pose, compose, invert
 from kinacc.models import dh, vec
 from kinacc.models.dh import DHModel
 from kinacc.models.vec import VECModel
@@ -33,6 +33,14 @@ class Residual:
 
 
 @dataclass(frozen=True)
+class Anchor:
+    """``base`` and ``targets`` of the DH model, as those of ``Calibration``."""
+
+    base: Pose
+    targets: Mapping[str, Pose]
+
+
+@dataclass(frozen=True)
 class Calibration:
     """One model of one calibrated arm.
 
@@ -40,7 +48,10 @@ class Calibration:
     ``targets`` are tool and other targets in the last DH frame. ``known`` is the uncertainty of the
     fit (None for the nominal model), ``residual`` what the model does not explain.
     ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides).
-    ``base_name`` is what ``known`` calls the base, which differs by session.
+    ``base_name`` is what ``known`` calls the base, which differs by session. ``anchor`` is the DH
+    model of the same data where this is a VEC model fitted with its base: errors of a VEC model can
+    turn or shift base and tool against each other by centimetres and no measured pose shows it, so
+    the robot's own base, and the tool programs mean, are those of the DH model.
     """
 
     name: str
@@ -53,6 +64,7 @@ class Calibration:
     residual: Residual | None = None
     fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None
     base_name: str = "base"
+    anchor: Anchor | None = None
 
     @property
     def default_point(self) -> str:
@@ -61,9 +73,16 @@ class Calibration:
 
     def point(self, name: str | None) -> Pose:
         """A target by name, or the flange, in the last DH frame. InputError for another name."""
+        return self._among(self.targets, name)
+
+    def programmed_point(self, name: str | None) -> Pose:
+        """A target as programs of the nominal arm mean it, in the last DH frame."""
+        return self._among(self.anchor.targets if self.anchor else self.targets, name)
+
+    def _among(self, targets: Mapping[str, Pose], name: str | None) -> Pose:
         name = name or self.default_point
-        if name in self.targets:
-            return self.targets[name]
+        if name in targets:
+            return targets[name]
         if name == FLANGE:
             return self.robot.flange
         known = ", ".join([*self.targets, FLANGE])
@@ -73,7 +92,11 @@ class Calibration:
         """First DH frame in ``frame``: the robot's own base, or the instrument."""
         if frame not in FRAMES:
             raise InputError(Problem("frame", f"{frame!r}", ", ".join(FRAMES)))
-        return self.base if frame == "instrument" else self.robot.base
+        if frame == "instrument":
+            return self.base
+        if self.anchor is None:
+            return self.robot.base
+        return compose(self.robot.base, compose(invert(self.anchor.base), self.base))
 
     def forward(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
         """Last DH frame in the first one, (n, ...), at DH joints (n, k)."""

@@ -28,8 +28,9 @@ def predict(
     unexplained_*   rms of what the model left of held-out measurements: add it in mind
     undetermined_*  movement per mm or mrad along what the calibration could not see
 
-    Where the base was estimated with the arm, the base frame holds how well the base is known too,
-    which can be millimetres for a VEC model: --frame instrument leaves that out.
+    Where the base was estimated with the arm, the base frame is that of the DH model, for a VEC
+    model as well. Where joints can take its place, it is a convention (undetermined_*):
+    --frame instrument leaves that out.
 
     \b
     Example:
