@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import chndtr, ndtri
+from scipy.stats import ncx2
 
 from kinacc.assess.ellipsoid import largest_size, mahalanobis_beyond, nearest_in_ball
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.size_kernels import reading_below, size_at
+from kinacc.assess.size_kernels import reading_below, reading_densities, size_at
 
 
 def random_covariance(rng: np.random.Generator, condition: float) -> np.ndarray:
@@ -180,3 +181,12 @@ def test_far_from_zero_the_upper_limit_is_the_one_of_a_normal_reading():
     assert upper_limit_mm(mean, 0.2, 0.05) == pytest.approx(100 + 0.2 * z, abs=1e-3)
     unequal = np.diag([0.04, 0.01, 0.09])
     assert upper_limit_mm(mean, unequal, 0.05) == pytest.approx(100 + 0.2 * z, abs=2e-3)
+
+
+def test_densities_of_readings_are_noncentral_chi_up_to_a_factor():
+    x, noise = np.array([0.05, 0.4, 1.3]), np.array([0.1, 0.3, 0.05])
+    true = np.linspace(0.01, 1.5, 40)
+    ours = reading_densities(x, noise, true)
+    for row in range(3):
+        exact = ncx2.pdf((x[row] / noise[row]) ** 2, 3, (true / noise[row]) ** 2)
+        assert ours[row] == pytest.approx(exact / exact.max(), rel=1e-6, abs=1e-15)

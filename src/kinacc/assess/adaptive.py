@@ -138,16 +138,19 @@ class Ledger:
 
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
         """Take one reading, or raise InputError and take nothing."""
-        reading = np.asarray(reading_mm, dtype=float)
-        covariance, equal = self._checked(point, reading, covariance_mm2)
+        reading, covariance, equal = self._checked(point, reading_mm, covariance_mm2)
         if not self.count[point]:
             self.visited.append(point)
         self.count[point] += 1
         self.taken += 1
         if equal and point not in self._information:
-            weight = 1.0 / covariance[0, 0]
-            total = self._weight[point] + weight
-            self.mean_mm[point] += (reading - self.mean_mm[point]) * (weight / total)
+            # Plain numbers: three components are too few for array operations to pay.
+            weight = 1.0 / covariance.item(0, 0)
+            total = self._weight.item(point) + weight
+            mean = self.mean_mm[point]
+            for axis, each in enumerate(reading):
+                before = mean.item(axis)
+                mean[axis] = before + (each - before) * (weight / total)
             self._weight[point] = total
             self.noise_mm[point] = math.sqrt(1.0 / total)
             return
@@ -155,7 +158,7 @@ class Ledger:
         before = (known * np.eye(3), known * self.mean_mm[point])
         matrix, vector = self._information.get(point, before)
         inverse = np.linalg.inv(covariance)
-        matrix, vector = matrix + inverse, vector + inverse @ reading
+        matrix, vector = matrix + inverse, vector + inverse @ np.array(reading)
         self._information[point] = (matrix, vector)
         spread = np.linalg.inv(matrix)
         self.mean_mm[point] = spread @ vector
@@ -172,18 +175,21 @@ class Ledger:
         """Sizes of the mean readings of the visited points, in visiting order."""
         return np.sqrt(np.sum(self.mean_mm[self.visited] ** 2, axis=1))
 
-    def _checked(self, point, reading, covariance_mm2) -> tuple[np.ndarray, bool]:
+    def _checked(self, point, reading_mm, covariance_mm2) -> tuple[list[float], np.ndarray, bool]:
+        """The reading as numbers, its covariance, and whether that is equal in all directions."""
         problems = []
         points = self.candidates.points
         if not 0 <= point < points:
             problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
-        if reading.shape != (3,) or not np.all(np.isfinite(reading)):
-            problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
+        reading = np.asarray(reading_mm, dtype=float).tolist()
+        is_vector = isinstance(reading, list) and len(reading) == 3
+        if not is_vector or not all(isinstance(x, float) and math.isfinite(x) for x in reading):
+            problems.append(Problem("reading", f"{reading}", "three numbers, in mm"))
         if covariance_mm2 is None:
             if problems:
                 raise InputError(problems, "this reading cannot be recorded")
             chosen = self.candidates
-            return chosen.covariance_mm2[point], bool(chosen.is_equal_noise[point])
+            return reading, chosen.covariance_mm2[point], bool(chosen.is_equal_noise[point])
         covariance = np.asarray(covariance_mm2, dtype=float)
         if covariance.shape != (3, 3):
             problems.append(Problem("covariance", f"shape {covariance.shape}", "(3, 3), in mm^2"))
@@ -195,7 +201,7 @@ class Ledger:
             raise InputError(problems, "this reading cannot be recorded")
         even = np.trace(covariance) / 3.0
         spread = np.abs(covariance - even * np.eye(3)).max()
-        return covariance, bool(spread <= _SYMMETRY * even)
+        return reading, covariance, bool(spread <= _SYMMETRY * even)
 
 
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinacc.assess.size_kernels import reading_densities
+
 _FREEDOM = 10  # a bump is a chi density with so many degrees: 23 % standard deviation
 _STEP = 0.2  # distance of bumps in the logarithm of their scale
 _SMALLEST, _LARGEST = 0.03, 0.8  # scales of the first and last bump over the largest reading
@@ -43,7 +45,7 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
     size, width = _grid(top)
     bumps = _chi_density(size, scale / np.sqrt(_FREEDOM)) * width
     bumps /= bumps.sum(axis=1, keepdims=True)
-    likelihood = _reading_density(sizes_mm, noise_mm, size)
+    likelihood = reading_densities(sizes_mm, noise_mm, size)
     by_bump = likelihood @ bumps.T
     pseudo = _PSEUDO / scale.size
     weight = np.full(scale.size, 1.0 / scale.size)
@@ -78,12 +80,4 @@ def _chi_density(size_mm: np.ndarray, unit_mm: np.ndarray) -> np.ndarray:
     """Chi densities (bumps, n) with units (bumps,), up to a factor per bump."""
     ratio = size_mm / unit_mm[:, None]
     log = (_FREEDOM - 1) * np.log(ratio) - 0.5 * ratio**2
-    return np.exp(log - log.max(axis=1, keepdims=True))
-
-
-def _reading_density(sizes_mm: np.ndarray, noise_mm: np.ndarray, true_mm: np.ndarray) -> np.ndarray:
-    """Density (n, grid) of the size of each reading at each true size, scaled to a peak of 1."""
-    noise, x, r = noise_mm[:, None], sizes_mm[:, None], true_mm[None, :]
-    log = -0.5 * ((x - r) / noise) ** 2 - np.log(r)
-    log += np.log(-np.expm1(np.maximum(-2.0 * x * r / noise**2, -700.0)) + 1e-300)
     return np.exp(log - log.max(axis=1, keepdims=True))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 _ROOT_HALF = math.sqrt(0.5)
@@ -48,3 +49,27 @@ def size_at(x, probability):
         else:
             high = middle
     return high
+
+
+@njit(cache=True)
+def reading_densities(x, noise, true):
+    """Density (n, g) of readings of size ``x`` (n,) at true sizes (g,), up to a factor per reading.
+
+    noise: (n,) standard deviations per axis; the largest value of every row is 1. Noncentral chi
+    with three degrees of freedom: exp(-(x - a)^2 / 2) (1 - exp(-2 x a)) / a.
+    """
+    rows, columns = x.size, true.size
+    found = np.zeros((rows, columns))
+    log = np.empty(columns)
+    for i in range(rows):
+        best = -np.inf
+        for j in range(columns):
+            gap, product = (x[i] - true[j]) / noise[i], 2.0 * x[i] * true[j] / noise[i] ** 2
+            log[j] = -0.5 * gap * gap - math.log(true[j])
+            if product < 40.0:
+                log[j] += math.log(-math.expm1(-product) + 1e-300)
+            best = max(best, log[j])
+        for j in range(columns):
+            if log[j] - best > -60.0:
+                found[i, j] = math.exp(log[j] - best)
+    return found
