@@ -44,7 +44,7 @@ def configuration(tmp_path):
 def test_a_good_file_is_described_and_passes(configuration):
     done = call("check-data", configuration())
     assert done.exit_code == 0, done.output
-    for words in ("poses: 20", "joint coverage", "limits -165..165", "nothing suspicious"):
+    for words in ("poses: 20", "joint coverage", "limits -165 to 165", "nothing suspicious"):
         assert words in done.output
 
 
@@ -62,6 +62,18 @@ def test_suspicions_name_their_lines_and_end_with_1(configuration):
     assert told["verdict"] == "suspicions"
     assert told["datasets"][0]["suspicions"][0]["lines"] == [6, 13]
     assert told["datasets"][0]["facts"]["poses"] == 20
+
+
+def test_the_picture_is_drawn_once(configuration, tmp_path):
+    def shifted(rows):
+        rows[4, 6] += 30.0
+        return rows
+
+    config, picture = configuration(shifted), tmp_path / "checked.svg"
+    assert call("check-data", config, "--figure", picture).exit_code == 1
+    assert picture.read_bytes().startswith(b"<?xml")
+    assert call("check-data", config, "--figure", picture).exit_code == 2
+    assert call("check-data", config, "--figure", picture, "--force").exit_code == 1
 
 
 @pytest.mark.parametrize("flag", [[], ["--json"]])

@@ -122,7 +122,13 @@ def test_orientation_in_radians_under_degrees(name, which, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "joint"),
-    [*(("arm", joint) for joint in range(1, 7)), ("ur10", 4), ("fanuc", 2)],
+    [
+        *(("arm", joint) for joint in range(1, 7)),
+        ("ur10", 4),
+        ("ur10", 5),
+        ("ur10", 6),
+        ("fanuc", 2),
+    ],
 )
 def test_wrong_joint_sign(name, joint, tmp_path):
     file = good(name)

@@ -12,8 +12,12 @@ from kinacc.commands.choice import CONFIG
 @click.command("check-data")
 @click.argument("files", nargs=-1, type=click.Path())
 @click.option("--dataset", multiple=True, help="Data set of the configuration. [all that are read]")
+@click.option("--figure", type=click.Path(), help="Draw one data set to a .svg, .png or .pdf file.")
+@click.option("--force", is_flag=True, help="Replace a figure that is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-def check_data(files: tuple[str, ...], dataset: tuple[str, ...], as_json: bool) -> None:
+def check_data(
+    files: tuple[str, ...], dataset: tuple[str, ...], figure: str | None, force: bool, as_json: bool
+) -> None:
     """Check measured files before anything is fitted: what is there, and what looks wrong.
 
     FILES are configuration files with data sets, config.yaml if none is given. Every suspicion
@@ -22,7 +26,7 @@ def check_data(files: tuple[str, ...], dataset: tuple[str, ...], as_json: bool) 
 
     \b
     Example:
-      kinacc check-data examples/ur10_published.yaml
+      kinacc check-data examples/ur10_published.yaml --figure checked.svg
       kinacc check-data config.yaml examples/ur10.yaml --dataset ur10_b --json
     """
     from kinacc.errors import InputError
@@ -30,15 +34,16 @@ def check_data(files: tuple[str, ...], dataset: tuple[str, ...], as_json: bool) 
 
     try:
         sections = _sections(files or (CONFIG,), dataset)
+        _check_figure(figure, force, list(sections))
     except InputError as error:
         if not as_json:
             raise
         click.echo(to_json([_unusable(", ".join(files or (CONFIG,)), "", error)]))
         sys.exit(UNUSABLE)
-    sys.exit(report_on(sections, as_json))
+    sys.exit(report_on(sections, as_json, figure))
 
 
-def report_on(sections: dict[str, dict], as_json: bool) -> int:
+def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = None) -> int:
     """Check every data set (complete configurations by name), print, and say the exit code."""
     from kinacc import robot
     from kinacc.errors import InputError
@@ -60,6 +65,8 @@ def report_on(sections: dict[str, dict], as_json: bool) -> int:
                 click.echo(f"{error}\n", err=True)
             continue
         worst = max(worst, report.code)
+        if figure is not None:
+            _draw(report, figure)
         told.append(report.as_dict())
         if not as_json:
             click.echo(report.as_text() + "\n")
@@ -91,6 +98,29 @@ def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict
     if problems:
         raise InputError(problems)
     return {name: full[name] for name in wanted or measured}
+
+
+def _check_figure(figure: str | None, force: bool, datasets: list[str]) -> None:
+    from kinacc.commands.compare import PICTURES
+    from kinacc.commands.sheet import check_output
+    from kinacc.errors import InputError, Problem
+
+    if figure is not None and len(datasets) > 1:
+        what = "draws one data set, and there are several"
+        raise InputError(Problem("--figure", what, ", ".join(datasets), "choose with --dataset"))
+    check_output(figure, force, PICTURES)
+
+
+def _draw(report, figure: str) -> None:
+    from pathlib import Path
+
+    from kinacc.figures.checked_data import draw
+    from kinacc.figures.save import write
+
+    suspects = {each.kind: each.lines for each in report.suspicions}
+    limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
+    drawn = draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
+    write(drawn, {Path(figure).suffix[1:]: Path(figure)})
 
 
 def _unusable(dataset: str, path: str, error) -> dict:

@@ -22,6 +22,7 @@ from kinacc.inspection import (
     rows,
     tails,
     targets,
+    turned_joints,
     turns,
 )
 from kinacc.inspection.cells import Cells
@@ -76,12 +77,14 @@ def check(
         known += _commanded(fitted, reading, raw, first, robot)
         known += rows.found(fitted, raw)
     known += _scattered(every, repeats)
+    facts = facts_of(every, robot, repeats, distances, fitted)
     return Report(
         dataset,
         path,
-        facts_of(every, robot, repeats, distances, fitted, raw.meaning),
-        remarks_of(every, reading, repeats, distances, equal),
+        facts,
+        remarks_of(every, reading, repeats, distances, equal, facts["joint_coverage"]),
         tuple(_once(known, np.unique(every.line).size)),
+        *(() if fitted is None else (fitted.seen.cells.line, fitted.left_mm)),
     )
 
 
@@ -106,18 +109,44 @@ def _meant(one: Cells, reading: Reading, layout: Layout, robot: Robot, first, pr
     if fitted.trial.sigma_mm > _FAR * spread * finding.meaning.scale:
         suspicions.append(_no_fit(one, fitted, robot))
         return fitted, raw, suspicions
-    there = seen.cells.turned
-    if there.any():
-        way, least, before = turns.find(
-            raw.turns[there], layout, fitted.left.flange[there], seen.target[there]
-        )
-        if way.change is not None:
-            suspicions.append(_turn(one, way.change, least, before, there))
-            rotation = seen.cells.rotation.copy()
-            rotation[there] = finding.meaning.rotations(way.read(raw.turns[there]))
-            seen = replace(seen, cells=replace(seen.cells, rotation=rotation))
-            fitted = fitting.fit(seen, robot.dh)
+    if seen.cells.turned.any():
+        return _turned(one, fitted, raw, robot, suspicions)
     return fitted, raw, suspicions
+
+
+def _turned(one: Cells, fitted: Fitted, raw: rows.Raw, robot: Robot, suspicions: list[Suspicion]):
+    """As ``_meant``, after the orientations were held against the joints."""
+    seen, there = fitted.seen, fitted.seen.cells.turned
+    way, least, before = turns.find(
+        raw.turns[there], raw.layout, fitted.left.flange[there], seen.target[there]
+    )
+    if before > turned_joints.BAD_RAD:
+        joints = turned_joints.find(one, robot, raw.meaning, least)
+        if joints is not None:
+            change = joints.meaning.changes[-1]
+            told = _turn(one, change, joints.found_rad, joints.before_rad, one.turned)
+            fitted = fitting.fit(meaning.seen_as(one, joints.meaning), robot.dh)
+            return fitted, replace(raw, meaning=joints.meaning), [*suspicions, told]
+    if way.change is not None:
+        suspicions = [*suspicions, _turn(one, way.change, least, before, there)]
+        rotation = seen.cells.rotation.copy()
+        rotation[there] = raw.meaning.rotations(way.read(raw.turns[there]))
+        seen = replace(seen, cells=replace(seen.cells, rotation=rotation))
+        fitted = fitting.fit(seen, robot.dh)
+    elif before > turned_joints.BAD_RAD:
+        suspicions = [*suspicions, _no_turn(one, before, there)]
+    return fitted, raw, suspicions
+
+
+def _no_turn(one: Cells, before: float, there: np.ndarray) -> Suspicion:
+    return suspicion(
+        "euler_convention",
+        f"the orientations do not go with the joints: seen from the flange they scatter by "
+        f"{np.rad2deg(before):.3g} deg, and no other way to read them that was tried does better",
+        one.lines(there),
+        "check their kind, convention, unit and the order of their columns",
+        as_written_deg=float(np.rad2deg(before)),
+    )
 
 
 def _of_all(one: Cells, change: changes.Change, finding: meaning.Finding) -> Suspicion:

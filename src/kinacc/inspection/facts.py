@@ -6,12 +6,12 @@ import numpy as np
 
 from kinacc.data.measurements import Reading
 from kinacc.inspection.cells import Cells
-from kinacc.inspection.changes import Meaning
 from kinacc.inspection.fitting import Fitted
-from kinacc.inspection.noise import Distance, Repeats
+from kinacc.inspection.noise import Distance, Repeats, Revisits, revisits
 from kinacc.robot import Robot
 
-_WEAK = 0.1  # of a joint's range: less cannot tell its parameters well
+_WEAK = 0.1  # of a joint's range
+_SAME_RAD = np.deg2rad(0.01)  # joints nearer than this are one configuration
 
 
 def facts_of(
@@ -20,7 +20,6 @@ def facts_of(
     repeats: Repeats,
     distances: list[Distance],
     fitted: Fitted | None,
-    meaning: Meaning,
 ) -> dict[str, object]:
     """What is there, by name; units stand in the names."""
     facts: dict[str, object] = {
@@ -46,6 +45,12 @@ def facts_of(
             "readings": repeats.readings,
             "configurations_and_targets": repeats.groups,
         }
+    if fitted is not None and (again := _revisits(fitted)).configurations:
+        facts["noise_from_revisits"] = {
+            "std_mm": [float(value) for value in again.std_mm],
+            "readings": again.readings,
+            "configurations": again.configurations,
+        }
     if distances:
         facts["target_distances"] = [
             {
@@ -67,19 +72,35 @@ def facts_of(
     return facts
 
 
+def _revisits(fitted: Fitted) -> Revisits:
+    """Scatter at configurations that several poses came back to, turns of a joint apart."""
+    from kinacc.calibration.folds import configurations
+
+    cells = fitted.seen.cells
+    poses = np.unique(cells.pose).size
+    same = configurations(cells.pose, cells.q, _SAME_RAD) if poses > 1 else cells.pose
+    first = np.unique(np.column_stack([same, cells.pose]), axis=0)[:, 0]
+    came_back = np.isin(same, np.flatnonzero(np.bincount(first) > 1)) & ~fitted.bad
+    left = fitted.left.position_mm[came_back]
+    return revisits(cells.select(came_back), left, same[came_back])
+
+
 def _coverage(every: Cells, robot: Robot) -> list[dict[str, object]]:
+    """What every joint went through and may go through."""
     found = []
     for joint in range(robot.dh.joints):
         slides = robot.dh.prismatic[joint]
-        unit, word = (1.0, "mm") if slides else (np.pi / 180.0, "deg")
-        low, high = every.q[:, joint].min() / unit, every.q[:, joint].max() / unit
-        least, most = robot.q_min_rad[joint] / unit, robot.q_max_rad[joint] / unit
+        factor, unit = (1.0, "mm") if slides else (np.pi / 180.0, "deg")
+        low, high = every.q[:, joint].min() / factor, every.q[:, joint].max() / factor
+        least, most = robot.q_min_rad[joint] / factor, robot.q_max_rad[joint] / factor
         found.append(
             {
                 "joint": joint + 1,
-                f"from_{word}": float(low),
-                f"to_{word}": float(high),
-                "limits": f"{least:g}..{most:g}",
+                "low": float(low),
+                "high": float(high),
+                "least": float(least),
+                "most": float(most),
+                "unit": unit,
                 "share": float((high - low) / (most - least)),
             }
         )
@@ -92,9 +113,16 @@ def remarks_of(
     repeats: Repeats,
     distances: list[Distance],
     earlier: np.ndarray,
+    coverage: list[dict[str, object]],
 ) -> tuple[str, ...]:
     """What to know about the file, in words."""
     remarks = list(reading.left_out())
+    for joint in coverage:
+        if joint["share"] < _WEAK:
+            remarks.append(
+                f"joint {joint['joint']} moves through {100 * joint['share']:.2g} % of its range "
+                "only: what belongs to it is weakly determined"
+            )
     if len(every.target_names) > 1:
         how = (
             f": their repeats go together (correlation {repeats.common:.2f})"

@@ -103,20 +103,39 @@ def with_jumps(seen: Seen, model: DHModel, progress: Progress) -> Fitted:
 def _next(fitted: Fitted, model: DHModel) -> tuple[Jump, Fitted] | None:
     """The next jump and the fit without it; None where there is none."""
     few = np.unique(fitted.seen.cells.pose).size < _FEW
-    best, least = None, 1.0
-    for row, target in _places(fitted):
-        again = fit(_split(fitted.seen, row, target)[0], model)
-        row = _refined(again, row, target)
-        if row is None:
-            continue
-        seen, rows = _split(fitted.seen, row, target)
-        again = fit(seen, model)
-        share = _share_left(fitted, again, rows)
-        if share < min(least, _PLAIN if few else 1.0):
-            best, least = (Jump(target, row, rows, np.zeros(3), 0.0), again), share
-            if share < _PLAIN:
-                break
+    best, least = None, _PLAIN if few else 1.0
+    tried = set()
+    for row, kind in _places(fitted):
+        for each in _kinds(fitted.seen, row, kind):
+            split = _parted(fitted, row, each, model)
+            if split is None or (split[0].row, split[0].target) in tried:
+                continue
+            tried.add((split[0].row, split[0].target))
+            share = _share_left(fitted, split[1], split[0].rows)
+            if share < least:
+                best, least = split, share
+            elif share > 1.1 and each == kind:
+                break  # nothing parts here, so nothing of another kind does
+        if least < _PLAIN:
+            break
     return best
+
+
+def _kinds(seen: Seen, row: int, first: int | None) -> list[int | None]:
+    """What may move at a reading, ``first`` first: base or one of the targets of its base."""
+    rows = seen.base == seen.base[row]
+    kinds = [None, *(int(each) for each in np.unique(seen.target[rows]))]
+    return [first, *(kind for kind in kinds if kind != first)]
+
+
+def _parted(fitted: Fitted, row: int, target: int | None, model: DHModel):
+    """The jump of base or target near a reading and the fit without it; None where none is."""
+    again = fit(_split(fitted.seen, row, target)[0], model)
+    place = _refined(again, row, target)
+    if place is None:
+        return None
+    seen, rows = _split(fitted.seen, place, target)
+    return Jump(target, place, rows, np.zeros(3), 0.0), fit(seen, model)
 
 
 def _share_left(before: Fitted, after: Fitted, rows: np.ndarray) -> float:

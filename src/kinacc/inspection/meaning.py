@@ -76,8 +76,7 @@ def find(cells: Cells, robot: Robot, written: Trial, progress: Progress) -> Find
     largest = np.argmax(np.bincount(cells.session))
     part = cells.select(np.flatnonzero(cells.session == largest))
     few = part.select(start.thinned(np.arange(len(part)), _TRIED_ROWS))
-    few = replace(few, rotation=np.full_like(few.rotation, np.nan))
-    misfit = _Misfit(few, robot)
+    misfit = Misfit(few, robot)
     least = misfit(as_it_is)
     good = written.sigma_mm < _GOOD * spread
     wanted = list(_searched(misfit, as_it_is, robot, good, progress))
@@ -151,18 +150,26 @@ def _different(ranked: list[tuple[float, Meaning]]) -> list[Meaning]:
 
 
 @dataclass(frozen=True)
-class _Misfit:
+class Misfit:
     """Misfit of base and target alone, as a share of the points' spread."""
 
     cells: Cells
     robot: Robot
 
     def __call__(self, meaning: Meaning) -> float:
+        left = np.linalg.norm(self._left(meaning).position_mm, axis=1)
+        points = meaning.positions(self.cells.position_mm)
+        return float(np.quantile(left, _MAJORITY)) / max(_spread(points), 1e-12)
+
+    def flange(self, meaning: Meaning) -> np.ndarray:
+        """Rotations (n, 3, 3) of the flange in the instrument's frame, by the positions alone."""
+        return self._left(meaning).flange
+
+    def _left(self, meaning: Meaning) -> trial.Residuals:
         seen = seen_as(self.cells, meaning)
-        one = Seen(seen.cells, seen.q, np.zeros_like(seen.base), seen.target)
-        arm = start.found(one, self.robot.dh, draws=0, stretches=())
-        left = np.linalg.norm(trial.residuals(arm, one).position_mm, axis=1)
-        return float(np.quantile(left, _MAJORITY)) / max(_spread(seen.cells.position_mm), 1e-12)
+        points = replace(seen.cells, rotation=np.full_like(seen.cells.rotation, np.nan))
+        one = Seen(points, seen.q, np.zeros_like(seen.base), seen.target)
+        return trial.residuals(start.found(one, self.robot.dh, draws=0, stretches=()), one)
 
     def ratio(self, meaning: Meaning) -> float:
         """Spread of the measured points over that of the flange."""

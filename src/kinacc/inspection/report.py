@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,7 +18,9 @@ VERDICTS = ("clean", "suspicions", "unusable")
 class Report:
     """What ``kinacc check-data`` says of one data set.
 
-    ``facts`` are what is there, ``remarks`` what to know about it, in words.
+    ``facts`` are what is there, ``remarks`` what to know about it, in words. For a picture:
+    ``line`` (n,) of the readings as compared and ``left_mm`` (n,) what a quick fit leaves of each,
+    empty where nothing was fitted.
     """
 
     dataset: str
@@ -26,6 +28,8 @@ class Report:
     facts: Mapping[str, object]
     remarks: tuple[str, ...]
     suspicions: tuple[Suspicion, ...]
+    line: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    left_mm: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def code(self) -> int:
@@ -71,12 +75,21 @@ class Report:
 
 
 def _fact(name: str, value: object) -> list[str]:
+    if name == "joint coverage":
+        return [f"  {name}", *(f"    {_covered(joint)}" for joint in value)]
     if isinstance(value, Mapping):
         return [f"  {name}", *(f"    {key}: {_word(each)}" for key, each in value.items())]
     if isinstance(value, list) and value and isinstance(value[0], Mapping):
         rows = [", ".join(f"{k} {_word(v)}" for k, v in row.items()) for row in value]
         return [f"  {name}", *(f"    {row}" for row in rows)]
     return [f"  {name}: {_word(value)}"]
+
+
+def _covered(joint: Mapping) -> str:
+    return (
+        f"joint {joint['joint']}: {joint['low']:.1f} to {joint['high']:.1f} {joint['unit']}, "
+        f"{100 * joint['share']:.0f} % of its limits {joint['least']:g} to {joint['most']:g}"
+    )
 
 
 def _word(value: object) -> str:
