@@ -58,7 +58,7 @@ def test_suspicions_name_their_lines_and_end_with_1(configuration):
     assert done.exit_code == 1
     assert "outliers" in done.output
     assert "lines 6, 13" in done.output
-    told = json.loads(call("check-data", config, "--json").output)
+    told = json.loads(call("check-data", config, "--json").stdout)
     assert told["verdict"] == "suspicions"
     assert told["datasets"][0]["suspicions"][0]["lines"] == [6, 13]
     assert told["datasets"][0]["facts"]["poses"] == 20
