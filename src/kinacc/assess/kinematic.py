@@ -17,6 +17,7 @@ from kinacc.assess.kinematic_model import (
     largest_draws,
     posterior,
 )
+from kinacc.assess.search_and_confirm import MISSING_PART, companions
 from kinacc.assess.sequential import first_points
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.errors import InputError, Problem
@@ -25,6 +26,7 @@ _DRAWS = 400
 _BATCH = 0.08  # of the budget: readings between two looks at who could be the largest
 _DOUBTED = 0.25  # of a batch, spent on the readings the model explains worst
 _CONTRADICTED = 0.01  # chance of the worst reading under the model, all points considered
+_ISOLATION, _CROWD = 1.25, 0.05  # as the recommended assessor assumes of unmeasured points
 _EXPLAINED = 0.5  # least share of the mean square error that joints have to explain
 
 
@@ -40,10 +42,12 @@ class Kinematic:
     Machine Learning, 2006), scales by marginal likelihood; local errors as a scale mixture.
 
     Assumes that single joints cause the errors smoothly, but for local errors of one population:
-    the bounds are the model's, not guaranteed. Says "no statement" where readings contradict it: a
-    reading farther off than one in a hundred campaigns would show (a local defect, a heavy tail),
-    joints that explain less than half of the mean square error, or candidates without joints and
-    effects.
+    the bounds are the model's, not guaranteed. As long as candidates are not measured, also that
+    the largest error is not alone, as :mod:`kinacc.assess.search_and_confirm` does: a defect that
+    was never touched cannot be seen. Says "no statement" where readings contradict the model (a
+    reading farther off than one in a hundred campaigns would show: a local defect, a heavy tail;
+    joints that explain less than half of the mean square error), and where the first visit has
+    fewer components than the model has coefficients, for then its scales are guesses.
     """
 
     measurements: int = 200
@@ -112,25 +116,45 @@ class KinematicCampaign:
         known = self._posterior()
         measured, everywhere, _ = self._draws(known)
         withheld = self._contradiction(known)
+        points, seen = self.ledger.candidates.points, len(self.ledger.visited)
+        crowd = 0
+        if seen < points:
+            crowd = companions(points, seen, MISSING_PART * (1.0 - self.settings.confidence))
+        missed = ""
+        if crowd > _CROWD * points:
+            missed = f"{seen} of {points} candidates measured: {crowd} could have been missed"
         return (
-            self._said(CANDIDATES, everywhere, withheld),
+            self._said(CANDIDATES, everywhere, withheld or missed, crowd),
             self._said(MEASURED, measured, withheld),
         )
 
-    def _said(self, target: str, draws: np.ndarray, withheld: str) -> Statement:
+    def _said(self, target: str, draws: np.ndarray, withheld: str, crowd: int = 0) -> Statement:
         confidence = self.settings.confidence
-        low, value, high = np.quantile(draws, [1.0 - confidence, 0.5, confidence])
+        low, value, high = (float(x) for x in np.quantile(draws, [1 - confidence, 0.5, confidence]))
         if withheld:
-            return Statement(target, float(value), confidence=confidence, withheld=withheld)
+            return Statement(target, value, confidence=confidence, withheld=withheld)
         assumption = "smooth errors of single joints cause the errors, but for local ones"
+        if crowd:
+            assumption += f"; at least {crowd} candidates have an error above the largest divided "
+            assumption += f"by {_ISOLATION:g}"
         return Statement(
-            target, float(value), float(low), float(high), confidence, assumption=assumption
+            target,
+            value,
+            low,
+            high,
+            confidence,
+            assumption=assumption,
+            crowd=crowd,
+            isolation=_ISOLATION if crowd else 1.0,
         )
 
     def _contradiction(self, known: Posterior) -> str:
         """Why the model is not believed; empty if it is."""
         from scipy.special import chdtrc
 
+        if 3 * self.first < known.mean.size:
+            needed = math.ceil(known.mean.size / 3)
+            return f"{self.first} points in the first visit; the model needs {needed}"
         worst = float(known.odd.max())
         chance = -math.expm1(known.odd.size * math.log1p(-float(chdtrc(3, worst))))
         if chance < _CONTRADICTED:

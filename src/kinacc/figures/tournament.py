@@ -12,6 +12,7 @@ from kinacc.figures.columns import Table, floats, require, texts
 
 COLUMNS = ("assessor", "target", "field", "candidates", "noise_mm", "budget")
 UM_PER_MM = 1000.0
+_MARKERS = "<>hp8d"
 
 # By quantity: column, words on the axis, targets in order of preference, the line to compare with.
 QUANTITIES = {
@@ -38,7 +39,8 @@ def draw(cells: Table, quantity: str, candidates: int, budget: int) -> Figure:
     noise = floats(cells, "noise_mm")
     levels = np.unique(noise[chosen])
     shown = sorted(set(fields[chosen]))
-    looks = style.assessor_style(sorted(set(names[chosen])))
+    taking_part = set(names[chosen])
+    looks = {name: look for name, look in _looks(set(names)).items() if name in taking_part}
     with style.house():
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.1)
         axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]
@@ -54,6 +56,19 @@ def draw(cells: Table, quantity: str, candidates: int, budget: int) -> Figure:
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
+
+
+def _looks(names: set[str]) -> dict[str, tuple[str, str, str]]:
+    """Label, colour and marker of every name of the table, the same in all its pictures.
+
+    Where there are more names than spare colours, a colour comes again with another marker.
+    """
+    looks, used = {}, set()
+    for name, (words, colour, marker) in style.assessor_style(sorted(names)).items():
+        free = next(each for each in (marker, *_MARKERS) if (colour, each) not in used)
+        used.add((colour, free))
+        looks[name] = (words, colour, free)
+    return looks
 
 
 def _chosen(cells: Table, column: str, targets, candidates: int, budget: int) -> np.ndarray:
@@ -89,6 +104,9 @@ def _panel(ax: Axes, cells: Table, column: str, mine, shown: list[str], looks: d
         own = mine & (names == name)
         x = np.array([shown.index(each) for each in fields[own]], dtype=float)
         x += (index - (len(looks) - 1) / 2) * width
+        if column == "upper_holds":
+            low, high = (floats(cells, name)[own] for name in ("upper_low", "upper_high"))
+            ax.vlines(x, low, high, color=colour, lw=0.6, alpha=0.6)
         ax.plot(
             x, values[own], marker, color=colour, ms=3.2, mec="white", mew=0.3, ls="", label=words
         )
