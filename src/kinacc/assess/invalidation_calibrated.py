@@ -46,7 +46,6 @@ class InvalidationCalibrated:
     alpha: float = 0.6
     confidence: float = 0.95
     name: ClassVar[str] = "invalidation_calibrated"
-    is_slow: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if problems := invalidation_problems(self):

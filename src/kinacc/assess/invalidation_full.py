@@ -34,7 +34,6 @@ class ModelInvalidationFull:
     alpha: float = 0.6
     bound_mm: float | None = None
     name: ClassVar[str] = "model_invalidation_full"
-    is_slow: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         problems = invalidation_problems(self)

@@ -50,7 +50,6 @@ class SearchAndConfirm:
     isolation: float = 1.25
     crowd: float = 0.05
     name: ClassVar[str] = "search_and_confirm"
-    is_slow: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         problems = check_budget(self.measurements, self.confidence)
