@@ -17,6 +17,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.kinematic import Kinematic
 from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.campaign import words
 from kinacc.campaign.plan import Plan
@@ -103,13 +104,13 @@ def forecast(
     target: str = CANDIDATES,
     progress: Callable | None = None,
 ) -> Forecast | None:
-    """Simulate the rest of the campaign; None before a few points were read.
+    """Simulate the rest of the campaign; None where ``why_none`` says why.
 
     Where the assessor makes no statement on ``target``, its main one is taken.
     """
-    mean, noise = _by_row(state)
-    if np.isfinite(noise).sum() < FEWEST_POINTS:
+    if why_none(state):
         return None
+    mean, noise = _by_row(state)
     read = np.isfinite(noise)
     known = population(mean[read], noise[read])
     left = state.plan.assessor.measurements - len(state.told)
@@ -137,24 +138,37 @@ def forecast(
     return found
 
 
+def why_none(state: State) -> str:
+    """Why no forecast can be made; empty where one can."""
+    if isinstance(state.plan.assessor, Kinematic):
+        return (
+            "simulated errors know nothing of each other, and this assessor rests on how errors of "
+            "different poses belong together: see kinacc plan-campaign"
+        )
+    read = len({each.reading.point for each in (*state.told, *state.in_hand)})
+    if read < FEWEST_POINTS:
+        return f"{read} points were read, {FEWEST_POINTS} are needed"
+    return ""
+
+
 def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, progress):
     """Look for a larger budget of a new campaign that does."""
     simulations = max(simulations // 2, 1)
-    now = state.plan.assessor.measurements
     tried = None
     for factor in progress(_FACTORS, "larger budgets") if progress else _FACTORS:
-        tried = math.ceil(factor * now)
+        tried = math.ceil(factor * state.plan.assessor.measurements)
         assessor = replace(state.plan.assessor, measurements=tried)
-        hits = 0
+        missed = 0
         for number in range(simulations):
             rng = np.random.default_rng([state.plan.seed, state.taken, number])
             errors = draw_errors(known, mean, noise, rng)
             entropy = (2, state.plan.seed, state.taken, number)
             campaign = assessor.begin(state.plan.candidates(state.rows))
-            deviates = Deviates(len(errors), tried, *entropy)
-            carry_on(campaign, errors, _root(state), deviates)
-            hits += _width(_main(state.plan, campaign, found.target)) <= wanted_mm
-        if hits >= ENOUGH * simulations:
+            carry_on(campaign, errors, _root(state), Deviates(len(errors), tried, *entropy))
+            missed += _width(_main(state.plan, campaign, found.target)) > wanted_mm
+            if missed > (1.0 - ENOUGH) * simulations:
+                break
+        else:
             return replace(found, budget=tried, tried=tried)
     return replace(found, tried=tried)
 
@@ -226,10 +240,12 @@ def in_words(found: Forecast) -> list[str]:
     lines = []
     if found.left:
         low, middle, high = found.width_mm
+        likely = f"{middle:.3f} mm apart" if math.isfinite(middle) else "not stated"
+        top = f"{high:.3f} mm" if math.isfinite(high) else "none stated"
+        spread = f" (90 % of cases: {low:.3f} mm to {top})" if math.isfinite(low) else ""
         lines.append(
             f"{head}: after the {found.left} readings left the bounds on "
-            f"{words.TARGETS[found.target]} are likely "
-            f"{_mm(middle)} apart (90 % of cases: {_mm(low)} to {_mm(high)})"
+            f"{words.TARGETS[found.target]} are likely {likely}{spread}"
         )
     if found.wanted_mm is not None:
         lines += _about_width(found, head)
@@ -257,9 +273,7 @@ def _about_width(found: Forecast, head: str) -> list[str]:
             f"{ENOUGH:.0%} of cases ({head})"
         )
     elif found.tried is not None:
-        lines.append(f"not even {found.tried} readings would bring {wanted} with certainty")
+        lines.append(
+            f"of new campaigns of up to {found.tried} readings, too few would come {wanted}"
+        )
     return lines
-
-
-def _mm(value: float) -> str:
-    return f"{value:.3f} mm" if math.isfinite(value) else "without bound"

@@ -190,15 +190,17 @@ def status(given: Mapping) -> None:
     wanted = given["width_mm"] or aims.width_mm
     tolerance = given["tolerance_mm"] or aims.tolerance_mm
     target = given["target"] or aims.target
-    ahead = None
+    ahead, why_none = None, ""
     if given["simulations"] and found.asked is not None:
+        why_none = forecast.why_none(found)
         with reporting("forecast", bar=True) as progress:
             ahead = forecast.forecast(
                 found, given["simulations"], wanted, tolerance, target, progress
             )
     if given["as_json"]:
         facts = as_facts(found, tolerance)
-        click.echo(json.dumps({**facts, "forecast": _forecast_facts(ahead)}, indent=1))
+        facts |= {"forecast": _forecast_facts(ahead), "no_forecast": why_none or None}
+        click.echo(json.dumps(facts, indent=1))
         return
     say_doubts(opened)
     lines = words.standing(found)
@@ -210,7 +212,10 @@ def status(given: Mapping) -> None:
                 f"tolerance {tolerance:g} mm, {words.TARGETS[said.target]}: {verdict.verdict}, "
                 f"{verdict.reason}"
             )
-    lines += forecast.in_words(ahead) if ahead is not None else []
+    if ahead is not None:
+        lines += forecast.in_words(ahead)
+    elif why_none and (wanted or tolerance):
+        lines.append(f"no forecast: {why_none}")
     click.echo("\n".join(lines))
 
 
