@@ -9,7 +9,8 @@ import pytest
 
 from kinacc.assess.adaptive import conduct
 from kinacc.assess.registry import ADAPTIVE
-from kinacc.campaign import folder
+from kinacc.assess.statement import MEASURED, Statement
+from kinacc.campaign import folder, words
 from kinacc.campaign.plan import fixed_visit, from_json, to_json
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import restore
@@ -161,6 +162,11 @@ def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world
     place = int(np.flatnonzero(by_tracker.rows == by_tracker.told[10].reading.point)[0])
     assert by_tracker.campaign.ledger.noise_mm[place] == pytest.approx(0.05)
     assert with_camera.campaign.ledger.noise_mm[place] == pytest.approx(0.5)
+
+
+def test_bounds_that_contradict_each_other_are_told(make_plan):
+    said = Statement(MEASURED, 1.0, 1.2, 1.1, 0.95)
+    assert "contradict each other" in words.statement(said, restore(make_plan(), []))
 
 
 def test_a_plan_comes_back_to_the_last_bit(make_plan):

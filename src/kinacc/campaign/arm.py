@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinacc.assess.causes import joint_errors
-from kinacc.calibrated.record import Calibration
 from kinacc.models.dh import PARAMETERS, DHModel
 from kinacc.robot import Robot
+
+if TYPE_CHECKING:
+    from kinacc.calibrated.record import Calibration
 
 
 @dataclass(frozen=True)

@@ -82,3 +82,13 @@ def covariance_of(text: str, where: str, problems: list[Problem]) -> np.ndarray 
         problems.append(Problem(where, f"standard deviation {text.strip()} mm", "below 1 m"))
         return None
     return np.diag(np.broadcast_to(values, 3) ** 2)
+
+
+def noise(each: Instrument) -> str:
+    """The noise of an instrument in few words."""
+    std = np.sqrt(np.diag(each.covariance_mm2))
+    if np.array_equal(each.covariance_mm2, np.diag(np.diag(each.covariance_mm2))):
+        same = np.all(std == std[0])
+        said = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
+        return f"{said} per axis"
+    return f"{std[0]:.3g}, {std[1]:.3g}, {std[2]:.3g} mm, correlated"

@@ -12,7 +12,7 @@ from kinacc.assess.conformity import decide
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.campaign import consistency, words
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.instrument import Instrument
+from kinacc.campaign.instrument import noise
 from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
 
@@ -270,13 +270,3 @@ def _grounds(state: State) -> list[str]:
     if all(each.frame == "base" for each in state.plan.instruments):
         lines.pop()
     return lines + sorted({each.assumption for each in state.statements() if each.assumption})
-
-
-def noise(each: Instrument) -> str:
-    """The noise of an instrument in few words."""
-    std = np.sqrt(np.diag(each.covariance_mm2))
-    if np.array_equal(each.covariance_mm2, np.diag(np.diag(each.covariance_mm2))):
-        same = np.all(std == std[0])
-        said = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
-        return f"{said} per axis"
-    return f"{std[0]:.3g}, {std[1]:.3g}, {std[2]:.3g} mm, correlated"

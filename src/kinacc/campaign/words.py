@@ -32,6 +32,11 @@ def statement(said: Statement, state: State) -> str:
     each = "each " if len(parts) > 1 else ""
     text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
+    if said.upper_mm < said.lower_mm:
+        text += (
+            ". They contradict each other: the noise is stated too small, or this is one of the "
+        )
+        text += "few campaigns the confidence allows to be wrong"
     return f"{text}, if {said.assumption}." if said.assumption else f"{text}."
 
 

@@ -75,7 +75,11 @@ def _region(given: Mapping, arm: Calibration):
         return None, None, "drawn evenly from the joints the calibration covers"
     settings = planned.settings_of({"dataset": arm.name, "config": given["config"], "robot": None})
     if settings["inside"] is not None:
-        return settings["box"], settings["inside"], "drawn from the configured evaluation space"
+        return (
+            settings["box"],
+            settings["inside"],
+            "drawn evenly in joints from the configured evaluation space",
+        )
     if settings["box"] is not None:
         return settings["box"], None, "drawn evenly from the configured joint box"
     return None, None, "drawn evenly from the joints the calibration covers"

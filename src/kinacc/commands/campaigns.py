@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -13,17 +14,23 @@ import numpy as np
 from kinacc import __version__
 from kinacc.assess.conformity import decide
 from kinacc.assess.statement import Statement
-from kinacc.campaign import begin, consistency, folder, forecast, instrument, marks, report, words
+from kinacc.campaign import consistency, folder, instrument, marks, words
 from kinacc.campaign.plan import Limits, Plan
 from kinacc.campaign.state import State
-from kinacc.commands import campaign_candidates, campaign_options, choice, rows
+from kinacc.commands import choice
 from kinacc.commands.sheet import Field, Sheet
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import invert
 
+if TYPE_CHECKING:
+    from kinacc.campaign.forecast import Forecast
+
 
 def start(given: Mapping) -> None:
     """Begin a campaign and say what was begun."""
+    from kinacc.campaign import begin
+    from kinacc.commands import campaign_candidates, campaign_options, rows
+
     problems: list[Problem] = []
     instruments = campaign_options.gathered(
         problems, lambda: campaign_options.instruments(given), ()
@@ -80,7 +87,7 @@ def _say_begun(given: Mapping, begun: Plan, merged: int) -> None:
     if given["as_json"]:
         click.echo(json.dumps(content, indent=1))
         return
-    named = ", ".join(f"{each.name} ({report.noise(each)})" for each in begun.instruments)
+    named = ", ".join(f"{each.name} ({instrument.noise(each)})" for each in begun.instruments)
     lines = [
         f"campaign begun in {given['folder']}",
         f"{len(begun.points)} candidates ({begun.about['candidates']})"
@@ -117,6 +124,8 @@ def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool
     wanted = wanted if found.asked in wanted else [found.asked, *wanted]
     if output is not None or as_json or every:
         choice.deliver(_visit_sheet(opened.plan, wanted), output, as_json, force)
+        if output is not None and not as_json:
+            click.echo(f"{len(wanted)} points, in the order to measure them")
         return
     click.echo(_next_in_words(found))
 
@@ -141,7 +150,8 @@ def _next_in_words(found: State) -> str:
     lines.append(f"expected at {x:.3f}, {y:.3f}, {z:.3f} mm in the {frame} frame")
     again = sum(each.reading.point == point for each in found.told)
     if again:
-        lines.append(f"read {again} times before: leave the pose and come back to it")
+        times = "once" if again == 1 else f"{again} times"
+        lines.append(f"read {times} before: leave the pose and come back to it")
     return "\n".join(lines)
 
 
@@ -171,7 +181,7 @@ def _visit_sheet(begun: Plan, points: list[int]) -> Sheet:
         Field(f"expected_{axis}_mm", seen[:, i], "mm", "modelled, in the instrument's frame")
         for i, axis in enumerate("xyz")
     ]
-    return Sheet("", dict(begun.about), fields)
+    return Sheet("", dict(begun.about), fields, shown_rows=60)
 
 
 def in_instrument(begun: Plan, position_mm: np.ndarray) -> np.ndarray:
@@ -182,6 +192,7 @@ def in_instrument(begun: Plan, position_mm: np.ndarray) -> np.ndarray:
 
 def status(given: Mapping) -> None:
     """Say where the campaign stands, and what it is likely to need."""
+    from kinacc.campaign import forecast
     from kinacc.stages.progress import reporting
 
     opened = folder.open_(given["folder"])
@@ -219,7 +230,7 @@ def status(given: Mapping) -> None:
     click.echo("\n".join(lines))
 
 
-def _forecast_facts(ahead: forecast.Forecast | None) -> dict[str, object] | None:
+def _forecast_facts(ahead: Forecast | None) -> dict[str, object] | None:
     if ahead is None:
         return None
     finite = [value if math.isfinite(value) else None for value in ahead.width_mm]
@@ -241,7 +252,7 @@ def _forecast_facts(ahead: forecast.Forecast | None) -> dict[str, object] | None
 def write_report(given: Mapping) -> None:
     """Write tables, picture and text of a campaign."""
     from kinacc.artifacts.store import TableToWrite, write_all
-    from kinacc.campaign.marks import marks_of
+    from kinacc.campaign import report
     from kinacc.commands.sheet import check_output, write_whole
     from kinacc.figures import campaign as drawing
     from kinacc.figures.save import write
@@ -259,8 +270,8 @@ def write_report(given: Mapping) -> None:
         state, tables = report.tables(opened, progress)
     if not state.told:
         raise InputError(Problem(str(opened.folder), "no reading was asked for and taken yet"))
-    marks = marks_of(opened)
-    write_all([TableToWrite(to / f"{name}.parquet", name, tables[name], marks) for name in names])
+    made = marks.marks_of(opened)
+    write_all([TableToWrite(to / f"{name}.parquet", name, tables[name], made) for name in names])
     figure = drawing.draw(
         tables["campaign_points"], tables["campaign_bounds"], len(state.plan.route),
         state.plan.limits.tolerance_mm, state.plan.about["calibration"],
