@@ -262,6 +262,8 @@ def _grounds(state: State) -> list[str]:
     lines = [
         "readings are normal about the true position, with the covariance stated: it holds the "
         "instrument, its target, and how well the arm repeats a pose",
+        "readings are independent of each other; what the instrument gets wrong every time at a "
+        "pose counts as an error of the arm",
         "candidates were drawn without regard to their errors, and none was left out for its error",
         "the error meant is the deterministic one: what stays when a pose is measured again",
         "readings in the instrument's frame are brought to the robot's base as the calibration "

@@ -1,0 +1,31 @@
+"""The page on campaigns names only commands and options that are there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from kinacc.cli import main
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "campaigns.md"
+
+
+def test_every_command_and_option_on_the_page_exists():
+    text = PAGE.read_text(encoding="utf-8")
+    calls = re.findall(r"^\$ kinacc (.*(?:\\\n.*)*)", text, re.MULTILINE)
+    assert len(calls) >= 8
+    for call in calls:
+        words = call.replace("\\\n", " ").split()
+        command = main.commands[words[0]]
+        if words[0] == "campaign":
+            command = command.commands[words[1]]
+        known = {option for each in command.params for option in each.opts}
+        assert {word for word in words if re.match(r"--?[a-z]", word)} <= known
+    commands = [main.commands["plan-campaign"], *main.commands["campaign"].commands.values()]
+    known = {option for each in commands for given in each.params for option in given.opts}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", text)) <= known
+
+
+def test_the_pictures_are_there():
+    for name in re.findall(r"\]\(([\w-]+\.png)\)", PAGE.read_text(encoding="utf-8")):
+        assert (PAGE.parent / name).stat().st_size > 1000
