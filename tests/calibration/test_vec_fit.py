@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import simulated
 
 from kinacc import robot
-from kinacc.calibration import frames, vec_fit
+from kinacc.calibration import dh_fit, frames, terms, vec_fit
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import Pose, compose, exp_so3
@@ -165,3 +166,29 @@ def test_prior_falls_with_the_order_as_stated():
     np.testing.assert_allclose(table[2, 0], [2.0, 2.0, 1.0, 0.5])
     np.testing.assert_allclose(table[4, 5], [3e-3, 3e-3, 1.5e-3, 0.75e-3])
     np.testing.assert_allclose(std[36 * 4 :], 7e-4)
+
+
+@pytest.mark.parametrize("name", ["irb120", "iiwa14"])
+def test_one_point_without_orientation_is_enough_to_converge(name):
+    """Base, tool and constants move against each other along directions poses hardly show."""
+    arm, rng = robot.load(name), np.random.default_rng(2)
+    k = arm.dh.joints
+    free = terms.free_parameters(k)
+    q = simulated.joints(arm, 220, rng)
+    true = simulated.disturbed(arm.dh, free, rng)
+    seen = simulated.measure(true, q, simulated.POINT, rng)
+    train, test = seen.select(slice(0, 120)), seen.select(slice(120, None))
+    begin = dh_fit.fit_frames(train, arm.dh, rotation_weight_mm_per_rad=WEIGHT).frames
+    found = vec_fit.fit(
+        train,
+        vec.without_errors(arm.dh, q.min(axis=0), q.max(axis=0), 1),
+        prior=Prior(0.1, 1e-4, 1.0, 1e-4, 3.0, 3e-3),
+        rotation_weight_mm_per_rad=WEIGHT,
+        frames=begin,
+        frames_free=True,
+    )
+    at = compose(
+        found.frames.base, compose(vec.pose(found.model, test.q_rad), found.frames.tool)
+    ).position_mm
+    error = np.linalg.norm(at - test.position_mm, axis=1)
+    assert np.sqrt(np.mean(error**2)) < 1.3 * np.sqrt(3) * 0.05

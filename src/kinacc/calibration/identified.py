@@ -25,6 +25,7 @@ IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", 
 STATUSES = (IDENTIFIED, PRIOR, UNDETERMINED, FIXED)
 STRUCTURAL = 1e-6  # share of the largest singular value over poses all over the joints
 _RANK = 1e-6
+_MOST_SAID = 3
 _OWN = 0.5  # part of a unit direction beside the structural ones that makes it one of its own
 
 
@@ -57,7 +58,7 @@ def parameters(fit: DHFit, known: Uncertainty, seen: Observations) -> list[Param
         status, statement = IDENTIFIED, ""
         if share[number] ** 2 > TOUCH_SQUARED:
             status = UNDETERMINED
-            statement = "; ".join(text for text, members in said if members[number])
+            statement = _first([text for text, members in said if members[number]])
         elif name in priors:
             unit, factor = ("mrad", 1e3) if is_angle(name) else ("mm", 1.0)
             status, statement = PRIOR, f"known beforehand to {factor * priors[name]:g} {unit}"
@@ -68,6 +69,12 @@ def parameters(fit: DHFit, known: Uncertainty, seen: Observations) -> list[Param
         if not free:
             found.append(Parameter(name, FIXED, 0.0, "not fitted"))
     return found
+
+
+def _first(texts: list[str]) -> str:
+    """The first sentences about a parameter, and how many more there are."""
+    more = len(texts) - _MOST_SAID
+    return "; ".join([*texts[:_MOST_SAID], f"and {more} more"] if more > 0 else texts)
 
 
 def statements(fit: DHFit, known: Uncertainty, seen: Observations) -> list[tuple[str, np.ndarray]]:

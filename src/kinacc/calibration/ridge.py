@@ -14,8 +14,7 @@ from kinacc.errors import FitError
 MAX_VARIANCE_STEPS = 20
 VARIANCE_TOLERANCE = 1e-5
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
-PATIENCE = 12  # steps after which standing still in the objective counts as arrived
-STANDSTILL = 1e-9  # share of the objective
+NO_CHANGE = 1e-4  # of chi-square: a hundredth of a standard deviation along one direction
 LEAST_VARIANCE = 1e-8  # mm^2: the prior must stay above rounding where data are free of noise
 
 
@@ -32,9 +31,9 @@ def minimise_with_prior(
     The variance of the residuals is estimated along with ``x``: what they leave over the number of
     residuals less the effective number of parameters (the trace of the hat matrix), so the balance
     against the prior follows the data. ``std`` is the posterior one.
-    Converged where the step falls below ``solve.STEP_TOLERANCE``, or where after PATIENCE steps the
-    objective moves by less than STANDSTILL: steps along directions no pose shows die out slowly
-    where the model misses much, and change nothing but these.
+    Converged where the step falls below ``solve.STEP_TOLERANCE``, or where after ``solve.PATIENCE``
+    steps the objective moves by less than NO_CHANGE (or ``solve.STANDSTILL`` of itself): steps
+    along directions that poses hardly show die out slowly, and change nothing but these.
     Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
@@ -57,7 +56,7 @@ def minimise_with_prior(
             scale,
             name,
         )
-        if iterations >= PATIENCE and abs(before - after) <= STANDSTILL * before:
+        if iterations >= solve.PATIENCE and abs(before - after) <= _least(balance, before):
             break
     else:
         solve.require_converged(name, iterations, last, system.cost(x), normal.count)
@@ -75,6 +74,11 @@ def minimise_with_prior(
         last_step=last,
         converged=True,
     )
+
+
+def _least(balance: _Balance, objective: float) -> float:
+    """Change of the objective that is none: nothing to chi-square, or to its own digits."""
+    return max(NO_CHANGE * balance.variance, solve.STANDSTILL * objective)
 
 
 class _Normal(NamedTuple):

@@ -17,6 +17,8 @@ from kinacc.errors import FitError
 
 STEP_TOLERANCE = 1e-6  # in units of `scale`: mm and mrad
 MAX_ITERATIONS = 60
+PATIENCE = 12  # steps after which standing still in the objective counts as arrived
+STANDSTILL = 1e-9  # share of the objective
 MAX_HALVINGS = 12
 COST_RESOLUTION = 1e-9  # close to the optimum the cost no longer resolves a step
 LEAST_COST = 1e-10  # mm^2: of noise-free data

@@ -38,7 +38,7 @@ def minimise_truncated(
     ``prior`` (P,): residual standard deviation over prior standard deviation of every parameter, 0
     for none. It adds ``prior (x - nominal)`` to the residuals, and a direction that the data leave
     open is determined where a prior speaks of it. ``cost`` stays that of the data.
-    Raises FitError where it does not converge.
+    Converged as ``ridge.minimise_with_prior`` is. Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
     weight = np.zeros(system.size) if prior is None else prior
@@ -58,8 +58,12 @@ def minimise_truncated(
         )
         ranks = split.ranks
         step = scale * split.step(held.displacement(x))
+        before = cost
         x, cost, last = solve.advance(objective, x, step, cost, scale, name, TRUNCATED_GROWTH)
-    solve.require_converged(name, iterations, last, cost, count)
+        if iterations >= solve.PATIENCE and abs(before - cost) <= solve.STANDSTILL * before:
+            break
+    else:
+        solve.require_converged(name, iterations, last, cost, count)
     factor, count = solve.triangle(system, x, scale)
     split = _Split.of(held.joined(factor, x), held, threshold, ranks)
     cost = float(np.sum(factor[:, -1] ** 2))
