@@ -64,6 +64,25 @@ def test_a_stopped_tournament_goes_on_where_it_was(results):
     assert done.stat().st_mtime_ns == before
 
 
+def test_verdicts_are_told_to_machines_with_times_on_request(results):
+    import json
+
+    given = ["tournament", "--results", str(results), *ASSESSORS, "--json", "--times"]
+    said = json.loads(CliRunner().invoke(main, given).stdout)
+    assert {row["assessor"] for row in said["verdicts"]} == {"single_shot"}
+    assert set(said["time_ms"]) == {"maximum", "single_shot"}
+
+
+def test_noise_that_the_size_does_not_have_is_refused(results):
+    said = run(results, "--noise-mm", "0.1", "--parts", "1")
+    assert said.exit_code == 0
+    cells = read(results / "tournament" / "tournament_cells.parquet")
+    assert set(cells["noise_mm"]) == {0.1}
+    said = run(results, "--noise-mm", "0.7")
+    assert said.exit_code == 1
+    assert "0.1, 0.3" in said.stderr
+
+
 def test_results_of_a_tournament_are_checked(results):
     run(results, "--parts", "2")
     folder = results / "tournament"

@@ -20,8 +20,11 @@ import click
 @click.option(
     "--cores", type=click.IntRange(1), default=1, show_default=True, help="Parts at a time."
 )
+@click.option("--times", is_flag=True, help="Also measure the time of a campaign of each.")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
-def tournament(config, results, size, parts, part, assessor, noise_mm, cores, as_json) -> None:
+def tournament(
+    config, results, size, parts, part, assessor, noise_mm, cores, times, as_json
+) -> None:
     """Let every assessor assess errors that are known, and hold what it says to the truth.
 
     The error fields are those of the configuration's data sets, whose tables have to be there
@@ -54,7 +57,7 @@ def tournament(config, results, size, parts, part, assessor, noise_mm, cores, as
     if part is not None:
         return
     execute(contest.tables_job(), bar=True)
-    _tell(contest.outputs["tournament_verdicts"], as_json)
+    _tell(contest.outputs["tournament_verdicts"], _times(contest) if times else {}, as_json)
 
 
 def _carry_out(jobs, cores: int) -> None:
@@ -75,7 +78,19 @@ def _carry_out(jobs, cores: int) -> None:
             click.echo(f"{started[future].label}: done, {done} of {len(jobs)}", err=True)
 
 
-def _tell(path: str, as_json: bool) -> None:
+def _times(contest) -> dict[str, float]:
+    """Milliseconds of a campaign by assessor; no table holds them, for they differ by the hour."""
+    from kinacc.stages.runner import read_inputs
+    from kinacc.tournament.contest import CONTESTANTS, SIZES, jobs, times_ms
+    from kinacc.tournament.fields import of_tables
+
+    fields = of_tables(read_inputs(contest.inputs), contest.settings["robots"], ())
+    work = jobs(fields, SIZES[contest.size])
+    job = next((each for each in work if each.budget == 200), work[-1])
+    return times_ms(job, contest.seed, contest.assessors or CONTESTANTS)
+
+
+def _tell(path: str, times: dict[str, float], as_json: bool) -> None:
     """Print the verdicts."""
     import json
 
@@ -84,7 +99,7 @@ def _tell(path: str, as_json: bool) -> None:
     table = read(path)
     rows = [dict(zip(table, each, strict=True)) for each in zip(*_plain(table), strict=True)]
     if as_json:
-        click.echo(json.dumps({"verdicts": rows, "table": path}, indent=2))
+        click.echo(json.dumps({"verdicts": rows, "time_ms": times, "table": path}, indent=2))
         return
     click.echo("assessor              about       statements  held   worst cell  cells below")
     for row in rows:
@@ -93,6 +108,8 @@ def _tell(path: str, as_json: bool) -> None:
             f"{row['assessor']:20s}  {row['target']:10s}  {row['statements']:10d}  "
             f"{row['mean_holds']:.3f}  {row['worst_holds']:10.3f}  {kept:4d} of {row['cells']}"
         )
+    for name, taken in times.items():
+        click.echo(f"{name:24s}  {taken:8.1f} ms a campaign of 200 measurements")
     click.echo(f"all of it: {path.rpartition('/')[0]}")
 
 
