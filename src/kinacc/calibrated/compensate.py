@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
@@ -12,8 +13,8 @@ import numpy as np
 
 from kinacc.calibrated.record import Calibration
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose, compose, invert, log_so3
-from kinacc.inverse import limits, newton
+from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
+from kinacc.inverse import few_axes, limits, newton
 from kinacc.inverse import solve as all_branches
 from kinacc.models import dh, vec
 from kinacc.models.vec import VECModel
@@ -21,9 +22,11 @@ from kinacc.region import points
 
 POSITION_TOLERANCE_MM = newton.POSITION_TOLERANCE_MM
 ROTATION_TOLERANCE_RAD = newton.ROTATION_TOLERANCE_RAD
+FEW_AXES_TURN_RAD = 0.05  # of an arm of four or five axes; more is another orientation
 _SAME_POSTURE_RAD = 0.35  # a calibration moves joints by less, another posture by more
 _SAME_RAD = 1e-5
-_STARTS = 48  # of the search where an arm has no list of branches
+_NEAR_START_MM = 1.0  # a posture of the plain arm, as a start on the calibrated one
+_STARTS, _FEW_STARTS = 48, 16  # of the search where an arm has no list of branches
 _MM_PER_RAD = 1000.0  # a sliding joint's travel counts like an arc at one metre
 
 
@@ -42,7 +45,9 @@ class Compensation(NamedTuple):
     """Joints that reach n wanted poses.
 
     ``q_rad`` (n, k): reported joints (mm where a joint slides), NaN unless the forward model was
-    seen to return to the pose within ``POSITION_TOLERANCE_MM`` and ``ROTATION_TOLERANCE_RAD``.
+    seen to return to the pose within ``POSITION_TOLERANCE_MM`` and ``ROTATION_TOLERANCE_RAD``. An
+    arm of four or five axes has the position alone within tolerance, and the nearest orientation it
+    can take there, at most ``FEW_AXES_TURN_RAD`` away.
     ``status`` (n,): a ``Status``. ``position_error_mm`` and ``rotation_error_rad`` (n,): what is
     left at the best joints found. ``offending`` (n, k): joints outside limits or covered range.
     ``change`` (n, k): joints less those given as near, NaN without those.
@@ -79,7 +84,7 @@ def compensate(
     given = near_rad is not None
     near = np.zeros(robot.dh.joints) if near_rad is None else np.atleast_2d(near_rad)
     near = np.broadcast_to(near, (count, robot.dh.joints))
-    arm = _Arm(calibration, goal, near, s)
+    arm = _Arm(calibration, goal, near, s, carried)
     best = _Best.none(count, robot.dh.joints, given)
     if given:
         every = np.arange(count)
@@ -121,9 +126,19 @@ class _Arm:
     """Wanted poses of the last DH frame, and what becomes of starts for them."""
 
     def __init__(
-        self, calibration: Calibration, goal: Pose, near: np.ndarray, s: np.ndarray | None
+        self,
+        calibration: Calibration,
+        goal: Pose,
+        near: np.ndarray,
+        s: np.ndarray | None,
+        carried: Pose,
     ) -> None:
         self.calibration, self.goal, self.near, self.s = calibration, goal, near, s
+        self.has_few_axes = calibration.robot.dh.joints < few_axes.SIX
+        # What is brought to the goal and verified there; an arm of few axes turns about its point.
+        self.carried = carried if self.has_few_axes else IDENTITY
+        self.wanted = compose(goal, self.carried)
+        self.turn_tolerance_rad = FEW_AXES_TURN_RAD if self.has_few_axes else ROTATION_TOLERANCE_RAD
         self.model = calibration.model
         self.is_vec = isinstance(self.model, VECModel)
         self.plain = self.model.dh if self.is_vec else self.model
@@ -166,7 +181,7 @@ class _Arm:
             if len(again) and self.is_vec:  # another turn is another place of a Chebyshev series
                 q_dh[again] = self._refined(turned[again], rows[again])
             off, angle = self._left(q_dh, rows)
-        hit = (off <= POSITION_TOLERANCE_MM) & (angle <= ROTATION_TOLERANCE_RAD)
+        hit = (off <= POSITION_TOLERANCE_MM) & (angle <= self.turn_tolerance_rad)
         reported = limits.reported_joints(calibration.robot, q_dh)
         covered = ~calibration.outside_range(q_dh).any(axis=1)
         beyond = Status.OUTSIDE_RANGE if self.is_vec else Status.EXTRAPOLATED
@@ -182,10 +197,12 @@ class _Arm:
         Each with the goals it is for.
         """
         goal = Pose(self.goal.rotation[rows], self.goal.position_mm[rows])
-        try:
-            found = all_branches(self.calibration.robot, self.plain, goal).q_rad
-        except InputError:
-            found = self._searched(goal)
+        found = None
+        if not self.has_few_axes:
+            with suppress(InputError):
+                found = all_branches(self.calibration.robot, self.plain, goal).q_rad
+        if found is None:
+            found = self._searched(rows)
         movement = np.full(found.shape[:2], np.inf)
         for number in range(found.shape[1]):
             there = np.flatnonzero(np.isfinite(found[:, number]).all(axis=1))
@@ -217,17 +234,23 @@ class _Arm:
         return best
 
     def _refined(self, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        goal = Pose(self.goal.rotation[rows], self.goal.position_mm[rows])
         if self.s is None or not self.is_vec:
-            return newton.refine(*self._functions(None), goal, start).q_rad
+            return self._onto(self._functions(None), start, rows)
         # Travel directions differ by row, and a refinement drops rows as they converge.
         found = np.empty_like(start)
         directions, group = np.unique(self.s[rows], axis=0, return_inverse=True)
         for number, direction in enumerate(directions):
             own = np.flatnonzero(group.ravel() == number)
-            part = Pose(goal.rotation[own], goal.position_mm[own])
-            found[own] = newton.refine(*self._functions(direction), part, start[own]).q_rad
+            found[own] = self._onto(self._functions(direction), start[own], rows[own])
         return found
+
+    def _onto(self, functions: tuple, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Joints (m, k) refined from ``start`` onto the goals ``rows`` (m,), reached or not."""
+        wanted = Pose(self.wanted.rotation[rows], self.wanted.position_mm[rows])
+        if self.has_few_axes:
+            slides = self.calibration.robot.dh.prismatic
+            return few_axes.refine(*functions, wanted, self.carried, start, slides)
+        return newton.refine(*functions, wanted, start).q_rad
 
     def _functions(self, direction: np.ndarray | None) -> tuple[Callable, Callable]:
         if not self.is_vec:
@@ -244,8 +267,9 @@ class _Arm:
     def _left(self, q_dh: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
         at = self.calibration.forward(q_dh, None if self.s is None else self.s[rows])
-        off = np.linalg.norm(at.position_mm - self.goal.position_mm[rows], axis=1)
-        turned = at.rotation @ np.swapaxes(self.goal.rotation[rows], 1, 2)
+        at = compose(at, self.carried)
+        off = np.linalg.norm(at.position_mm - self.wanted.position_mm[rows], axis=1)
+        turned = at.rotation @ np.swapaxes(self.wanted.rotation[rows], 1, 2)
         angle = np.linalg.norm(log_so3(turned), axis=1)
         return np.nan_to_num(off, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
 
@@ -255,19 +279,21 @@ class _Arm:
         apart = np.abs(limits.reported_joints(robot, q_dh) - self.near[rows])
         return np.max(apart / np.where(robot.dh.prismatic, _MM_PER_RAD, 1.0), axis=1)
 
-    def _searched(self, goal: Pose) -> np.ndarray:
+    def _searched(self, rows: np.ndarray) -> np.ndarray:
         """Postures (m, starts, k) of the plain arm from starts all over its joint range."""
         robot = self.calibration.robot
         low, high = robot.q_min_rad, robot.q_max_rad
-        share = points("sobol", _STARTS, robot.dh.joints)
+        count = _FEW_STARTS if self.has_few_axes else _STARTS
+        share = points("sobol", count, robot.dh.joints)
         starts = (low + share * (high - low)) @ robot.joint_map.T
-        count = len(goal.position_mm)
-        found = np.full((count, _STARTS, robot.dh.joints), np.nan)
+        found = np.full((len(rows), count, robot.dh.joints), np.nan)
         functions = partial(dh.forward, self.plain), partial(dh.joint_jacobian, self.plain)
         for number, start in enumerate(starts):
-            first = np.tile(start, (count, 1))
-            refined = newton.refine(*functions, goal, first, most_steps=40)
-            found[refined.converged, number] = refined.q_rad[refined.converged]
+            q_dh = self._onto(functions, np.tile(start, (len(rows), 1)), rows)
+            at = compose(dh.forward(self.plain, q_dh), self.carried)
+            off = np.linalg.norm(at.position_mm - self.wanted.position_mm[rows], axis=1)
+            reached = off <= _NEAR_START_MM
+            found[reached, number] = q_dh[reached]
         return found
 
     @staticmethod

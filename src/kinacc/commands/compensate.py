@@ -31,7 +31,8 @@ def compensate(
     them the posture nearest to zero is taken.
 
     Joints are given only where the forward model was seen to come back to the pose within 1e-6 mm;
-    every other row says in words why it has none. Exit code 1 if a row has none.
+    every other row says in words why it has none. Exit code 1 if a row has none. An arm of four or
+    five axes comes back to the position, and is turned as near as it can be.
 
     \b
     Example:
@@ -48,7 +49,8 @@ def compensate(
     given = wanted.poses(arm, poses, pose, near_deg, program, frame, point)
     with reporting("compensate", bar=True):
         found = joints_for(arm, given.pose, given.joints, given.directions, frame, point)
-    choice.deliver(wanted.compensated(arm, given, found, frame, point), output, as_json, force)
+    answer = wanted.compensated(arm, given, found, frame, point, program is not None)
+    choice.deliver(answer, output, as_json, force)
     rows.say_unused(given)
     missed = int((found.q_rad != found.q_rad).any(axis=1).sum())
     if missed:

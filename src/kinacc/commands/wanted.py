@@ -6,7 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinacc.calibrated.compensate import Compensation, Status, programmed
+from kinacc.calibrated.compensate import (
+    FEW_AXES_TURN_RAD,
+    ROTATION_TOLERANCE_RAD,
+    Compensation,
+    Status,
+    programmed,
+)
 from kinacc.calibrated.record import Calibration
 from kinacc.commands import rows
 from kinacc.commands.rows import Rows
@@ -15,6 +21,7 @@ from kinacc.commands.tables import facts, joint_fields, joints_in_words, pose_fi
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 
+_FAR_FROM_PROGRAM_RAD = np.deg2rad(20.0)  # a calibration moves joints by less
 _NUMBERS = "7 numbers: x, y, z in mm, then a unit quaternion w, x, y, z"
 
 
@@ -60,16 +67,21 @@ def poses(
 
 
 def compensated(
-    arm: Calibration, given: Rows, found: Compensation, frame: str, point: str | None
+    arm: Calibration,
+    given: Rows,
+    found: Compensation,
+    frame: str,
+    point: str | None,
+    is_program: bool = False,
 ) -> Sheet:
-    """The sheet of ``kinacc compensate``."""
+    """The sheet of ``kinacc compensate``; ``is_program``: the near joints are a program's."""
     angular = np.where(arm.robot.dh.prismatic, np.nan, np.rad2deg(np.abs(found.change)))
     largest = np.max(np.nan_to_num(angular, nan=-1.0), axis=1)
     point = point or arm.default_point
     fields = [
         Field("row", given.label, "", "the file's pose, or its line"),
         *joint_fields(arm.robot, found.q_rad),
-        Field("status", _words(found), "", "why there are joints, or none"),
+        Field("status", _words(arm, found, is_program), "", "why there are joints, or none"),
         Field("position_error_mm", found.position_error_mm, "mm", "left by the forward model"),
         Field(
             "orientation_error_mrad",
@@ -89,25 +101,40 @@ def compensated(
     return Sheet(title, facts(arm, frame, point), fields)
 
 
-def _words(found: Compensation) -> np.ndarray:
+def _words(arm: Calibration, found: Compensation, is_program: bool) -> np.ndarray:
     words = []
-    for status, error, outside in zip(
-        found.status, found.position_error_mm, found.offending, strict=True
-    ):
-        joints = joints_in_words(outside) if outside.any() else ""
-        left = f", {error:.3g} mm left" if np.isfinite(error) else ""
+    for row, status in enumerate(found.status):
+        joints = joints_in_words(found.offending[row]) if found.offending[row].any() else ""
+        off_mm, off_rad = found.position_error_mm[row], found.rotation_error_rad[row]
+        left = f", {off_mm:.3g} mm left" if np.isfinite(off_mm) else ""
+        if np.isfinite(off_mm) and off_rad > FEW_AXES_TURN_RAD:
+            left += f" and {np.rad2deg(off_rad):.3g} deg"
         beyond = f" ({joints} outside the range the data cover)" if joints else ""
-        words.append(
-            {
-                Status.CONVERGED: "converged",
-                Status.EXTRAPOLATED: f"converged, extrapolated: {joints} outside the data's range",
-                Status.OTHER_POSTURE: f"converged in another posture than the nearest{beyond}",
-                Status.OUTSIDE_LIMITS: f"no joints: {joints} would be outside the limits",
-                Status.OUTSIDE_RANGE: f"no joints: {joints} would be outside the data's range",
-                Status.NOT_REACHED: f"no joints: not reached{left}",
-            }[Status(status)]
-        )
+        said = {
+            Status.CONVERGED: "converged",
+            Status.EXTRAPOLATED: f"converged, extrapolated: {joints} outside the data's range",
+            Status.OTHER_POSTURE: f"converged in another posture than the nearest{beyond}",
+            Status.OUTSIDE_LIMITS: f"no joints: {joints} would be outside the limits",
+            Status.OUTSIDE_RANGE: f"no joints: {joints} would be outside the data's range",
+            Status.NOT_REACHED: f"no joints: not reached{left}",
+        }[Status(status)]
+        if status <= Status.OTHER_POSTURE:
+            said += _remarks(arm, found, row, is_program)
+        words.append(said)
     return np.array(words, dtype=object)
+
+
+def _remarks(arm: Calibration, found: Compensation, row: int, is_program: bool) -> str:
+    """What a person should know before the joints are used."""
+    said, off_rad = "", found.rotation_error_rad[row]
+    if off_rad > ROTATION_TOLERANCE_RAD:
+        said += (
+            f", turned {1e3 * off_rad:.3g} mrad away: {arm.robot.dh.joints} axes reach no nearer"
+        )
+    far = (np.abs(found.change[row]) > _FAR_FROM_PROGRAM_RAD) & ~arm.robot.dh.prismatic
+    if is_program and far.any():
+        said += f", {joints_in_words(far)} far from the program: a singular or another posture"
+    return said
 
 
 def _of_arguments(texts: tuple[str, ...]) -> Pose:
