@@ -57,11 +57,10 @@ def init(measurement_file: str, **options) -> None:
     robot, chosen = _robot(guess, options["robot"], ask)
     own, text = _robot_file(robot, guess.joints, name, paths[1])
     texts = {} if text is None else {paths[1]: text}
-    report, configurations = None, _FOLDS_UNKNOWN
+    report = None
     if robot is not None:
         guess, report = _tried(guess, robots.load(robot), name)
-        configurations = int(report.facts["poses"])
-    texts[paths[0]] = _dataset(name, own, guess, configurations, chosen)
+    texts[paths[0]] = _dataset(name, own, guess, report, chosen)
     folder.mkdir(parents=True, exist_ok=True)
     for path, text in texts.items():
         path.write_text(text, encoding="utf-8")
@@ -234,14 +233,21 @@ def _set_right(guess: Guess, settings: dict) -> Guess:
     return replace(guess.but(settings), assumed=kept)
 
 
-def _dataset(name: str, robot: str, guess: Guess, configurations: int, chosen: str) -> str:
+def _how(report: Report | None) -> str:
+    """How far what the file does not state was held against its readings."""
+    return "assumed" if report is None or report.code else "assumed, and the readings agree"
+
+
+def _dataset(name: str, robot: str, guess: Guess, report: Report | None, chosen: str) -> str:
     from kinacc.intake.write import dataset_text
 
     note = [f"Written by kinacc init. Robot: {chosen}."]
-    note += [f"Assumed: {words}." for words in guess.assumed.values()]
+    how = _how(report).capitalize()
+    note += [f"{how}: {words}." for words in guess.assumed.values()]
     note.append(
         f"Everything not given here is as in config.yaml.\n    kinacc check-data {name}.yaml"
     )
+    configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
 
 
@@ -273,7 +279,7 @@ def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
     click.echo(f"orientation: {kind}{unit}")
     for words in guess.assumed.values():
-        click.echo(f"assumed: {words}")
+        click.echo(f"{_how(report)}: {words}")
     if guess.unused:
         click.echo(f"columns not used: {', '.join(guess.unused)}")
     if report is not None and report.suspicions:

@@ -34,6 +34,8 @@ from kinacc.robot import Robot
 
 Progress = Callable[[Iterable, str], Iterable]
 _FEWEST_POSES = 6
+_FROM_THERE_ON = ("base_jump", "target_moved")
+NO_TURN = "orientations"
 _SYMPTOMS = ("outliers", "outside_limits")
 _FAR = 0.02  # of the points' spread: what no meaning of the file explains
 
@@ -73,6 +75,8 @@ def check(
         seen = replace(fitted.seen, target=numbers[first])
         fitted = fitting.with_jumps(seen, robot.dh, progress)
         raw = replace(raw, earlier=equal[first])
+        if fitted.jumps and _turned_well(fitted):
+            known = [each for each in known if each.kind != NO_TURN]
         known += [_jump(fitted, jump) for jump in fitted.jumps]
         known += _commanded(fitted, reading, raw, first, robot)
         known += rows.found(fitted, raw)
@@ -138,9 +142,18 @@ def _turned(one: Cells, fitted: Fitted, raw: rows.Raw, robot: Robot, suspicions:
     return fitted, raw, suspicions
 
 
+def _turned_well(fitted: Fitted) -> bool:
+    """Whether the orientations go with the joints, now that every jump has frames of its own."""
+    there = fitted.seen.cells.turned
+    if not there.any():
+        return False
+    flange, rotation = fitted.left.flange[there], fitted.seen.cells.rotation[there]
+    return turns.scatter(flange, rotation, fitted.seen.target[there]) < turned_joints.BAD_RAD
+
+
 def _no_turn(one: Cells, before: float, there: np.ndarray) -> Suspicion:
     return suspicion(
-        "euler_convention",
+        NO_TURN,
         f"the orientations do not go with the joints: seen from the flange they scatter by "
         f"{np.rad2deg(before):.3g} deg, and no other way to read them that was tried does better",
         one.lines(there),
@@ -275,8 +288,10 @@ def _once(known: list[Suspicion], lines: int) -> list[Suspicion]:
     named = set().union(*(each.lines for each in faults))
     kept: list[Suspicion] = []
     for each in known:
-        rivals = [other for other in kept if other.kind == each.kind]
-        needless = any(set(each.lines) <= set(other.lines) for other in rivals)
+        rivals = [set(other.lines) for other in kept if other.kind == each.kind]
+        # A second jump concerns part of the rows of the first and is another one all the same.
+        jump = each.kind in _FROM_THERE_ON
+        needless = any(set(each.lines) == o if jump else set(each.lines) <= o for o in rivals)
         if not needless and not (each.kind in _SYMPTOMS and set(each.lines) <= named):
             kept.append(each)
     return kept

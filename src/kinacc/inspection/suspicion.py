@@ -15,6 +15,7 @@ KINDS = {
     "left_handed": "left-handed coordinates",
     "transposed_rotation": "orientations the wrong way round (transposed)",
     "euler_convention": "orientations of another convention than stated",
+    "orientations": "orientations that do not go with the joints",
     "joint_sign": "a joint that counts the other way",
     "joint_coupling": "joints that are coupled",
     "joint_zero": "a joint that counts from another zero",
