@@ -1,5 +1,6 @@
 """The command line as a person uses it: help, one stage by hand, mistakes."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -30,6 +31,42 @@ def test_help_of_a_stage_says_what_it_reads_and_leaves(stage):
     text = " ".join(shown.output.split())
     for name in (*stage.inputs, *stage.outputs, *stage.settings):
         assert name in text
+
+
+def commands_of(group, words=()):
+    """Words that call each command below a group."""
+    for name, command in group.commands.items():
+        yield (*words, name)
+        if hasattr(command, "commands"):
+            yield from commands_of(command, (*words, name))
+
+
+@pytest.mark.parametrize("words", list(commands_of(main)), ids=" ".join)
+def test_every_command_has_an_example_of_itself_and_says_its_answer_in_json(words):
+    command = main
+    for word in words:
+        command = command.commands[word]
+    shown = call(*words, "--help").output
+    assert f"kinacc {' '.join(words)}" in shown.split("Example:")[1]
+    if not hasattr(command, "commands"):
+        assert "--json" in shown
+        assert all(option.help for option in command.params if option.param_type_name == "option")
+
+
+def test_every_command_is_listed_once_with_all_its_words():
+    shown = call("--help").output
+    for name in main.commands:
+        (line,) = (line for line in shown.splitlines() if line.startswith(f"  {name} "))
+        assert not line.endswith("...")
+
+
+def test_a_stage_says_what_it_wrote(tmp_path):
+    done = call("run", "fig1", "--config", CONFIG, "--results", tmp_path)
+    paths = [line.removeprefix("written: ") for line in done.stdout.splitlines()]
+    assert len(paths) == 3
+    assert all(Path(path).is_file() for path in paths)
+    again = call("run", "fig1", "--config", CONFIG, "--results", tmp_path, "--json")
+    assert json.loads(again.stdout) == {"stage": "fig1", "written": paths}
 
 
 def test_help_loads_no_numerical_library():

@@ -13,6 +13,7 @@ from kinacc.commands.check_data import check_data
 from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
+from kinacc.commands.groups import InOrder
 from kinacc.commands.init import init
 from kinacc.commands.plan_campaign import plan_campaign
 from kinacc.commands.plan_poses import plan_poses
@@ -22,6 +23,29 @@ from kinacc.errors import InputError, Problem
 from kinacc.stages.catalogue import STAGES, Stage, maker_of
 
 CONFIG = "config.yaml"
+SECTIONS = {
+    "Measured data": {
+        "init": "describe a file of measurements, and its robot",
+        "check-data": "look for mistakes before anything is fitted",
+        "plan-poses": "choose poses for a calibration, in a short order",
+    },
+    "The study": {
+        "run": "run one stage of the workflow by hand",
+        "check-results": "hold a results folder to its contract",
+        "draw-robots": "search synthetic arms like the paper's",
+    },
+    "A calibrated arm": {
+        "predict": "joints to the pose of the tool, with uncertainty",
+        "compensate": "poses to the joints that put the tool there",
+        "export": "write the model for other programs",
+        "compare": "what differs between two calibrations",
+    },
+    "Its largest error": {
+        "plan-campaign": "how many readings a wanted bound takes",
+        "campaign": "measure: what next, what was read, what may be said",
+        "tournament": "hold all assessors to errors that are known",
+    },
+}
 
 
 class Commands(click.Group):
@@ -35,22 +59,53 @@ class Commands(click.Group):
             click.echo(str(error), err=True)
             context.exit(2)
 
+    def list_commands(self, context: click.Context) -> list[str]:
+        """The commands in the order of the work."""
+        ordered = [name for names in SECTIONS.values() for name in names]
+        return [*ordered, *(name for name in sorted(self.commands) if name not in ordered)]
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """The commands by what they are for, in the order of the work."""
+        known = {name for names in SECTIONS.values() for name in names}
+        others = {name: "" for name in self.commands if name not in known}
+        for title, names in {**SECTIONS, "Other": others}.items():
+            rows = [
+                (name, words or self.commands[name].get_short_help_str(60))
+                for name, words in names.items()
+                if name in self.commands
+            ]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="kinacc")
 def main() -> None:
     """How accurate is a robot's kinematic model, and how large can its error be?
 
-    `snakemake -c2` runs the whole study of config.yaml; here are its stages one by one, and the
-    check of what it leaves.
+    `snakemake -c2` runs the whole study of config.yaml. Here are its stages one by one, what can
+    be done with a calibration it leaves, and campaigns that bound what the calibration leaves.
+    Every command has --help with an example.
+
+    \b
+    Example:
+      kinacc check-results results/ --config config.yaml
+      kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
+      kinacc campaign start check --calibration results/mh180 --noise-mm 0.05
     """
 
 
-@main.group()
+@main.group(cls=InOrder)
 def run() -> None:
     """Run one stage by hand, as the workflow would.
 
-    Reads the artefacts of earlier stages in results/<dataset>/ and writes its own there.
+    Reads the artefacts of earlier stages in results/<dataset>/ and writes its own there. The stages
+    are listed in their order.
+
+    \b
+    Example:
+      kinacc run dh --dataset mh180
     """
 
 
@@ -63,6 +118,11 @@ def check_results(folder: str, as_json: bool, config: tuple[str, ...]) -> None:
 
     With --config also that every data set of the configuration is there and was made with these
     values. Exit code 0 if all is well, 1 if anything is not.
+
+    \b
+    Example:
+      kinacc check-results results/
+      kinacc check-results results/ --config config.yaml --config my-robot.yaml --json
     """
     from kinacc.artifacts import check
     from kinacc.stages.plan import planned
@@ -72,26 +132,45 @@ def check_results(folder: str, as_json: bool, config: tuple[str, ...]) -> None:
 
 @main.command("draw-robots")
 @click.argument("output", type=click.Path(dir_okay=False))
-@click.option("--draws", type=click.IntRange(1, 1000), default=21, show_default=True)
-def draw_robots(output: str, draws: int) -> None:
+@click.option(
+    "--draws", type=click.IntRange(1, 1000), default=21, show_default=True, help="Arms wanted."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+def draw_robots(output: str, draws: int, as_json: bool) -> None:
     """Search synthetic arms like the paper's and write them to OUTPUT, a CSV file.
 
     Random arms are tried in order of their seeds, under the default configuration; those that meet
     Tables I to III and the true accuracy of 0.906 mm are kept, with the number tried. The table
     shipped with kinacc is src/kinacc/synthetic/accepted_draws.csv; `make test` says when it no
     longer follows from the code and the defaults, and this command makes it again (minutes).
+
+    \b
+    Example:
+      kinacc draw-robots my_draws.csv --draws 5
     """
     from kinacc.synthetic import search
 
     tried = search.write(output, draws)
+    if as_json:
+        import json
+
+        click.echo(json.dumps({"draws": draws, "seeds_tried": tried, "file": output}))
+        return
     click.echo(f"{tried} seeds tried for {draws} draws: {output}")
 
 
 def _stage_command(stage: Stage) -> click.Command:
     """The command that runs one stage."""
 
-    def command(dataset: str | None, config: tuple[str, ...], results: str, part: str | None):
-        run_stage(stage, dataset, config or (CONFIG,), results, part)
+    def command(
+        dataset: str | None,
+        config: tuple[str, ...],
+        results: str,
+        as_json: bool,
+        part: str | None,
+    ):
+        written = run_stage(stage, dataset, config or (CONFIG,), results, part)
+        _say_written(stage.name, written, as_json)
 
     options = [
         click.Option(["--dataset"], help="Data set of the configuration; needed if there are two."),
@@ -99,6 +178,7 @@ def _stage_command(stage: Stage) -> click.Command:
             ["--config"], multiple=True, help=f"Configuration file; may be repeated. [{CONFIG}]"
         ),
         click.Option(["--results"], default="results", show_default=True, help="Results folder."),
+        click.Option(["--json", "as_json"], is_flag=True, help="Print what was written as JSON."),
     ]
     if stage.scattered:
         options.append(
@@ -108,6 +188,16 @@ def _stage_command(stage: Stage) -> click.Command:
     return click.Command(
         stage.name, params=options, callback=callback, help=_help(stage), short_help=stage.message
     )
+
+
+def _say_written(stage: str, written: list[str], as_json: bool) -> None:
+    if as_json:
+        import json
+
+        click.echo(json.dumps({"stage": stage, "written": written}, indent=1))
+        return
+    for path in written:
+        click.echo(f"written: {path}")
 
 
 def _without_part(command: Callable) -> Callable:
@@ -121,6 +211,7 @@ def _help(stage: Stage) -> str:
     return (
         f"{words}.\n\nReads: {reads or 'no artefact'}.\n\nLeaves: {', '.join(stage.outputs)}."
         f"\n\nConfiguration used: {settings}."
+        f"\n\n\b\nExample:\n  kinacc run {stage.name} --dataset mh180"
     )
 
 
@@ -144,8 +235,8 @@ def run_stage(
     config: tuple[str, ...],
     results: str = "results",
     part: str | None = None,
-) -> None:
-    """Run one stage of one data set; InputError if it cannot be run as asked."""
+) -> list[str]:
+    """Run one stage of one data set and say what it wrote; InputError if it cannot be run."""
     from pathlib import Path
 
     from kinacc.stages.plan import planned
@@ -172,12 +263,15 @@ def run_stage(
         absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
     if absent:
         raise InputError(absent, f"{stage.name} cannot be run")
+    written: list[str] = []
     for each in parts if part is None else [part]:
+        outputs = plan.outputs(stage.name, dataset, each)
+        written += outputs.values()
         execute(
             Job(
                 stage.module,
                 inputs,
-                plan.outputs(stage.name, dataset, each),
+                outputs,
                 plan.settings(stage.name, dataset),
                 plan.seed(dataset),
                 part=each,
@@ -186,7 +280,8 @@ def run_stage(
             ),
             bar=True,
         )
+    return written
 
 
 if __name__ == "__main__":
-    main()
+    main(prog_name="kinacc")

@@ -78,7 +78,7 @@ class Arm:
 
 def standing(folder):
     """What status says, without a forecast."""
-    return json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).output)
+    return json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).stdout)
 
 
 def files_of(folder):
@@ -108,7 +108,7 @@ def test_a_whole_campaign_ends_as_in_memory(begun):
     arm = Arm(folder)
     asked = []
     while point := json.loads(
-        call("campaign", "status", folder, "--json", "--simulations", 0).output
+        call("campaign", "status", folder, "--json", "--simulations", 0).stdout
     )["next"]:
         asked.append(point)
         done = call("campaign", "record", folder, "--point", point,
@@ -444,15 +444,15 @@ def left_to_visit(folder):
 def test_status_forecasts_what_the_wanted_width_takes(begun):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", "--width-mm", "0.25", budget=40)
     arm = Arm(folder)
-    assert json.loads(call("campaign", "status", folder, "--json").output)["forecast"] is None
+    assert json.loads(call("campaign", "status", folder, "--json").stdout)["forecast"] is None
     recorded(folder, arm, 22)
-    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", "8").output)[
+    said = json.loads(call("campaign", "status", folder, "--json", "--simulations", "8").stdout)[
         "forecast"
     ]
     assert said["readings_left"] == 18
     assert said["final_width_mm"]["q05"] <= said["final_width_mm"]["q95"]
     assert 0.0 <= said["reached_within_budget"] <= 1.0
-    again = call("campaign", "status", folder, "--json", "--simulations", "8").output
+    again = call("campaign", "status", folder, "--json", "--simulations", "8").stdout
     assert json.loads(again)["forecast"] == said
     shown = call("campaign", "status", folder, "--simulations", "8").output
     assert "by 8 simulations from the readings so far" in shown

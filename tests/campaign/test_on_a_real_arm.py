@@ -89,7 +89,7 @@ def test_the_series_itself_imported_whole_says_what_it_says_in_memory(ur10_d, tm
     assert np.sqrt(np.mean(sizes**2)) == pytest.approx(columns["rms"][row][0], rel=1e-6)
     wanted = conduct(SingleShot(measurements=len(errors)), measured_world(
         errors, np.zeros((len(errors), 0, 3)), SIGMA_MM))  # fmt: skip
-    said = json.loads(call("campaign", "status", folder, "--json").output)["statements"]
+    said = json.loads(call("campaign", "status", folder, "--json").stdout)["statements"]
     same(said, wanted.statements())
 
 
@@ -114,7 +114,7 @@ def test_a_simulated_campaign_on_its_residuals_ends_as_in_memory(ur10_d, tmp_pat
             seen = plan.points.modelled_mm[state.asked] + world.reading_mm(row[state.asked], visit)
             seen = back.rotation @ seen + back.position_mm
             opened.write(campaigns.readings_entry([Reading(state.asked, seen, "instrument")]))
-    said = json.loads(call("campaign", "status", folder, "--json").output)["statements"]
+    said = json.loads(call("campaign", "status", folder, "--json").stdout)["statements"]
     wanted = conduct(SearchAndConfirm(measurements=len(rows)), world)
     same(said, wanted.statements())
     measured = np.linalg.norm(errors[rows[wanted.ledger.visited]], axis=1).max()

@@ -108,6 +108,15 @@ def test_later_files_replace_values_and_keep_the_rest(config):
     assert loaded["mh180"]["seed"] == defaults()["seed"]
 
 
+def test_a_value_of_the_command_line_is_no_second_file():
+    source = {"measurements": {"source": "synthetic"}}
+    assert load([PAPER], {"datasets": {"mh180": source}})["mh180"]
+    with pytest.raises(InputError) as caught:
+        load([PAPER], {"datasets": {"mh180": {"measurements": {"source": "File"}}}})
+    (problem,) = caught.value.problems
+    assert problem.where == "command line, datasets.mh180.measurements.source"
+
+
 def test_values_of_the_command_line_come_last():
     loaded = load([PAPER], overrides={"study": {"repetitions": 2}})
     assert loaded["mh180"]["study"]["repetitions"] == 2
@@ -215,6 +224,7 @@ BAD = {
         "datasets: {../evil: {robot: mh180}}",
         ("'../evil'", "letters, digits, _ and -"),
     ),
+    "name like an option": ("datasets: {-x: {robot: mh180}}", ("'-x'", "the first not -")),
     "name with a blank": ("datasets: {a b: {robot: mh180}}", ("'a b'", "letters, digits")),
     "name that is a number": ("datasets: {12: {robot: mh180}}", ("12", "in quotes")),
     "no robot": ("datasets: {own: {seed: 1}}", ("datasets.own", "names no robot")),

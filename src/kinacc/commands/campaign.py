@@ -5,9 +5,10 @@ from __future__ import annotations
 import click
 
 from kinacc.commands import choice
+from kinacc.commands.groups import InOrder
 
 
-@click.group("campaign")
+@click.group("campaign", cls=InOrder)
 def campaign() -> None:
     """Bound the largest error of a calibrated arm, one measurement after another.
 
@@ -56,7 +57,8 @@ def campaign() -> None:
 @click.option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]")
 @click.option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE.")
 @click.option("--budget", default=200, show_default=True, type=int, help="Readings in all.")
-@click.option("--confidence", default=0.95, show_default=True, type=float)
+@click.option("--confidence", default=0.95, show_default=True, type=float,
+              help="How surely each bound is to hold.")  # fmt: skip
 @click.option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have.")
 @click.option("--width-mm", type=float, help="Wanted distance of upper from lower bound.")
 @click.option("--target", type=click.Choice(["candidates", "measured"]), default="candidates",
@@ -67,7 +69,8 @@ def campaign() -> None:
 @click.option("--from-deg", help="Joints the arm starts at. [zero]")
 @click.option("--visit", type=click.Choice(["travel", "random"]), default="travel",
               show_default=True, help="Order of the first visit.")  # fmt: skip
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0),
+              help="Decides every random draw.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print what was begun as JSON.")
 def start(**given) -> None:
     """Begin a campaign in FOLDER: nothing of this can be changed once there are readings.
@@ -146,7 +149,8 @@ def record(**given) -> None:
 @click.argument("folder", type=click.Path())
 @click.argument("point")
 @click.option("--reason", required=True, help="Why it cannot be measured.")
-def leave_out(folder, point, reason) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print the standing as JSON.")
+def leave_out(folder, point, reason, as_json) -> None:
     """Leave out a POINT that cannot be measured: hidden from the instrument, or not to be reached.
 
     Only a point without readings, and only for a reason that has nothing to do with its error. The
@@ -158,14 +162,15 @@ def leave_out(folder, point, reason) -> None:
     """
     from kinacc.commands import campaigns_record
 
-    campaigns_record.leave_out(folder, point, reason)
+    campaigns_record.leave_out(folder, point, reason, as_json)
 
 
 @campaign.command("strike")
 @click.argument("folder", type=click.Path())
 @click.argument("number", type=click.IntRange(1))
 @click.option("--reason", required=True, help="What went wrong with it.")
-def strike(folder, number, reason) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print the standing as JSON.")
+def strike(folder, number, reason, as_json) -> None:
     """Declare reading NUMBER void: something went wrong that has nothing to do with its size.
 
     The reading stays in the journal and in every report, with the reason. A reading that is struck
@@ -177,7 +182,7 @@ def strike(folder, number, reason) -> None:
     """
     from kinacc.commands import campaigns_record
 
-    campaigns_record.strike(folder, number, reason)
+    campaigns_record.strike(folder, number, reason, as_json)
 
 
 @campaign.command("status")

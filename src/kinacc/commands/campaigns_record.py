@@ -39,7 +39,7 @@ def record(given: Mapping) -> None:
     _say_taken(given, taken, skipped, before, after)
 
 
-def leave_out(path: str, name: str, reason: str) -> None:
+def leave_out(path: str, name: str, reason: str, as_json: bool) -> None:
     """Leave a point without readings out of the campaign."""
     with folder.writing(path) as opened:
         before = opened.state()
@@ -59,10 +59,10 @@ def leave_out(path: str, name: str, reason: str) -> None:
             raise InputError(problems, "Nothing was left out")
         opened.write(folder.leave_out_entry(point, reason.strip()))
         after = folder.open_(path).state()
-    click.echo("\n".join(words.standing(after)))
+    _say_standing(after, as_json)
 
 
-def strike(path: str, number: int, reason: str) -> None:
+def strike(path: str, number: int, reason: str, as_json: bool) -> None:
     """Declare a reading void."""
     with folder.writing(path) as opened:
         before = opened.state()
@@ -78,6 +78,13 @@ def strike(path: str, number: int, reason: str) -> None:
             raise InputError(problems, "Nothing was struck")
         opened.write(folder.strike_entry(number, reason.strip()))
         after = folder.open_(path).state()
+    _say_standing(after, as_json)
+
+
+def _say_standing(after: State, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps(campaigns.as_facts(after, after.plan.limits.tolerance_mm), indent=1))
+        return
     click.echo("\n".join(words.standing(after)))
 
 

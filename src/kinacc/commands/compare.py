@@ -18,7 +18,8 @@ PICTURES = (".svg", ".png", ".pdf")
 )
 @click.option("--picture", type=click.Path(), help="Draw to a .svg, .png or .pdf file.")
 @click.option(
-    "--model", type=click.Choice(["dh", "vec", "nominal"]), default="dh", show_default=True
+    "--model", type=click.Choice(["dh", "vec", "nominal"]), default="dh", show_default=True,
+    help="Model compared.",
 )
 @click.option("--robot", help="Robot of both. [as the results say]")
 @click.option("--config", multiple=True, help="Configuration naming it.")

@@ -26,10 +26,12 @@ from kinacc.commands.plan_poses import PICTURES
 @click.option("--largest-mm", type=float, help="Scale the errors so that the largest is this.")
 @click.option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]")
 @click.option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE.")
-@click.option("--confidence", default=0.95, show_default=True, type=float)
+@click.option("--confidence", default=0.95, show_default=True, type=float,
+              help="How surely each bound is to hold.")  # fmt: skip
 @click.option("--repetitions", default=30, show_default=True, type=click.IntRange(2),
               help="Simulated campaigns per budget.")  # fmt: skip
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0),
+              help="Decides every random draw.")  # fmt: skip
 @click.option("--picture", type=click.Path(), help="Draw width against budget: .svg, .png, .pdf.")
 @choice.output_options
 def plan_campaign(**given) -> None:

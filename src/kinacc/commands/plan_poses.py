@@ -12,8 +12,12 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 
 @click.command("plan-poses")
 @click.argument("robot", required=False)
-@click.option("--poses", "count", default=40, show_default=True, type=click.IntRange(1))
-@click.option("--index", type=click.Choice(INDICES), default="O1", show_default=True)
+@click.option(
+    "--poses", "count", default=40, show_default=True, type=click.IntRange(1), help="Poses chosen."
+)
+@click.option(
+    "--index", type=click.Choice(INDICES), default="O1", show_default=True, help="What is best."
+)
 @click.option("--candidates", type=click.Path(), help="File of joints to choose from.")
 @click.option(
     "--drawn", default=1000, show_default=True, type=click.IntRange(10), help="Candidates drawn."

@@ -21,6 +21,7 @@ from kinacc.config.validate import (
 from kinacc.config.values import shown
 from kinacc.errors import InputError, Problem
 
+COMMAND_LINE = "command line"
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
 
@@ -45,7 +46,7 @@ def load(
         documents.append(document)
         problems += found
     if overrides:
-        documents.append(Document("command line", plain(overrides)))
+        documents.append(Document(COMMAND_LINE, plain(overrides)))
     if not documents:
         raise InputError(Problem("configuration", "no file given", fix="give config.yaml"))
     problems += _defined_twice(documents)
@@ -142,6 +143,8 @@ def _defined_twice(documents: Sequence[Document]) -> list[Problem]:
     problems = []
     first: dict[KeyPath, Document] = {}
     for document in documents:
+        if document.name == COMMAND_LINE:
+            continue  # replaces values on purpose
         datasets = document.data.get("datasets")
         for name in datasets if isinstance(datasets, Mapping) else ():
             for keys in _IDENTITY:

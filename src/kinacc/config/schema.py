@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-DATASET_NAME = "[A-Za-z0-9_-]+"
+DATASET_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]*"  # with - first it would read as an option
 KINDS = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair", "pairs", "names")
 KINDS += ("parameters",)
 NUMERIC = {

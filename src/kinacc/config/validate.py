@@ -50,7 +50,7 @@ def check_section(
 
 def check_dataset_name(name: Any, place: Place) -> list[Problem]:
     """A name becomes a folder below results/, so it may not lead anywhere else."""
-    allowed = "letters, digits, _ and -"
+    allowed = "letters, digits, _ and -, the first not -"
     where = place(("datasets", name))
     if not isinstance(name, str):
         fix = "put the name in quotes"
