@@ -64,8 +64,7 @@ def _region(given: Mapping, arm: Calibration):
     """Joint box, test of tool positions and words of the region asked for."""
     wanted = given["region"]
     if wanted is None:
-        known = bool(given["config"]) or (given["robot"] is None and Path(CONFIG).is_file())
-        wanted = "configured" if known else "fitted"
+        wanted = "configured" if _is_configured(given, arm) else "fitted"
     if wanted == "limits":
         if arm.choice == "vec":
             what = "the VEC model says nothing beyond the joints the data cover"
@@ -83,6 +82,21 @@ def _region(given: Mapping, arm: Calibration):
     if settings["box"] is not None:
         return settings["box"], None, "drawn evenly from the configured joint box"
     return None, None, "drawn evenly from the joints the calibration covers"
+
+
+def _is_configured(given: Mapping, arm: Calibration) -> bool:
+    """Whether the configuration given, or the one that lies here, has the calibration's data set.
+
+    One that was given has to be readable; one that only lies here need not be about this arm.
+    """
+    from kinacc.stages.plan import planned as read
+
+    if given["config"]:
+        return arm.name in read(given["config"]).datasets
+    try:
+        return Path(CONFIG).is_file() and arm.name in read((CONFIG,)).datasets
+    except InputError:
+        return False
 
 
 def _covered(arm: Calibration) -> tuple[np.ndarray, np.ndarray]:

@@ -106,18 +106,22 @@ def pool_of(name: str) -> Pool:
 
 def _of_folder(path: Path) -> Pool:
     from kinacc.artifacts import store
+    from kinacc.assess.causes import joint_errors
+    from kinacc.calibrated.folder import recorded_robot
     from kinacc.tournament import fields
 
-    name = path.resolve().name
-    if all((path / f"{each}.parquet").is_file() for each in ("pose_errors", "measurements")):
-        errors, seen = (store.read(path / f"{each}.parquet")
-                        for each in ("pose_errors", "measurements"))  # fmt: skip
-        return Pool(name, fields.of_measurements(name, "", errors, seen).error_mm)
-    if (path / "assessment_points.parquet").is_file():
-        points = store.read(path / "assessment_points.parquet")
-        return Pool(name, fields.of_points(name, "", points).error_mm)
-    what = "holds neither pose_errors with measurements nor assessment_points"
-    raise InputError(Problem(str(path), what, "a results folder", "run the workflow first"))
+    name, robot = path.resolve().name, recorded_robot(path)
+    needed = ("pose_errors", "measurements")
+    if all((path / f"{each}.parquet").is_file() for each in needed):
+        errors, seen = (store.read(path / f"{each}.parquet") for each in needed)
+        found = fields.of_measurements(name, "", errors, seen)
+    elif (path / "assessment_points.parquet").is_file():
+        found = fields.of_points(name, "", store.read(path / "assessment_points.parquet"))
+    else:
+        what = "holds neither pose_errors with measurements nor assessment_points"
+        raise InputError(Problem(str(path), what, "a results folder", "run the workflow first"))
+    effects = None if robot is None else joint_errors(robot, found.q_rad)
+    return Pool(name, found.error_mm, found.q_rad, effects)
 
 
 def _scaled(pool: Pool, largest_mm: float) -> Pool:

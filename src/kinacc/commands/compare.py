@@ -18,7 +18,10 @@ PICTURES = (".svg", ".png", ".pdf")
 )
 @click.option("--picture", type=click.Path(), help="Draw to a .svg, .png or .pdf file.")
 @click.option(
-    "--model", type=click.Choice(["dh", "vec", "nominal"]), default="dh", show_default=True,
+    "--model",
+    type=click.Choice(["dh", "vec", "nominal"]),
+    default="dh",
+    show_default=True,
     help="Model compared.",
 )
 @click.option("--robot", help="Robot of both. [as the results say]")
