@@ -168,16 +168,14 @@ def test_prior_falls_with_the_order_as_stated():
     np.testing.assert_allclose(std[36 * 4 :], 7e-4)
 
 
-@pytest.mark.parametrize("name", ["irb120", "iiwa14"])
-def test_one_point_without_orientation_is_enough_to_converge(name):
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_one_point_without_orientation_is_enough_to_converge(seed):
     """Base, tool and constants move against each other along directions poses hardly show."""
-    arm, rng = robot.load(name), np.random.default_rng(2)
-    k = arm.dh.joints
-    free = terms.free_parameters(k)
-    q = simulated.joints(arm, 220, rng)
-    true = simulated.disturbed(arm.dh, free, rng)
+    arm, rng = robot.load("iiwa14"), np.random.default_rng(seed)
+    q = simulated.joints(arm, 180, rng)
+    true = simulated.disturbed(arm.dh, terms.free_parameters(arm.dh.joints), rng)
     seen = simulated.measure(true, q, simulated.POINT, rng)
-    train, test = seen.select(slice(0, 120)), seen.select(slice(120, None))
+    train, test = seen.select(slice(0, 80)), seen.select(slice(80, None))
     begin = dh_fit.fit_frames(train, arm.dh, rotation_weight_mm_per_rad=WEIGHT).frames
     found = vec_fit.fit(
         train,

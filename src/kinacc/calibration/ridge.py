@@ -11,6 +11,7 @@ from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, System
 from kinacc.errors import FitError
 
+MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slowly
 MAX_VARIANCE_STEPS = 20
 VARIANCE_TOLERANCE = 1e-5
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
@@ -39,7 +40,7 @@ def minimise_with_prior(
     x = np.array(start, dtype=float)
     weight_sq = (scale / prior_std) ** 2
     last, iterations, balance = np.inf, 0, None
-    while last > solve.STEP_TOLERANCE and iterations < solve.MAX_ITERATIONS:
+    while last > solve.STEP_TOLERANCE and iterations < MAX_ITERATIONS:
         iterations += 1
         normal = _normal_equations(system, x, scale)
         balance = _balanced(normal, weight_sq, (x - prior_mean) / scale, balance, name)
