@@ -83,6 +83,8 @@ def statements(fit: DHFit, known: Uncertainty, seen: Observations) -> list[tuple
     for directions, structural in groups(fit, known, seen):
         members = (np.abs(directions) >= LEAST).any(axis=0)
         words = blind_words.sentence(directions, known.names, fit.frames)
+        if any(words == text for text, _ in found):
+            continue  # parts too small for words told them apart
         found.append((words if structural else f"{words} {blind_words.WEAK}", members))
     # Joint by joint, what concerns frames alone at the end.
     return sorted(found, key=lambda each: [*np.flatnonzero(each[1][frames:]), len(known.names)][0])
