@@ -13,6 +13,7 @@ from kinacc.commands.check_data import check_data
 from kinacc.commands.compare import compare
 from kinacc.commands.compensate import compensate
 from kinacc.commands.export import export
+from kinacc.commands.fitted import fitted
 from kinacc.commands.groups import InOrder
 from kinacc.commands.init import init
 from kinacc.commands.plan_campaign import plan_campaign
@@ -35,6 +36,7 @@ SECTIONS = {
         "draw-robots": "search synthetic arms like the paper's",
     },
     "A calibrated arm": {
+        "fitted": "what the fits are worth, and what the poses leave open",
         "predict": "joints to the pose of the tool, with uncertainty",
         "compensate": "poses to the joints that put the tool there",
         "export": "write the model for other programs",
@@ -223,6 +225,7 @@ main.add_command(predict)
 main.add_command(compensate)
 main.add_command(export)
 main.add_command(compare)
+main.add_command(fitted)
 main.add_command(plan_poses)
 main.add_command(tournament)
 main.add_command(plan_campaign)

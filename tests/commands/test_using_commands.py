@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from kinacc import robot
 from kinacc.cli import main
 
-HELP = ("predict", "compensate", "export", "compare", "plan-poses")
+HELP = ("predict", "compensate", "export", "compare", "plan-poses", "fitted")
 
 
 def call(*words):
@@ -41,6 +41,32 @@ def test_help_has_an_example(name):
     assert "Example:" in shown.output
     assert f"kinacc {name} " in shown.output
     assert "--json" in shown.output
+
+
+def test_fitted_says_what_the_fits_are_worth(folder, tmp_path):
+    shown = call("fitted", folder)
+    assert shown.exit_code == 0, shown.output
+    assert "is selected: the VEC model takes" in shown.output
+    assert "d of joint 2 and d of joint 3 appear only as their difference" in shown.output
+    answer = json.loads(call("fitted", folder, "--json").output)
+    table = pq.read_table(folder / "residuals.parquet").to_pydict()
+    for model, of in answer["position_error_mm"].items():
+        rows = [
+            i
+            for i, name in enumerate(table["comparison"])
+            if name == f"{model}_vs_measured"
+            and table["quantity"][i] == "position"
+            and table["fold"][i] is None
+        ]
+        got = {table["subset"][i]: table["rms"][i] for i in rows}
+        assert {subset: figures["rms"] for subset, figures in of.items()} == got
+    assert answer["selected"] in ("dh", "vec")
+    assert answer["vec_order"] == 1
+    assert "j2.d_mm" in answer["parameters"]["undetermined"]
+    assert len(answer["worst_rows"]) == 5
+    missing = call("fitted", tmp_path)
+    assert missing.exit_code == 2
+    assert missing.output.count("no such file") == 5
 
 
 def test_predict_and_compensate_undo_each_other(folder, tmp_path):
