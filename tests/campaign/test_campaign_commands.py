@@ -417,6 +417,7 @@ def test_a_report_holds_its_contract_and_says_what_status_says(begun):
         columns, problems = check_file(made / f"{name}.parquet", ARTEFACTS[name])
         assert not problems
         assert len(next(iter(columns.values())))
+    assert call("check-results", made).exit_code == 0
     said = standing(folder)
     text = (made / "report.md").read_text()
     for each in said["statements"]:
@@ -456,3 +457,27 @@ def test_status_forecasts_what_the_wanted_width_takes(begun):
     assert json.loads(again)["forecast"] == said
     shown = call("campaign", "status", folder, "--simulations", "8").output
     assert "by 8 simulations from the readings so far" in shown
+
+
+def test_tables_of_two_states_of_a_campaign_do_not_pass_as_one_report(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    recorded(folder, arm, 13)
+    call("campaign", "report", folder)
+    earlier = (folder / "report" / "campaign_points.parquet").read_bytes()
+    recorded(folder, arm, 1)
+    call("campaign", "report", folder)
+    (folder / "report" / "campaign_points.parquet").write_bytes(earlier)
+    done = call("check-results", folder / "report")
+    assert done.exit_code == 1
+    assert "different states of a campaign" in done.output
+
+
+def test_a_folder_that_cannot_be_written_is_said(begun, calibration, tmp_path):
+    taken = tmp_path / "file"
+    taken.write_text("")
+    done = call("campaign", "start", taken / "campaign", "--calibration", calibration, "--robot",
+                "mh180", "--noise-mm", "0.1")  # fmt: skip
+    assert done.exit_code == 2
+    assert "cannot be written" in done.output
+    assert "Traceback" not in done.output

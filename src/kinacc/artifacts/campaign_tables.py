@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from kinacc.artifacts.columns import (
     ERROR_MM,
     JOINTS,
@@ -16,6 +18,7 @@ from kinacc.artifacts.columns import (
     whole,
 )
 from kinacc.artifacts.tournament_tables import TARGETS
+from kinacc.errors import Problem
 
 CAMPAIGN_POINTS = Artefact(
     "campaign_points",
@@ -79,3 +82,22 @@ CAMPAIGN_BOUNDS = Artefact(
     ("readings", "target", "share"),
 )
 ALL = (CAMPAIGN_POINTS, CAMPAIGN_READINGS, CAMPAIGN_BOUNDS)
+
+
+def contradictions(tables: Mapping[str, Mapping]) -> list[Problem]:
+    """What the three tables of one campaign say of each other that cannot be."""
+    points, readings, bounds = (tables[each.name] for each in ALL)
+    used = [name for name, place in zip(readings["point"], readings["used"], strict=True)
+            if place == place]  # fmt: skip
+    problems = []
+    for name, count in zip(points["point"], points["readings"], strict=True):
+        if used.count(name) != count:
+            what = f"{count} readings, {used.count(name)} in campaign_readings"
+            problems.append(Problem(f"campaign_points, point {name}", what))
+    if unknown := sorted(set(readings["point"]) - set(points["point"])):
+        what = f"points that are no candidates: {', '.join(unknown[:5])}"
+        problems.append(Problem("campaign_readings", what))
+    if (last := int(max(bounds["readings"]))) != len(used):
+        what = f"ends at {last} readings, {len(used)} were used"
+        problems.append(Problem("campaign_bounds", what))
+    return problems

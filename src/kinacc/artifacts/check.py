@@ -8,7 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinacc.artifacts import store, tournament_tables
+from kinacc.artifacts import campaign_tables, store, tournament_tables
+from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
 from kinacc.artifacts.conformity import check_file
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.artifacts.lineage import check_lineage, made_without, parts
@@ -93,6 +94,8 @@ def check_results(results: Path | str, plan: Plan | None = None) -> Report:
     if not folder.is_dir():
         problem = Problem(str(folder), "no such folder", "a results folder", "run snakemake -c2")
         return Report(str(folder), (), (problem,))
+    if (folder / f"{CAMPAIGN[0].name}.parquet").is_file():
+        return Report(str(folder), (check_campaign(folder),))
     if folder.name == TOURNAMENT:
         return Report(str(folder), (check_tournament(folder),))
     if _is_dataset(folder):
@@ -170,6 +173,27 @@ def check_tournament(folder: Path) -> DatasetReport:
     ]
     leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
     return DatasetReport(folder.name, tuple(checked), tuple(problems), tuple(leftovers))
+
+
+def check_campaign(folder: Path) -> DatasetReport:
+    """Check the report of a measuring campaign: its tables whole, made together, of one mind."""
+    checked, problems, tables, marks = [], [], {}, []
+    for artefact in CAMPAIGN:
+        path = folder / f"{artefact.name}.parquet"
+        if not path.is_file():
+            problems.append(Problem(str(path), "missing", fix="run kinacc campaign report again"))
+            continue
+        checked.append(str(path))
+        tables[artefact.name], found = check_file(path, artefact)
+        problems += found
+        with suppress(InputError):
+            marks.append(store.read_metadata(path))
+    if any(each != marks[0] for each in marks):
+        fix = "run kinacc campaign report again"
+        problems.append(Problem(str(folder), "tables of different states of a campaign", fix=fix))
+    if not problems:
+        problems += campaign_tables.contradictions(tables)
+    return DatasetReport(folder.name, tuple(checked), tuple(problems), ())
 
 
 def main(folder: str, as_json: bool = False, plan: Plan | None = None) -> int:

@@ -41,7 +41,6 @@ def start(folder: Path | str, begun: Plan) -> None:
         if (folder / name).exists():
             what = "a campaign is there already"
             raise InputError(Problem(str(folder / name), what, "a new folder"))
-    folder.mkdir(parents=True, exist_ok=True)
     journal.create(folder / journal.PLAN, plan.to_json(begun))
 
 

@@ -13,7 +13,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,32 +61,45 @@ def read(path: Path, seed: str) -> Journal:
 
 
 def append(path: Path, known: Journal, entry: Mapping) -> None:
-    """Add an entry; when this returns, it is on disk. The caller holds the lock."""
+    """Add an entry; when this returns, it is on disk. The caller holds the lock.
+
+    Raises InputError where the disk does not take it.
+    """
     chain = _chained(known.last, entry)
     line = json.dumps({"chain": chain, "entry": entry}, sort_keys=True).encode() + b"\n"
     fresh = not path.exists()
-    with open(path, "ab") as file:
-        if known.cut_off:
-            file.truncate(known.end)
-        file.write(line)
-        file.flush()
-        os.fsync(file.fileno())
-    if fresh:
-        _sync_folder(path.parent)
+    try:
+        with open(path, "ab") as file:
+            if known.cut_off:
+                file.truncate(known.end)
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+        if fresh:
+            _sync_folder(path.parent)
+    except OSError as error:
+        raise _not_written(path, error) from None
 
 
 def create(path: Path, content: bytes) -> None:
-    """Write a new file so that it appears whole and on disk, or not at all."""
+    """Write a new file so that it appears whole and on disk, or not at all.
+
+    Raises InputError where the disk does not take it.
+    """
     part = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with open(part, "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
         _sync_folder(path.parent)
+    except OSError as error:
+        raise _not_written(path, error) from None
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -99,7 +112,11 @@ def writing(
     """
     import fcntl
 
-    with open(folder / LOCK, "a+") as file:
+    try:
+        lock = open(folder / LOCK, "a+")  # noqa: SIM115 closed by the next line's block
+    except OSError as error:
+        raise _not_written(folder / LOCK, error) from None
+    with lock as file:
         waited = 0.0
         while True:
             try:
@@ -124,6 +141,11 @@ def _chained(before: str, entry: Mapping) -> str:
 def _damaged(path: Path, number: int, what: str) -> InputError:
     fix = "nothing was done; bring the file back from a copy"
     return InputError(Problem(f"{path}, line {number}", what, fix=fix))
+
+
+def _not_written(path: Path, error: OSError) -> InputError:
+    fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
+    return InputError(Problem(str(path), f"cannot be written: {error.strerror}", fix=fix))
 
 
 def _sync_folder(folder: Path) -> None:

@@ -201,7 +201,7 @@ def from_json(text: bytes, where: str) -> Plan:
             what = f"format {content['format']!r}"
             raise InputError(Problem(where, what, f"format {FORMAT}", "use a later kinacc"))
         return _plan(content)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, IndexError) as error:
         what = f"is no campaign: {type(error).__name__}: {error}"
         raise InputError(Problem(where, what, fix="bring it back from a copy")) from None
 

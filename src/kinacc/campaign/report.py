@@ -184,7 +184,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     if plan.limits.tolerance_mm is not None:
         lines += ["## Conformity", "", *_conformity(state), ""]
     lines += [f"![sizes of the errors, and the bounds as they grew]({picture})", ""]
-    lines += ["## What was measured", "", *(f"- {each}" for each in _facts(state)), ""]
+    lines += ["## What was measured", "", *(f"- {each}" for each in _facts(opened, state)), ""]
     lines += ["## Largest errors", "", *_largest(found["campaign_points"]), ""]
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in _grounds(state)), ""]
     lines += [f"Campaign {opened.digest}, readings {opened.journal.last}."]
@@ -212,7 +212,7 @@ def _conformity(state: State) -> list[str]:
     return lines
 
 
-def _facts(state: State) -> list[str]:
+def _facts(opened: Opened, state: State) -> list[str]:
     plan = state.plan
     visited = len({each.reading.point for each in state.told})
     joints = f"{len(plan.points) - len(state.left_out)} candidates ({plan.about['candidates']})"
@@ -226,6 +226,9 @@ def _facts(state: State) -> list[str]:
         ),
         f"assessor {plan.assessor.name}: {(type(plan.assessor).__doc__ or '').splitlines()[0]}",
     ]
+    times = [each["at"] for each in opened.journal.entries if "at" in each]
+    if times:
+        lines.append(f"recorded from {min(times)} to {max(times)}")
     if state.in_hand:
         lines.append(f"{len(state.in_hand)} readings were taken and not asked for: not used")
     large = sum(np.linalg.norm(each.error_mm) > plan.limits.implausible_mm for each in state.told)
