@@ -248,3 +248,30 @@ def test_coupled_joints_reach_the_same_points(tmp_path, good, truth):
     np.testing.assert_allclose(
         dh.forward(ARM.dh, found @ matrix.T).position_mm, pose.position_mm[inside], atol=1e-9
     )
+
+
+def test_a_column_mapped_to_two_quantities_is_refused(tmp_path, good):
+    text = problems_of(tmp_path, good, columns={"q1": "q2_deg"})
+    assert "column q2_deg: is taken for 2 quantities, q1 among them" in text
+
+
+def test_a_file_without_orientations_is_told_from_a_missing_column(tmp_path, good):
+    bare = {name: column for name, column in good.items() if name[0] != "r"}
+    text = problems_of(tmp_path, bare)
+    assert text.count("\n") == 1
+    assert "column rx, ry, rz" in text
+    assert "orientation.kind" in text
+    assert "rz_deg or rz_rad" in problems_of(tmp_path, {**bare, "rx_deg": good["rx_deg"],
+                                                        "ry_deg": good["ry_deg"]})  # fmt: skip
+
+
+@pytest.mark.parametrize("nothing", ["NaN", "nan", "NA", "#N/A", "null"])
+def test_what_programs_write_for_nothing_is_an_empty_cell(tmp_path, good, nothing):
+    columns = {name: [f"{value!r}" for value in column.tolist()] for name, column in good.items()}
+    for name in ("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"):
+        columns[name][3] = nothing
+    reading = read(SECTION | {"path": written(tmp_path, columns)}, ARM)
+    assert len(reading.columns["pose"]) == 11
+    assert "nothing was measured in line 5" in " ".join(reading.left_out())
+    columns["q2_deg"][4] = nothing
+    assert "not a finite number" in problems_of(tmp_path, columns)

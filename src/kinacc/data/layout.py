@@ -10,6 +10,7 @@ unit.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -150,13 +151,15 @@ def find(
     finder.refuse_unknown_columns()
     if len(problems) > before:
         return None
-    return Found(
+    found = Found(
         joints,
         commanded,
         {joint: place for joint, place in directions.items() if place},
         targets,
         {name: place for name, place in single.items() if place},
     )
+    finder.refuse_shared_columns(found)
+    return found if len(problems) == before else None
 
 
 @dataclass(frozen=True)
@@ -259,7 +262,14 @@ class _Finder:
                 names = in_order_of(self.layout.convention)
         # A single target must have its orientation; one of several may be a bare point.
         look = self.required if len(self.targets()) == 1 else self.any
-        places = [look(f"{prefix}{name}", units, unit) for name in names]
+        own = [f"{prefix}{name}" for name in names]
+        places = [self.any(name, units, unit) for name in own]
+        if look == self.required and not any(places) and not set(own) & set(self.layout.columns):
+            self._problem(", ".join(own), "are missing: the file states no orientation",
+                          _listed(self.table), "set measurements.file.orientation.kind (none for "
+                          "positions alone), or map them in measurements.file.columns")  # fmt: skip
+            return ()
+        places = [look(name, units, unit) for name in own]
         if None in places and any(places) and look == self.any:
             missing = [f"{prefix}{n}" for n, p in zip(names, places, strict=True) if p is None]
             self._problem(", ".join(missing), "is missing beside the rest of the orientation")
@@ -292,6 +302,16 @@ class _Finder:
             if foreign not in self.table.columns:
                 what = f"is not there, but measurements.file.columns maps {name} to it"
                 self._problem(foreign, what, _listed(self.table))
+
+    def refuse_shared_columns(self, found: Found) -> None:
+        """A column that is taken for two measured quantities, as a slip in a mapping makes it."""
+        measured = [*found.joints, *found.commanded, *found.directions.values()]
+        measured += [place for target in found.targets for place in target.places()]
+        count = Counter(place.column for place in measured)
+        for column in (each for each in count if count[each] > 1):
+            mapped = [name for name, own in self.layout.columns.items() if own == column]
+            what = f"is taken for {count[column]} quantities, {', '.join(mapped)} among them"
+            self._problem(column, what, "one", "correct measurements.file.columns")
 
     def _problem(self, column: str, what: str, allowed: str = "", fix: str = "") -> None:
         self.problems.append(Problem(f"{self.table.path}: column {column}", what, allowed, fix))

@@ -10,6 +10,7 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 
+_NOTHING = ("", "nan", "na", "n/a", "null", "none", "#n/a")
 _SHOWN = 5  # rows named per problem; the rest is counted
 
 
@@ -111,7 +112,10 @@ def _number_or_nan(cell: object, decimal: str) -> float:
 
 
 def _is_gap(cell: object) -> bool:
-    return cell is None or (isinstance(cell, str) and not cell.strip())
+    """Empty, or not a number in one of the ways numerical programs write it."""
+    if isinstance(cell, str):
+        return cell.strip().lower() in _NOTHING
+    return cell is None or cell != cell
 
 
 def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> RawTable:
