@@ -62,7 +62,7 @@ SIZES = {
         {200: (50, 100, 200, 500, 1000), 1000: (50, 200, 500, 1000)},
         1000,
         200,
-        (0, 1, 2),
+        (0, 1),
     ),
 }
 SLOW = tuple(name for name, each in ADAPTIVE.items() if getattr(each, "is_slow", False))
