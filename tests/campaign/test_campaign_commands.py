@@ -481,3 +481,17 @@ def test_a_folder_that_cannot_be_written_is_said(begun, calibration, tmp_path):
     assert done.exit_code == 2
     assert "cannot be written" in done.output
     assert "Traceback" not in done.output
+
+
+def test_candidates_drawn_for_a_vec_model_are_ones_it_speaks_of(calibration, tmp_path):
+    folder = tmp_path / "campaign"
+    done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+                "--model", "vec", "--drawn", 30, "--noise-mm", "0.1")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    plan = campaigns.open_(folder).plan
+    assert len(plan.points) == 30
+    assert np.isfinite(plan.points.modelled_mm).all()
+    done = call("campaign", "start", tmp_path / "other", "--calibration", calibration, "--robot",
+                "mh180", "--model", "vec", "--region", "limits", "--noise-mm", "0.1")  # fmt: skip
+    assert done.exit_code == 2
+    assert "says nothing beyond" in done.output

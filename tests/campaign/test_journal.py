@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -139,3 +140,19 @@ def test_the_lock_goes_with_its_process(tmp_path):
     holder.stdout.close()
     with journal.writing(tmp_path, patience_s=0.0):
         pass
+
+
+def test_a_disk_that_does_not_take_a_line_is_told_and_nothing_before_is_lost(tmp_path, monkeypatch):
+    path = tmp_path / "j"
+    known = written(path, 2)
+
+    def full(_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(journal.os, "fsync", full)
+        with pytest.raises(InputError, match="No space left"):
+            journal.append(path, known, {"kind": "test", "number": 2})
+    assert [each["number"] for each in journal.read(path, SEED).entries][:2] == [0, 1]
+    journal.append(path, journal.read(path, SEED), {"kind": "test", "number": 3})
+    assert journal.read(path, SEED).entries[-1]["number"] == 3

@@ -15,6 +15,8 @@ from kinacc.errors import InputError, Problem
 from kinacc.inverse import limits
 from kinacc.planning.candidates import spread
 
+_MOST_DRAWS = 256  # joint values drawn per candidate before the region is called too wide
+
 
 @dataclass(frozen=True)
 class Found:
@@ -55,9 +57,25 @@ def candidates(given: Mapping, arm: Calibration) -> Found:
     low, high = limited if given["region"] == "limits" else _covered(arm)
     if box is not None:
         low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
-    drawn = spread(arm.robot, given["drawn"], (low, high), inside, arm.point(given["point"]))
+    drawn = _spoken_of(arm, given, (low, high), inside)
     label = [str(number) for number in range(1, len(drawn) + 1)]
     return Found(drawn, label, None, source)
+
+
+def _spoken_of(arm: Calibration, given: Mapping, box, inside) -> np.ndarray:
+    """Joints drawn from a box, without those that a VEC model says nothing of."""
+    wanted = given["drawn"]
+    count = wanted
+    while True:
+        drawn = spread(arm.robot, count, box, inside, arm.point(given["point"]))
+        if arm.choice == "vec":  # coupled joints have no box of their own
+            drawn = drawn[~arm.outside_range(drawn @ arm.robot.joint_map.T).any(axis=1)]
+        if len(drawn) >= wanted:
+            return drawn[:wanted]
+        if count >= _MOST_DRAWS * wanted:
+            what = f"the model speaks of only {len(drawn)} of {count} joint values drawn"
+            raise InputError(Problem("candidates", what, f"{wanted}", "narrow the region"))
+        count *= 4
 
 
 def _region(given: Mapping, arm: Calibration):
