@@ -16,8 +16,8 @@ _MARKERS = "<>hp8d"
 
 # By quantity: column, words on the axis, targets in order of preference, the line to compare with.
 QUANTITIES = {
-    "bias": ("bias_mm", "Bias of the value (mm)", ("candidates", "measured"), 0.0),
-    "rmse": ("rmse_mm", "RMS error of the value (mm)", ("candidates", "measured"), None),
+    "bias": ("bias_mm", "Bias of the value (mm)", ("candidates",), 0.0),
+    "rmse": ("rmse_mm", "RMS error of the value (mm)", ("candidates",), None),
     "coverage": ("upper_holds", "Upper bounds that hold", ("measured", "region"), 0.95),
     "width": ("excess_mm", "Upper bound above the truth (mm)", ("measured", "region"), None),
 }
@@ -65,8 +65,8 @@ def _looks(names: set[str]) -> dict[str, tuple[str, str, str]]:
     """
     looks, used = {}, set()
     for name, (words, colour, marker) in style.assessor_style(sorted(names)).items():
-        free = next(each for each in (marker, *_MARKERS) if (colour, each) not in used)
-        used.add((colour, free))
+        free = next((each for each in (marker, *_MARKERS) if each not in used), marker)
+        used.add(free)
         looks[name] = (words, colour, free)
     return looks
 
