@@ -13,7 +13,14 @@ from kinacc import robot
 from kinacc.calibrated.record import TOOL, nominal
 from kinacc.cli import main
 from kinacc.export import description, tables
-from kinacc.geometry import Pose, exp_so3
+from kinacc.geometry import (
+    Pose,
+    compose,
+    exp_so3,
+    rotation_from_quaternion,
+    rotation_x,
+    rotation_z,
+)
 from kinacc.models import dh
 
 
@@ -159,3 +166,32 @@ def test_the_command_names_what_is_missing(tmp_path):
     assert done.exit_code == 2
     for name in ("vec_model", "dh_model", "frames"):
         assert f"{name}.parquet: no such file" in done.output
+
+
+def test_json_rebuilds_an_arm_whose_first_axis_points_down():
+    """A modified table has frames before its first row and none behind its last."""
+    text = """
+convention: modified
+dh:
+  - {theta_offset_deg: 0, d_mm: -400, a_mm: 0, alpha_deg: 180, limits_deg: [-140, 140]}
+  - {theta_offset_deg: 0, d_mm: 0, a_mm: 25, alpha_deg: 90, limits_deg: [-145, 145]}
+  - {joint: prismatic, theta_offset_deg: 0, d_mm: 5, a_mm: 250, alpha_deg: 0, limits_mm: [0, 200]}
+  - {theta_offset_deg: 0, d_mm: 50, a_mm: 0, alpha_deg: 90, limits_deg: [-90, 90]}
+"""
+    arm = replace(nominal(robot.of_text(text, "down.yaml")), choice="dh")
+    std = np.full((4, 5), np.nan)
+    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {}))
+    rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh))))
+    assert [row["type"] for row in rows] == [joint["type"] for joint in content["joints"]]
+    q = np.array([0.3, -0.7, 120.0, 0.2])
+    frame = content["first_dh_frame_in_base"]
+    turned = rotation_from_quaternion(np.array(frame["quaternion_wxyz"]))
+    here = Pose(turned, np.array(frame["position_mm"]))
+    for joint, value in zip(content["joints"], q, strict=True):
+        slides = joint["type"] == "prismatic"
+        turn = joint["theta_offset_rad"] + (0.0 if slides else value)
+        shift = joint["d_mm"] + (value if slides else 0.0)
+        here = compose(here, Pose(rotation_z(turn), np.array([0.0, 0.0, shift])))
+        here = compose(here, Pose(rotation_x(joint["alpha_rad"]), np.array([joint["a_mm"], 0, 0])))
+    wanted = arm.pose(q, None, "base", "flange")
+    np.testing.assert_allclose(here.position_mm, wanted.position_mm[0], rtol=0, atol=1e-9)

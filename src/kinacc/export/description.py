@@ -59,7 +59,7 @@ def robot_json(
     for joint in range(dh.joints):
         row: dict[str, object] = {
             "joint": joint + 1,
-            "type": "prismatic" if dh.prismatic[joint] else "revolute",
+            "type": _kind(dh, joint),
         }
         for column, name in enumerate(PARAMETERS):
             value = float(getattr(dh, name)[joint])
@@ -76,6 +76,8 @@ def robot_json(
         "units": {"length": "mm", "angle": "rad", "quaternion": "w, x, y, z"},
         "joints": joints,
         "joint_map": arm.robot.joint_map.tolist(),
+        "first_dh_frame_in_base": _frame_record(arm.robot.base),
+        "flange_in_last_dh_frame": _frame_record(arm.robot.flange),
         "base_in_instrument": _frame_record(arm.base),
         "targets_in_last_dh_frame": {
             name: _frame_record(pose) for name, pose in arm.targets.items()
@@ -98,7 +100,13 @@ def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
     writer = csv.writer(out, lineterminator="\n")
     names = [name.replace("_rad", "_deg") for name in PARAMETERS]
     writer.writerow(
-        ["joint", *names, *(f"std_{name}" for name in names), *(f"nominal_{n}" for n in names)]
+        [
+            "joint",
+            "type",
+            *names,
+            *(f"std_{name}" for name in names),
+            *(f"nominal_{n}" for n in names),
+        ]
     )
     factor = np.array([180.0 / np.pi if name.endswith("_rad") else 1.0 for name in PARAMETERS])
     fitted, given = (
@@ -107,7 +115,8 @@ def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
     )
     for joint in range(dh.joints):
         cells = np.concatenate([fitted[joint], std[joint] * factor, given[joint]])
-        writer.writerow([joint + 1, *("" if np.isnan(x) else f"{x:.12g}" for x in cells)])
+        kind = _kind(dh, joint)
+        writer.writerow([joint + 1, kind, *("" if np.isnan(x) else f"{x:.12g}" for x in cells)])
     return out.getvalue()
 
 
@@ -122,6 +131,10 @@ def _dh_of(arm: Calibration) -> DHModel:
     if not isinstance(arm.model, DHModel):
         raise TypeError("a VEC model has no DH table: choose dh")
     return arm.model
+
+
+def _kind(dh: DHModel, joint: int) -> str:
+    return "prismatic" if dh.prismatic[joint] else "revolute"
 
 
 def _number(value: float) -> float | None:
