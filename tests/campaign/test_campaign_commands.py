@@ -287,6 +287,16 @@ def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(begun):
     assert "reflector not seated" in (folder / "report" / "report.md").read_text()
 
 
+def test_a_reading_given_twice_to_the_last_digit_is_taken_once(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    label = arm.plan.points.label[int(arm.plan.route[0])]
+    words = ("record", folder, "--point", label, "--position-mm", arm.position(label))
+    assert call("campaign", *words).exit_code == 0
+    assert "is reading 1, to the last digit" in refused(folder, *words)
+    assert call("campaign", *words, "--again").exit_code == 0
+
+
 def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     arm = Arm(folder)

@@ -125,7 +125,7 @@ def next_(folder, every, output, as_json, force) -> None:
 @click.option("--std-mm", help="Noise of this reading where it is not the instrument's.")
 @click.option("--accept-implausible", is_flag=True, help="Take it however large the error is.")
 @click.option("--skip-bad", is_flag=True, help="Take the good rows of a file, name the others.")
-@click.option("--again", is_flag=True, help="Take a file that was taken before.")
+@click.option("--again", is_flag=True, help="Take what was taken before, to the last digit.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 def record(**given) -> None:
     """Take a reading, or all readings of a CSV or Parquet FILE.

@@ -116,6 +116,12 @@ def _single(given: Mapping, before: State) -> Reading:
     problems = reading.problems_of(
         plan, found, "the reading", left_out, given["accept_implausible"]
     )
+    same = [each.number for each in (*before.told, *before.in_hand)
+            if each.reading.point == point
+            and np.array_equal(each.reading.position_mm, found.position_mm)]  # fmt: skip
+    if same and not given["again"]:
+        what = f"is reading {same[-1]}, to the last digit: it was recorded before"
+        problems.append(Problem("the reading", what, fix="give --again if it is a new one"))
     if problems:
         raise InputError(problems, "Nothing was recorded")
     return found
