@@ -21,7 +21,7 @@ from kinacc.inspection.trial import Seen, Trial
 from kinacc.models import dh
 from kinacc.robot import Robot
 
-_TRIED_ROWS = 120
+_TRIED_ROWS = 80
 _FITTED_ROWS = 360
 _GOOD = 0.01  # of the points' spread: what an arm as described may leave, uncalibrated
 _SURE = 0.003  # of the spread: what leaves no more than this needs no rival
