@@ -12,7 +12,7 @@ import pytest
 from small_results import SmallResults
 
 from kinacc import provenance
-from kinacc.artifacts import check, store
+from kinacc.artifacts import check, rules, store
 from kinacc.stages.catalogue import STAGES
 from kinacc.stages.plan import planned
 
@@ -188,7 +188,7 @@ def test_provenance_with_more_than_its_keys(results):
 
 
 LIMITS = [
-    ("measurements", "measurements", "q2", 1, 100.0, "column q2"),
+    ("measurements", "measurements", "q2", 1, 100.0, "q2 beyond two turns"),
     ("measurements", "measurements", "s1", 1, 2, "column s1"),
     ("measurements", "measurements", "x_mm", 1, 1e9, "1e+09 mm in row 1"),
     ("vec", "vec_model", "error", 0, "delta_w", "'delta_w' in row 0"),
@@ -207,6 +207,24 @@ def test_values_out_of_their_limits(results, stage, artefact, column, row, value
     results.change(stage, artefact, **put(results, artefact, column, row, value))
     found = problems(results)
     assert any(f"{artefact}" in text and words in text for text in found), found
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_only_joints_that_slide_go_beyond_two_turns(slides):
+    rows = "\n".join(
+        "  - {joint: prismatic}" if slides and joint == 1 else "  - {}" for joint in range(1, 7)
+    )
+    tables = {
+        "robot": {"description": np.array([f"dh:\n{rows}\n"], dtype=object)},
+        "vec_model": {
+            "joint": np.arange(1, 7),
+            "q_min_rad": np.array([-3000.0, -1.0, -1.0, -1.0, -1.0, -1.0]),
+            "q_max_rad": np.full(6, 1.0),
+        },
+    }
+    rule = next(rule for needed, rule in rules.RULES if needed == ("vec_model", "robot"))
+    found = [problem.what for problem in rule(tables)]
+    assert found == ([] if slides else ["q_min_rad beyond two turns in row 0"])
 
 
 def test_a_key_used_twice(results):

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinacc.artifacts.columns import TURN_RAD
 from kinacc.artifacts.rule import TOLERANCE, Columns, Rule, Tables, mark
 from kinacc.errors import Problem
 
@@ -168,6 +169,29 @@ def _pose_errors(tables: Tables) -> Iterator[Problem]:
         yield from mark("pose_errors", wrong, f"another {name}", "as in the row of measurements")
 
 
+def _turns(name: str, columns: tuple[str, ...]) -> Rule:
+    """Joints that turn stay within two turns; the table has one row per joint where it names it."""
+
+    def rule(tables: Tables) -> Iterator[Problem]:
+        table, slides = tables[name], _slides(tables["robot"])
+        for column in columns or [each for each in table if each[0] == "q" and each[1:].isdigit()]:
+            values = np.asarray(table[column], dtype=float)
+            joint = np.asarray(table["joint"], dtype=int) if columns else int(column[1:])
+            turning = ~np.isin(joint, slides)
+            wrong = turning & (np.abs(values) > TURN_RAD)
+            yield from mark(name, wrong, f"{column} beyond two turns", f"at most {TURN_RAD:g} rad")
+
+    return rule
+
+
+def _slides(table: Columns) -> list[int]:
+    """Joints (from 1) of the described arm that slide."""
+    import yaml
+
+    rows = yaml.safe_load(str(table["description"][0]))["dh"]
+    return [joint for joint, row in enumerate(rows, 1) if row.get("joint") == "prismatic"]
+
+
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("measurements",), _unit_quaternions("measurements")),
     (("measurements",), _measurements),
@@ -179,6 +203,10 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("vec_model",), _vec_model),
     (("vec_model", "measurements"), _every_joint("vec_model")),
     (("dh_model", "measurements"), _every_joint("dh_model")),
+    (("measurements", "robot"), _turns("measurements", ())),
+    (("assessment_points", "robot"), _turns("assessment_points", ())),
+    (("vec_model", "robot"), _turns("vec_model", ("q_min_rad", "q_max_rad"))),
+    (("joint_bias", "robot"), _turns("joint_bias", ("from_rad", "to_rad"))),
     (("pose_errors", "measurements"), _pose_errors),
     (("residuals",), _residuals),
     (("residuals", "pose_errors"), _residuals_told),

@@ -17,6 +17,8 @@ from kinacc.artifacts.columns import (
     JOINTS,
     JOINTS_MAX,
     REACH_MM,
+    SLIDES,
+    TRAVEL_MM,
     TURN_RAD,
     Artefact,
     Column,
@@ -140,8 +142,8 @@ VEC_MODEL = Artefact(
         magnitude(
             "std", "mm for delta, rad for eps", "standard deviation of the coefficient", 1e4, True
         ),
-        real("q_min_rad", "rad", "joint position mapped to -1", -TURN_RAD, TURN_RAD),
-        real("q_max_rad", "rad", "joint position mapped to +1", -TURN_RAD, TURN_RAD),
+        real("q_min_rad", "rad", f"joint position mapped to -1, {SLIDES}", -TRAVEL_MM, TRAVEL_MM),
+        real("q_max_rad", "rad", f"joint position mapped to +1, {SLIDES}", -TRAVEL_MM, TRAVEL_MM),
         *_DH,
     ),
     ("joint", "error", "direction", "order"),

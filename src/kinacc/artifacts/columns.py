@@ -136,9 +136,11 @@ REACH_MM = 1.0e5  # no laser tracker sees further than 100 m
 ERROR_MM = 1.0e3
 ERROR_MRAD = 4.0e3  # beyond half a turn, pi rad, an orientation error has no meaning
 TURN_RAD = 4.0 * math.pi
+TRAVEL_MM = 2.0e4  # of a joint that slides; joints that turn are held to TURN_RAD by a rule
+SLIDES = "mm where it slides"
 
 JOINTS = (
-    real("q*", "rad", "reported position of each joint", -TURN_RAD, TURN_RAD),
+    real("q*", "rad", f"reported position of each joint, {SLIDES}", -TRAVEL_MM, TRAVEL_MM),
     Column(
         "s*",
         "int8",

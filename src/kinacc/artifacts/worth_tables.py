@@ -6,7 +6,8 @@ from kinacc.artifacts.allowed import COMPARISONS, ESTIMATES
 from kinacc.artifacts.columns import (
     ERROR_MM,
     JOINTS_MAX,
-    TURN_RAD,
+    SLIDES,
+    TRAVEL_MM,
     Artefact,
     error_vector,
     magnitude,
@@ -31,6 +32,8 @@ MODEL_SELECTION = Artefact(
     ),
     ("model",),
 )
+_TRAVEL = (-TRAVEL_MM, TRAVEL_MM)
+
 JOINT_BIAS = Artefact(
     "joint_bias",
     "Position errors by region of every joint, robot base: what a model leaves systematically.",
@@ -38,8 +41,8 @@ JOINT_BIAS = Artefact(
         text("comparison", "what is compared with what", COMPARISONS),
         text("estimate", "train or cross_validated", ESTIMATES),
         whole("joint", "joint number, from 1", 1, JOINTS_MAX),
-        real("from_rad", "rad", "DH joint position where the region begins", -TURN_RAD, TURN_RAD),
-        real("to_rad", "rad", "DH joint position where the region ends", -TURN_RAD, TURN_RAD),
+        real("from_rad", "rad", f"where the region of the DH joint begins, {SLIDES}", *_TRAVEL),
+        real("to_rad", "rad", f"where the region of the DH joint ends, {SLIDES}", *_TRAVEL),
         whole("n", "target points in the region", 1),
         *error_vector("the mean position error"),
         *(

@@ -36,7 +36,7 @@ class Experiment:
     frames_estimated: bool = True
     hayati_joints: tuple[int, ...] = ()
     rotation_weight_mm_per_rad: float = 500.0
-    threshold: float = 1e-3
+    threshold: float = 1e-2
 
 
 @dataclass(frozen=True)
