@@ -35,6 +35,17 @@ def slopes(
     return np.array(columns).T
 
 
+def two_variances(r: np.ndarray, fitted: np.ndarray) -> np.ndarray:
+    """Variance of every residual, one for positions and one for rotations: those whose expected
+    sums of squares, with the projector that leaves out the ``fitted`` columns, are those seen."""
+    turned = np.tile([False] * 3 + [True] * 3, r.size // 6)
+    rest = np.eye(r.size) - fitted @ fitted.T
+    kinds = (~turned, turned)
+    expected = [[(rest[np.ix_(one, other)] ** 2).sum() for other in kinds] for one in kinds]
+    position, rotation = np.linalg.solve(expected, [(r[one] ** 2).sum() for one in kinds])
+    return np.where(turned, rotation, position)
+
+
 def truncated_fit(
     function: Callable[[np.ndarray], np.ndarray],
     nominal: np.ndarray,
@@ -59,7 +70,8 @@ def truncated_fit(
             break
     cost = float(function(x) @ function(x))
     rank = int(keep.sum())
-    variance = cost / (r.size - rank)
-    std = unit * np.sqrt(variance * ((right[keep].T / values[keep]) ** 2).sum(axis=1))
+    solving = (right[keep].T / values[keep]) @ left.T[keep]
+    variance = two_variances(function(x), left[:, keep])
+    std = unit * np.sqrt((solving**2 * variance).sum(axis=1))
     lost = (right[~keep] ** 2).sum(axis=0)  # share of each parameter in undetermined directions
     return {"x": x, "rank": rank, "values": values, "cost": cost, "std": std, "lost": lost}

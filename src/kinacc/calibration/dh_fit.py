@@ -98,6 +98,7 @@ def fit(
         threshold=threshold,
         frames=coords.size,
         name="DH fit",
+        is_rotation=observations.is_rotation if observations.has_rotation.any() else None,
     )
     solution, weights = refined.minimise(task, observations, loss)
     vector, found = held.copy(), np.full(held.size, np.nan)

@@ -58,6 +58,13 @@ class Observations:
         return 3 * len(self) + 3 * int(self.has_rotation.sum())
 
     @property
+    def is_rotation(self) -> np.ndarray:
+        """True (components,) where a residual is one of an orientation; row by row."""
+        kinds = np.array([False] * 3 + [True] * 3)
+        keep = np.repeat(np.stack([np.ones(len(self), bool), self.has_rotation], 1), 3, axis=1)
+        return np.broadcast_to(kinds, keep.shape)[keep]
+
+    @property
     def measured(self) -> Pose:
         """Measured frames (n,); rotations are NaN where none was measured."""
         return Pose(self.rotation, self.position_mm)

@@ -24,6 +24,7 @@ class Task:
     """What ``truncated.minimise_truncated`` is asked, with priors by their standard deviation.
 
     ``prior_std`` (P,) in the parameters' own units about ``nominal``, inf for none.
+    ``is_rotation`` (m,) of the residuals where some are of rotations, else None.
     """
 
     system: System
@@ -34,6 +35,7 @@ class Task:
     threshold: float
     frames: int
     name: str
+    is_rotation: np.ndarray | None = None
 
     def solved(
         self, start: np.ndarray, variance: float, weights: Weights | None = None
@@ -50,6 +52,7 @@ class Task:
             frames=self.frames,
             name=self.name,
             prior=np.sqrt(variance) / self.prior_std if known.any() else None,
+            is_rotation=self.is_rotation,
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr
 
-from kinacc.calibration import solve
+from kinacc.calibration import solve, variances
 from kinacc.calibration.solve import Solution, Spectrum, System
 
 # Going back to nominal where the data is (nearly) blind costs a little: the optimum of a truncated
@@ -26,18 +26,22 @@ def minimise_truncated(
     frames: int = 0,
     name: str = "fit",
     prior: np.ndarray | None = None,
+    is_rotation: np.ndarray | None = None,
 ) -> Solution:
     """Gauss-Newton with truncated SVD, from ``start`` (P,), leaning on ``nominal`` (P,).
 
     Two blocks are judged one after the other: the first ``frames`` parameters (base and targets),
     then the others after what the frames can express is projected out of them. In each, directions
     whose singular value is below a share of the block's largest (``FRAME_THRESHOLD``, then
-    ``threshold``) keep their nominal value; frame directions between the two are fitted, but count
-    as undetermined in what is said of the solution; ``scale`` (P,) is the unit in which
+    ``threshold``) keep their nominal value, as do frame directions that the arm at ``nominal`` does
+    not show; frame directions between the two are fitted, but count as undetermined in what is
+    said of the solution; ``scale`` (P,) is the unit in which
     displacement is measured (mm, and rad of one mrad).
     ``prior`` (P,): residual standard deviation over prior standard deviation of every parameter, 0
     for none. It adds ``prior (x - nominal)`` to the residuals, and a direction that the data leave
     open is determined where a prior speaks of it. ``cost`` stays that of the data.
+    ``is_rotation`` (m,): residuals of rotations, which have a variance of their own in the
+    covariance (not in the estimates); None where all are of one kind.
     Converged as ``ridge.minimise_with_prior`` is. Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
@@ -47,15 +51,20 @@ def minimise_truncated(
     def objective(at: np.ndarray) -> float:
         return system.cost(at) + held.cost(at)
 
-    cost, ranks, last = objective(x), None, np.inf
+    # The errors of an arm tilt axes that are parallel by its description: along what that shows
+    # nothing of, a fit would follow noise by many mm.
+    shown = None
+    if frames:
+        described, _ = solve.triangle(system, nominal, scale)
+        shown = _Split.of(held.joined(described, nominal), held, threshold, None).frames.rank
+    cost, ranks, last = objective(x), (shown, None), np.inf
     iterations = 0
     while last > solve.STEP_TOLERANCE and iterations < solve.MAX_ITERATIONS:
         iterations += 1
         factor, count = solve.triangle(system, x, scale)
         # A rank that has been lost is not taken back, so the iteration cannot swing between two.
-        split = _Split.of(
-            held.joined(factor, x), held, threshold, ranks if iterations > 3 else None
-        )
+        most = ranks if iterations > 3 else (shown, None)
+        split = _Split.of(held.joined(factor, x), held, threshold, most)
         ranks = split.ranks
         step = scale * split.step(held.displacement(x))
         before = cost
@@ -67,7 +76,7 @@ def minimise_truncated(
     factor, count = solve.triangle(system, x, scale)
     split = _Split.of(held.joined(factor, x), held, threshold, ranks)
     cost = float(np.sum(factor[:, -1] ** 2))
-    root = split.root()
+    root = of_fit = split.root()
     fitted = sum(split.ranks)
     if weight.any():
         fitted = float(np.sum((factor[:, :-1] @ root) ** 2))  # what the data, not the prior, decide
@@ -75,9 +84,13 @@ def minimise_truncated(
     variance = cost / freedom if freedom > 0 else np.nan
     told = split
     if threshold > FRAME_THRESHOLD:  # fitted as they are, weak frames still count as undetermined
-        told = _Split.of(held.joined(factor, x), held, threshold, None, threshold)
+        told = _Split.of(held.joined(factor, x), held, threshold, (shown, None), threshold)
         root = told.root()
     covariance = variance * (root @ root.T) * np.outer(scale, scale)
+    if is_rotation is not None and freedom > 0:
+        roots = scale[:, None] * of_fit, scale[:, None] * root
+        along = variances.along_root(system, x, is_rotation, *roots, variance)
+        covariance = roots[1] @ along @ roots[1].T
     return Solution(
         x=x,
         std=np.where(told.touched(), np.nan, np.sqrt(np.diag(covariance))),
@@ -209,7 +222,7 @@ class _Split:
         factor: np.ndarray,
         held: _Held,
         threshold: float,
-        most: tuple[int, int] | None,
+        most: tuple[int | None, int | None] | None,
         frame_threshold: float = FRAME_THRESHOLD,
     ) -> _Split:
         count = held.frames
