@@ -358,6 +358,32 @@ def test_other_code_than_that_installed_is_a_note(results, monkeypatch):
     assert any("made with other code" in note for note in report.datasets[0].notes)
 
 
+def with_other_inputs(results, names):
+    for name in names:
+        rewrite(
+            results.path(name),
+            lambda table: table.replace_schema_metadata(
+                table.schema.metadata | {b"inputs_hash": b"with a robot file"}
+            ),
+        )
+
+
+def test_a_robot_file_nobody_named_is_a_note_but_one_stale_stage_is_a_problem(results):
+    read_it = [
+        name
+        for stage in STAGES.values()
+        if stage.files and not (stage.is_figure or stage.scattered)
+        for name in stage.outputs
+        if results.path(name).exists()
+    ]
+    with_other_inputs(results, [name for name in read_it if name.startswith("dh_")])
+    the_one(problems(results), "dh_model.parquet: inputs_hash")
+    with_other_inputs(results, read_it)
+    report = check.check_results(results.root)
+    assert not [text for text in problems(results) if "inputs_hash with a robot" in text]
+    assert any("robot file is not checked" in note for note in report.datasets[0].notes)
+
+
 def test_what_a_stopped_run_left_is_a_note(results):
     (results.folder / ".study.parquet.12.partial").write_bytes(b"x")
     report = check.check_results(results.root)

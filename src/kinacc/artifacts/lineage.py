@@ -28,6 +28,7 @@ def check_lineage(
     """
     problems = list(_one_version(folder, marks))
     older: list[str] = []
+    of_robot_file: dict[str, list[Problem]] = {}
     for stage in STAGES.values():
         made = [name for name in stage.outputs if name in marks]
         problems += _one_run(folder, made, marks)
@@ -36,12 +37,24 @@ def check_lineage(
         if not made or stage.scattered or (plan is None and "measurements_file" in _roles(stage)):
             continue
         found, is_current = _held_to_inputs(folder, stage, marks[made[0]], plan)
-        problems += found
+        if plan is None and stage.files:
+            of_robot_file[made[0]] = found
+        else:
+            problems += found
         older += [] if is_current else made
-    if not older:
-        return problems, []
-    names = ", ".join(older)
-    return problems, [f"{folder}: made with other code or library versions than installed: {names}"]
+    notes = []
+    if len(of_robot_file) > 1 and all(of_robot_file.values()):
+        # One robot serves all stages: where every one that reads it differs, it has a file.
+        names = ", ".join(of_robot_file)
+        notes.append(
+            f"{folder}: its robot file is not checked without --config: {names}"
+        )
+    else:
+        problems += [each for found in of_robot_file.values() for each in found]
+    if older:
+        names = ", ".join(older)
+        notes.append(f"{folder}: made with other code or library versions than installed: {names}")
+    return problems, notes
 
 
 def made_without(folder: Path, artefact: str, marks: Marks) -> bool:
