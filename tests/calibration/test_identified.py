@@ -92,7 +92,7 @@ def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
     said = [text for text, _ in identified.statements(fit, told, data)]
     assert (
         "a shift of the base along y of the robot's base cannot be told from a shift of the tool "
-        "along z of the last frame (these poses show it too little, others need not)"
+        "along z of the last frame (these poses show it too little; others may)"
     ) in said
     found = {each.name: each for each in identified.parameters(fit, told, data)}
     assert found["t0.z_mm"].status == "undetermined"

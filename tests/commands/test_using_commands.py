@@ -46,7 +46,7 @@ def test_help_has_an_example(name):
 def test_fitted_says_what_the_fits_are_worth(folder, tmp_path):
     shown = call("fitted", folder)
     assert shown.exit_code == 0, shown.output
-    assert "is selected: the VEC model takes" in shown.output
+    assert "is selected: with VEC the squared error" in shown.output
     assert "d of joint 2 and d of joint 3 appear only as their difference" in shown.output
     answer = json.loads(call("fitted", folder, "--json").output)
     table = pq.read_table(folder / "residuals.parquet").to_pydict()

@@ -46,9 +46,7 @@ def check_lineage(
     if len(of_robot_file) > 1 and all(of_robot_file.values()):
         # One robot serves all stages: where every one that reads it differs, it has a file.
         names = ", ".join(of_robot_file)
-        notes.append(
-            f"{folder}: its robot file is not checked without --config: {names}"
-        )
+        notes.append(f"{folder}: its robot file is not checked without --config: {names}")
     else:
         problems += [each for found in of_robot_file.values() for each in found]
     if older:

@@ -11,7 +11,7 @@ from kinacc.calibration.uncertainty import is_angle
 from kinacc.geometry import skew
 
 LEAST = 0.02  # of the largest part of a direction; less is not worth a word
-WEAK = "(these poses show it too little, others need not)"
+WEAK = "(these poses show it too little; others may)"
 _MOST_NAMES = 4
 _SAME = 0.02  # relative difference of parts that count as equal
 _CALLED = {

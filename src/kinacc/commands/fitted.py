@@ -150,7 +150,9 @@ def _why(answer: Mapping) -> str:
     gain, error = answer["gain_of_vec_mm2"], answer["gain_std_error_mm2"]
     if gain is None:
         return ": nothing was held out to judge the VEC model by"
+    change = f"{abs(gain):.4f} mm^2 {'less' if gain > 0 else 'more'}"
     if error is None:
-        return f" (the VEC model takes {gain:.4f} mm^2 off)"
-    off = f"takes {gain:.4f} +- {error:.4f} mm^2 off the squared error of held-out rows"
-    return f": the VEC model {off}"
+        return f": with VEC the squared error of held-out rows is {change}"
+    change = change.replace(" mm^2", f" +- {error:.4f} mm^2")
+    need = "VEC has to be less by more than two standard errors"
+    return f": with VEC the squared error of held-out rows is {change}; {need}"

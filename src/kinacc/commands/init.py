@@ -138,7 +138,7 @@ def _asked(guess: Guess) -> Guess:
     for setting, words in guess.assumed.items():
         click.echo(f"Not stated in the file: {words}.")
         if setting == "orientation":
-            answer = click.prompt(
+            answer = _prompt(
                 "Orientation (Euler capitals: about moving axes, small: about fixed axes)",
                 type=click.Choice(_CONVENTIONS),
                 default=guess.section["orientation"]["convention"],
@@ -148,12 +148,23 @@ def _asked(guess: Guess) -> Guess:
             units = ["mm", "m"] if setting == "length_unit" else ["deg", "rad"]
             now = guess.section["orientation"]["unit"]
             now = now if setting == "angle_unit" else guess.section[setting]
-            unit = click.prompt("Unit", type=click.Choice(units), default=now)
+            unit = _prompt("Unit", type=click.Choice(units), default=now)
             changed = (
                 {"orientation": {"unit": unit}} if setting == "angle_unit" else {setting: unit}
             )
             guess = guess.but(changed)
     return guess
+
+
+def _prompt(question: str, **how: object) -> str:
+    """The answer to a question. InputError where nobody is there to answer."""
+    from kinacc.errors import InputError, Problem
+
+    try:
+        return click.prompt(question, **how)
+    except click.Abort:
+        fix = "run it in a terminal, give the option, or --yes to take the guesses"
+        raise InputError(Problem(f"question: {question}", "was not answered", fix=fix)) from None
 
 
 def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]:
@@ -169,7 +180,7 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     if ask:
         names = [n for n in robots.shipped() if robots.load(n).dh.joints == guess.joints]
         click.echo(f"Shipped robots of {guess.joints} axes: {', '.join(names)}.")
-        answer = click.prompt(
+        answer = _prompt(
             "Robot (shipped name, robot file, URDF file, or 'new' for a template)",
             default=found or "new",
         )

@@ -27,7 +27,7 @@ _DATASETS = """\
 # Data sets by name (letters, digits, _ and -); results go to results/<name>/.
 datasets:
   mh180: # the synthetic arm of the paper
-    robot: mh180 # a shipped robot (mh180, ur10) or the path of a robot file
+    robot: mh180 # a shipped robot (docs/robots.md) or the path of a robot file
     measurements:
       source: synthetic
 """
