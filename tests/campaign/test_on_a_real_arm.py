@@ -64,6 +64,17 @@ def begun(ur10_d, folder, *more):
     return campaigns.open_(folder).plan
 
 
+def test_candidates_the_calibration_is_unsure_of_are_warned_of(ur10_d, tmp_path):
+    """The series does not tell the base's y from the tool's z."""
+    done = call("campaign", "start", tmp_path / "campaign", "--calibration", ur10_d[0], "--robot",
+                "ur10", "--model", "dh", "--region", "fitted", "--drawn", 20, "--noise-mm", 0.05,
+                "--json")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["prediction"]["undetermined"] > 0
+    assert "did not determine moves" in done.stderr
+    assert "docs/fitting.md" in done.stderr
+
+
 def same(said, wanted):
     assert [each["target"] for each in said] == [each.target for each in wanted]
     for mine, theirs in zip(said, wanted, strict=True):

@@ -15,7 +15,7 @@ from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.streams import key_of
 from kinacc.assess.world import drawn_world
-from kinacc.campaign.power import Aim, Row, rows, smallest_budget
+from kinacc.campaign.power import Aim, Row, repetitions_to_show, rows, smallest_budget
 from kinacc.campaign.simulate import Outcome, Pool, outcomes
 from kinacc.cli import main
 from kinacc.errors import InputError
@@ -74,10 +74,24 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
     assert row.broken == 0.25
     assert row.within == 0.5
     assert row.holds == 0.5
+    assert (row.holding, row.judged) == (1, 2)
+    assert row.holds_interval == pytest.approx((0.01258, 0.98742), abs=1e-5)  # Clopper, Pearson
     assert row.excess_mm == pytest.approx(0.0)
     assert row.decisions == {"accept": 0.5, "reject": 0.25, "undecided": 0.25}
     assert row.width_mm[0] == pytest.approx(0.2)
     assert row.width_mm[2] == math.inf
+
+
+def test_bounds_that_contradict_each_other_are_no_width_below_zero():
+    (row,) = rows([outcome(10, 1.1, 0.9, 0), outcome(10, 0.9, 1.2, 1)], Aim(CANDIDATES))
+    assert row.width_mm[0] == 0.0
+    assert row.width_mm[2] == pytest.approx(0.3)
+
+
+def test_repetitions_named_are_the_fewest_that_show_the_share():
+    # All of n hold: the lower limit is 0.025 ** (1 / n), 0.7941 for 16 and 0.8049 for 17.
+    assert repetitions_to_show(1.0, 0.8) == 17
+    assert repetitions_to_show(0.8, 0.8) is None
 
 
 def test_the_budget_named_is_enough_on_all_errors_and_beyond():
@@ -111,9 +125,10 @@ def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path
              "--width-mm", "0.2", "--repetitions", 6, "--budget", 15, "--budget", 60)  # fmt: skip
     shown = call(*words, "--picture", picture)
     assert shown.exit_code == 0, shown.output
-    assert (
-        "60 readings give bounds at most 0.2 mm apart in at least 80% of campaigns" in shown.output
-    )
+    assert "60 readings gave bounds at most 0.2 mm apart in 6 of 6 simulated" in shown.output
+    # Six of six leave room for a share of 0.025 ** (1 / 6) = 54 %.
+    assert "at least 54% of campaigns with 97.5 % confidence, not yet 80%" in shown.output
+    assert "--repetitions 17 would" in shown.output
     assert picture.stat().st_size > 1000
     content = json.loads(call(*words, "--json").stdout)
     assert content["budget"] == 60

@@ -12,6 +12,7 @@ from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.campaign.simulate import Outcome, binomial_interval, quantiles
 
 VERDICTS = (ACCEPT, REJECT, UNDECIDED)
+_MOST_REPETITIONS = 2000
 
 
 @dataclass(frozen=True)
@@ -29,11 +30,12 @@ class Aim:
 class Row:
     """Simulated campaigns of one budget on one kind of errors.
 
-    ``width_mm``: 5, 50 and 95 % quantiles of upper minus lower bound (infinite: no bound).
+    ``width_mm``: 5, 50 and 95 % quantiles of upper minus lower bound, 0 where they contradict each
+    other (infinite: no bound).
     ``stated``: share with an upper bound; ``broken``: share whose upper bound rests on an
     assumption that is not true of the errors simulated. Of the upper bounds stated, those left out:
     ``excess_mm``, mean of bound minus truth, and ``holds``, share at or above the truth (NaN where
-    there are none).
+    there are none); ``judged`` is how many these are, ``holding`` how many of them hold.
     ``within``: share whose width is as wanted, ``interval`` its exact 95 % limits.
     ``decisions``: share by decision on the tolerance.
     """
@@ -51,6 +53,15 @@ class Row:
     within: float
     interval: tuple[float, float]
     decisions: dict[str, float]
+    judged: int = 0
+    holding: int = 0
+
+    @property
+    def holds_interval(self) -> tuple[float, float]:
+        """Exact 95 % limits of ``holds``; NaN where no bound is judged."""
+        if not self.judged:
+            return math.nan, math.nan
+        return binomial_interval(self.holding, self.judged)
 
     def reaches(self, aim: Aim) -> float:
         """Share of campaigns that do what is wanted: the width, the right decision, or both."""
@@ -84,10 +95,21 @@ def smallest_budget(found: Sequence[Row], aim: Aim) -> int | None:
     return enough
 
 
+def repetitions_to_show(share: float, power: float) -> int | None:
+    """The fewest campaigns of which a ``share`` shows ``power`` with 97.5 % confidence; None if
+    that takes more than is worth simulating."""
+    for count in range(2, _MOST_REPETITIONS + 1):
+        hits = math.floor(share * count + 1e-9)
+        if binomial_interval(hits, count)[0] >= power:
+            return count
+    return None
+
+
 def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
     count = len(group)
     stated = [each for each in group if not math.isnan(each.said.upper_mm)]
     sound = [each for each in stated if not each.broken]
+    holds = [each.said.upper_mm >= each.truth_mm for each in sound]
     wanted = math.inf if aim.width_mm is None else aim.width_mm
     within = sum(each.width_mm <= wanted for each in stated)
     said = []
@@ -99,14 +121,16 @@ def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
         float(np.mean([each.readings for each in group])),
         count,
         float(np.mean([each.truth_mm for each in group])),
-        tuple(quantiles([each.width_mm for each in group], (0.05, 0.5, 0.95))),
+        tuple(quantiles([max(each.width_mm, 0.0) for each in group], (0.05, 0.5, 0.95))),
         _mean([each.said.upper_mm - each.truth_mm for each in sound]),
-        _mean([each.said.upper_mm >= each.truth_mm for each in sound]),
+        _mean(holds),
         len(stated) / count,
         (len(stated) - len(sound)) / count,
         within / count,
         binomial_interval(within, count),
         {kind: said.count(kind) / count for kind in VERDICTS} if said else {},
+        len(holds),
+        sum(holds),
     )
 
 

@@ -155,6 +155,10 @@ def as_sheet(asked: Question, found: list[Row]) -> Sheet:
               "share whose bound rests on an assumption these errors break"),
         Field("holds", column(lambda row: row.holds), "1",
               "share of the other upper bounds that hold"),
+        Field("held", np.array([_counted(row) for row in found], dtype=object), "",
+              "the same, counted"),
+        Field("holds_low", column(lambda row: row.holds_interval[0]), "1", "95 % limits", False),
+        Field("holds_high", column(lambda row: row.holds_interval[1]), "1", "95 % limits", False),
     ]  # fmt: skip
     if aim.width_mm is not None:
         fields += [
@@ -189,8 +193,12 @@ def as_sheet(asked: Question, found: list[Row]) -> Sheet:
 _TARGETS = {"candidates": "all", "measured": "those measured"}
 
 
+def _counted(row: Row) -> str | None:
+    return f"{row.holding} of {row.judged}" if row.judged else None
+
+
 def in_words(asked: Question, found: list[Row]) -> str:
-    """The budget that does, or that none did."""
+    """The budget that does, or that none did, and how surely so many repetitions show it."""
     aim = asked.aim
     if not _aims(aim):
         return "give --width-mm or --tolerance-mm to be told a budget"
@@ -199,17 +207,38 @@ def in_words(asked: Question, found: list[Row]) -> str:
         wanted.append(f"bounds at most {aim.width_mm:g} mm apart")
     if aim.tolerance_mm is not None:
         wanted.append(f"a decision on {aim.tolerance_mm:g} mm")
-    said = f"{' and '.join(wanted)} in at least {aim.power:.0%} of campaigns"
+    said = " and ".join(wanted)
     enough = power.smallest_budget(found, aim)
     if enough is None:
-        most = max(row.budget for row in found)
-        best = min(row.reaches(aim) for row in found if row.budget == most)
-        return f"no budget up to {most} gives {said} on all errors: {best:.0%} with {most}"
+        return _none_did(asked, found, said)
     share = min(row.reaches(aim) for row in found if row.budget == enough)
-    low, _ = simulate.binomial_interval(round(share * asked.repetitions), asked.repetitions)
+    hits = round(share * asked.repetitions)
+    low, _ = simulate.binomial_interval(hits, asked.repetitions)
+    counted = f"{hits} of {asked.repetitions}"
+    if low >= aim.power:
+        return (
+            f"{enough} readings give {said} in at least {aim.power:.0%} of campaigns on all errors "
+            f"simulated: {counted} there (at least {low:.0%} with 97.5 % confidence)"
+        )
+    needed = power.repetitions_to_show(share, aim.power)
+    more = "only more readings would" if needed is None else f"--repetitions {needed} would, if"
+    more += "" if needed is None else " as large a share of them does"
     return (
-        f"{enough} readings give {said} on all errors simulated: {share:.0%} there "
-        f"(at least {low:.0%} with 97.5 % confidence)"
+        f"{enough} readings gave {said} in {counted} simulated campaigns or more on all errors; "
+        f"that shows at least {low:.0%} of campaigns with 97.5 % confidence, not yet "
+        f"{aim.power:.0%}: {more}"
+    )
+
+
+def _none_did(asked: Question, found: list[Row], said: str) -> str:
+    aim, most = asked.aim, max(row.budget for row in found)
+    best = min(row.reaches(aim) for row in found if row.budget == most)
+    hits = round(best * asked.repetitions)
+    _, high = simulate.binomial_interval(hits, asked.repetitions)
+    few = f"; so few repetitions do not rule out {high:.0%}" if high >= aim.power else ""
+    return (
+        f"no budget up to {most} gave {said} in {aim.power:.0%} of the simulated campaigns on all "
+        f"errors: {hits} of {asked.repetitions} with {most}{few}"
     )
 
 

@@ -24,11 +24,12 @@ from kinacc.geometry import invert
 
 if TYPE_CHECKING:
     from kinacc.campaign.forecast import Forecast
+    from kinacc.campaign.foreseen import Unsure
 
 
 def start(given: Mapping) -> None:
     """Begin a campaign and say what was begun."""
-    from kinacc.campaign import begin
+    from kinacc.campaign import begin, foreseen
     from kinacc.commands import campaign_candidates, campaign_options, rows
 
     problems: list[Problem] = []
@@ -70,10 +71,11 @@ def start(given: Mapping) -> None:
     )  # fmt: skip
     folder.start(given["folder"], begun)
     merged = len(found.joints) - len(points)
-    _say_begun(given, begun, merged)
+    unsure = foreseen.unsure(arm, points, instruments, given["point"], limits.implausible_mm)
+    _say_begun(given, begun, merged, unsure)
 
 
-def _say_begun(given: Mapping, begun: Plan, merged: int) -> None:
+def _say_begun(given: Mapping, begun: Plan, merged: int, unsure: Unsure | None) -> None:
     content = {
         "folder": str(given["folder"]),
         **begun.about,
@@ -83,7 +85,10 @@ def _say_begun(given: Mapping, begun: Plan, merged: int) -> None:
         "budget": begun.assessor.measurements,
         "implausible_mm": begun.limits.implausible_mm,
         "joint_tolerance_deg": math.degrees(begun.limits.joint_rad),
+        "prediction": None if unsure is None else unsure.as_facts(),
     }
+    for line in [] if unsure is None else unsure.in_words():
+        click.echo(line, err=True)
     if given["as_json"]:
         click.echo(json.dumps(content, indent=1))
         return

@@ -53,7 +53,7 @@ def _sizes(ax: Axes, points: Columns) -> None:
             ax.plot(place[chosen], size[order][chosen], marker, ms=2.5, color=colour, label=label)
     ax.set(xlabel="Measured points, largest first", ylabel="Size of the error, mm")
     if len(order):
-        ax.legend(loc="best", title="mean reading, with limits")
+        _legend_above(ax, "mean reading, with limits")
 
 
 def _growth(ax: Axes, bounds: Columns, first_visit: int) -> None:
@@ -77,9 +77,21 @@ def _growth(ax: Axes, bounds: Columns, first_visit: int) -> None:
     ax.axvline(first_visit, color=style.FAINT, lw=0.8, zorder=0)
     ax.set(xlabel="Readings")
     if drawn:
-        ax.legend(loc="best")
+        _legend_above(ax)
     else:
         ax.text(0.5, 0.5, "nothing can be said yet", transform=ax.transAxes, ha="center")
+
+
+def _legend_above(ax: Axes, title: str | None = None) -> None:
+    """Where it covers no limits, however many points there are."""
+    ax.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=2,
+        title=title,
+        title_fontsize=style.SMALL_PT,
+        alignment="left",
+    )
 
 
 def _place(ax: Axes, height: float) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinacc.figures import style
@@ -19,6 +20,7 @@ _STYLES = (
     (style.SKY, "P"),
     (style.INK, "X"),
 )
+_POWER_TOP = 1.04
 
 
 class Curve(NamedTuple):
@@ -38,18 +40,23 @@ def draw(
 ) -> Figure:
     """Draw width and power against budget; ``enough`` is the smallest budget that does."""
     with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 2.7)
+        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.0)
         left, right = figure.subplots(1, 2, sharex=True)
+        top = _top(curves, wanted_mm)
         for number, curve in enumerate(curves):
             colour, marker = _STYLES[number % len(_STYLES)]
-            low, middle, high = np.where(np.isfinite(curve.width_mm), curve.width_mm, np.nan).T
-            left.fill_between(curve.budget, low, high, color=colour, alpha=0.15, lw=0)
+            _band(left, curve, colour, top)
+            middle = np.where(np.isfinite(curve.width_mm[:, 1]), curve.width_mm[:, 1], np.nan)
             left.plot(curve.budget, middle, color=colour, marker=marker, ms=3, label=curve.name)
             right.plot(curve.budget, curve.power, color=colour, marker=marker, ms=3)
+        left.set_ylim(0.0, top)
+        right.set_ylim(0.0, _POWER_TOP)
         if wanted_mm is not None:
             left.axhline(wanted_mm, color=style.VERMILION, lw=1.0, ls=(0, (6, 2)))
+            style.outside_label(left, wanted_mm / top, "wanted", style.VERMILION)
         if power is not None:
             right.axhline(power, color=style.VERMILION, lw=1.0, ls=(0, (6, 2)))
+            style.outside_label(right, power / _POWER_TOP, f"{power:.0%}\nwanted", style.VERMILION)
         if enough is not None:
             for ax in (left, right):
                 ax.axvline(enough, color=style.MUTED, lw=0.8, ls=(0, (1, 1)))
@@ -61,11 +68,27 @@ def draw(
                 fontsize=style.SMALL_PT,
             )
         left.set(xlabel="Readings allowed", ylabel="Upper minus lower bound, mm")
-        left.set_title("median, 5 to 95 %", fontsize=style.SMALL_PT, loc="left")
-        left.set_ylim(bottom=0.0)
-        left.legend(loc="best")
-        right.set(xlabel="Readings allowed", ylabel="Share of campaigns that reach the aim")
+        title = "median, 5 to 95 % of campaigns; to the top where some state no bound"
+        figure.legend(loc="outside lower center", ncols=min(len(curves), 4), title=title,
+                      title_fontsize=style.SMALL_PT)  # fmt: skip
+        right.set(xlabel="Readings allowed", ylabel="Share that reach the aim")
         if power is None:
-            right.set_ylabel("Share of campaigns with a bound")
-        right.set_ylim(0.0, 1.04)
+            right.set_ylabel("Share with a bound")
     return figure
+
+
+def _top(curves: Sequence[Curve], wanted_mm: float | None) -> float:
+    """Height of the axis: all widths that are finite, and the one wanted."""
+    widths = np.concatenate([curve.width_mm.ravel() for curve in curves])
+    highest = max(widths[np.isfinite(widths)], default=0.0)
+    return 1.08 * max(float(highest), wanted_mm or 0.0) or 1.0
+
+
+def _band(ax: Axes, curve: Curve, colour: str, top: float) -> None:
+    """From the narrow to the wide campaigns; to the top where more than 5 % state no bound."""
+    low, _, high = curve.width_mm.T
+    stated = np.isfinite(low)
+    high = np.where(np.isfinite(high), high, top)
+    ax.fill_between(curve.budget, low, high, where=stated, color=colour, alpha=0.15, lw=0)
+    for edge in (low, high):
+        ax.plot(curve.budget[stated], edge[stated], color=colour, lw=0.5, alpha=0.6)

@@ -1,0 +1,75 @@
+"""Whether readings of the candidates can be judged against the calibration at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinacc.calibrated.predict import predict
+from kinacc.calibrated.record import Residual
+from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
+from kinacc.campaign import begin
+from kinacc.campaign.foreseen import unsure
+from kinacc.campaign.instrument import instruments
+from kinacc.planning.candidates import spread
+
+USED = instruments(("tracker=0.05",), "base")
+
+
+@pytest.fixture(scope="module")
+def points(arm):
+    return begin.points_of(arm, spread(arm.robot, 30), [str(i) for i in range(30)])
+
+
+@pytest.fixture(scope="module")
+def calibrated(arm):
+    """The nominal arm with a deviation of the first joint's zero, and directions nobody saw."""
+    names = tuple(dh_parameter_names(arm.model.joints))
+
+    def make(std_rad, blind_per_unit=0.0):
+        covariance = np.zeros((len(names), len(names)))
+        place = names.index("j1.theta_offset_rad")
+        covariance[place, place] = std_rad**2
+        undetermined = np.zeros((1 if blind_per_unit else 0, len(names)))
+        if blind_per_unit:
+            undetermined[0, names.index("j1.d_mm")] = blind_per_unit
+        known = Uncertainty(names, covariance, undetermined)
+        return replace(arm, known=known, residual=Residual(0.3, 0.001, "validation"))
+
+    return make
+
+
+def test_an_arm_that_was_never_fitted_is_not_judged(arm, points):
+    assert unsure(arm, points, USED, None, 6.0) is None
+
+
+def test_a_sure_calibration_is_not_warned_of(calibrated, points):
+    found = unsure(calibrated(1e-5), points, USED, None, 6.0)
+    assert not found
+    assert found.in_words() == []
+
+
+def test_unsure_candidates_are_counted_by_their_predicted_deviation(calibrated, points):
+    arm = calibrated(1e-3)
+    std = predict(arm, points.joints).std_position_mm
+    # A turn of the base by 1 mrad moves a point by 1 mm per metre from the axis.
+    np.testing.assert_allclose(std, 1e-3 * np.hypot(*points.modelled_mm[:, :2].T), rtol=1e-6)
+    limit = 3.0 * float(np.median(std))
+    found = unsure(arm, points, USED, None, limit)
+    assert found.uncertain == np.sum(std > 0.9)
+    assert 0 < found.uncertain < 30
+    assert found.refusable == 15
+    said = " ".join(found.in_words())
+    assert f"{found.uncertain} of 30 candidates" in said
+    assert "refused at 15 of them" in said
+    assert f"{std.max():.3g} mm" in said
+    assert "prior" in said
+
+
+def test_what_no_pose_showed_is_named(calibrated, points):
+    found = unsure(calibrated(1e-5, blind_per_unit=1.0), points, USED, None, 6.0)
+    assert (found.uncertain, found.undetermined) == (0, 30)
+    assert found.largest_undetermined_mm == pytest.approx(1.0)
+    assert "30 of 30 candidates" in found.in_words()[0]
