@@ -77,7 +77,8 @@ def start(**given) -> None:
 
     Candidates are the joint configurations the statement is about: rows of a file (q1_deg .. or
     q1_rad ..; q1_mm where a joint slides; a `pose` column names them, s1 .. are directions of
-    travel), or drawn. Their order is random, by the seed, and knows nothing of the errors.
+    travel), or drawn. Their order is random, by the seed, and knows nothing of the errors. Where
+    the calibration is too unsure of them for readings to be judged, that is said.
 
     The noise must hold all that differs between readings of one pose: the instrument, its target,
     and how well the arm repeats the pose.
