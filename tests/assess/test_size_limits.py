@@ -158,7 +158,7 @@ def test_limits_miss_as_seldom_as_they_say_whatever_the_direction(ratio):
     rng = np.random.default_rng(5)
     covariance = 0.01 * np.diag([1.0, 1.0 / ratio, 1.0 / ratio**2])
     noise = 0.1 if ratio == 1.0 else covariance
-    draws, allowed = 2000, 0.05
+    draws, allowed = 1000, 0.05
     worst_upper = worst_lower = 0
     for direction in ([1, 0, 0], [0, 0, 1], [0.6, 0.0, 0.8]):
         for size in (0.05, 0.3):
