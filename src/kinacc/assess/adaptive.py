@@ -83,7 +83,12 @@ class Candidates:
 
 
 class Campaign(Protocol):
-    """One assessment under way."""
+    """One assessment under way.
+
+    ``first``: rows 0 to ``first`` - 1 are visited whatever is read, each before any other point.
+    """
+
+    first: int
 
     def next(self) -> int | None:
         """The row to measure next; None if no further measurement is wanted."""
@@ -202,6 +207,24 @@ class Ledger:
         even = np.trace(covariance) / 3.0
         spread = np.abs(covariance - even * np.eye(3)).max()
         return reading, covariance, bool(spread <= _SYMMETRY * even)
+
+
+class LedgerCampaign:
+    """What campaigns that keep all readings in one ledger have in common."""
+
+    first = 0
+
+    def __init__(self, settings, candidates: Candidates) -> None:
+        self.settings = settings
+        self.ledger = Ledger(candidates)
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take a reading."""
+        self.ledger.record(point, reading_mm, covariance_mm2)
+
+    def taken(self) -> tuple[int, list[int]]:
+        """Number of readings, and the rows read."""
+        return self.ledger.taken, self.ledger.visited
 
 
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:

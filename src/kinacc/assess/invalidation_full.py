@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.adaptive import Candidates, LedgerCampaign, check_budget
 from kinacc.assess.ellipsoid import BallDistances
 from kinacc.assess.sequential import first_points
 from kinacc.assess.statement import MEASURED, Statement
@@ -57,12 +57,11 @@ def invalidation_problems(settings) -> list[Problem]:
     return problems
 
 
-class ChallengeCampaign:
+class ChallengeCampaign(LedgerCampaign):
     """New points first, then the worst point at the bound under test."""
 
     def __init__(self, settings, candidates: Candidates, bound_mm: float | None = None) -> None:
-        self.settings = settings
-        self.ledger = Ledger(candidates)
+        super().__init__(settings, candidates)
         self.first = first_points(settings.measurements, candidates.points, settings.visited)
         self._fixed_mm = bound_mm
         self._bound_mm, self._found_at = 0.0, -1
@@ -75,14 +74,6 @@ class ChallengeCampaign:
         if taken >= self.settings.measurements:
             return None
         return self.ledger.visited[self._worst()]
-
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
-        self.ledger.record(point, reading_mm, covariance_mm2)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
 
     def statements(self) -> tuple[Statement, ...]:
         """The smallest bound the readings do not reject."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.adaptive import Candidates, LedgerCampaign, check_budget
 from kinacc.assess.kinematic_model import (
     Basis,
     Posterior,
@@ -75,12 +75,11 @@ class Kinematic:
         return KinematicCampaign(self, candidates)
 
 
-class KinematicCampaign:
+class KinematicCampaign(LedgerCampaign):
     """See :class:`Kinematic`."""
 
     def __init__(self, settings: Kinematic, candidates: Candidates) -> None:
-        self.settings = settings
-        self.ledger = Ledger(candidates)
+        super().__init__(settings, candidates)
         self.first = first_points(settings.measurements, candidates.points, settings.visited)
         self._batch = max(round(_BATCH * settings.measurements), 1)
         self._basis: Basis | None = None
@@ -100,13 +99,9 @@ class KinematicCampaign:
 
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
         """Take a reading."""
-        self.ledger.record(point, reading_mm, covariance_mm2)
+        super().record(point, reading_mm, covariance_mm2)
         if point in self._planned:
             self._planned.remove(point)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
 
     def statements(self) -> tuple[Statement, ...]:
         """The largest error of the measured points, and of all candidates."""

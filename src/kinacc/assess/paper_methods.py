@@ -14,9 +14,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger
+from kinacc.assess.adaptive import Candidates, LedgerCampaign
 from kinacc.assess.assessor import Assessor, check
 from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
+from kinacc.assess.once import OnceCampaign
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.world import measured_world
 from kinacc.errors import InputError, Problem
@@ -43,25 +44,10 @@ class OncePerPoint:
         return OncePerPointCampaign(self.assessor, candidates)
 
 
-class OncePerPointCampaign:
+class OncePerPointCampaign(OnceCampaign):
     """See :class:`OncePerPoint`."""
 
-    def __init__(self, assessor: Assessor, candidates: Candidates) -> None:
-        self.assessor = assessor
-        self.ledger = Ledger(candidates)
-
-    def next(self) -> int | None:
-        """The next point in order."""
-        done = self.ledger.taken
-        return done if done < min(self.assessor.measurements, self.ledger.count.size) else None
-
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
-        self.ledger.record(point, reading_mm, covariance_mm2)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
+    settings: Assessor
 
     def statements(self) -> tuple[Statement, ...]:
         """The assessed accuracy of the points read."""
@@ -70,7 +56,7 @@ class OncePerPointCampaign:
             return (Statement(CANDIDATES, withheld="nothing measured yet"),)
         readings = self.ledger.mean_mm[visited]
         world = measured_world(readings, readings[:, None], self.ledger.noise_mm[visited])
-        return (Statement(CANDIDATES, self.assessor.assess(world).assessed_mm),)
+        return (Statement(CANDIDATES, self.settings.assess(world).assessed_mm),)
 
 
 @dataclass(frozen=True)
@@ -114,12 +100,11 @@ class InvalidationAt:
         return InvalidationCampaign(self, candidates)
 
 
-class InvalidationCampaign:
+class InvalidationCampaign(LedgerCampaign):
     """See :class:`InvalidationAt`."""
 
     def __init__(self, settings: InvalidationAt, candidates: Candidates) -> None:
-        self.settings = settings
-        self.ledger = Ledger(candidates)
+        super().__init__(settings, candidates)
 
     def next(self) -> int | None:
         """The worst point while the rejection probability exceeds alpha, else a new one."""
@@ -130,14 +115,6 @@ class InvalidationCampaign:
             return self.ledger.visited[int(np.argmax(excess))]
         visited = len(self.ledger.visited)
         return visited if visited < self.ledger.count.size else None
-
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
-        self.ledger.record(point, reading_mm, covariance_mm2)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
 
     def statements(self) -> tuple[Statement, ...]:
         """The smallest bound that the readings do not reject."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.adaptive import Candidates, LedgerCampaign, check_budget
 from kinacc.assess.looks import Looks
 from kinacc.assess.population import LargestSize, largest_size
 from kinacc.assess.sequential import bounding_point, first_points
@@ -65,12 +65,11 @@ class SearchAndConfirm:
         return SearchAndConfirmCampaign(self, candidates)
 
 
-class SearchAndConfirmCampaign:
+class SearchAndConfirmCampaign(LedgerCampaign):
     """See :class:`SearchAndConfirm`."""
 
     def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
-        self.settings = settings
-        self.ledger = Ledger(candidates)
+        super().__init__(settings, candidates)
         budget = settings.measurements
         self.first = first_points(budget, candidates.points, FIRST_SHARE)
         self.most = min(budget, candidates.points)
@@ -93,12 +92,8 @@ class SearchAndConfirmCampaign:
 
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
         """Take a reading."""
-        self.ledger.record(point, reading_mm, covariance_mm2)
+        super().record(point, reading_mm, covariance_mm2)
         self.looks.update(point)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
 
     def statements(self) -> tuple[Statement, ...]:
         """On the measured points, and on all candidates."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.adaptive import Candidates, Ledger, LedgerCampaign, check_budget
 from kinacc.assess.looks import Looks
 from kinacc.assess.single_shot import about_all_if_all_measured
 from kinacc.assess.statement import MEASURED, Statement
@@ -47,12 +47,11 @@ class Sequential:
         return SequentialCampaign(self, candidates)
 
 
-class SequentialCampaign:
+class SequentialCampaign(LedgerCampaign):
     """See :class:`Sequential`."""
 
     def __init__(self, settings: Sequential, candidates: Candidates) -> None:
-        self.settings = settings
-        self.ledger = Ledger(candidates)
+        super().__init__(settings, candidates)
         self.first = first_points(settings.measurements, candidates.points, settings.visited)
         allowed = 1.0 - settings.confidence
         self.looks = Looks(self.ledger, (allowed,), allowed / self.first)
@@ -67,12 +66,8 @@ class SequentialCampaign:
 
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
         """Take a reading."""
-        self.ledger.record(point, reading_mm, covariance_mm2)
+        super().record(point, reading_mm, covariance_mm2)
         self.looks.update(point)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
 
     def statements(self) -> tuple[Statement, ...]:
         """The bounds as they stand."""

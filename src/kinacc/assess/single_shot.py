@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Candidates, Ledger, check_budget
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
+from kinacc.assess.once import OnceCampaign
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.errors import InputError
 
@@ -38,25 +39,10 @@ class SingleShot:
         return SingleShotCampaign(self, candidates)
 
 
-class SingleShotCampaign:
+class SingleShotCampaign(OnceCampaign):
     """See :class:`SingleShot`."""
 
-    def __init__(self, settings: SingleShot, candidates: Candidates) -> None:
-        self.settings = settings
-        self.ledger = Ledger(candidates)
-        self.points = min(settings.measurements, candidates.points)
-
-    def next(self) -> int | None:
-        """The next point in order."""
-        return self.ledger.taken if self.ledger.taken < self.points else None
-
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
-        self.ledger.record(point, reading_mm, covariance_mm2)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
+    settings: SingleShot
 
     def statements(self) -> tuple[Statement, ...]:
         """The bound, with the largest reading as the value."""
@@ -64,7 +50,7 @@ class SingleShotCampaign:
         if not ledger.visited:
             return (Statement(MEASURED, withheld="nothing measured yet"),)
         error = 1.0 - self.settings.confidence
-        each = error / self.points
+        each = error / self.first
         means = _outstanding(ledger)
         said = Statement(
             MEASURED,

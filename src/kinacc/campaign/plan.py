@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign.arm import Arm
@@ -129,12 +129,7 @@ def candidates_of(covariance_mm2: np.ndarray, joints: np.ndarray, arm: Arm) -> C
 
 def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:
     """Number of points that are visited whatever is read: rows 0, 1, .. in order."""
-    return fixed_length(assessor.begin(candidates))
-
-
-def fixed_length(campaign: Campaign) -> int:
-    """As ``fixed_visit``, of a campaign that was begun; 0 where it does not say."""
-    return int(getattr(campaign, "first", getattr(campaign, "points", 0)))
+    return assessor.begin(candidates).first
 
 
 def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:

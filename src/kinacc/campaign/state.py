@@ -15,7 +15,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.statement import MEASURED, Statement
-from kinacc.campaign.plan import Plan, fixed_length
+from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading, covariance_mm2, error_mm
 
 READINGS, LEAVE_OUT, STRIKE = "readings", "leave_out", "strike"
@@ -65,7 +65,7 @@ class State:
 
     def ahead(self) -> list[int]:
         """Points without a reading that are measured whatever the others read, in order."""
-        first = fixed_length(self.campaign)
+        first = self.campaign.first
         have = {each.reading.point for each in (*self.told, *self.in_hand)}
         return [int(point) for point in self.rows[:first] if point not in have]
 
@@ -77,7 +77,7 @@ def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
     said of points that were not measured.
     """
     said = campaign.statements()
-    left = fixed_length(campaign) - len(campaign.taken()[1])
+    left = campaign.first - len(campaign.taken()[1])
     if left <= 0 or not plan.by_travel:
         return said
     words = f"{left} points of the first visit, made in order of travel, are left"
