@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import call, small_study
 
 from kinacc.artifacts import store
 from kinacc.artifacts.conformity import check_file
@@ -16,29 +16,15 @@ from kinacc.assess.adaptive import conduct
 from kinacc.assess.streams import key_of
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
-from kinacc.cli import main
 
 SIGMA_MM = 0.05
 COMMANDS = ("start", "next", "record", "leave-out", "strike", "status", "report")
 
 
-def call(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
-
-
 @pytest.fixture(scope="module")
 def calibration(tmp_path_factory):
     """Results of a small synthetic study, made by the workflow's own stages."""
-    base = tmp_path_factory.mktemp("study")
-    config = base / "small.yaml"
-    config.write_text(
-        "datasets: {mh180: {robot: mh180}}\nmeasurements: {folds: 2, synthetic: {poses: 80}}\n"
-        "calibration: {vec: {order: 1}}\n"
-    )
-    for stage in ("measurements", "vec", "dh", "residuals"):
-        done = call("run", stage, "--config", config, "--results", base / "results")
-        assert done.exit_code == 0, done.output
-    return base / "results" / "mh180"
+    return small_study(tmp_path_factory.mktemp("study"))
 
 
 @pytest.fixture

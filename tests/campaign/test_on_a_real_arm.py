@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import call
 
 from kinacc.artifacts import store
 from kinacc.assess import drawn_world, measured_world
@@ -17,16 +17,11 @@ from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.streams import key_of
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
-from kinacc.cli import main
 from kinacc.geometry import invert
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "ur10_tmac" / "series_D.csv"
 pytestmark = pytest.mark.skipif(not DATA.is_file(), reason=f"no measured series at {DATA}")
 SIGMA_MM = 0.05
-
-
-def call(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 @pytest.fixture(scope="module")

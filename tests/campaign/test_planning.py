@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import call
 
 from kinacc.assess.adaptive import conduct
 from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -17,12 +17,7 @@ from kinacc.assess.streams import key_of
 from kinacc.assess.world import drawn_world
 from kinacc.campaign.power import Aim, Row, repetitions_to_show, rows, smallest_budget
 from kinacc.campaign.simulate import Outcome, Pool, outcomes
-from kinacc.cli import main
 from kinacc.errors import InputError
-
-
-def call(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def pool(count=100, seed=0):

@@ -3,15 +3,9 @@
 import json
 
 import pytest
-from click.testing import CliRunner
-
-from kinacc.cli import main
+from command_line import call
 
 ROBOT = "irb120"
-
-
-def call(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 @pytest.fixture

@@ -7,31 +7,17 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from click.testing import CliRunner
+from command_line import call, small_study
 
 from kinacc import robot
-from kinacc.cli import main
 
 HELP = ("predict", "compensate", "export", "compare", "plan-poses", "fitted")
-
-
-def call(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Results of a small synthetic study, made by the workflow's own stages."""
-    base = tmp_path_factory.mktemp("study")
-    config = base / "small.yaml"
-    config.write_text(
-        "datasets: {mh180: {robot: mh180}}\nmeasurements: {folds: 2, synthetic: {poses: 80}}\n"
-        "calibration: {vec: {order: 1}}\n"
-    )
-    for stage in ("measurements", "vec", "dh", "residuals"):
-        done = call("run", stage, "--config", config, "--results", base / "results")
-        assert done.exit_code == 0, done.output
-    return base / "results" / "mh180"
+    return small_study(tmp_path_factory.mktemp("study"))
 
 
 @pytest.mark.parametrize("name", HELP)

@@ -1,0 +1,27 @@
+"""The command line as tests use it: one call, and results of a small study made through it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from click.testing import CliRunner, Result
+
+from kinacc.cli import main
+
+
+def call(*words: object) -> Result:
+    """Run a command as a person would."""
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def small_study(base: Path) -> Path:
+    """Results folder of a small synthetic arm, made by the workflow's own stages."""
+    config = base / "small.yaml"
+    config.write_text(
+        "datasets: {mh180: {robot: mh180}}\nmeasurements: {folds: 2, synthetic: {poses: 80}}\n"
+        "calibration: {vec: {order: 1}}\n"
+    )
+    for stage in ("measurements", "vec", "dh", "residuals"):
+        done = call("run", stage, "--config", config, "--results", base / "results")
+        assert done.exit_code == 0, done.output
+    return base / "results" / "mh180"
