@@ -12,6 +12,7 @@ from kinacc.models.dh import PARAMETERS, DHModel
 from kinacc.models.vec import ERRORS, VECModel
 
 Columns = Mapping[str, np.ndarray]
+_ROUNDING = 1e-9
 
 
 def dh_model(columns: Columns, prismatic: np.ndarray | None = None) -> DHModel:
@@ -69,3 +70,15 @@ def frame(columns: Columns, model: str, name: str, session: str | None = None) -
     quaternion = np.array([columns[part][row] for part in ("qw", "qx", "qy", "qz")], dtype=float)
     position = np.array([columns[part][row] for part in ("x_mm", "y_mm", "z_mm")], dtype=float)
     return Pose(rotation_from_quaternion(quaternion), position)
+
+
+def fitted_tool(columns: Columns | None, model: str, own: Pose) -> Pose | None:
+    """The tool a ``frames`` table has for ``model``; None where it is the arm's ``own``, or none.
+
+    A tool that was not estimated stands in the table as the arm's own.
+    """
+    if columns is None or not (np.asarray(columns["frame"]) == "tool").any():
+        return None
+    tool = frame(columns, model, "tool")
+    apart = max(np.abs(a - b).max() for a, b in zip(tool, own, strict=True))
+    return tool if apart > _ROUNDING else None

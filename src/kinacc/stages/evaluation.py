@@ -13,8 +13,6 @@ from kinacc.models import tables
 from kinacc.region import Cylinder
 from kinacc.robot import Robot
 
-_ROUNDING = 1e-9
-
 
 def cylinder(evaluation: Mapping) -> Cylinder:
     """The cylinder of the ``evaluation`` settings."""
@@ -66,11 +64,6 @@ def _vec_base(inputs: Mapping) -> Pose | None:
 def _tool(inputs: Mapping, evaluation: Mapping, arm: Robot, model: str) -> Pose:
     """The tool fitted with a model; the configured one, on the arm's flange, where none was."""
     own = robot.carried(arm)
-    if "frames" in inputs:
-        names = np.asarray(inputs["frames"]["frame"])
-        if (names == "tool").any():
-            fitted = tables.frame(inputs["frames"], model, "tool")
-            apart = max(np.abs(a - b).max() for a, b in zip(fitted, own, strict=True))
-            if apart > _ROUNDING:  # a tool that is not estimated is the arm's own
-                return fitted
-    return compose(own, Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float)))
+    fitted = tables.fitted_tool(inputs.get("frames"), model, own)
+    offset = np.array(evaluation["tool_mm"], dtype=float)
+    return compose(own, Pose(np.eye(3), offset)) if fitted is None else fitted

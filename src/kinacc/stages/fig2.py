@@ -12,8 +12,6 @@ from kinacc.figures import fig2
 from kinacc.figures.columns import floats
 from kinacc.models import tables
 
-_ROUNDING = 1e-9
-
 
 def run(inputs: Mapping, settings: Mapping) -> Figure:
     """Return the figure of the ``dh_model`` among the ``assessment_points``."""
@@ -34,9 +32,8 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
 def _tool_mm(frames: Mapping | None, evaluation: Mapping, arm: robot.Robot) -> np.ndarray:
     """Return the tool centre point in the last DH frame: the fitted one, or the configured one."""
     own = robot.carried(arm)
-    if frames is not None and (np.asarray(frames["frame"]) == "tool").any():
-        fitted = tables.frame(frames, "dh", "tool")
-        if max(np.abs(a - b).max() for a, b in zip(fitted, own, strict=True)) > _ROUNDING:
-            return fitted.position_mm
+    fitted = tables.fitted_tool(frames, "dh", own)
+    if fitted is not None:
+        return fitted.position_mm
     offset = np.asarray(evaluation.get("tool_mm", (0.0, 0.0, 0.0)), dtype=float)
     return own.position_mm + own.rotation @ offset
