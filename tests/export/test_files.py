@@ -78,9 +78,11 @@ def test_json_and_csv_say_the_same_of_every_joint():
     arm = bent("ur10")
     std = np.abs(np.random.default_rng(2).normal(0.0, 1e-3, (6, 5)))
     std[0, 1] = np.nan
-    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {"seed": "1"}))
+    said = ("d of joint 2 and d of joint 3 appear only as their sum",)
+    content = json.loads(description.robot_json(arm, std, arm.robot.dh, said, {"seed": "1"}))
     rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh))))
     assert content["provenance"] == {"seed": "1"}
+    assert content["undetermined"] == list(said)
     assert content["joints"][0]["std_d_mm"] is None
     assert rows[0]["std_d_mm"] == ""
     for joint, row in zip(content["joints"], rows, strict=True):
@@ -180,7 +182,7 @@ dh:
 """
     arm = replace(nominal(robot.of_text(text, "down.yaml")), choice="dh")
     std = np.full((4, 5), np.nan)
-    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {}))
+    content = json.loads(description.robot_json(arm, std, arm.robot.dh, None, {}))
     rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh))))
     assert [row["type"] for row in rows] == [joint["type"] for joint in content["joints"]]
     q = np.array([0.3, -0.7, 120.0, 0.2])

@@ -19,7 +19,8 @@ from kinacc.robot import Robot
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 
 _NEEDED = ("vec_model", "dh_model", "frames")
-_WANTED = ("dh_fit", "vec_fit", "residuals", "model_selection")  # used where they are there
+# Used where they are there.
+_WANTED = ("dh_fit", "dh_identified", "vec_fit", "residuals", "model_selection")
 _COVARIANCE = {"dh": "dh_covariance", "vec": "vec_covariance"}
 _SAME = 1e-9
 

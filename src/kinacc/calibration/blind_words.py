@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinacc.calibration.blind_groups import LEAST
 from kinacc.calibration.frames import BASE, MOTIONS, Frames
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.geometry import skew
 
-LEAST = 0.02  # of the largest part of a direction; less is not worth a word
 WEAK = "(these poses show it too little; others may)"
 _MOST_NAMES = 4
 _SAME = 0.02  # relative difference of parts that count as equal
@@ -23,13 +23,34 @@ _CALLED = {
 }
 
 
+def statements(
+    groups: Sequence[tuple[np.ndarray, bool]], names: Sequence[str], frames: Frames
+) -> list[tuple[str, np.ndarray]]:
+    """Sentences about ``blind_groups.groups``, each with the mask (P,) of whom it speaks."""
+    found: list[tuple[str, np.ndarray]] = []
+    for directions, structural in groups:
+        words = sentence(directions, names, frames)
+        if any(words == text for text, _ in found):
+            continue  # parts too small for words told them apart
+        members = (np.abs(directions) >= LEAST).any(axis=0)
+        found.append((words if structural else f"{words} {WEAK}", members))
+    # Joint by joint, what concerns frames alone at the end.
+    arm = of_arm(names)
+    return sorted(found, key=lambda each: [*np.flatnonzero(each[1][arm]), len(names)][0])
+
+
+def of_arm(names: Sequence[str]) -> np.ndarray:
+    """True (P,) for parameters of the arm; the others are motions of base and targets."""
+    return np.array([name.partition(".")[2] in _CALLED for name in names])
+
+
 def sentence(directions: np.ndarray, names: Sequence[str], frames: Frames) -> str:
     """What it means that no pose shows the m ``directions`` (m, P; mm, mrad) of parameters.
 
     ``frames``: base and targets of the fit. Several directions are of the arm alone.
     """
-    arm = [i for i, name in enumerate(names) if name.partition(".")[2] in _CALLED]
-    involved = [i for i in arm if (np.abs(directions[:, i]) >= LEAST).any()]
+    said = (np.abs(directions) >= LEAST).any(axis=0)
+    involved = np.flatnonzero(of_arm(names) & said).tolist()
     involved.sort(key=lambda i: -np.abs(directions[:, i]).max())
     called = [_called(names[i]) for i in sorted(involved)]
     moved = _motions(directions[0], names, frames) if len(directions) == 1 else []

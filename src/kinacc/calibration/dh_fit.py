@@ -183,8 +183,7 @@ def _everywhere(fit: DHFit, observations: Observations) -> Observations:
         np.stack([observations.session, observations.target, observations.has_rotation], axis=1),
         axis=0,
     )
-    reach = np.where(fit.model.prismatic, 1e3, np.pi)
-    q_rad = np.random.default_rng(0).uniform(-reach, reach, (UNSEEN_POSES, fit.model.joints))
+    q_rad = joints_anywhere(fit.model)
     pose, kind = np.repeat(np.arange(len(q_rad)), len(kinds)), np.tile(kinds.T, len(q_rad))
     session, target, turned = kind
     frames = fit.frames
@@ -203,6 +202,12 @@ def _everywhere(fit: DHFit, observations: Observations) -> Observations:
         target_names=observations.target_names,
         session_names=observations.session_names,
     )
+
+
+def joints_anywhere(model: DHModel) -> np.ndarray:
+    """Joints (n, k) of all kinds, beyond any limits: a whole turn each, or a metre either way."""
+    reach = np.where(model.prismatic, 1e3, np.pi)
+    return np.random.default_rng(0).uniform(-reach, reach, (UNSEEN_POSES, model.joints))
 
 
 def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:

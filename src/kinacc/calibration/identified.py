@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
 
-from kinacc.calibration import blind_words
-from kinacc.calibration.blind_words import LEAST
+from kinacc.calibration import blind_groups, blind_words
 from kinacc.calibration.constrained import ConstrainedFrames
 from kinacc.calibration.dh_fit import DHFit, unseen_anywhere
 from kinacc.calibration.observations import Observations
@@ -24,9 +22,8 @@ from kinacc.calibration.uncertainty import (
 IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
 STATUSES = (IDENTIFIED, PRIOR, UNDETERMINED, FIXED)
 STRUCTURAL = 1e-6  # share of the largest singular value over poses all over the joints
-_RANK = 1e-6
 _MOST_SAID = 3
-_OWN = 0.5  # part of a unit direction beside the structural ones that makes it one of its own
+_JOIN, _MORE = "; ", "and "
 
 
 @dataclass(frozen=True)
@@ -74,81 +71,27 @@ def parameters(fit: DHFit, known: Uncertainty, seen: Observations) -> list[Param
 def _first(texts: list[str]) -> str:
     """The first sentences about a parameter, and how many more there are."""
     more = len(texts) - _MOST_SAID
-    return "; ".join([*texts[:_MOST_SAID], f"and {more} more"] if more > 0 else texts)
+    return _JOIN.join([*texts[:_MOST_SAID], f"{_MORE}{more} more"] if more > 0 else texts)
 
 
 def statements(fit: DHFit, known: Uncertainty, seen: Observations) -> list[tuple[str, np.ndarray]]:
     """What the data cannot tell apart: sentences, each with the mask (P,) of whom it speaks."""
-    found, frames = [], len(known.names) - int(fit.free.sum())
-    for directions, structural in groups(fit, known, seen):
-        members = (np.abs(directions) >= LEAST).any(axis=0)
-        words = blind_words.sentence(directions, known.names, fit.frames)
-        if any(words == text for text, _ in found):
-            continue  # parts too small for words told them apart
-        found.append((words if structural else f"{words} {blind_words.WEAK}", members))
-    # Joint by joint, what concerns frames alone at the end.
-    return sorted(found, key=lambda each: [*np.flatnonzero(each[1][frames:]), len(known.names)][0])
+    return blind_words.statements(groups(fit, known, seen), known.names, fit.frames)
 
 
 def groups(fit: DHFit, known: Uncertainty, seen: Observations) -> list[tuple[np.ndarray, bool]]:
-    """Undetermined directions (m, P) by what they share, and whether no pose at all shows them.
-
-    Any mixture of directions no pose shows is one too: they are mixed to involve few parameters
-    each, scaled to a largest part of 1 (mm and mrad), those of the arm alone gathered where they
-    have parameters in common. Directions that some pose would show come last, free of the others.
-    """
-    frames = len(known.names) - int(fit.free.sum())
-    arm = np.arange(len(known.names)) >= frames
-    exact = unseen_anywhere(fit, seen, STRUCTURAL)
-    exact = named_directions(fit, seen.target_names, exact)
-    of_arm = np.abs(exact[:, arm]).max(axis=1, initial=0.0) > 0.0
-    simple = _simple(exact[of_arm], arm)
-    found = [(each[None], True) for each in _simple(exact[~of_arm], ~arm)]
-    found += [(each, True) for each in _gathered(simple, ~arm)]
-    rows = known.undetermined
-    moving = np.abs(rows[:, arm]).max(axis=1, initial=0.0) > 0.0
-    weak = _beside(rows[~moving], exact[~of_arm], ~arm)
-    found += [(each[None], False) for each in _simple(weak, ~arm)]
-    weak = _beside(rows[moving], exact[of_arm], arm)
-    return found + [(each[None], False) for each in _simple(weak, arm)]
+    """Undetermined directions of a fit in groups, as ``blind_groups.groups`` has them."""
+    hidden = named_directions(fit, seen.target_names, unseen_anywhere(fit, seen, STRUCTURAL))
+    return blind_groups.groups(hidden, known.undetermined, blind_words.of_arm(known.names))
 
 
-def _beside(rows: np.ndarray, exact: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """The directions in the span of ``rows`` that ``exact`` do not explain, by parts ``among``."""
-    if not len(rows) or not len(exact):
-        return rows
-    _, values, right = np.linalg.svd(exact[:, among], full_matrices=False)
-    basis = right[values > _RANK * values[0]]
-    of_each = rows[:, among] / np.linalg.norm(rows[:, among], axis=1, keepdims=True)
-    left, values, _ = np.linalg.svd(of_each - of_each @ basis.T @ basis, full_matrices=False)
-    rest = left[:, values > _OWN].T @ rows
-    return rest - rest[:, among] @ np.linalg.pinv(exact[:, among], rcond=_RANK) @ exact
-
-
-def _simple(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """The same space by directions that share no pivot ``among`` (P,), to a largest part of 1."""
-    if not len(rows):
-        return rows
-    left, upper, _ = qr(rows[:, among], mode="economic", pivoting=True)
-    mixed = solve_triangular(upper[:, : len(rows)], left.T @ rows)
-    return mixed / np.abs(mixed).max(axis=1, keepdims=True)
-
-
-def _gathered(rows: np.ndarray, frames: np.ndarray) -> list[np.ndarray]:
-    """Directions by what they share; one that moves a frame stays alone."""
-    found: list[np.ndarray] = []
-    for row in rows:
-        moves = np.abs(row) >= LEAST
-        shared = [
-            number
-            for number, group in enumerate(found)
-            if not (moves | (np.abs(group) >= LEAST).any(axis=0))[frames].any()
-            and (moves & (np.abs(group) >= LEAST).any(axis=0)).any()
-        ]
-        joined = np.concatenate([*(found[number] for number in shared), row[None]])
-        found = [group for number, group in enumerate(found) if number not in shared]
-        found.append(joined)
-    return found
+def recorded(table: Mapping[str, Sequence]) -> list[str]:
+    """The sentences of a ``dh_identified`` table, each once."""
+    found: dict[str, None] = {}
+    for status, statement in zip(table["status"], table["statement"], strict=True):
+        if status == UNDETERMINED and statement:
+            found |= dict.fromkeys(str(statement).split(_JOIN))
+    return [text for text in found if not text.startswith(_MORE)]
 
 
 def _priors(fit: DHFit) -> dict[str, float]:

@@ -55,6 +55,8 @@ def read(folder: Path) -> dict[str, dict]:
 
 def summary(tables: Mapping[str, Mapping]) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
+    from kinacc.calibration import identified
+
     choice, told = tables["model_selection"], tables["dh_identified"]
     selected = next(
         str(name) for name, yes in zip(choice["model"], choice["selected"], strict=True) if yes
@@ -78,7 +80,7 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
             ]
             for status in dict.fromkeys(str(each) for each in told["status"])
         },
-        "undetermined": _statements(told),
+        "undetermined": identified.recorded(told),
         "worst_rows": _worst(tables["worst_rows"], selected),
     }
 
@@ -89,14 +91,6 @@ def _errors(table: Mapping, model: str, subset: str) -> dict | None:
         if wanted and table["quantity"][i] == "position" and table["fold"][i] != table["fold"][i]:
             return {name: _plain(table[name][i]) for name in _FIGURES}
     return None
-
-
-def _statements(told: Mapping) -> list[str]:
-    found: dict[str, None] = {}
-    for status, statement in zip(told["status"], told["statement"], strict=True):
-        if status == "undetermined" and statement:
-            found |= dict.fromkeys(str(statement).split("; "))
-    return [text for text in found if not text.startswith("and ")]
 
 
 def _worst(table: Mapping, model: str) -> list[dict]:

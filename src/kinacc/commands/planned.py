@@ -147,8 +147,9 @@ def in_words(asked: Question, found: Answer) -> str:
     lines = [
         f"{asked.index} = {plan.value:.4g} ({observability.INDICES[asked.index]}), "
         f"{plan.path[-1]:.4g} before {plan.swaps} swaps; no single swap makes it better",
-        f"{told.rank} of {len(told.names)} parameter directions are determined; no candidate shows",
-        *(f"  {words}" for words in told.excluded),
+        f"{told.rank} of {len(told.names)} parameter directions are determined; the candidates "
+        "leave open:",
+        *(f"  - {words}" for words in told.excluded),
         f"travel {np.rad2deg(found.moves.sum()):.0f} deg, {np.rad2deg(found.unordered):.0f} deg in "
         f"the order of the candidates ({travel.METRICS[asked.metric]})",
     ]

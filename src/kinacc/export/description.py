@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kinacc.calibrated.blind import in_words
 from kinacc.calibrated.record import TOOL, Calibration
 from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
 from kinacc.models.dh import PARAMETERS, DHModel
@@ -48,11 +47,16 @@ def robot_yaml(arm: Calibration) -> str:
 
 
 def robot_json(
-    arm: Calibration, std: np.ndarray, nominal: DHModel, provenance: Mapping[str, str]
+    arm: Calibration,
+    std: np.ndarray,
+    nominal: DHModel,
+    undetermined: Sequence[str] | None,
+    provenance: Mapping[str, str],
 ) -> str:
     """Everything the calibration says of the arm: parameters, deviations, frames, residuals.
 
-    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined.
+    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined; ``undetermined`` says in sentences
+    what the poses leave open, None where nobody asked.
     """
     dh = _dh_of(arm)
     joints = []
@@ -88,7 +92,7 @@ def robot_json(
             "position_rms_mm": _number(left.position_mm),
             "orientation_rms_mrad": _number(1e3 * left.orientation_rad),
         },
-        "undetermined": undetermined_in_words(arm),
+        "undetermined": None if undetermined is None else list(undetermined),
         "provenance": dict(provenance),
     }
     return json.dumps(content, indent=1) + "\n"
@@ -118,13 +122,6 @@ def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
         kind = _kind(dh, joint)
         writer.writerow([joint + 1, kind, *("" if np.isnan(x) else f"{x:.12g}" for x in cells)])
     return out.getvalue()
-
-
-def undetermined_in_words(arm: Calibration) -> list[str]:
-    """Ways to change the parameters that change no measured pose, one each."""
-    if arm.known is None or not len(arm.known.undetermined):
-        return []
-    return in_words(arm.known.undetermined, arm.known.names)
 
 
 def _dh_of(arm: Calibration) -> DHModel:

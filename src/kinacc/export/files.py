@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.calibrated import folder as results
+from kinacc.calibration import identified
 from kinacc.errors import InputError, Problem
 from kinacc.export import description, tables, urdf
 from kinacc.models.dh import PARAMETERS
@@ -41,13 +42,15 @@ def contents(
     dataset = Path(folder).resolve().name
     arm = results.calibration(found, robot, "dh", dataset)
     std = _deviations(found["dh_model"])
+    told = found.get("dh_identified")
+    unseen = None if told is None else identified.recorded(told)
     made = {}
     for each in dict.fromkeys(formats):
         if each == "yaml":
             text = description.robot_yaml(arm)
         elif each == "json":
             marks = store.read_metadata(Path(folder) / "dh_model.parquet")
-            text = description.robot_json(arm, std, robot.dh, marks)
+            text = description.robot_json(arm, std, robot.dh, unseen, marks)
         elif each == "csv":
             text = description.robot_csv(arm, std, robot.dh)
         elif each == "urdf" and urdf_file is not None:
@@ -55,7 +58,7 @@ def contents(
         elif each == "urdf":
             text = urdf.generated(arm, dh_joints)
         else:
-            text = _tables(found, robot, dataset, arm, each)
+            text = _tables(found, robot, dataset, unseen or (), each)
         made[f"{name or dataset}{_ENDINGS[each]}"] = text
     return made
 
@@ -89,12 +92,11 @@ def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> l
     return [str(path) for path in paths]
 
 
-def _tables(found: Mapping, robot: Robot, dataset: str, arm, form: str) -> str:
+def _tables(found: Mapping, robot: Robot, dataset: str, unseen: Sequence[str], form: str) -> str:
     if "residuals" not in found:
         raise InputError(Problem(f"{dataset}: residuals.parquet", "no such file", "a finished run"))
     nominal = {"joint": np.arange(1, robot.dh.joints + 1)}
     nominal |= {name: getattr(robot.dh, name) for name in PARAMETERS}
-    unseen = description.undetermined_in_words(arm)
     made = tables.paper_tables(found["residuals"], found["dh_model"], nominal, dataset, unseen)
     return (tables.markdown if form == "markdown" else tables.latex)(made)
 

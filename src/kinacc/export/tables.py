@@ -33,7 +33,7 @@ def paper_tables(
 ) -> list[Table]:
     """Tables of a data set from its ``residuals`` and ``dh_model``; ``nominal`` as ``dh_model``.
 
-    ``unseen``: directions the poses do not determine, in words, as notes to the DH parameters.
+    ``unseen``: what the poses leave open, in sentences, as a note to the DH parameters.
     """
     return [
         _residual_table(
@@ -138,7 +138,7 @@ def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str
         notes.append(
             "† shares a direction the poses do not determine; along it the value is nominal."
         )
-    notes += [f"Changes that no measured pose shows: {'; '.join(unseen)}."] if unseen else []
+    notes += [f"Left open by the poses: {'; '.join(unseen)}."] if unseen else []
     return Table(
         "dh_parameters",
         f"DH parameters, {name}",

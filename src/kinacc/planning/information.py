@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibrated.blind import in_words
 from kinacc.calibrated.predict import sensitivity
-from kinacc.calibrated.record import TOOL, nominal
+from kinacc.calibrated.record import TOOL, Calibration, nominal
+from kinacc.calibration import blind_groups, blind_words, frames
+from kinacc.calibration.dh_fit import joints_anywhere
 from kinacc.calibration.frames import BASE, MOTIONS
+from kinacc.calibration.identified import STRUCTURAL
 from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
 from kinacc.geometry import Pose
 from kinacc.robot import Robot
@@ -43,9 +45,9 @@ class Experiment:
 class Information:
     """Rows (n, m, r) that n candidate poses add to the normal equations of r directions.
 
-    The r directions are those at least one candidate shows; ``excluded`` names the others, each in
-    words. ``values`` are the singular values of all candidates together, falling, of ``names``
-    parameters (P,), and ``rank`` how many of them count.
+    The r directions are those at least one candidate shows; ``excluded`` says in sentences what
+    that leaves open. ``values`` are the singular values of all candidates together, falling, of
+    ``names`` parameters (P,), and ``rank`` how many of them count.
     """
 
     rows: np.ndarray
@@ -61,20 +63,36 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     count = len(names)
     blank = Uncertainty(names, np.eye(count), np.zeros((0, count)))
     arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
-    q_dh = np.atleast_2d(q_rad) @ robot.joint_map.T
+    slopes = _slopes(arm, np.atleast_2d(q_rad) @ robot.joint_map.T, experiment)
+    _, values, right = np.linalg.svd(slopes.reshape(-1, count), full_matrices=False)
+    rank = int(np.sum(values > experiment.threshold * values[0]))
+    lost = right[rank:] if len(right) == count else _complement(right[:rank])
+    excluded = _said(arm, experiment, lost) if len(lost) else ()
+    return Information(slopes @ right[:rank].T, names, values, rank, excluded)
+
+
+def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:
+    """Movement (n, m, P) of what is measured at DH joints (n, k), per mm or mrad."""
     weight = np.ones(6)
     weight[3:] = experiment.rotation_weight_mm_per_rad
     seen = 6 if experiment.orientation else 3
-    slopes = np.empty((len(q_dh), seen, count))
+    slopes = np.empty((len(q_dh), seen, len(arm.known.names)))
     for begin in range(0, len(q_dh), _BLOCK):
         block = slice(begin, begin + _BLOCK)
         part = sensitivity(arm, q_dh[block], None, "instrument", TOOL)
         slopes[block] = (part * weight[:, None])[:, :seen] * arm.units
-    _, values, right = np.linalg.svd(slopes.reshape(-1, count), full_matrices=False)
-    rank = int(np.sum(values > experiment.threshold * values[0]))
-    lost = right[rank:] if len(right) == count else _complement(right[:rank])
-    excluded = tuple(in_words(lost, names)) if len(lost) else ()
-    return Information(slopes @ right[:rank].T, names, values, rank, excluded)
+    return slopes
+
+
+def _said(arm: Calibration, experiment: Experiment, lost: np.ndarray) -> tuple[str, ...]:
+    """What the directions ``lost`` (u, P) leave open, in the sentences of a fit."""
+    names = arm.known.names
+    anywhere = _slopes(arm, joints_anywhere(arm.robot.dh), experiment).reshape(-1, len(names))
+    _, values, right = np.linalg.svd(anywhere)
+    hidden = right[int(np.sum(values > STRUCTURAL * values[0])) :]
+    groups = blind_groups.groups(hidden, lost, blind_words.of_arm(names))
+    fitted = frames.known(arm.base, experiment.tool)
+    return tuple(text for text, _ in blind_words.statements(groups, names, fitted))
 
 
 def parameter_names(robot: Robot, experiment: Experiment) -> tuple[str, ...]:
