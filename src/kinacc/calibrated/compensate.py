@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,8 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
 from kinacc.inverse import few_axes, limits, newton
 from kinacc.inverse import solve as all_branches
-from kinacc.models import dh, vec
+from kinacc.inverse.onto_model import Functions, functions_of
+from kinacc.models import dh
 from kinacc.models.vec import VECModel
 from kinacc.region import points
 
@@ -235,34 +235,22 @@ class _Arm:
 
     def _refined(self, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
         if self.s is None or not self.is_vec:
-            return self._onto(self._functions(None), start, rows)
+            return self._onto(functions_of(self.model, None), start, rows)
         # Travel directions differ by row, and a refinement drops rows as they converge.
         found = np.empty_like(start)
         directions, group = np.unique(self.s[rows], axis=0, return_inverse=True)
         for number, direction in enumerate(directions):
             own = np.flatnonzero(group.ravel() == number)
-            found[own] = self._onto(self._functions(direction), start[own], rows[own])
+            found[own] = self._onto(functions_of(self.model, direction), start[own], rows[own])
         return found
 
-    def _onto(self, functions: tuple, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    def _onto(self, of: Functions, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Joints (m, k) refined from ``start`` onto the goals ``rows`` (m,), reached or not."""
         wanted = Pose(self.wanted.rotation[rows], self.wanted.position_mm[rows])
         if self.has_few_axes:
             slides = self.calibration.robot.dh.prismatic
-            return few_axes.refine(*functions, wanted, self.carried, start, slides)
-        return newton.refine(*functions, wanted, start).q_rad
-
-    def _functions(self, direction: np.ndarray | None) -> tuple[Callable, Callable]:
-        if not self.is_vec:
-            return partial(dh.forward, self.model), partial(dh.joint_jacobian, self.model)
-
-        def directions(q: np.ndarray) -> np.ndarray | None:
-            return None if direction is None else np.broadcast_to(direction, q.shape)
-
-        return (
-            lambda q: vec.pose(self.model, q, directions(q)),
-            lambda q: vec.joint_jacobian(self.model, q, directions(q)),
-        )
+            return few_axes.refine(of.forward, of.jacobian, wanted, self.carried, start, slides)
+        return newton.refine(of.forward, of.jacobian, wanted, start).q_rad
 
     def _left(self, q_dh: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
@@ -287,7 +275,7 @@ class _Arm:
         share = points("sobol", count, robot.dh.joints)
         starts = (low + share * (high - low)) @ robot.joint_map.T
         found = np.full((len(rows), count, robot.dh.joints), np.nan)
-        functions = partial(dh.forward, self.plain), partial(dh.joint_jacobian, self.plain)
+        functions = functions_of(self.plain, None)
         for number, start in enumerate(starts):
             q_dh = self._onto(functions, np.tile(start, (len(rows), 1)), rows)
             at = compose(dh.forward(self.plain, q_dh), self.carried)

@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import IDENTITY, Pose, compose, invert
+from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
 from kinacc.models import dh, vec
 from kinacc.models.dh import DHModel
 from kinacc.models.vec import VECModel
@@ -113,6 +113,24 @@ class Calibration:
     ) -> Pose:
         """Poses (n, ...) of a point in ``frame`` at DH joints (n, k); travel s (n, k)."""
         return compose(self.origin(frame), compose(self.forward(q_rad, s), self.point(point)))
+
+    def joint_jacobian(
+        self,
+        q_rad: np.ndarray,
+        s: np.ndarray | None = None,
+        frame: str = "base",
+        point: str | None = None,
+    ) -> np.ndarray:
+        """Jacobian (n, 6, k) of ``pose`` in the DH joints; rows as in ``dh.joint_jacobian``."""
+        if isinstance(self.model, VECModel):
+            slopes = vec.joint_jacobian(self.model, q_rad, s)
+        else:
+            slopes = dh.joint_jacobian(self.model, q_rad)
+        # A turn of the last frame swings the point: w x arm = -[arm] w.
+        arm = self.forward(q_rad, s).rotation @ self.point(point).position_mm
+        slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
+        turn = self.origin(frame).rotation
+        return np.concatenate([turn @ slopes[:, :3], turn @ slopes[:, 3:]], axis=1)
 
     @cached_property
     def root(self) -> np.ndarray:

@@ -16,7 +16,6 @@ from kinacc.geometry import compose, invert
 from kinacc.models.vec import VECModel
 from kinacc.planning import travel
 
-_STEP_RAD, _STEP_MM = 1e-6, 1e-4
 _MM_PER_RAD = 1000.0  # a sliding joint's travel counts like an arc at one metre
 _ROUTED = 400  # points beyond which the route is built in stretches of so many
 
@@ -46,15 +45,9 @@ def points_of(
         problems.append(Problem("candidates", what, "one name per point"))
     if problems:
         raise InputError(problems, "These candidates cannot be measured against the model")
-    where = _positions(arm, joints, directions, point)
-    slides = arm.robot.dh.prismatic
-    slope = np.empty((*where.shape, joints.shape[1]))
-    for joint, slide in enumerate(slides):
-        step = np.zeros(joints.shape[1])
-        step[joint] = _STEP_MM if slide else _STEP_RAD
-        apart = _positions(arm, joints + step, directions, point)
-        apart -= _positions(arm, joints - step, directions, point)
-        slope[:, :, joint] = apart / (2.0 * step[joint])
+    q_dh = joints @ arm.robot.joint_map.T
+    where = arm.pose(q_dh, directions, "base", point).position_mm
+    slope = arm.joint_jacobian(q_dh, directions, "base", point)[:, :3] @ arm.robot.joint_map
     return Points(tuple(label), joints, directions, where, slope)
 
 
@@ -118,10 +111,6 @@ def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
         path.append(left.pop(nearest))
         here = places[path[-1]]
     return np.array(path)
-
-
-def _positions(arm, joints, directions, point) -> np.ndarray:
-    return arm.pose(joints @ arm.robot.joint_map.T, directions, "base", point).position_mm
 
 
 def _outside(arm: Calibration, joints: np.ndarray, label: list[str]) -> list[Problem]:
