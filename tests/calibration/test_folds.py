@@ -101,7 +101,17 @@ def test_time_blocks_are_even_and_contiguous_without_revisits():
 
 
 def test_a_label_of_one_fold_alone_must_train():
-    fold = np.array([0, 0, 0, 1, 1, 1, 1, 1, 1])
-    label = np.array(["a", "a", "a", "a", "a", "a", "b", "b", "b"])
-    assert folds.always_trained(fold, label, 3) == ["b"]
-    assert folds.always_trained(fold, label, 4) == ["a", "b"]
+    fold = np.array([0, 0, 1, 1, 1, 1, 1, 1, 1])
+    label = np.array(["a", "a", "a", "a", "a", "b", "b", "b", "b"])
+    same = np.array([0, 1, 2, 3, 4, 5, 6, 7, 4])  # the last is the fifth visited again
+    labels = {"session": np.zeros(9), "target": label}
+    found = folds.always_trained(fold, labels, same)
+    assert [(each.kind, each.value) for each in found] == [("target", "a"), ("target", "b")]
+    np.testing.assert_array_equal(found[0].rows, [1, 1, 1, 1, 1, 0, 0, 0, 1])
+    np.testing.assert_array_equal(found[1].rows, [0, 0, 0, 0, 1, 1, 1, 1, 1])
+
+
+def test_a_label_with_enough_rows_outside_each_fold_is_held_out():
+    fold, label = np.array([0, 0, 0, 1, 1, 1, 1, 0]), np.array([*"aaaaaa", "b", "b"])
+    found = folds.always_trained(fold, {"target": label}, np.arange(8))
+    assert [each.value for each in found] == ["b"]

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import NamedTuple
+
 import numpy as np
+
+LEAST_ROWS = 3  # that place a base or a target
 
 
 def configurations(pose: np.ndarray, q_rad: np.ndarray, tolerance_rad: float) -> np.ndarray:
@@ -60,18 +65,41 @@ def blocks(configuration: np.ndarray, folds: int) -> np.ndarray:
     return fold_of[inverse]
 
 
-def always_trained(fold: np.ndarray, label: np.ndarray, least: int) -> list:
-    """Values of ``label`` (n,) that leave fewer than ``least`` rows outside one of their folds.
+class Trained(NamedTuple):
+    """Rows (n,) that must train for a session or a target (``kind``) ``value`` to be placed."""
 
-    A fold that holds out all rows of a session or target leaves nothing to place it by.
+    kind: str
+    value: str
+    rows: np.ndarray
+
+
+def always_trained(
+    fold: np.ndarray, labels: Mapping[str, np.ndarray], configuration: np.ndarray
+) -> list[Trained]:
+    """Rows of ``labels`` (by kind, each (n,)) that no fold (n,) may hold out.
+
+    A fold that leaves fewer than ``LEAST_ROWS`` rows of a session or target leaves nothing to place
+    it by: all rows of its configurations (n,) train. Where all rows have one label it is not asked.
     """
+    found = []
+    for kind, label in labels.items():
+        names = [str(each) for each in label]
+        values = _scarce(fold, np.array(names)) if len(set(names)) > 1 else []
+        for value in values:
+            own = configuration[np.array(names) == value]
+            found.append(Trained(kind, value, np.isin(configuration, own)))
+    return found
+
+
+def _scarce(fold: np.ndarray, label: np.ndarray) -> list[str]:
+    """Values of ``label`` (n,) that leave too few rows outside one of their folds."""
     names, number = np.unique(label, return_inverse=True)
     total = np.bincount(number)
     found = set()
     for each in np.unique(fold):
         inside = np.bincount(number[fold == each], minlength=len(names))
-        found |= set(np.flatnonzero((inside > 0) & (total - inside < least)))
-    return [names[i] for i in sorted(found)]
+        found |= set(np.flatnonzero((inside > 0) & (total - inside < LEAST_ROWS)))
+    return [str(names[i]) for i in sorted(found)]
 
 
 def _ranks(values: np.ndarray) -> np.ndarray:

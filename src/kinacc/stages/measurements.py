@@ -13,7 +13,6 @@ from kinacc.data.measurements import UNCERTAINTY
 
 Columns = dict[str, np.ndarray]
 TIME_BLOCK = "time_block"
-LEAST_ROWS = 3  # that place a base or a target
 SAME_CONFIGURATION_DEG = 0.1  # joints this close are one configuration visited again
 
 
@@ -54,29 +53,17 @@ def split(columns: Mapping, settings: Mapping) -> Columns:
             fold = folds.blocks(same, int(section["folds"])).astype(float)
         else:
             fold = folds.assign(same, int(section["folds"]), int(settings["seed"])).astype(float)
-        fold[_never_held_out(columns, fold, same)] = np.nan
+        labels = {kind: columns[kind] for kind in ("session", "target") if kind in columns}
+        for kind, value, rows in folds.always_trained(fold, labels, same):
+            fold[rows] = np.nan
+            warnings.warn(
+                f"{kind} {value} has fewer than {folds.LEAST_ROWS} rows outside one of its folds: "
+                f"its {int(rows.sum())} rows always train and are not cross-validated",
+                stacklevel=2,
+            )
     held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])
     subset = np.where(held_out, "validation", "train").astype(object)
     return {**_not_stated(count), **columns, "subset": subset, "fold": fold}
-
-
-def _never_held_out(columns: Mapping, fold: np.ndarray, same: np.ndarray) -> np.ndarray:
-    """Rows (n,) of the configurations that must train, for a session or a target to be placed."""
-    kept = np.zeros(len(fold), dtype=bool)
-    for name in ("session", "target"):
-        if name not in columns:
-            continue
-        label = np.array([str(each) for each in columns[name]])
-        found = folds.always_trained(fold, label, LEAST_ROWS)
-        for each in found if len(np.unique(label)) > 1 else ():
-            rows = np.isin(same, same[label == each])
-            warnings.warn(
-                f"{name} {each} has fewer than {LEAST_ROWS} rows outside one of its folds: its "
-                f"{int(rows.sum())} rows always train and are not cross-validated",
-                stacklevel=3,
-            )
-            kept |= rows
-    return kept
 
 
 def _not_stated(count: int) -> Columns:
