@@ -98,6 +98,30 @@ def test_arms_of_different_kinds_are_refused():
         compare(nominal(robot.load("mh180")), nominal(robot.load("iiwa14")), np.zeros((2, 6)))
 
 
+def test_another_geometry_is_another_robot_and_a_calibration_is_not():
+    q_rad = joints("irb120", 60)
+    arm, other = (nominal(robot.load(name)) for name in ("irb120", "meca500"))
+    found = compare(arm, other, q_rad)
+    assert not found.same_robot
+    assert found.robots_apart_mm == pytest.approx(found.apart_from_frames.rms_mm)
+    assert compare(arm, arm, q_rad).same_robot
+    before, after = (calibrated("mh180", "dh", 60, seed) for seed in (3, 4))
+    far = changed(after, j2_theta_offset_rad=0.2)  # the same robot, whatever happened to it
+    for each in (after, far):
+        found = compare(before, each, joints("mh180", 60))
+        assert found.same_robot
+        assert found.robots_apart_mm == 0.0
+
+
+def test_a_robot_file_of_the_calibrated_arm_is_the_same_robot():
+    arm = nominal(robot.load("mh180"))
+    bent = changed(arm, j2_a_mm=2.0, j3_theta_offset_rad=3e-3, j5_alpha_rad=2e-3)
+    own = replace(bent, robot=replace(bent.robot, dh=bent.model))
+    found = compare(arm, own, joints("mh180", 60))
+    assert found.same_robot
+    assert found.robots_apart_mm > 1.0
+
+
 def test_the_picture_marks_every_parameter():
     before = calibrated("ur10", "dh", 60, 3)
     after = changed(calibrated("ur10", "dh", 60, 4), j2_a_mm=1.0)

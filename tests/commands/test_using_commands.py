@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,18 @@ def test_compare_draws_and_says_what_moved(folder, tmp_path):
     assert done.exit_code == 0, done.output
     assert "after the best base and tool" in done.output
     assert picture.stat().st_size > 5000
+
+
+def test_compare_says_that_robots_differ_and_refuses_what_cannot_be_compared():
+    other = call("compare", "irb120", "meca500")
+    assert other.exit_code == 0, other.output
+    assert "these are different robots (irb120 and meca500)" in other.output
+    assert "the arm has changed" not in other.output
+    assert not re.search(r"e-\d\d", other.output)
+    assert json.loads(call("compare", "irb120", "meca500", "--json").stdout)["same_robot"] is False
+    refused = call("compare", "mh180", "iiwa14")
+    assert refused.exit_code == 2
+    assert "iiwa14: has 7 joints; allowed: 6, as mh180 has" in refused.output
 
 
 def test_plan_poses_writes_joints_a_controller_can_read(tmp_path):

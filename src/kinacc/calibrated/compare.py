@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
+from kinacc import robot as robots
 from kinacc.calibrated.predict import sensitivity
 from kinacc.calibrated.record import FLANGE, Calibration
 from kinacc.calibration.uncertainty import dh_parameter_names, is_angle
@@ -25,6 +26,8 @@ _MRAD = 1e-3
 _SPAN = 1e-3  # directions closer than this are one
 _TOUCHED = 1e-4  # as in the fits: 1 % of a parameter in a direction nobody sees
 _STEPS = 8
+_ANOTHER = 0.005  # of the length of an arm; a calibration changes far less
+_ROUNDING = 1e-9  # mm and mrad
 
 
 class Parameters(NamedTuple):
@@ -64,7 +67,8 @@ class Comparison:
     ``directions`` both determine, in units of their covariances, and ``probability`` that of one at
     least as large where nothing changed; NaN where not both know their covariance.
     ``as_they_stand`` are shifts of the flange in the base, ``apart_from_frames`` after the best
-    base and tool.
+    base and tool. ``robots_apart_mm`` is the rms by which the arms they were calibrated from differ
+    after the best base and tool, and ``same_robot`` whether that is no more than calibrations do.
     """
 
     parameters: Parameters | None
@@ -73,6 +77,8 @@ class Comparison:
     probability: float
     as_they_stand: Shift
     apart_from_frames: Shift
+    robots_apart_mm: float
+    same_robot: bool
 
 
 def compare(
@@ -85,7 +91,7 @@ def compare(
 
     Raises InputError where the two are of different kinds of arm.
     """
-    _require_alike(first, second)
+    require_alike(first, second)
     parameters, test = None, (np.nan, 0, np.nan)
     if isinstance(first.model, DHModel) and isinstance(second.model, DHModel):
         parameters = _parameters(first, second)
@@ -101,35 +107,55 @@ def compare(
     known = all(each is not None for each in chance)
     scatter = np.concatenate(chance, axis=2) if known else None
     left = None if scatter is None else _without_frames(scatter, slopes, weights)
+    apart_mm = _robots_apart(first, second, q_rad, weights)
     return Comparison(
         parameters,
         *test,
         _shift(plain, scatter),
         _shift(aligned, left),
+        apart_mm,
+        apart_mm <= _ANOTHER * _length(first.robot.dh),
     )
 
 
-def _require_alike(first: Calibration, second: Calibration) -> None:
+def require_alike(first: Calibration, second: Calibration) -> None:
+    """InputError where the joints of two arms do not mean the same, so that nothing compares."""
     one, two = first.robot.dh, second.robot.dh
     problems = []
     if one.joints != two.joints:
-        problems.append(Problem(second.name, f"has {two.joints} joints", f"{one.joints}"))
+        allowed = f"{one.joints}, as {first.name} has"
+        problems.append(Problem(second.name, f"has {two.joints} joints", allowed))
     elif not np.array_equal(one.prismatic, two.prismatic):
         problems.append(Problem(second.name, "other joints slide", "the same kind of arm"))
     elif not np.array_equal(first.robot.joint_map, second.robot.joint_map):
         problems.append(Problem(second.name, "another joint_map", "the same reported joints"))
     if problems:
-        raise InputError(problems, f"{first.name} and {second.name} cannot be compared")
+        raise InputError(problems, f"{first.name} and {second.name} are not the same kind of robot")
+
+
+def _robots_apart(
+    first: Calibration, second: Calibration, q_rad: np.ndarray, weights: np.ndarray
+) -> float:
+    """Rms distance (mm) of the arms before calibration, after the best base and tool."""
+    before, after = (robots.forward(arm.robot, q_rad) for arm in (first, second))
+    return _rms(np.linalg.norm(_aligned(before, after, weights)[:, :3], axis=1))
+
+
+def _length(model: DHModel) -> float:
+    """Length of the arm along its links, mm."""
+    return float(np.hypot(model.a_mm, model.d_mm).sum())
 
 
 def _parameters(first: Calibration, second: Calibration) -> Parameters:
     names = dh_parameter_names(first.model.joints)
     values = [dh.to_vector(arm.model) for arm in (first, second)]
     free = [_free(arm) for arm in (first, second)]
+    units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
+    differ = np.abs(values[1] - values[0]) > _ROUNDING * units
     shown = [
         number
         for number, name in enumerate(names)
-        if any(name in each for each in free) or values[0][number] != values[1][number]
+        if any(name in each for each in free) or differ[number]
     ]
     variance, blind = np.zeros((2, len(names))), np.zeros((2, len(names)), dtype=bool)
     for row, arm in enumerate((first, second)):

@@ -16,6 +16,7 @@ from kinacc.errors import InputError, Problem
 
 KINDS = (".csv", ".json", ".parquet")
 _SHOWN_ROWS = 24
+_NOTHING = 5e-7  # rounding to a person who reads mm and mrad
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,13 @@ def write_whole(path: Path | str, content: bytes) -> None:
         part.unlink(missing_ok=True)
 
 
+def number(value: float) -> str:
+    """Three digits for a sentence, whole thousands in full; 0 for what is only rounding."""
+    if abs(value) < _NOTHING:
+        return "0"
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+
+
 def _plain(value: object) -> object:
     """A value JSON and Arrow know; None for NaN."""
     if isinstance(value, np.generic):
@@ -159,5 +167,7 @@ def _short(value: object) -> str:
     if value is None:
         return "-"
     if isinstance(value, float):
-        return f"{value:.4f}" if abs(value) >= 0.01 or value == 0.0 else f"{value:.3g}"
+        if abs(value) < _NOTHING:
+            return f"{0.0:.4f}"
+        return f"{value:.4f}" if abs(value) >= 0.01 else f"{value:.3g}"
     return str(value)

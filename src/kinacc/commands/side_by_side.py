@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from kinacc import robot as robots
-from kinacc.calibrated.compare import Comparison, Shift
+from kinacc.calibrated.compare import Comparison, Shift, require_alike
 from kinacc.calibrated.record import Calibration, nominal
 from kinacc.commands import choice, rows
-from kinacc.commands.sheet import Field, Sheet
+from kinacc.commands.sheet import Field, Sheet, number
 from kinacc.errors import InputError, Problem
 from kinacc.operating_points import spread_rows
 from kinacc.region import points
@@ -33,7 +33,11 @@ def source(place: str, model: str, robot: str | None, config: tuple[str, ...]) -
 def joints(
     arms: Sequence[Calibration], places: Sequence[str], path: str | None, count: int
 ) -> np.ndarray:
-    """Reported joints (n, k) to compare at: of a file, as measured, or all over the limits."""
+    """Reported joints (n, k) to compare at: of a file, as measured, or all over the limits.
+
+    Raises InputError where the joints of the two do not mean the same.
+    """
+    require_alike(*arms)
     robot = arms[0].robot
     if path is not None:
         return rows.read(path, robot).joints
@@ -63,6 +67,7 @@ def answer(found: Comparison, arms: Sequence[Calibration], poses: int) -> Sheet:
         "first": arms[0].name,
         "second": arms[1].name,
         "model": arms[0].choice,
+        "same_robot": found.same_robot,
         "poses": poses,
         "statistic": found.statistic,
         "directions": found.directions,
@@ -106,7 +111,14 @@ def short_names(arms: Sequence[Calibration]) -> tuple[str, str]:
 def in_words(found: Comparison, arms: Sequence[Calibration]) -> str:
     """What moved, in sentences."""
     lines = []
-    if np.isfinite(found.probability):
+    if not found.same_robot:
+        first, second = (arm.robot.name for arm in arms)
+        lines.append(
+            f"these are different robots ({first} and {second}): before any calibration they are "
+            f"{number(found.robots_apart_mm)} mm rms apart, after the best base and tool; what "
+            "follows is no change of one arm"
+        )
+    elif np.isfinite(found.probability):
         verdict = "the arm has changed" if found.probability < _UNLIKELY else "no change is proven"
         lines.append(
             f"{found.directions} directions both determine: squared distance "
@@ -121,10 +133,11 @@ def in_words(found: Comparison, arms: Sequence[Calibration]) -> str:
 def _moved(words: str, shift: Shift) -> str:
     by_chance = ""
     if np.isfinite(shift.chance_mm):
-        by_chance = f" (by chance {shift.chance_mm:.3g} mm, {1e3 * shift.chance_rad:.3g} mrad)"
+        chance = number(shift.chance_mm), number(1e3 * shift.chance_rad)
+        by_chance = f" (by chance {chance[0]} mm, {chance[1]} mrad)"
     return (
-        f"{words}: {shift.rms_mm:.3g} mm rms, at most {shift.position_mm.max():.3g} mm, "
-        f"{1e3 * shift.rms_rad:.3g} mrad rms{by_chance}"
+        f"{words}: {number(shift.rms_mm)} mm rms, at most {number(shift.position_mm.max())} mm, "
+        f"{number(1e3 * shift.rms_rad)} mrad rms{by_chance}"
     )
 
 
