@@ -1,12 +1,19 @@
-"""What a campaign keeps of its candidates: modelled positions and their slopes."""
+"""What a campaign keeps of its candidates: modelled positions, their slopes, and their frame."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from kinacc import robot
-from kinacc.calibrated.record import nominal
+from kinacc.assess.registry import ADAPTIVE
+from kinacc.calibrated.record import Anchor, nominal
 from kinacc.campaign import begin
+from kinacc.campaign.instrument import instruments
+from kinacc.campaign.plan import Limits
+from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.planning.candidates import spread
 
 COUPLED_AND_SLIDING = """
@@ -33,3 +40,32 @@ def test_slopes_are_the_finite_differences_of_the_modelled_position():
         )
         apart = (high - low) / (2 * step)
         np.testing.assert_allclose(found.slope[:, :, joint], apart, atol=1e-5)
+
+
+def shifted(x_mm, y_mm, z_mm, turn_rad):
+    return Pose(exp_so3(np.array([0.3, -0.5, 1.0]) * turn_rad), np.array([x_mm, y_mm, z_mm]))
+
+
+@pytest.mark.parametrize("anchored", [False, True])
+def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
+    """A VEC model fitted with its base keeps the robot's base of the DH model of the same data."""
+    arm = nominal(robot.load("irb120"))
+    station = shifted(-2300.0, 1700.0, -640.0, 1.1)
+    arm = replace(arm, base=compose(station, shifted(0.4, -1.2, 0.7, 2e-3)))
+    if anchored:
+        arm = replace(arm, anchor=Anchor(station, arm.targets))
+    joints = spread(arm.robot, 6)
+    points = begin.points_of(arm, joints, [str(number) for number in range(6)])
+    plan = begin.plan_of(
+        arm,
+        points,
+        ADAPTIVE["single_shot"](measurements=6),
+        instruments(["tracker=0.05"], "instrument"),
+        Limits(3e-4, 5.0),
+        0,
+        np.zeros(6),
+        {},
+    )
+    seen = arm.pose(joints @ arm.robot.joint_map.T, frame="instrument").position_mm
+    in_base = seen @ plan.to_base.rotation.T + plan.to_base.position_mm
+    np.testing.assert_allclose(in_base, points.modelled_mm, atol=1e-9)

@@ -69,7 +69,7 @@ def plan_of(
     """
     order = np.random.default_rng(seed).permutation(len(points))
     slides, kept = arm.robot.dh.prismatic, Arm.of(arm, about.get("point"))
-    to_base = compose(arm.robot.base, invert(arm.base))
+    to_base = compose(arm.origin("base"), invert(arm.origin("instrument")))
     covariance = instruments[0].in_base(to_base.rotation)
     equal = candidates_of(covariance, points.joints, kept)
     route = order[: fixed_visit(assessor, equal)]
