@@ -15,6 +15,7 @@ from kinacc.assess import drawn_world
 from kinacc.assess.adaptive import conduct
 from kinacc.assess.streams import key_of
 from kinacc.campaign import folder as campaigns
+from kinacc.campaign import foreseen
 from kinacc.campaign.reading import Reading
 
 SIGMA_MM = 0.05
@@ -367,8 +368,27 @@ def test_a_bad_reading_leaves_the_campaign_as_it_was(begun, words, said):
 def test_a_second_campaign_does_not_overwrite_the_first(begun, calibration):
     folder = begun("--noise-mm", SIGMA_MM)
     said = refused(folder, "start", folder, "--calibration", calibration, "--robot", "mh180",
-                   "--noise-mm", "0.1")  # fmt: skip
+                   "--noise-mm", "0.1", "--width-mm", "-1")  # fmt: skip
     assert "a campaign is there already" in said
+    assert "--width-mm" in said
+
+
+def test_what_the_calibration_is_unsure_of_is_said_before_anything_is_written(
+    calibration, tmp_path, monkeypatch
+):
+    folder, seen = tmp_path / "campaign", []
+
+    def doubts(_):
+        seen.append(folder.exists())
+        return ["warning: doubtful"]
+
+    monkeypatch.setattr(foreseen.Unsure, "in_words", doubts)
+    done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+                "--model", "dh", "--noise-mm", "0.1", "--json")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "warning: doubtful" in done.stderr
+    assert json.loads(done.stdout)["points"] == 200
+    assert seen == [False]
 
 
 def test_a_plan_that_was_edited_is_noticed(begun):

@@ -56,6 +56,7 @@ def test_a_foreign_file_is_described_and_passes_the_check(foreign, tmp_path):
     assert done.exit_code == 0, done.output
     dataset = tmp_path / "cell" / "Messung_3.yaml"
     assert f"kinacc check-data {dataset}" in done.output
+    assert f"#     kinacc check-data {dataset}\n" in dataset.read_text(encoding="utf-8")
     settings = load((dataset,))["Messung_3"]
     file = settings["measurements"]["file"]
     assert (file["delimiter"], file["decimal"], file["joint_unit"]) == (";", ",", "rad")

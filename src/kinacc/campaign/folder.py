@@ -34,14 +34,18 @@ class Opened:
         journal.append(self.folder / journal.JOURNAL, self.journal, stamped)
 
 
+def in_the_way(folder: Path | str) -> list[Problem]:
+    """Files of a campaign that a folder holds already."""
+    paths = [Path(folder) / name for name in (journal.PLAN, journal.JOURNAL)]
+    what = "a campaign is there already"
+    return [Problem(str(path), what, "a new folder") for path in paths if path.exists()]
+
+
 def start(folder: Path | str, begun: Plan) -> None:
     """Put a new campaign on disk. Raises InputError where the folder holds one already."""
-    folder = Path(folder)
-    for name in (journal.PLAN, journal.JOURNAL):
-        if (folder / name).exists():
-            what = "a campaign is there already"
-            raise InputError(Problem(str(folder / name), what, "a new folder"))
-    journal.create(folder / journal.PLAN, plan.to_json(begun))
+    if there := in_the_way(folder):
+        raise InputError(there, "The campaign was not begun")
+    journal.create(Path(folder) / journal.PLAN, plan.to_json(begun))
 
 
 def open_(folder: Path | str) -> Opened:

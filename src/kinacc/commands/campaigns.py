@@ -1,4 +1,4 @@
-"""What the commands of ``kinacc campaign`` do with their options and how they answer."""
+"""What the commands of ``kinacc campaign`` do with their options."""
 
 from __future__ import annotations
 
@@ -6,25 +6,17 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 import numpy as np
 
 from kinacc import __version__
 from kinacc.assess.conformity import decide
-from kinacc.assess.statement import Statement
-from kinacc.campaign import consistency, folder, instrument, marks, words
-from kinacc.campaign.plan import Limits, Plan
-from kinacc.campaign.state import State
+from kinacc.campaign import folder, marks, words
+from kinacc.campaign.plan import Limits
+from kinacc.commands import campaigns_answers as answers
 from kinacc.commands import choice
-from kinacc.commands.sheet import Field, Sheet
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import invert
-
-if TYPE_CHECKING:
-    from kinacc.campaign.forecast import Forecast
-    from kinacc.campaign.foreseen import Unsure
 
 
 def start(given: Mapping) -> None:
@@ -32,7 +24,7 @@ def start(given: Mapping) -> None:
     from kinacc.campaign import begin, foreseen
     from kinacc.commands import campaign_candidates, campaign_options, rows
 
-    problems: list[Problem] = []
+    problems = folder.in_the_way(given["folder"])
     instruments = campaign_options.gathered(
         problems, lambda: campaign_options.instruments(given), ()
     )
@@ -69,51 +61,15 @@ def start(given: Mapping) -> None:
         arm, points, assessor, instruments, limits, given["seed"], joints_now, about,
         by_travel=given["visit"] == "travel",
     )  # fmt: skip
-    folder.start(given["folder"], begun)
-    merged = len(found.joints) - len(points)
     unsure = foreseen.unsure(arm, points, instruments, given["point"], limits.implausible_mm)
-    _say_begun(given, begun, merged, unsure)
-
-
-def _say_begun(given: Mapping, begun: Plan, merged: int, unsure: Unsure | None) -> None:
-    content = {
-        "folder": str(given["folder"]),
-        **begun.about,
-        "points": len(begun.points),
-        "first_visit": len(begun.route),
-        "assessor": begun.assessor.name,
-        "budget": begun.assessor.measurements,
-        "implausible_mm": begun.limits.implausible_mm,
-        "joint_tolerance_deg": math.degrees(begun.limits.joint_rad),
-        "prediction": None if unsure is None else unsure.as_facts(),
-    }
     for line in [] if unsure is None else unsure.in_words():
         click.echo(line, err=True)
+    folder.start(given["folder"], begun)
     if given["as_json"]:
-        click.echo(json.dumps(content, indent=1))
+        click.echo(json.dumps(answers.begun_facts(given["folder"], begun, unsure), indent=1))
         return
-    named = ", ".join(f"{each.name} ({instrument.noise(each)})" for each in begun.instruments)
-    lines = [
-        f"campaign begun in {given['folder']}",
-        f"{len(begun.points)} candidates ({begun.about['candidates']})"
-        + (f"; {merged} rows repeat the joints of others" if merged else ""),
-        f"the {begun.about['point']} of {begun.about['robot']}, {begun.about['model']} model of "
-        f"{begun.about['calibration']}",
-        f"instruments: {named}",
-        f"{begun.assessor.name}: {begun.assessor.measurements} readings, the first at "
-        f"{len(begun.route)} points whatever they say",
-        f"a reading is refused {refusals(begun)}",
-        f"next: kinacc campaign next {given['folder']}",
-    ]
-    click.echo("\n".join(lines))
-
-
-def refusals(begun: Plan) -> str:
-    """When a reading is refused."""
-    return (
-        f"more than {math.degrees(begun.limits.joint_rad):g} deg from the joints asked for, or "
-        f"more than {begun.limits.implausible_mm:g} mm from the model"
-    )
+    merged = len(found.joints) - len(points)
+    click.echo(answers.begun_in_words(given["folder"], begun, merged))
 
 
 def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool) -> None:
@@ -128,71 +84,11 @@ def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool
     wanted = found.ahead() if every else []
     wanted = wanted if found.asked in wanted else [found.asked, *wanted]
     if output is not None or as_json or every:
-        choice.deliver(_visit_sheet(opened.plan, wanted), output, as_json, force)
+        choice.deliver(answers.visit_sheet(opened.plan, wanted), output, as_json, force)
         if output is not None and not as_json:
             click.echo(f"{len(wanted)} points, in the order to measure them")
         return
-    click.echo(_next_in_words(found))
-
-
-def _next_in_words(found: State) -> str:
-    begun, point = found.plan, found.asked
-    joints = begun.points.joints[point]
-    lines = [f"point {begun.points.label[point]}, reading {len(found.told) + 1} of "
-             f"{begun.assessor.measurements}"]  # fmt: skip
-    for joint, value in enumerate(joints):
-        if begun.slides[joint]:
-            shown = f"{value:12.4f} mm"
-        else:
-            shown = f"{math.degrees(value):12.4f} deg  {value:12.7f} rad"
-        arrive = ""
-        if begun.points.directions is not None and begun.points.directions[point, joint]:
-            arrive = "  arriving " + ("up" if begun.points.directions[point, joint] > 0 else "down")
-        lines.append(f"  q{joint + 1} {shown}{arrive}")
-    seen = in_instrument(begun, begun.points.modelled_mm[[point]])[0]
-    frame = begun.instruments[0].frame
-    x, y, z = seen if frame == instrument.INSTRUMENT else begun.points.modelled_mm[point]
-    lines.append(f"expected at {x:.3f}, {y:.3f}, {z:.3f} mm in the {frame} frame")
-    again = sum(each.reading.point == point for each in found.told)
-    if again:
-        times = "once" if again == 1 else f"{again} times"
-        lines.append(f"read {times} before: leave the pose and come back to it")
-    return "\n".join(lines)
-
-
-def _visit_sheet(begun: Plan, points: list[int]) -> Sheet:
-    joints = begun.points.joints[points]
-    seen = in_instrument(begun, begun.points.modelled_mm[points])
-    label = np.array([begun.points.label[each] for each in points], dtype=object)
-    fields = [Field("pose", label, "", "name of the point among the candidates")]
-    for joint, slides in enumerate(begun.slides):
-        name = f"q{joint + 1}"
-        if slides:
-            fields.append(Field(f"{name}_mm", joints[:, joint], "mm", f"joint {joint + 1}"))
-        else:
-            degrees = np.rad2deg(joints[:, joint])
-            fields.append(Field(f"{name}_deg", degrees, "deg", f"joint {joint + 1}"))
-    fields += [
-        Field(f"q{joint + 1}_rad", joints[:, joint], "rad", f"joint {joint + 1}", False)
-        for joint, slides in enumerate(begun.slides)
-        if not slides
-    ]
-    if begun.points.directions is not None:
-        fields += [
-            Field(f"s{joint + 1}", begun.points.directions[points, joint], "1", "travel", False)
-            for joint in range(joints.shape[1])
-        ]
-    fields += [
-        Field(f"expected_{axis}_mm", seen[:, i], "mm", "modelled, in the instrument's frame")
-        for i, axis in enumerate("xyz")
-    ]
-    return Sheet("", dict(begun.about), fields, shown_rows=60)
-
-
-def in_instrument(begun: Plan, position_mm: np.ndarray) -> np.ndarray:
-    """Positions (n, 3) of the robot's base in the instrument's frame."""
-    back = invert(begun.to_base)
-    return position_mm @ back.rotation.T + back.position_mm
+    click.echo(answers.next_in_words(found))
 
 
 def status(given: Mapping) -> None:
@@ -214,8 +110,8 @@ def status(given: Mapping) -> None:
                 found, given["simulations"], wanted, tolerance, target, progress
             )
     if given["as_json"]:
-        facts = as_facts(found, tolerance)
-        facts |= {"forecast": _forecast_facts(ahead), "no_forecast": why_none or None}
+        facts = answers.as_facts(found, tolerance)
+        facts |= {"forecast": answers.forecast_facts(ahead), "no_forecast": why_none or None}
         click.echo(json.dumps(facts, indent=1))
         return
     say_doubts(opened)
@@ -233,25 +129,6 @@ def status(given: Mapping) -> None:
     elif why_none and (wanted or tolerance):
         lines.append(f"no forecast: {why_none}")
     click.echo("\n".join(lines))
-
-
-def _forecast_facts(ahead: Forecast | None) -> dict[str, object] | None:
-    if ahead is None:
-        return None
-    finite = [value if math.isfinite(value) else None for value in ahead.width_mm]
-    return {
-        "by": "simulation from the readings so far",
-        "simulations": ahead.simulations,
-        "readings_left": ahead.left,
-        "final_width_mm": dict(zip(("q05", "median", "q95"), finite, strict=True)),
-        "target": ahead.target,
-        "wanted_width_mm": ahead.wanted_mm,
-        "reached_within_budget": ahead.reached,
-        "readings_needed": ahead.more,
-        "budget_of_a_new_campaign": ahead.budget,
-        "largest_budget_tried": ahead.tried,
-        "decisions": ahead.decisions,
-    }
 
 
 def write_report(given: Mapping) -> None:
@@ -285,78 +162,11 @@ def write_report(given: Mapping) -> None:
     write_whole(text, report.markdown(opened, state, tables, "campaign.svg").encode())
     written = [*(f"{name}.parquet" for name in names), "campaign.svg", "campaign.png", "report.md"]
     if given["as_json"]:
-        facts = as_facts(state, state.plan.limits.tolerance_mm)
+        facts = answers.as_facts(state, state.plan.limits.tolerance_mm)
         click.echo(json.dumps({**facts, "folder": str(to), "files": written}, indent=1))
         return
     click.echo("\n".join(words.statement(said, state) for said in state.statements()))
     click.echo(f"{to}: {', '.join(written)}")
-
-
-def as_facts(found: State, tolerance: float | None) -> dict[str, object]:
-    """The standing of a campaign for a machine."""
-    label = found.plan.points.label
-    return {
-        **found.plan.about,
-        "assessor": found.plan.assessor.name,
-        "budget": found.plan.assessor.measurements,
-        "readings": found.taken,
-        "readings_used": len(found.told),
-        "points": len(label) - len(found.left_out),
-        "points_measured": len({each.reading.point for each in found.told}),
-        "left_out": {label[point]: reason for point, reason in found.left_out.items()},
-        "struck": {str(each.number): reason for each, reason in found.struck},
-        "scatter": _scatter_facts(found),
-        "next": None if found.asked is None else label[found.asked],
-        "statements": [statement_facts(said, found, tolerance) for said in found.statements()],
-    }
-
-
-def _scatter_facts(found: State) -> dict[str, object] | None:
-    """Scatter of repeated readings for a machine."""
-    seen = consistency.scatter(found)
-    if seen is None:
-        return None
-    return {
-        "ratio": seen.ratio,
-        "degrees_of_freedom": seen.freedom,
-        "probability": seen.probability,
-        "in_words": consistency.in_words(seen),
-    }
-
-
-def statement_facts(said: Statement, found: State, tolerance: float | None) -> dict[str, object]:
-    """A statement for a machine; null for what is not said."""
-
-    def plain(value: float) -> float | None:
-        return None if math.isnan(value) else value
-
-    facts = {
-        "target": said.target,
-        "value_mm": plain(said.value_mm),
-        "lower_mm": plain(said.lower_mm),
-        "upper_mm": plain(said.upper_mm),
-        "confidence": plain(said.confidence),
-        "share": said.share,
-        "assumption": said.assumption or None,
-        "withheld": said.withheld or None,
-        "in_words": words.statement(said, found),
-    }
-    if tolerance is not None:
-        facts |= {"tolerance_mm": tolerance, "decision": _decision_facts(said, tolerance)}
-    return facts
-
-
-def _decision_facts(said: Statement, tolerance: float) -> dict[str, object]:
-    """A decision for a machine."""
-    found = decide(said, tolerance)
-    known = math.isfinite(found.guard_band_mm)
-    return {
-        "verdict": found.verdict,
-        "reason": found.reason,
-        "guard_band_mm": found.guard_band_mm if known else None,
-        "acceptance_limit_mm": found.acceptance_limit_mm if known else None,
-        "risk": None if math.isnan(found.risk) else found.risk,
-    }
 
 
 def say_doubts(opened: folder.Opened) -> None:

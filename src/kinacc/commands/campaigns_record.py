@@ -14,7 +14,8 @@ from kinacc.campaign import folder, reading, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import State
-from kinacc.commands import campaigns
+from kinacc.commands.campaigns import say_doubts
+from kinacc.commands.campaigns_answers import as_facts
 from kinacc.commands.rows import ANGLE, LENGTH, open_table
 from kinacc.data.table import RawTable, numbers
 from kinacc.errors import InputError, Problem
@@ -28,7 +29,7 @@ def record(given: Mapping) -> None:
         raise InputError(Problem("the reading", what, "--position-mm, or a FILE"))
     with folder.writing(given["folder"]) as opened:
         before = opened.state()
-        campaigns.say_doubts(opened)
+        say_doubts(opened)
         if one:
             taken, skipped, mark = [_single(given, before)], [], None
         else:
@@ -83,7 +84,7 @@ def strike(path: str, number: int, reason: str, as_json: bool) -> None:
 
 def _say_standing(after: State, as_json: bool) -> None:
     if as_json:
-        click.echo(json.dumps(campaigns.as_facts(after, after.plan.limits.tolerance_mm), indent=1))
+        click.echo(json.dumps(as_facts(after, after.plan.limits.tolerance_mm), indent=1))
         return
     click.echo("\n".join(words.standing(after)))
 

@@ -37,8 +37,8 @@ def compensate(
     \b
     Example:
       kinacc compensate results/mh180 --pose "1500,200,900,0,1,0,0"
-      kinacc compensate results/ur10_b poses.csv -o joints.csv
-      kinacc compensate results/mh180 --program joints.csv -o corrected.csv
+      kinacc compensate results/ur10_b wanted.csv -o joints.csv
+      kinacc compensate results/mh180 --program program.csv -o corrected.csv
     """
     from kinacc.calibrated.compensate import compensate as joints_for
     from kinacc.commands import rows, sheet, wanted

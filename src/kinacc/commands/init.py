@@ -60,7 +60,7 @@ def init(measurement_file: str, **options) -> None:
     report = None
     if robot is not None:
         guess, report = _tried(guess, robots.load(robot), name)
-    texts[paths[0]] = _dataset(name, own, guess, report, chosen)
+    texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
     folder.mkdir(parents=True, exist_ok=True)
     for path, text in texts.items():
         path.write_text(text, encoding="utf-8")
@@ -249,15 +249,16 @@ def _how(report: Report | None) -> str:
     return "assumed" if report is None or report.code else "assumed, and the readings agree"
 
 
-def _dataset(name: str, robot: str, guess: Guess, report: Report | None, chosen: str) -> str:
+def _dataset(
+    path: Path, name: str, robot: str, guess: Guess, report: Report | None, chosen: str
+) -> str:
+    """Text of the data set, which names files from the folder the command was called in."""
     from kinacc.intake.write import dataset_text
 
     note = [f"Written by kinacc init. Robot: {chosen}."]
     how = _how(report).capitalize()
     note += [f"{how}: {words}." for words in guess.assumed.values()]
-    note.append(
-        f"Everything not given here is as in config.yaml.\n    kinacc check-data {name}.yaml"
-    )
+    note.append(f"Everything not given here is as in config.yaml.\n    kinacc check-data {path}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
 

@@ -54,9 +54,9 @@ def plan_poses(**given) -> None:
 
     \b
     Example:
-      kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o poses.csv --picture index.svg
+      kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv --picture index.svg
       kinacc plan-poses --dataset mh180 --poses 60 --index O4 --json
-      kinacc plan-poses my_robot.yaml --candidates reachable.csv --position-only -o poses.csv
+      kinacc plan-poses my_robot.yaml --candidates reachable.csv --position-only -o my_plan.csv
     """
     from kinacc.commands import planned, sheet
     from kinacc.stages.progress import reporting

@@ -35,7 +35,7 @@ def predict(
     \b
     Example:
       kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
-      kinacc predict results/ur10_b poses.csv --frame instrument -o predicted.csv
+      kinacc predict results/ur10_b plan.csv --frame instrument -o predicted.csv
     """
     from kinacc.calibrated.predict import predict as poses_at
     from kinacc.commands import rows, sheet, tables
