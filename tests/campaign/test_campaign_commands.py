@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from kinacc.assess.streams import key_of
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import foreseen
 from kinacc.campaign.reading import Reading
+from kinacc.commands import campaigns_answers
+from kinacc.geometry import Pose, exp_so3
 
 SIGMA_MM = 0.05
 COMMANDS = ("start", "next", "record", "leave-out", "strike", "status", "report")
@@ -135,6 +138,19 @@ def test_the_rest_of_the_first_visit_can_be_written_for_a_robot_program(begun, t
     lines = output.read_text().splitlines()
     plan = campaigns.open_(folder).plan
     assert [line.split(",")[0] for line in lines[1:]] == [plan.points.label[p] for p in plan.route]
+
+
+@pytest.mark.parametrize("frame", ["base", "instrument"])
+def test_readings_are_expected_in_the_frame_they_come_in(make_plan, frame):
+    to_base = Pose(exp_so3(np.array([0.1, -0.2, 0.3])), np.array([500.0, -20.0, 30.0]))
+    plan = replace(make_plan(frame=frame), to_base=to_base)
+    sheet = campaigns_answers.visit_sheet(plan, [4, 2])
+    fields = {field.name: field for field in sheet.fields}
+    assert frame in fields["expected_x_mm"].meaning
+    seen = np.stack([fields[f"expected_{axis}_mm"].values for axis in "xyz"], axis=1)
+    if frame == "instrument":
+        seen = seen @ to_base.rotation.T + to_base.position_mm
+    np.testing.assert_allclose(seen, plan.points.modelled_mm[[4, 2]], atol=1e-9)
 
 
 def test_a_file_of_readings_is_taken_whole(begun, tmp_path):

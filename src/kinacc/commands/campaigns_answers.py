@@ -76,10 +76,8 @@ def next_in_words(found: State) -> str:
         if begun.points.directions is not None and begun.points.directions[point, joint]:
             arrive = "  arriving " + ("up" if begun.points.directions[point, joint] > 0 else "down")
         lines.append(f"  q{joint + 1} {shown}{arrive}")
-    seen = _in_instrument(begun, begun.points.modelled_mm[[point]])[0]
-    frame = begun.instruments[0].frame
-    x, y, z = seen if frame == instrument.INSTRUMENT else begun.points.modelled_mm[point]
-    lines.append(f"expected at {x:.3f}, {y:.3f}, {z:.3f} mm in the {frame} frame")
+    x, y, z = _expected(begun, [point])[0]
+    lines.append(f"expected at {x:.3f}, {y:.3f}, {z:.3f} mm in the {_frame(begun)} frame")
     again = sum(each.reading.point == point for each in found.told)
     if again:
         times = "once" if again == 1 else f"{again} times"
@@ -90,7 +88,7 @@ def next_in_words(found: State) -> str:
 def visit_sheet(begun: Plan, points: list[int]) -> Sheet:
     """Joints and expected readings of points, in the order to measure them."""
     joints = begun.points.joints[points]
-    seen = _in_instrument(begun, begun.points.modelled_mm[points])
+    seen, about = _expected(begun, points), f"modelled, in the {_frame(begun)} frame"
     label = np.array([begun.points.label[each] for each in points], dtype=object)
     fields = [Field("pose", label, "", "name of the point among the candidates")]
     for joint, slides in enumerate(begun.slides):
@@ -111,16 +109,23 @@ def visit_sheet(begun: Plan, points: list[int]) -> Sheet:
             for joint in range(joints.shape[1])
         ]
     fields += [
-        Field(f"expected_{axis}_mm", seen[:, i], "mm", "modelled, in the instrument's frame")
-        for i, axis in enumerate("xyz")
+        Field(f"expected_{axis}_mm", seen[:, i], "mm", about) for i, axis in enumerate("xyz")
     ]
     return Sheet("", dict(begun.about), fields, shown_rows=60)
 
 
-def _in_instrument(begun: Plan, position_mm: np.ndarray) -> np.ndarray:
-    """Positions (n, 3) of the robot's base in the instrument's frame."""
+def _expected(begun: Plan, points: list[int]) -> np.ndarray:
+    """Modelled positions (n, 3) of points in the frame the readings come in."""
+    modelled = begun.points.modelled_mm[points]
+    if _frame(begun) != instrument.INSTRUMENT:
+        return modelled
     back = invert(begun.to_base)
-    return position_mm @ back.rotation.T + back.position_mm
+    return modelled @ back.rotation.T + back.position_mm
+
+
+def _frame(begun: Plan) -> str:
+    """Frame of the readings, which is one for all instruments."""
+    return begun.instruments[0].frame
 
 
 def as_facts(found: State, tolerance: float | None) -> dict[str, object]:
