@@ -300,6 +300,30 @@ def test_a_reading_given_twice_to_the_last_digit_is_taken_once(begun):
     assert call("campaign", *words, "--again").exit_code == 0
 
 
+def test_readings_of_a_file_that_has_grown_are_taken_once(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    names = [arm.plan.points.label[point] for point in arm.plan.route[:3]]
+    rows = [f"{name},{arm.position(name)}" for name in names]
+    file = tmp_path / "export.csv"
+
+    def export(*kept):
+        file.write_text("\n".join(["pose,x_mm,y_mm,z_mm", *kept]) + "\n")
+
+    export(*rows[:2])
+    assert call("campaign", "record", folder, file).exit_code == 0
+    export(*rows, rows[2])
+    said = refused(folder, "record", folder, file)
+    assert "line 2: is reading 1, to the last digit" in said
+    assert "line 3: is reading 2, to the last digit" in said
+    assert "line 5: is line 4, to the last digit" in said
+    assert "line 4: " not in said
+    assert call("campaign", "record", folder, file, "--skip-bad").exit_code == 0
+    assert standing(folder)["readings"] == 3
+    assert call("campaign", "record", folder, file, "--again").exit_code == 0
+    assert standing(folder)["readings"] == 7
+
+
 def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     arm = Arm(folder)

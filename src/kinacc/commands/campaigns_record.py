@@ -117,15 +117,30 @@ def _single(given: Mapping, before: State) -> Reading:
     problems = reading.problems_of(
         plan, found, "the reading", left_out, given["accept_implausible"]
     )
-    same = [each.number for each in (*before.told, *before.in_hand)
-            if each.reading.point == point
-            and np.array_equal(each.reading.position_mm, found.position_mm)]  # fmt: skip
-    if same and not given["again"]:
-        what = f"is reading {same[-1]}, to the last digit: it was recorded before"
-        problems.append(Problem("the reading", what, fix="give --again if it is a new one"))
+    if not given["again"]:
+        problems += _repeated(found, "the reading", _recorded(before))
     if problems:
         raise InputError(problems, "Nothing was recorded")
     return found
+
+
+def _digits(found: Reading) -> tuple:
+    return found.point, *found.position_mm.tolist()
+
+
+def _recorded(before: State) -> dict[tuple, str]:
+    """What readings there are, by their digits."""
+    there = (*before.told, *before.in_hand)
+    return {_digits(each.reading): f"reading {each.number}" for each in there}
+
+
+def _repeated(found: Reading, where: str, earlier: Mapping[tuple, str]) -> list[Problem]:
+    """The problem with a reading that is an earlier one to the last digit: it tells nothing new."""
+    same = earlier.get(_digits(found))
+    if same is None:
+        return []
+    what = f"is {same}, to the last digit: it was recorded before"
+    return [Problem(where, what, fix="give --again if it is a new one")]
 
 
 def _of_file(given: Mapping, before: State) -> tuple[list[Reading], list[Problem], str]:
@@ -142,6 +157,7 @@ def _of_file(given: Mapping, before: State) -> tuple[list[Reading], list[Problem
         raise InputError(Problem(path, "was recorded before", fix=fix), "Nothing was recorded")
     rows, problems = _rows(table, given["instrument"], before)
     left_out = frozenset(before.left_out)
+    earlier = _recorded(before)
     good = []
     for number, row in enumerate(rows):
         if isinstance(row, Problem):
@@ -149,6 +165,9 @@ def _of_file(given: Mapping, before: State) -> tuple[list[Reading], list[Problem
             continue
         where = f"{table.path}, line {table.line[number]}"
         wrong = reading.problems_of(before.plan, row, where, left_out, given["accept_implausible"])
+        if not given["again"]:
+            wrong += _repeated(row, where, earlier)
+            earlier.setdefault(_digits(row), f"line {table.line[number]}")
         problems += wrong
         good += [] if wrong else [row]
     if problems and not given["skip_bad"]:
