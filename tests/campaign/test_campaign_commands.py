@@ -349,7 +349,7 @@ def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
     [
         (("--noise-mm", "0"), "no instrument is without noise"),
         (("--noise-mm", "-0.1"), "no instrument is without noise"),
-        (("--noise-mm", "nan"), "no instrument is without noise"),
+        (("--noise-mm", "nan"), "nan"),
         (("--covariance-mm2", "1,2,3,4,5,6,7,8,9"), "not symmetric"),
         (("--covariance-mm2", "1,1,0,1,1,0,0,0,1"), "not positive definite"),
         (("--covariance-mm2", "1,0,0,0,1,0,0,0,-1"), "not positive definite"),
@@ -389,8 +389,8 @@ def test_points_that_are_all_equal_are_refused(calibration, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--position-mm", "nan,1,2"), "three numbers, in mm"),
-        (("--position-mm", "inf,1,2"), "three numbers, in mm"),
+        (("--position-mm", "nan,1,2"), "three numbers x,y,z"),
+        (("--position-mm", "inf,1,2"), "three numbers x,y,z"),
         (("--position-mm", "1,2"), "three numbers x,y,z"),
         (("--position-mm", "a,b,c"), "three numbers x,y,z"),
         (("--position-mm", "1,2,3", "--point", "none"), "is no candidate"),

@@ -195,6 +195,12 @@ def test_every_wrong_option_of_plan_poses_is_named():
     assert done.exit_code == 2
     for name in ("--tool-mm", "--joints-deg", "--hayati"):
         assert name in done.output
+    ranges = ",".join(["nan:1", *["0:1"] * 5])
+    done = call("plan-poses", "ur10", "--tool-mm", "1,nan,2", "--joints-deg", ranges,
+                "--hayati", "2.5")  # fmt: skip
+    assert done.exit_code == 2
+    for name in ("--tool-mm", "--joints-deg", "--hayati"):
+        assert name in done.output
 
 
 def test_results_say_which_robot_they_were_made_with(folder, tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.assess.adaptive import covariance_faults
+from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
 
 BASE, INSTRUMENT = "base", "instrument"
@@ -61,10 +62,7 @@ def instruments(texts: Iterable[str], frame: str) -> tuple[Instrument, ...]:
 
 def covariance_of(text: str, where: str, problems: list[Problem]) -> np.ndarray | None:
     """Covariance (3, 3) of a text with 1, 3 or 9 numbers; None with what is wrong noted."""
-    try:
-        values = np.array([float(word) for word in text.replace(",", " ").split()])
-    except ValueError:
-        values = np.zeros(0)
+    values = numbers_of(text)
     if values.size not in (1, 3, 9):
         problems.append(Problem(where, repr(text), _FORMS))
         return None
@@ -74,7 +72,7 @@ def covariance_of(text: str, where: str, problems: list[Problem]) -> np.ndarray 
             problems.append(Problem(where, said, "symmetric, positive definite, in mm^2"))
             return None
         return covariance
-    if not (np.isfinite(values).all() and (values > 0.0).all()):
+    if not (values > 0.0).all():
         allowed = "above 0, in mm: no instrument is without noise"
         problems.append(Problem(where, f"standard deviation {text.strip()}", allowed))
         return None

@@ -16,8 +16,9 @@ from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import State
 from kinacc.commands.campaigns import say_doubts
 from kinacc.commands.campaigns_answers import as_facts
-from kinacc.commands.rows import ANGLE, LENGTH, open_table
-from kinacc.data.table import RawTable, numbers
+from kinacc.commands.rows import ANGLE, LENGTH, Reader, open_table
+from kinacc.data.table import RawTable
+from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
 
 
@@ -177,12 +178,15 @@ def _of_file(given: Mapping, before: State) -> tuple[list[Reading], list[Problem
 
 def _rows(table: RawTable, instrument: str | None, before: State):
     """A Reading, or the Problem with it, of every row; and problems of the file as a whole."""
-    plan, problems = before.plan, []
-    position = _group(table, ["x", "y", "z"], [LENGTH] * 3, problems, needed=True)
+    plan = before.plan
+    # A cell that is no number spoils its row, not the file: it is found again row by row.
+    reader = Reader(table, cells=[])
+    problems = reader.problems
+    position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
     kinds = [LENGTH if slides else ANGLE for slides in plan.slides]
     names = [f"q{joint + 1}" for joint in range(len(plan.slides))]
-    joints = _group(table, names, kinds, problems, needed=False)
-    std = _group(table, ["std_x", "std_y", "std_z"], [LENGTH] * 3, problems, needed=False)
+    joints = reader.group(names, kinds, False)
+    std = reader.group(["std_x", "std_y", "std_z"], [LENGTH] * 3, False)
     if "pose" not in table.columns and joints is None and not problems:
         what = "does not say which point a row was measured at"
         problems.append(Problem(table.path, what, f"a column pose, or {names[0]}_deg .."))
@@ -215,28 +219,6 @@ def _rows(table: RawTable, instrument: str | None, before: State):
     return rows, problems
 
 
-def _group(table: RawTable, names, units, problems, needed: bool) -> np.ndarray | None:
-    """Columns (n, m) of quantities with their units; cells that are no number are NaN."""
-    columns = []
-    for name, kinds in zip(names, units, strict=True):
-        present = [(f"{name}_{unit}", by) for unit, by in kinds.items()
-                   if f"{name}_{unit}" in table.columns]  # fmt: skip
-        if len(present) > 1:
-            both = ", ".join(each for each, _ in present)
-            problems.append(Problem(f"{table.path}: columns {both}", "are the same in two units"))
-        columns.append(present[0] if present else None)
-    if all(each is None for each in columns) and not needed:
-        return None
-    for name, kinds, each in zip(names, units, columns, strict=True):
-        if each is None:
-            wanted = " or ".join(f"{name}_{unit}" for unit in kinds)
-            problems.append(Problem(f"{table.path}: column {wanted}", "is missing"))
-    if any(each is None for each in columns):
-        return None
-    # A cell that is no number spoils its row, not the file: it is found again row by row.
-    return np.stack([numbers(table, name, []) * by for name, by in columns], axis=1)
-
-
 def _point_named(opened: Opened, name: str) -> int:
     label = opened.plan.points.label
     if name not in label:
@@ -247,10 +229,7 @@ def _point_named(opened: Opened, name: str) -> int:
 
 
 def _three(text: str, problems: list[Problem]) -> np.ndarray:
-    try:
-        values = np.array([float(word) for word in text.replace(",", " ").split()])
-    except ValueError:
-        values = np.zeros(0)
+    values = numbers_of(text)
     if values.shape != (3,):
         problems.append(Problem("--position-mm", repr(text), "three numbers x,y,z"))
         return np.zeros(3)
@@ -260,10 +239,7 @@ def _three(text: str, problems: list[Problem]) -> np.ndarray:
 def _joints(
     text: str, unit: str, slides, option: str, problems: list[Problem]
 ) -> np.ndarray | None:
-    try:
-        values = np.array([float(word) for word in text.replace(",", " ").split()])
-    except ValueError:
-        values = np.zeros(0)
+    values = numbers_of(text)
     if values.shape != (len(slides),):
         problems.append(Problem(option, repr(text), f"{len(slides)} numbers, one per joint"))
         return None

@@ -14,6 +14,7 @@ from kinacc.commands import rows
 from kinacc.commands.choice import CONFIG
 from kinacc.commands.sheet import Field, Sheet
 from kinacc.commands.tables import joint_fields
+from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose
 from kinacc.planning import candidates, exchange, observability, travel
@@ -63,7 +64,9 @@ def question(given: Mapping) -> Question:
     if given["hayati"] is not None:
         values = _numbers("--hayati", given["hayati"], None, problems)
         hayati = tuple(int(value) for value in values)
-        if any(not 1 <= joint <= robot.dh.joints for joint in hayati):
+        if any(joint != value for joint, value in zip(hayati, values, strict=True)) or any(
+            not 1 <= joint <= robot.dh.joints for joint in hayati
+        ):
             problems.append(Problem("--hayati", given["hayati"], f"joints 1 to {robot.dh.joints}"))
     box = ranges("--joints-deg", given["joints_deg"], robot.dh.joints, problems)
     if box is not None:
@@ -223,10 +226,7 @@ def inside_box(space: tuple[np.ndarray, np.ndarray]) -> Callable[[np.ndarray], n
 
 
 def _numbers(option: str, text: str, count: int | None, problems: list[Problem]) -> np.ndarray:
-    try:
-        values = np.array([float(word) for word in text.replace(",", " ").split()])
-    except ValueError:
-        values = np.zeros(0)
+    values = numbers_of(text)
     if not values.size or (count is not None and values.size != count):
         problems.append(Problem(option, repr(text), f"{count or 'some'} numbers, 1,2,3"))
         return np.zeros(count or 0)
@@ -244,7 +244,7 @@ def ranges(
         pairs = [[float(end) for end in pair.split(":")] for pair in text.split(",")]
     except ValueError:
         pairs = []
-    if len(pairs) != count or any(len(pair) != 2 or pair[0] >= pair[1] for pair in pairs):
+    if len(pairs) != count or any(len(pair) != 2 or not pair[0] < pair[1] for pair in pairs):
         problems.append(Problem(option, repr(text), allowed))
         return None
     low, high = np.array(pairs).T

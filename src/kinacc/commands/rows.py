@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.data.table import RawTable, load, numbers
+from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.robot import Robot
@@ -43,7 +44,7 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
     ``rx_deg`` .. (or rad). Raises InputError listing every problem.
     """
     table = open_table(path)
-    reader = _Reader(table, [], set())
+    reader = Reader(table)
     slides = robot.dh.prismatic
     q_rad = reader.group(
         [f"q{i + 1}" for i in range(len(slides))],
@@ -69,12 +70,8 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
     """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in ``unit``; InputError if unfit."""
     slides, rows, problems = robot.dh.prismatic, [], []
     for text in texts:
-        words = text.replace(",", " ").split()
-        try:
-            row = [float(word) for word in words]
-        except ValueError:
-            row = []
-        if len(row) != len(slides) or not np.isfinite(row).all():
+        row = numbers_of(text)
+        if len(row) != len(slides):
             allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
             problems.append(Problem(option, repr(text), allowed))
         rows.append(row)
@@ -106,11 +103,17 @@ def limit_problems(
     return problems
 
 
-@dataclass
-class _Reader:
-    table: RawTable
-    problems: list[Problem]
-    used: set[str]
+class Reader:
+    """Quantities of a table by name and unit; ``problems`` and the columns ``used`` grow.
+
+    ``cells``: where what is wrong with single cells is noted; they are NaN then.
+    """
+
+    def __init__(self, table: RawTable, cells: list[Problem] | None = None) -> None:
+        self.table = table
+        self.problems: list[Problem] = []
+        self.used: set[str] = set()
+        self.cells = self.problems if cells is None else cells
 
     def group(self, names: list[str], units: list[dict], needed: bool) -> np.ndarray | None:
         """Columns (n, m) of quantities that come together, or None where none is there."""
@@ -128,7 +131,7 @@ class _Reader:
         columns = []
         for name, factor in found:
             self.used.add(name)
-            columns.append(numbers(self.table, name, self.problems) * factor)
+            columns.append(numbers(self.table, name, self.cells) * factor)
         return np.stack(columns, axis=1)
 
     def _column(self, name: str, units: dict) -> tuple[str, float] | None:

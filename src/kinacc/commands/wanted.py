@@ -18,6 +18,7 @@ from kinacc.commands import rows
 from kinacc.commands.rows import Rows
 from kinacc.commands.sheet import Field, Sheet
 from kinacc.commands.tables import facts, joint_fields, joints_in_words, pose_fields
+from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 
@@ -140,15 +141,12 @@ def _remarks(arm: Calibration, found: Compensation, row: int, is_program: bool) 
 def _of_arguments(texts: tuple[str, ...]) -> Pose:
     values, problems = [], []
     for text in texts:
-        try:
-            row = [float(word) for word in text.replace(",", " ").split()]
-        except ValueError:
-            row = []
+        row = numbers_of(text)
         length = np.linalg.norm(row[3:]) if len(row) == 7 else 0.0
-        if not np.isfinite(row).all() or abs(length - 1.0) > 1e-3:
+        if abs(length - 1.0) > 1e-3:
             problems.append(Problem("--pose", repr(text), _NUMBERS))
             continue
-        values.append([*row[:3], *(np.array(row[3:]) / length)])
+        values.append([*row[:3], *(row[3:] / length)])
     if problems:
         raise InputError(problems)
     table = np.array(values)
