@@ -14,7 +14,6 @@ import numpy as np
 from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
 
 SEQUENCES = ("sobol", "halton")
-ROTATIONS = ("signs_and_zero", "all_27")
 
 _ROUND_OFF_MM = 1e-9
 

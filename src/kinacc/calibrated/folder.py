@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.calibrated.record import MODELS, Anchor, Calibration, Residual
-from kinacc.calibration.uncertainty import Uncertainty, is_angle
+from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
 from kinacc.models import tables as model_tables
@@ -20,7 +20,7 @@ Tables = Mapping[str, Mapping[str, np.ndarray]]
 
 _NEEDED = ("vec_model", "dh_model", "frames")
 # Used where they are there.
-_WANTED = ("dh_fit", "dh_identified", "vec_fit", "residuals", "model_selection")
+_WANTED = ("dh_fit", "dh_identified", "residuals", "model_selection")
 _COVARIANCE = {"dh": "dh_covariance", "vec": "vec_covariance"}
 _SAME = 1e-9
 
@@ -181,11 +181,6 @@ def _undetermined(tables: Tables, choice: str, place: Mapping[str, int]) -> np.n
     for row in rows:
         directions[int(fit["number"][row]) - 1, place[fit["parameter"][row]]] = fit["value"][row]
     return directions
-
-
-def in_own_units(directions: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """Directions (m, P) in mm and mrad as displacements in mm and rad."""
-    return directions * np.where([is_angle(name) for name in names], 1e-3, 1.0)
 
 
 def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:

@@ -20,7 +20,6 @@ from kinacc.calibration.uncertainty import (
 )
 
 IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
-STATUSES = (IDENTIFIED, PRIOR, UNDETERMINED, FIXED)
 STRUCTURAL = 1e-6  # share of the largest singular value over poses all over the joints
 _MOST_SAID = 3
 _JOIN, _MORE = "; ", "and "

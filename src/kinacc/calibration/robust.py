@@ -10,7 +10,6 @@ from scipy.special import chdtri
 from kinacc.calibration.observations import Observations
 
 SQUARES, HUBER, TUKEY = "squares", "huber", "tukey"
-LOSSES = (SQUARES, HUBER, TUKEY)
 # Share of rows of Gaussian noise alone that lies beyond the bend: of one component those are the
 # usual 1.345 and 4.685 standard deviations (95 % efficiency).
 _BEYOND = {HUBER: 0.17863, TUKEY: 2.7995e-6}

@@ -19,7 +19,6 @@ from kinacc.models.tables import frame
 from kinacc.models.vec import ERRORS
 
 Columns = dict[str, np.ndarray]
-_DELTAS = 3
 _DIRECTIONS = (-1, 1)
 
 

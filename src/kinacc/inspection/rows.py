@@ -17,7 +17,6 @@ from kinacc.inspection.trial import Seen
 from kinacc.models import dh
 
 _CHANCE = 0.01  # that a wrong explanation fits
-_TURNS = 2.0 * np.pi
 
 
 @dataclass(frozen=True)

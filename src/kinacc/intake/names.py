@@ -21,7 +21,6 @@ UNITS = {
 }
 _WORD = re.compile(r"[a-z]+|\d+|°c?", re.IGNORECASE)
 _HUMP = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")
-_JOINED = re.compile(r"^(r|q|std|s|sigma|cov)?(x|y|z|w)$")
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -113,15 +112,3 @@ def plain_name(path: str | Path) -> str:
     """Name of a data set after a file: letters, digits, _ and -."""
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", Path(path).stem).strip("_-")
     return stem or "measured"
-
-
-def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Settings that changed from one section to another, in words."""
-    told = []
-    for key, value in after.items():
-        if isinstance(value, Mapping) and key == "orientation":
-            old = before[key]
-            told += [f"orientation.{k}: {v}" for k, v in value.items() if v != old[k]]
-        elif key != "columns" and value != before[key]:
-            told.append(f"{key}: {value}")
-    return told
