@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from small_arms import calibrated, joints
 
 from kinacc import robot
-from kinacc.calibrated.compensate import Status, compensate, programmed
+from kinacc.calibrated.compensate import compensate, programmed
+from kinacc.calibrated.postures import Status
 from kinacc.calibrated.predict import predict
 from kinacc.calibrated.record import nominal
 from kinacc.geometry import Pose, compose, invert, log_so3

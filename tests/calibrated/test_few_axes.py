@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kinacc import robot
-from kinacc.calibrated.compensate import FEW_AXES_TURN_RAD, Status, compensate, programmed
+from kinacc.calibrated.compensate import compensate, programmed
+from kinacc.calibrated.postures import FEW_AXES_TURN_RAD, Status
 from kinacc.calibrated.record import nominal
 from kinacc.geometry import Pose, log_so3, rotation_x, skew
 from kinacc.models import dh

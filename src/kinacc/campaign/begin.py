@@ -13,10 +13,10 @@ from kinacc.campaign.instrument import INSTRUMENT, Instrument
 from kinacc.campaign.plan import Limits, Plan, Points, candidates_of, fixed_visit
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose, invert
+from kinacc.inverse.limits import travel_unit
 from kinacc.models.vec import VECModel
 from kinacc.planning import travel
 
-_MM_PER_RAD = 1000.0  # a sliding joint's travel counts like an arc at one metre
 _ROUTED = 400  # points beyond which the route is built in stretches of so many
 
 
@@ -68,14 +68,14 @@ def plan_of(
     the random order.
     """
     order = np.random.default_rng(seed).permutation(len(points))
-    slides, kept = arm.robot.dh.prismatic, Arm.of(arm, about.get("point"))
+    kept = Arm.of(arm, about.get("point"))
     to_base = compose(arm.origin("base"), invert(arm.origin("instrument")))
     covariance = instruments[0].in_base(to_base.rotation)
     equal = candidates_of(covariance, points.joints, kept)
     route = order[: fixed_visit(assessor, equal)]
     if by_travel:
-        scaled = points.joints[route] / np.where(slides, _MM_PER_RAD, 1.0)
-        route = route[_short_path(scaled, start / np.where(slides, _MM_PER_RAD, 1.0))]
+        unit = travel_unit(arm.robot)
+        route = route[_short_path(points.joints[route] / unit, start / unit)]
     return Plan(
         points, order, route, assessor, tuple(instruments), to_base,
         kept, limits, seed, about,

@@ -17,13 +17,13 @@ from kinacc.commands.tables import joint_fields
 from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose
+from kinacc.inverse.limits import travel_unit
 from kinacc.planning import candidates, exchange, observability, travel
 from kinacc.planning.information import Experiment, Information, information
 from kinacc.robot import Robot
 
 _RANDOM_SETS, _SIZES = 40, 9
 _SEED = 0
-_MM_PER_RAD = 1000.0  # a sliding joint's travel counts like an arc at one metre
 
 
 @dataclass(frozen=True)
@@ -109,8 +109,7 @@ def answer(asked: Question, progress: Callable | None = None) -> Answer:
         raise InputError(Problem("candidates", "show no direction at all"))
     plan = exchange.choose(told.rows, asked.count, asked.index, progress)
     chosen = np.sort(plan.chosen)
-    scale = np.where(asked.robot.dh.prismatic, _MM_PER_RAD, 1.0)
-    places = np.concatenate([asked.start[None], asked.joints[chosen]]) / scale
+    places = np.concatenate([asked.start[None], asked.joints[chosen]]) / travel_unit(asked.robot)
     distance = travel.distances(places, asked.metric)
     path = travel.order(distance)
     moves = distance[path[:-1], path[1:]]

@@ -6,13 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinacc.calibrated.compensate import (
-    FEW_AXES_TURN_RAD,
-    ROTATION_TOLERANCE_RAD,
-    Compensation,
-    Status,
-    programmed,
-)
+from kinacc.calibrated.compensate import Compensation, programmed
+from kinacc.calibrated.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, Status
 from kinacc.calibrated.record import Calibration
 from kinacc.commands import rows
 from kinacc.commands.rows import Rows

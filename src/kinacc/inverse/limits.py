@@ -18,6 +18,11 @@ def reported_joints(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
     return q_rad @ np.linalg.inv(robot.joint_map).T
 
 
+def travel_unit(robot: Robot) -> np.ndarray:
+    """Movement (k,) of each joint that counts as a radian: one, or a metre where it slides."""
+    return np.where(robot.dh.prismatic, 1000.0, 1.0)
+
+
 def dh_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Limits (k,), (k,) of the DH joints; infinite where a joint is coupled to others."""
     joints = len(robot.joint_map)
