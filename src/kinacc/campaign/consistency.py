@@ -58,11 +58,7 @@ def scatter(state: State) -> Scatter | None:
 
 def _square(state: State, readings: list[Told]) -> float:
     """Chi-square of readings of one point about their weighted mean."""
-    planned = state.plan.instruments[0].in_base(state.plan.to_base.rotation)
-    weights = []
-    for each in readings:
-        own = covariance_mm2(state.plan, each.reading)
-        weights.append(np.linalg.inv(planned if own is None else own))
+    weights = [np.linalg.inv(covariance_mm2(state.plan, each.reading)) for each in readings]
     values = [each.error_mm for each in readings]
     sums = sum(w @ x for w, x in zip(weights, values, strict=True))
     mean = np.linalg.solve(sum(weights), sums)

@@ -21,7 +21,7 @@ from kinacc.assess.kinematic import Kinematic
 from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.campaign import words
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.simulate import Deviates, carry_on, quantiles
+from kinacc.campaign.simulate import Deviates, carry_on, quantiles, width_mm
 from kinacc.campaign.state import State, sayable
 
 FEWEST_POINTS = 8
@@ -122,7 +122,7 @@ def forecast(
         entropy = (1, state.plan.seed, state.taken, number)
         runs.append(_one_end(state, errors, left, target, entropy))
     last = [run[-1][1] for run in runs]
-    widths = quantiles(map(_width, last), (0.05, 0.5, 0.95))
+    widths = quantiles(map(width_mm, last), (0.05, 0.5, 0.95))
     found = Forecast(simulations, left, tuple(widths), wanted_mm, target=last[0].target)
     if wanted_mm is not None:
         needed = [_first_within(run, wanted_mm) for run in runs]
@@ -165,7 +165,7 @@ def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, 
             entropy = (2, state.plan.seed, state.taken, number)
             campaign = assessor.begin(state.plan.candidates(state.rows))
             carry_on(campaign, errors, _root(state), Deviates(len(errors), tried, *entropy))
-            missed += _width(_main(state.plan, campaign, found.target)) > wanted_mm
+            missed += width_mm(_main(state.plan, campaign, found.target)) > wanted_mm
             if missed > (1.0 - ENOUGH) * simulations:
                 break
         else:
@@ -194,7 +194,7 @@ def _one_end(
 
 def _first_within(looks: Sequence[tuple[int, Statement]], wanted_mm: float) -> float:
     """Readings after which the bounds are first as near as wanted; infinite where never."""
-    return next((done for done, said in looks if _width(said) <= wanted_mm), math.inf)
+    return next((done for done, said in looks if width_mm(said) <= wanted_mm), math.inf)
 
 
 def _main(plan: Plan, campaign: Campaign, target: str) -> Statement:
@@ -203,28 +203,22 @@ def _main(plan: Plan, campaign: Campaign, target: str) -> Statement:
     return next((each for each in said if each.target == target), said[0])
 
 
-def _width(said: Statement) -> float:
-    width = said.upper_mm - said.lower_mm
-    return math.inf if math.isnan(width) else width
-
-
 def _by_row(state: State) -> tuple[np.ndarray, np.ndarray]:
     """Mean readings (m, 3) and their noise (m,) by the assessor's rows; infinite where unread."""
     from kinacc.assess.adaptive import Ledger
-    from kinacc.campaign.reading import covariance_mm2
+    from kinacc.campaign.reading import unplanned_mm2
 
     ledger = Ledger(state.plan.candidates(state.rows))
     row = {int(point): number for number, point in enumerate(state.rows)}
     for each in (*state.told, *state.in_hand):
         if each.reading.point in row:
-            covariance = covariance_mm2(state.plan, each.reading)
+            covariance = unplanned_mm2(state.plan, each.reading)
             ledger.record(row[each.reading.point], each.error_mm, covariance)
     return ledger.mean_mm, ledger.noise_mm
 
 
 def _root(state: State) -> np.ndarray:
-    planned = state.plan.instruments[0].in_base(state.plan.to_base.rotation)
-    return np.linalg.cholesky(planned)
+    return np.linalg.cholesky(state.plan.covariance_mm2)
 
 
 def _likelihood(square: np.ndarray, noise_mm: np.ndarray, scale_mm: np.ndarray) -> np.ndarray:

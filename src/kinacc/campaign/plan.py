@@ -88,6 +88,11 @@ class Plan:
         return self.arm.dh.prismatic
 
     @property
+    def covariance_mm2(self) -> np.ndarray:
+        """Covariance (3, 3) of a reading of the first instrument, in the robot's base."""
+        return self.instruments[0].in_base(self.to_base.rotation)
+
+    @property
     def by_travel(self) -> bool:
         """Whether the first visit is made in order of travel."""
         return not np.array_equal(self.route, self.order[: len(self.route)])
@@ -116,9 +121,7 @@ class Plan:
 
     def candidates(self, rows: np.ndarray) -> Candidates:
         """The candidates in the order of ``rows``, with the noise of the first instrument."""
-        covariance = self.instruments[0].in_base(self.to_base.rotation)
-        joints = self.points.joints[rows]
-        return candidates_of(covariance, joints, self.arm)
+        return candidates_of(self.covariance_mm2, self.points.joints[rows], self.arm)
 
 
 def candidates_of(covariance_mm2: np.ndarray, joints: np.ndarray, arm: Arm) -> Candidates:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,14 +61,18 @@ def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
     return measured - plan.points.position_mm(reading.point, reading.joints)
 
 
-def covariance_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
+def covariance_mm2(plan: Plan, reading: Reading) -> np.ndarray:
+    """Covariance (3, 3) of the reading in the robot's base."""
+    unplanned = unplanned_mm2(plan, reading)
+    return plan.covariance_mm2 if unplanned is None else unplanned
+
+
+def unplanned_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
     """Covariance (3, 3) of the reading in the robot's base; None where it is the planned one."""
     instrument = plan.instrument(reading.instrument)
     if reading.std is not None:
         own = covariance_of(reading.std, "reading", [])
-        return type(instrument)(instrument.name, own, instrument.frame).in_base(
-            plan.to_base.rotation
-        )
+        return replace(instrument, covariance_mm2=own).in_base(plan.to_base.rotation)
     if instrument is plan.instruments[0]:
         return None
     return instrument.in_base(plan.to_base.rotation)

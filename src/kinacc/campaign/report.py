@@ -97,8 +97,6 @@ def _readings(state: State) -> Columns:
         reading = each.reading
         instrument = plan.instrument(reading.instrument)
         covariance = covariance_mm2(plan, reading)
-        if covariance is None:
-            covariance = instrument.covariance_mm2
         row = {
             "reading": each.number,
             "point": plan.points.label[reading.point],
@@ -236,13 +234,7 @@ def _facts(opened: Opened, state: State) -> list[str]:
         lines.append(
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
-    label = plan.points.label
-    lines += [f"point {label[p]} left out: {reason}" for p, reason in state.left_out.items()]
-    lines += [
-        f"reading {each.number}, {np.linalg.norm(each.error_mm):.3f} mm at point "
-        f"{label[each.reading.point]}, was struck: {reason}"
-        for each, reason in state.struck
-    ]
+    lines += words.not_counted(state)
     found = consistency.scatter(state)
     return lines if found is None else [*lines, consistency.in_words(found)]
 

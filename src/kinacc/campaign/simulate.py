@@ -89,8 +89,13 @@ class Outcome:
     @property
     def width_mm(self) -> float:
         """Distance of upper from lower bound; infinite where none is stated."""
-        width = self.said.upper_mm - self.said.lower_mm
-        return math.inf if math.isnan(width) else width
+        return width_mm(self.said)
+
+
+def width_mm(said: Statement) -> float:
+    """Distance of upper from lower bound; infinite where none is stated."""
+    width = said.upper_mm - said.lower_mm
+    return math.inf if math.isnan(width) else width
 
 
 def outcomes(

@@ -16,7 +16,7 @@ import numpy as np
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.statement import MEASURED, Statement
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.reading import Reading, covariance_mm2, error_mm
+from kinacc.campaign.reading import Reading, error_mm, unplanned_mm2
 
 READINGS, LEAVE_OUT, STRIKE = "readings", "leave_out", "strike"
 
@@ -122,7 +122,7 @@ def restore(
         if not waiting.get(asked):
             break
         known = waiting[asked].popleft()
-        campaign.record(row, known.error_mm, covariance_mm2(plan, known.reading))
+        campaign.record(row, known.error_mm, unplanned_mm2(plan, known.reading))
         told.append(known)
         asked = None
         if watch is not None:

@@ -51,15 +51,7 @@ def standing(state: State) -> list[str]:
         else f"{state.taken} readings taken, {len(state.told)} of {budget} used, at {visited} of "
         f"{points} points; {len(state.in_hand)} in hand, not asked for yet"
     ]
-    lines += [
-        f"point {state.plan.points.label[point]} was left out: {reason}"
-        for point, reason in state.left_out.items()
-    ]
-    lines += [
-        f"reading {each.number}, {np.linalg.norm(each.error_mm):.3f} mm at point "
-        f"{state.plan.points.label[each.reading.point]}, was struck: {reason}"
-        for each, reason in state.struck
-    ]
+    lines += not_counted(state)
     found = consistency.scatter(state)
     if found is not None:
         lines.append(consistency.in_words(found))
@@ -70,6 +62,17 @@ def standing(state: State) -> list[str]:
     else:
         lines.append("no further measurement is wanted")
     return lines
+
+
+def not_counted(state: State) -> list[str]:
+    """Points left out and readings struck, each with the reason given."""
+    label = state.plan.points.label
+    lines = [f"point {label[p]} was left out: {reason}" for p, reason in state.left_out.items()]
+    return lines + [
+        f"reading {each.number}, {np.linalg.norm(each.error_mm):.3f} mm at point "
+        f"{label[each.reading.point]}, was struck: {reason}"
+        for each, reason in state.struck
+    ]
 
 
 def _about(said: Statement, state: State) -> str:

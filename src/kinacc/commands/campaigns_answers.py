@@ -13,6 +13,7 @@ from kinacc.campaign import consistency, instrument, words
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import State
 from kinacc.commands.sheet import Field, Sheet
+from kinacc.commands.tables import joint_fields
 from kinacc.geometry import invert
 
 if TYPE_CHECKING:
@@ -91,13 +92,7 @@ def visit_sheet(begun: Plan, points: list[int]) -> Sheet:
     seen, about = _expected(begun, points), f"modelled, in the {_frame(begun)} frame"
     label = np.array([begun.points.label[each] for each in points], dtype=object)
     fields = [Field("pose", label, "", "name of the point among the candidates")]
-    for joint, slides in enumerate(begun.slides):
-        name = f"q{joint + 1}"
-        if slides:
-            fields.append(Field(f"{name}_mm", joints[:, joint], "mm", f"joint {joint + 1}"))
-        else:
-            degrees = np.rad2deg(joints[:, joint])
-            fields.append(Field(f"{name}_deg", degrees, "deg", f"joint {joint + 1}"))
+    fields += joint_fields(begun.slides, joints)
     fields += [
         Field(f"q{joint + 1}_rad", joints[:, joint], "rad", f"joint {joint + 1}", False)
         for joint, slides in enumerate(begun.slides)

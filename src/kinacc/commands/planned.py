@@ -135,7 +135,7 @@ def as_sheet(asked: Question, found: Answer) -> Sheet:
     }
     fields = [
         Field("order", np.arange(1, len(found.order) + 1), "", "order of driving"),
-        *joint_fields(asked.robot, asked.joints[found.order]),
+        *joint_fields(asked.robot.dh.prismatic, asked.joints[found.order]),
         Field("move_deg", np.rad2deg(found.moves), "deg", travel.METRICS[asked.metric]),
         Field("candidate", asked.label[found.order], "", "its pose or line among the candidates"),
     ]

@@ -47,7 +47,7 @@ def predicted(
     left = f"rms of what the model left of {arm.residual.subset if arm.residual else 'no'} poses"
     fields = [
         Field("row", given.label, "", "the file's pose, or its line"),
-        *joint_fields(arm.robot, given.joints),
+        *joint_fields(arm.robot.dh.prismatic, given.joints),
         *pose_fields(found.pose, frame),
         *(Field(f"std_{axis}_mm", std[:, i], "mm", by, False) for i, axis in enumerate("xyz")),
         *(
@@ -78,13 +78,13 @@ def facts(arm: Calibration, frame: str, point: str) -> dict[str, object]:
     }
 
 
-def joint_fields(robot: Robot, joints: np.ndarray) -> list[Field]:
-    """Reported joints (n, k) in degrees, or mm where a joint slides."""
+def joint_fields(prismatic: np.ndarray, joints: np.ndarray) -> list[Field]:
+    """Reported joints (n, k) in degrees, or mm where a joint slides (k,)."""
     return [
         Field(f"q{i + 1}_mm", joints[:, i], "mm", f"joint {i + 1}")
         if slides
         else Field(f"q{i + 1}_deg", np.rad2deg(joints[:, i]), "deg", f"joint {i + 1}")
-        for i, slides in enumerate(robot.dh.prismatic)
+        for i, slides in enumerate(prismatic)
     ]
 
 

@@ -76,7 +76,7 @@ def compensated(
     point = point or arm.default_point
     fields = [
         Field("row", given.label, "", "the file's pose, or its line"),
-        *joint_fields(arm.robot, found.q_rad),
+        *joint_fields(arm.robot.dh.prismatic, found.q_rad),
         Field("status", _words(arm, found, is_program), "", "why there are joints, or none"),
         Field("position_error_mm", found.position_error_mm, "mm", "left by the forward model"),
         Field(
