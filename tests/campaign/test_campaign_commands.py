@@ -270,6 +270,7 @@ def test_a_point_is_left_out_only_before_it_is_read(begun):
 def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(begun):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     arm = Arm(folder)
+    assert "none was taken yet" in refused(folder, "strike", folder, 1, "--reason", "x")
     recorded(folder, arm, 3)
     first = arm.plan.points.label[arm.plan.route[0]]
     assert "reading 4: is not there" in refused(folder, "strike", folder, 4, "--reason", "x")

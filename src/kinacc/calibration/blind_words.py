@@ -11,7 +11,7 @@ from kinacc.calibration.frames import BASE, MOTIONS, Frames
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.geometry import skew
 
-WEAK = "(these poses show it too little; others may)"
+WEAK = "(these poses show it too little, others may)"
 _MOST_NAMES = 4
 _SAME = 0.02  # relative difference of parts that count as equal
 _CALLED = {

@@ -73,7 +73,8 @@ def strike(path: str, number: int, reason: str, as_json: bool) -> None:
         if number in {each.number for each, _ in before.struck}:
             problems.append(Problem(f"reading {number}", "was struck before"))
         elif number not in there:
-            problems.append(Problem(f"reading {number}", "is not there", f"1 to {before.numbered}"))
+            allowed = f"1 to {before.numbered}" if before.numbered else "none was taken yet"
+            problems.append(Problem(f"reading {number}", "is not there", allowed))
         if not reason.strip():
             problems.append(Problem("--reason", "is empty", "what went wrong"))
         if problems:

@@ -16,7 +16,7 @@ from kinacc.errors import InputError, Problem
 
 KINDS = (".csv", ".json", ".parquet")
 _SHOWN_ROWS = 24
-_NOTHING = 5e-7  # rounding to a person who reads mm and mrad
+_NOTHING = 5e-5  # less is no digit of the four shown after the point
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def write_whole(path: Path | str, content: bytes) -> None:
 
 
 def number(value: float) -> str:
-    """Three digits for a sentence, whole thousands in full; 0 for what is only rounding."""
+    """Three digits for a sentence, whole thousands in full; 0 for what no digit is shown of."""
     if abs(value) < _NOTHING:
         return "0"
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
