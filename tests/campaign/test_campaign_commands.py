@@ -356,14 +356,18 @@ def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
         (("--covariance-mm2", "1,0,0,0,1,0,0,0,-1"), "not positive definite"),
         (("--instrument", "a=0.1,0.2"), "1 standard deviation, 3"),
         (("--instrument", "a=0.1", "--instrument", "a=0.2"), "is given twice"),
-        ((), "--noise-mm, --covariance-mm2 or --instrument"),
-        (("--noise-mm", "0.1", "--budget", "0"), "at least 1"),
+        ((), "--noise-mm or --covariance-mm2, or --instrument"),
+        (
+            ("--noise-mm", "0.1", "--budget", "0"),
+            "--budget: 0; allowed: a whole number, at least 1",
+        ),
         (("--noise-mm", "0.1", "--assessor", "two_stage", "--budget", "4"), "do not cover"),
         (("--noise-mm", "0.1", "--assessor", "guess"), "search_and_confirm"),
         (("--noise-mm", "0.1", "--set", "repeats=3"), "setting repeats"),
         (("--noise-mm", "0.1", "--confidence", "2"), "at least 0.5 and below 1"),
         (("--noise-mm", "0.1", "--tolerance-mm", "-1"), "--tolerance-mm"),
         (("--noise-mm", "0.1", "--drawn", "1"), "at least 2 different points"),
+        (("--noise-mm", "0.1", "--session", "noon"), "none: the data name no sessions"),
     ],
 )
 def test_what_cannot_be_begun_leaves_no_folder(calibration, tmp_path, noise, words):
@@ -497,6 +501,13 @@ def left_to_visit(folder):
     state = campaigns.open_(folder).state()
     have = {each.reading.point for each in state.told}
     return [state.plan.points.label[point] for point in state.rows if point not in have]
+
+
+def test_status_refuses_aims_that_are_none(begun):
+    folder = begun("--noise-mm", SIGMA_MM)
+    said = refused(folder, "status", folder, "--width-mm", "-1", "--tolerance-mm", "0")
+    assert "--width-mm: -1; allowed: above 0" in said
+    assert "--tolerance-mm: 0; allowed: above 0" in said
 
 
 def test_status_forecasts_what_the_wanted_width_takes(begun):

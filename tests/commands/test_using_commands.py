@@ -153,6 +153,13 @@ def test_export_writes_every_form(folder, tmp_path):
     assert json.loads(compared.stdout)["moved_max_mm"] < 1e-9
 
 
+def test_a_urdf_that_is_not_there_is_said(folder, tmp_path):
+    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--format", "urdf",
+                "--urdf", tmp_path / "none.urdf")  # fmt: skip
+    assert done.exit_code == 2
+    assert "none.urdf: no such file or directory" in done.output
+
+
 def test_compare_draws_and_says_what_moved(folder, tmp_path):
     picture = tmp_path / "moved.svg"
     done = call("compare", "mh180", folder, "--robot", "mh180", "--picture", picture)

@@ -113,9 +113,10 @@ def _session_number(frames: Mapping, of_model: np.ndarray, session: str | None) 
     if session is None or "session" not in frames:
         return 0
     bases = of_model & (np.asarray(frames["frame"]) == "base")
-    known = [str(each) for each in np.asarray(frames["session"])[bases]]
+    known = [str(each) for each in np.asarray(frames["session"])[bases] if each is not None]
     if session not in known:
-        raise InputError(Problem("session", f"{session!r} is not there", ", ".join(known)))
+        allowed = ", ".join(known) or "none: the data name no sessions"
+        raise InputError(Problem("session", f"{session!r} is not there", allowed))
     return known.index(session)
 
 

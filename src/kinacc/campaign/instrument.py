@@ -52,7 +52,7 @@ def instruments(texts: Iterable[str], frame: str) -> tuple[Instrument, ...]:
             continue
         if name in found:
             problems.append(Problem(f"instrument {name}", "is given twice"))
-        covariance = covariance_of(numbers, f"instrument {name}", problems)
+        covariance = covariance_of(numbers, f"noise of {name}", problems)
         if covariance is not None:
             found[name] = Instrument(name, covariance, frame)
     if problems:

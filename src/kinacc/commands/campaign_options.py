@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TypeVar
 
 from kinacc.assess.adaptive import AdaptiveAssessor
@@ -17,12 +18,13 @@ Made = TypeVar("Made")
 
 def instruments(given: Mapping) -> tuple[instrument.Instrument, ...]:
     """Instruments of ``--noise-mm``, ``--covariance-mm2`` and ``--instrument``."""
-    texts = list(given["instrument"])
+    texts = list(given.get("instrument", ()))
     for option in ("noise_mm", "covariance_mm2"):
         if given[option] is not None:
             texts.insert(0, f"instrument={given[option]}")
     if not texts:
-        allowed = "--noise-mm, --covariance-mm2 or --instrument NAME=.."
+        allowed = "--noise-mm or --covariance-mm2"
+        allowed += ", or --instrument NAME=.." if "instrument" in given else ""
         raise InputError(Problem("noise", "is not given", allowed))
     return instrument.instruments(texts, given["frame"])
 
@@ -41,7 +43,14 @@ def assessor(given: Mapping) -> AdaptiveAssessor:
             settings[name.strip()] = json.loads(value)
         except ValueError:
             settings[name.strip()] = value.strip()
-    return plan.assessor_of(given["assessor"] or RECOMMENDED, settings)
+    try:
+        return plan.assessor_of(given["assessor"] or RECOMMENDED, settings)
+    except InputError as error:
+        # An assessor knows its settings, not the options they came from.
+        options = {"measurements": "--budget", "confidence": "--confidence"}
+        raise InputError(
+            [replace(each, where=options.get(each.where, each.where)) for each in error.problems]
+        ) from None
 
 
 def not_positive(given: Mapping, name: str) -> list[Problem]:

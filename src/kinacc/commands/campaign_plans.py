@@ -39,7 +39,7 @@ def question(given: Mapping) -> Question:
     """The question of the command's options. Raises InputError listing what is wrong."""
     problems: list[Problem] = []
     instruments = campaign_options.gathered(
-        problems, lambda: campaign_options.instruments({**given, "instrument": (), "frame": "base"})
+        problems, lambda: campaign_options.instruments({**given, "frame": "base"})
     )
     for name in ("width_mm", "tolerance_mm", "largest_mm"):
         problems += campaign_options.not_positive(given, name)

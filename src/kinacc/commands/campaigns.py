@@ -94,8 +94,12 @@ def next_(path: str, every: bool, output: str | None, as_json: bool, force: bool
 def status(given: Mapping) -> None:
     """Say where the campaign stands, and what it is likely to need."""
     from kinacc.campaign import forecast
+    from kinacc.commands.campaign_options import not_positive
     from kinacc.stages.progress import reporting
 
+    names = ("width_mm", "tolerance_mm")
+    if problems := [each for name in names for each in not_positive(given, name)]:
+        raise InputError(problems)
     opened = folder.open_(given["folder"])
     found = opened.state()
     aims = opened.plan.limits

@@ -209,7 +209,10 @@ def _parse(path: Path) -> tuple[list[Joint], list[str], str]:
     from pytransform3d import urdf as library
 
     place, title = str(path), f"{path} cannot be used as a robot"
-    text = path.read_bytes()
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise InputError(Problem(place, (error.strerror or "").lower(), "a URDF file")) from None
     try:
         root = etree.fromstring(text, etree.XMLParser(remove_comments=True, resolve_entities=False))
     except etree.XMLSyntaxError as error:
