@@ -169,6 +169,16 @@ def test_bounds_that_contradict_each_other_are_told(make_plan):
     assert "contradict each other" in words.statement(said, restore(make_plan(), []))
 
 
+def test_an_estimate_above_its_upper_bound_is_told(make_plan):
+    state = restore(make_plan(), [])
+    said = Statement(MEASURED, 1.006, 0.970, 0.989, 0.95, assumption="none is alone")
+    text = words.statement(said, state)
+    assert "(estimated at 1.006 mm), if none is alone. The estimate lies above the upper" in text
+    assert text.endswith("wrong.")
+    usual = words.statement(Statement(MEASURED, 0.98, 0.970, 0.989, 0.95), state)
+    assert usual.endswith("(estimated at 0.980 mm).")
+
+
 def test_a_plan_comes_back_to_the_last_bit(make_plan):
     plan = make_plan(texts=("a=0.1,0.2,0.3", "b=0.01"), frame="instrument")
     assert to_json(from_json(to_json(plan), "here")) == to_json(plan)

@@ -32,12 +32,8 @@ def statement(said: Statement, state: State) -> str:
     each = "each " if len(parts) > 1 else ""
     text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
-    if said.upper_mm < said.lower_mm:
-        text += (
-            ". They contradict each other: the noise is stated too small, or this is one of the "
-        )
-        text += "few campaigns the confidence allows to be wrong"
-    return f"{text}, if {said.assumption}." if said.assumption else f"{text}."
+    text += f", if {said.assumption}" if said.assumption else ""
+    return f"{text}{_doubt(said)}."
 
 
 def standing(state: State) -> list[str]:
@@ -83,6 +79,24 @@ def _about(said: Statement, state: State) -> str:
         points = len(state.plan.points) - len(state.left_out)
         return f"the largest error of all {points} candidates"
     return f"the largest error of {said.share:.1%} of the region"
+
+
+def _doubt(said: Statement) -> str:
+    """What the figures of a statement say against it.
+
+    Bounds are the narrowest of several looks, the estimate is of all readings: where it lies above
+    the upper bound, that bound is nearly always wrong.
+    """
+    if said.upper_mm < said.lower_mm:
+        found = "They contradict each other"
+    elif said.value_mm > said.upper_mm:
+        found = "The estimate lies above the upper bound, which cannot be relied on"
+    else:
+        return ""
+    return (
+        f". {found}: the noise is stated too small, or this is one of the few campaigns the "
+        "confidence allows to be wrong"
+    )
 
 
 def _sure(said: Statement) -> str:
