@@ -158,6 +158,14 @@ def test_a_urdf_that_is_not_there_is_said(folder, tmp_path):
                 "--urdf", tmp_path / "none.urdf")  # fmt: skip
     assert done.exit_code == 2
     assert "none.urdf: no such file or directory" in done.output
+    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--tip-link", "tool0")
+    assert done.exit_code == 2
+    assert "--tip-link" in done.output
+    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--format", "yaml",
+                "--urdf", tmp_path / "none.urdf")  # fmt: skip
+    assert done.exit_code == 2
+    assert "--urdf" in done.output
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_compare_draws_and_says_what_moved(folder, tmp_path):

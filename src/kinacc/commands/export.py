@@ -45,12 +45,24 @@ def export(
       kinacc export results/mh180 --to exported
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --to exported
     """
+    from kinacc.errors import InputError, Problem
     from kinacc.export.files import contents, note, write
 
+    wanted = formats or FORMATS
+    about_urdf = {"--base-link": base_link, "--tip-link": tip_link}
+    problems = [
+        Problem(option, "is given without a file of yours", fix="give --urdf as well")
+        for option, value in about_urdf.items()
+        if value is not None and urdf is None
+    ]
+    if urdf is not None and "urdf" not in wanted:
+        problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
+    if problems:
+        raise InputError(problems, "Nothing was written")
     made = contents(
         folder,
         choice.robot_of(folder, robot, config),
-        formats or FORMATS,
+        wanted,
         name,
         urdf,
         (base_link, tip_link),

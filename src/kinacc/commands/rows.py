@@ -125,7 +125,7 @@ class Reader:
             if not there:
                 where = f"{self.table.path}: column {_names(name, own)}"
                 listed = "the file has " + ", ".join(self.table.columns)
-                self.problems.append(Problem(where, "is missing", listed))
+                self.problems.append(Problem(where, "is missing", fix=listed))
         if not all(present):
             return None
         columns = []
