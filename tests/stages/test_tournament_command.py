@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from kinacc.artifacts.check import check_results
 from kinacc.artifacts.store import read, write
 from kinacc.cli import main
+from kinacc.commands import tournament as command
 from kinacc.tournament import contest, fields
 
 TINY = contest.Size((0.1, 0.3), {20: (10, 30)}, 2, 1, (0,))
@@ -71,6 +72,30 @@ def test_verdicts_are_told_to_machines_with_times_on_request(results):
     said = json.loads(CliRunner().invoke(main, given).stdout)
     assert {row["assessor"] for row in said["verdicts"]} == {"single_shot"}
     assert set(said["time_ms"]) == {"maximum", "single_shot"}
+
+
+def test_statements_whose_assumption_is_untrue_are_told_apart(tmp_path, capsys, monkeypatch):
+    verdict = {"assessor": "search_and_confirm", "target": "candidates", "cells": 2, "rejected": 1,
+               "statements": 50, "below": 1, "worst_holds": 0.9, "mean_holds": 0.98,
+               "withheld": 0.125}  # fmt: skip
+    cells = {
+        "assessor": ["search_and_confirm"] * 3 + ["single_shot"],
+        "target": ["candidates", "candidates", "measured", "candidates"],
+        "broken": [7, 0, 9, 5],
+        "broken_holds": [5 / 7, np.nan, 1.0, 1.0],
+    }
+    tables = {
+        "verdicts": {name: np.array([value]) for name, value in verdict.items()},
+        "cells": {name: np.array(column) for name, column in cells.items()},
+    }
+    monkeypatch.setattr("kinacc.artifacts.store.read", tables.__getitem__)
+    paths = {"tournament_verdicts": "verdicts", "tournament_cells": "cells"}
+    command._tell(paths, {}, False)
+    head, row, *_ = capsys.readouterr().out.splitlines()
+    assert row.split() == ["search_and_confirm", "candidates", "50", "0.980", "0.900", "1", "1",
+                           "2", "12.5%", "7", "0.714"]  # fmt: skip
+    assert head.endswith("rejected  below  cells  no statement  untrue  then held")
+    assert len(head) == len(row)
 
 
 def test_noise_that_the_size_does_not_have_is_refused(results):

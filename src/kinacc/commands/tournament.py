@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import click
 
 
@@ -57,7 +59,7 @@ def tournament(
     if part is not None:
         return
     execute(contest.tables_job(), bar=True)
-    _tell(contest.outputs["tournament_verdicts"], _times(contest) if times else {}, as_json)
+    _tell(contest.outputs, _times(contest) if times else {}, as_json)
 
 
 def _carry_out(jobs, cores: int) -> None:
@@ -90,27 +92,46 @@ def _times(contest) -> dict[str, float]:
     return times_ms(job, contest.seed, contest.assessors or CONTESTANTS)
 
 
-def _tell(path: str, times: dict[str, float], as_json: bool) -> None:
-    """Print the verdicts."""
+def _tell(outputs: Mapping[str, str], times: dict[str, float], as_json: bool) -> None:
+    """Print the verdicts, and how statements fared whose assumption is not true of the field."""
     import json
 
     from kinacc.artifacts.store import read
 
+    path = outputs["tournament_verdicts"]
     table = read(path)
     rows = [dict(zip(table, each, strict=True)) for each in zip(*_plain(table), strict=True)]
     if as_json:
         click.echo(json.dumps({"verdicts": rows, "time_ms": times, "table": path}, indent=2))
         return
-    click.echo("assessor              about       statements  held   worst cell  cells below")
+    cells = read(outputs["tournament_cells"])
+    click.echo(
+        "assessor                 about       statements   held  worst cell  rejected  below  cells"
+        "  no statement  untrue  then held"
+    )
     for row in rows:
-        kept = row["rejected"] + row["below"]
+        untrue, held = _untrue(cells, row["assessor"], row["target"])
         click.echo(
-            f"{row['assessor']:20s}  {row['target']:10s}  {row['statements']:10d}  "
-            f"{row['mean_holds']:.3f}  {row['worst_holds']:10.3f}  {kept:4d} of {row['cells']}"
+            f"{row['assessor']:23s}  {row['target']:10s}  {row['statements']:10d}  "
+            f"{row['mean_holds']:5.3f}  {row['worst_holds']:10.3f}  {row['rejected']:8d}  "
+            f"{row['below']:5d}  {row['cells']:5d}  {row['withheld']:12.1%}  {untrue:6d}  "
+            + (f"{held / untrue:9.3f}" if untrue else f"{'-':>9s}")
         )
+    click.echo(
+        "held: share of upper bounds not below the truth; rejected: cells significantly below the "
+        "confidence;\nbelow: cells more than 3 points below it; untrue: statements left out of all "
+        "this because what they\nassume is not true of the field, which the readings did not show"
+    )
     for name, taken in times.items():
         click.echo(f"{name:24s}  {taken:8.1f} ms a campaign of 200 measurements")
     click.echo(f"all of it: {path.rpartition('/')[0]}")
+
+
+def _untrue(cells: Mapping, assessor: str, target: str) -> tuple[int, int]:
+    """Number of statements whose assumption is not true of the field, and how many of them held."""
+    mine = (cells["assessor"] == assessor) & (cells["target"] == target) & (cells["broken"] > 0)
+    broken = cells["broken"][mine]
+    return int(broken.sum()), round(float((cells["broken_holds"][mine] * broken).sum()))
 
 
 def _plain(table) -> list[list]:
