@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.calibrated.record import Calibration
-from kinacc.commands import planned, rows
+from kinacc.commands import rows, spaces
 from kinacc.commands.choice import CONFIG
 from kinacc.errors import InputError, Problem
 from kinacc.inverse import limits
@@ -40,18 +40,17 @@ def candidates(given: Mapping, arm: Calibration) -> Found:
         return Found(file.joints, label, file.directions, source)
     problems: list[Problem] = []
     joints = arm.robot.dh.joints
-    box = planned.ranges("--joints-deg", given["joints_deg"], joints, problems)
-    space = planned.ranges("--inside-mm", given["inside_mm"], 3, problems)
+    box = spaces.ranges("--joints-deg", given["joints_deg"], joints, problems)
+    space = spaces.ranges("--inside-mm", given["inside_mm"], 3, problems)
     if problems:
         raise InputError(problems)
-    slides = arm.robot.dh.prismatic
     inside, source = None, "drawn evenly from the joint ranges given"
     if box is not None:
-        box = tuple(np.where(slides, end, np.deg2rad(end)) for end in box)
+        box = spaces.in_own_units(box, arm.robot)
     else:
         box, inside, source = _region(given, arm)
     if space is not None:
-        inside = planned.inside_box(space)
+        inside = spaces.inside_box(space)
         source += ", the tool in the box given"
     limited = arm.robot.q_min_rad, arm.robot.q_max_rad
     low, high = limited if given["region"] == "limits" else _covered(arm)
@@ -90,15 +89,12 @@ def _region(given: Mapping, arm: Calibration):
         return None, None, "drawn evenly from the joint limits"
     if wanted == "fitted":
         return None, None, "drawn evenly from the joints the calibration covers"
-    settings = planned.settings_of({"dataset": arm.name, "config": given["config"], "robot": None})
-    if settings["inside"] is not None:
-        return (
-            settings["box"],
-            settings["inside"],
-            "drawn evenly in joints from the configured evaluation space",
-        )
-    if settings["box"] is not None:
-        return settings["box"], None, "drawn evenly from the configured joint box"
+    settings = spaces.settings_of(arm.name, given["config"])
+    if settings.inside is not None:
+        source = "drawn evenly in joints from the configured evaluation space"
+        return None, settings.inside, source
+    if settings.box is not None:
+        return settings.box, None, "drawn evenly from the configured joint box"
     return None, None, "drawn evenly from the joints the calibration covers"
 
 

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc import region
 from kinacc import robot as robots
 from kinacc.commands import rows
-from kinacc.commands.choice import CONFIG
 from kinacc.commands.sheet import Field, Sheet
+from kinacc.commands.spaces import Settings, in_own_units, inside_box, ranges, settings_of
 from kinacc.commands.tables import joint_fields
 from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
@@ -53,14 +52,18 @@ class Answer:
 
 def question(given: Mapping) -> Question:
     """The question of the command's options. Raises InputError listing what is wrong."""
-    settings = settings_of(given)
-    robot = robots.load(given["robot"] or settings["robot"])
+    if given["dataset"] is None and given["robot"] is None:
+        raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
+    settings = Settings()
+    if given["dataset"] is not None:
+        settings = settings_of(given["dataset"], given["config"])
+    robot = robots.load(given["robot"] or settings.robot)
     problems: list[Problem] = []
     tool = robots.carried(robot)
     if given["tool_mm"] is not None:
         offset = _numbers("--tool-mm", given["tool_mm"], 3, problems)
         tool = compose(robot.flange, Pose(np.eye(3), offset))
-    hayati = tuple(settings["hayati"])
+    hayati = settings.hayati_joints
     if given["hayati"] is not None:
         values = _numbers("--hayati", given["hayati"], None, problems)
         hayati = tuple(int(value) for value in values)
@@ -69,8 +72,7 @@ def question(given: Mapping) -> Question:
         ):
             problems.append(Problem("--hayati", given["hayati"], f"joints 1 to {robot.dh.joints}"))
     box = ranges("--joints-deg", given["joints_deg"], robot.dh.joints, problems)
-    if box is not None:
-        box = tuple(np.where(robot.dh.prismatic, end, np.deg2rad(end)) for end in box)
+    box = settings.box if box is None else in_own_units(box, robot)
     space = ranges("--inside-mm", given["inside_mm"], 3, problems)
     start = np.zeros(robot.dh.joints)
     if given["from_deg"] is not None:
@@ -80,9 +82,9 @@ def question(given: Mapping) -> Question:
     experiment = Experiment(
         tool,
         orientation=not given["position_only"],
-        frames_estimated=settings["estimated"] and not given["frames_known"],
+        frames_estimated=settings.frames_estimated and not given["frames_known"],
         hayati_joints=hayati,
-        rotation_weight_mm_per_rad=settings["weight"],
+        rotation_weight_mm_per_rad=settings.rotation_weight_mm_per_rad,
         threshold=given["threshold"],
     )
     if given["candidates"] is not None:
@@ -92,10 +94,8 @@ def question(given: Mapping) -> Question:
             raise InputError(found, "Candidates outside the robot's limits")
         joints, label = file.joints, file.label
     else:
-        inside = settings["inside"] if space is None else inside_box(space)
-        joints = candidates.spread(
-            robot, given["drawn"], settings["box"] if box is None else box, inside, tool
-        )
+        inside = settings.inside if space is None else inside_box(space)
+        joints = candidates.spread(robot, given["drawn"], box, inside, tool)
         label = np.arange(1, len(joints) + 1)
     return Question(
         robot, joints, label, experiment, given["count"], given["index"], given["metric"], start
@@ -184,67 +184,9 @@ def draw(asked: Question, found: Answer, picture: str, progress: Callable | None
     write(figure, {path.suffix[1:]: path})
 
 
-def settings_of(given: Mapping) -> dict:
-    """Robot, fit and region of a data set; defaults without one."""
-    plain = {"robot": None, "estimated": True, "weight": 500.0, "hayati": (), "box": None}
-    plain["inside"] = None
-    if given["dataset"] is None:
-        if given["robot"] is None:
-            raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
-        return plain
-    from kinacc.stages.calibration_settings import hayati_joints
-    from kinacc.stages.plan import planned
-
-    datasets = planned(given["config"] or (CONFIG,)).datasets
-    if given["dataset"] not in datasets:
-        what = f"{given['dataset']!r} is not in the configuration"
-        raise InputError(Problem("--dataset", what, ", ".join(datasets)))
-    config = datasets[given["dataset"]]
-    calibration, evaluation = config["calibration"], config["evaluation"]
-    plain |= {
-        "robot": config["robot"],
-        "estimated": calibration["base_and_tool"] == "estimated",
-        "weight": float(calibration["rotation_weight_mm_per_rad"]),
-        "hayati": hayati_joints(calibration["dh"], robots.load(config["robot"])),
-    }
-    box = evaluation["joint_box"]["joints_deg"]
-    if evaluation["space"] == "joint_box" and box is not None:
-        plain["box"] = tuple(np.deg2rad(np.array(box, dtype=float)).T)
-    if evaluation["space"] == "cylinder":
-        from kinacc.stages.evaluation import cylinder
-
-        space = cylinder(evaluation)
-        plain["inside"] = lambda position_mm: region.contains(space, position_mm)
-    return plain
-
-
-def inside_box(space: tuple[np.ndarray, np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
-    """Test of positions (n, 3) for lying in a box (3,), (3,)."""
-    low, high = space
-    return lambda position_mm: ((position_mm >= low) & (position_mm <= high)).all(axis=1)
-
-
 def _numbers(option: str, text: str, count: int | None, problems: list[Problem]) -> np.ndarray:
     values = numbers_of(text)
     if not values.size or (count is not None and values.size != count):
         problems.append(Problem(option, repr(text), f"{count or 'some'} numbers, 1,2,3"))
         return np.zeros(count or 0)
     return values
-
-
-def ranges(
-    option: str, text: str | None, count: int, problems: list[Problem]
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Ends (count,), (count,) of a text such as "-90:90,-60:60"; None where there is none."""
-    if text is None:
-        return None
-    allowed = f"{count} ranges low:high, apart by commas"
-    try:
-        pairs = [[float(end) for end in pair.split(":")] for pair in text.split(",")]
-    except ValueError:
-        pairs = []
-    if len(pairs) != count or any(len(pair) != 2 or not pair[0] < pair[1] for pair in pairs):
-        problems.append(Problem(option, repr(text), allowed))
-        return None
-    low, high = np.array(pairs).T
-    return low, high
