@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from kinacc.geometry import quaternion_from_rotation, rotation_z
 from kinacc.inverse import limits
 from kinacc.models import dh, tables, vec
 from kinacc.models.vec import ERRORS
-from kinacc.stages import accuracy_map, assessment_points
+from kinacc.stages import accuracy_map, assessment_points, evaluation
 
 ARM = robot.load("mh180")
 PROVENANCE = {
@@ -153,6 +155,16 @@ def test_points_fit_their_contract_and_state_the_error_of_their_joints(changed):
     assert np.allclose(stated, error, atol=1e-9)
     assert np.allclose(columns["true_error_mm"], np.linalg.norm(error, axis=1))
     assert limits.within(q, model.q_min_rad, model.q_max_rad).all()
+
+
+def test_a_joint_box_is_in_millimetres_where_a_joint_slides():
+    slides = np.array([False, False, True, False, False, False])
+    arm = replace(ARM, dh=replace(ARM.dh, prismatic=slides))
+    ranges = [[-10, 20], [0, 90], [-50, 150], [0, 1], [0, 1], [0, 1]]
+    low, high = evaluation.joint_box({"joint_box": {"joints_deg": ranges}}, arm)
+    np.testing.assert_allclose(low[:3], [np.deg2rad(-10), 0.0, -50.0])
+    np.testing.assert_allclose(high[:3], [np.deg2rad(20), np.pi / 2, 150.0])
+    assert evaluation.joint_box({"joint_box": {"joints_deg": None}}, arm) is None
 
 
 def test_a_fitted_tool_carries_the_point_assessed():

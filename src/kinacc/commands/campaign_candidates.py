@@ -39,15 +39,12 @@ def candidates(given: Mapping, arm: Calibration) -> Found:
         source = f"rows of {Path(given['candidates']).name}"
         return Found(file.joints, label, file.directions, source)
     problems: list[Problem] = []
-    joints = arm.robot.dh.joints
-    box = spaces.ranges("--joints-deg", given["joints_deg"], joints, problems)
+    box = spaces.joint_ranges(given["joints_deg"], arm.robot, problems)
     space = spaces.ranges("--inside-mm", given["inside_mm"], 3, problems)
     if problems:
         raise InputError(problems)
     inside, source = None, "drawn evenly from the joint ranges given"
-    if box is not None:
-        box = spaces.in_own_units(box, arm.robot)
-    else:
+    if box is None:
         box, inside, source = _region(given, arm)
     if space is not None:
         inside = spaces.inside_box(space)

@@ -11,7 +11,7 @@ import numpy as np
 from kinacc import robot as robots
 from kinacc.commands import rows
 from kinacc.commands.sheet import Field, Sheet
-from kinacc.commands.spaces import Settings, in_own_units, inside_box, ranges, settings_of
+from kinacc.commands.spaces import Settings, inside_box, joint_ranges, ranges, settings_of
 from kinacc.commands.tables import joint_fields
 from kinacc.data.text import numbers_of
 from kinacc.errors import InputError, Problem
@@ -71,8 +71,7 @@ def question(given: Mapping) -> Question:
             not 1 <= joint <= robot.dh.joints for joint in hayati
         ):
             problems.append(Problem("--hayati", given["hayati"], f"joints 1 to {robot.dh.joints}"))
-    box = ranges("--joints-deg", given["joints_deg"], robot.dh.joints, problems)
-    box = settings.box if box is None else in_own_units(box, robot)
+    box = joint_ranges(given["joints_deg"], robot, problems) or settings.box
     space = ranges("--inside-mm", given["inside_mm"], 3, problems)
     start = np.zeros(robot.dh.joints)
     if given["from_deg"] is not None:

@@ -55,22 +55,14 @@ def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:
 
 def _configured(evaluation: Mapping, robot: robots.Robot) -> tuple[Ends | None, Inside | None]:
     """Joint box and test of positions of a data set's evaluation space."""
-    box = evaluation["joint_box"]["joints_deg"]
-    if evaluation["space"] == "joint_box" and box is not None:
-        low, high = np.array(box, dtype=float).T
-        return in_own_units((low, high), robot), None
-    if evaluation["space"] == "cylinder":
-        from kinacc.stages.evaluation import cylinder
+    from kinacc.stages.evaluation import cylinder, joint_box
 
+    if evaluation["space"] == "joint_box":
+        return joint_box(evaluation, robot), None
+    if evaluation["space"] == "cylinder":
         space = cylinder(evaluation)
         return None, lambda position_mm: region.contains(space, position_mm)
     return None, None
-
-
-def in_own_units(ends: Ends, robot: robots.Robot) -> Ends:
-    """Ends (k,), (k,) in degrees, mm where a joint slides, in rad and mm."""
-    low, high = (np.where(robot.dh.prismatic, end, np.deg2rad(end)) for end in ends)
-    return low, high
 
 
 def inside_box(space: Ends) -> Inside:
@@ -92,4 +84,13 @@ def ranges(option: str, text: str | None, count: int, problems: list[Problem]) -
         problems.append(Problem(option, repr(text), allowed))
         return None
     low, high = np.array(pairs).T
+    return low, high
+
+
+def joint_ranges(text: str | None, robot: robots.Robot, problems: list[Problem]) -> Ends | None:
+    """Ends (k,), (k,) of ``--joints-deg`` in rad, mm where a joint slides; None where not given."""
+    ends = ranges("--joints-deg", text, robot.dh.joints, problems)
+    if ends is None:
+        return None
+    low, high = robots.in_own_units(robot, np.stack(ends))
     return low, high

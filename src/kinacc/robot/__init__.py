@@ -4,7 +4,7 @@ A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
 """
 
 from kinacc.robot.description import files, load, of_text, shipped
-from kinacc.robot.record import Robot, carried, dh_angles, forward
+from kinacc.robot.record import Robot, carried, dh_angles, forward, in_own_units
 from kinacc.robot.written import as_yaml
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "dh_angles",
     "files",
     "forward",
+    "in_own_units",
     "load",
     "of_text",
     "shipped",

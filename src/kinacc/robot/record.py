@@ -49,6 +49,11 @@ def forward(robot: Robot, q_rad: np.ndarray) -> Pose:
     return compose(compose(robot.base, end), robot.flange)
 
 
+def in_own_units(robot: Robot, joints: np.ndarray) -> np.ndarray:
+    """Reported joints (..., k) given in degrees, mm where a joint slides, in rad and mm."""
+    return np.where(robot.dh.prismatic, joints, np.deg2rad(joints))
+
+
 def carried(robot: Robot) -> Pose:
     """Tool centre point of the description in the last DH frame: flange, then tool."""
     return compose(robot.flange, robot.tool)

@@ -30,8 +30,7 @@ def _drawn(arm: Robot, inputs: Mapping, evaluation: Mapping) -> OperatingPoints:
     sequence, count = evaluation["sequence"], int(evaluation["points"])
     limited = arm.q_min_rad, arm.q_max_rad
     if evaluation["space"] == "joint_box":
-        ranges = evaluation["joint_box"]["joints_deg"]
-        box = limited if ranges is None else tuple(np.deg2rad(np.array(ranges, dtype=float)).T)
+        box = shared.joint_box(evaluation, arm) or limited
         q_rad = operating_points.in_joints(arm, pair, box, sequence, count)
     elif evaluation["points_in"] == "joints":
         space = shared.cylinder(evaluation)

@@ -14,6 +14,15 @@ from kinacc.region import Cylinder
 from kinacc.robot import Robot
 
 
+def joint_box(evaluation: Mapping, arm: Robot) -> tuple[np.ndarray, np.ndarray] | None:
+    """Ends (k,), (k,) of the reported joints in the ``evaluation`` settings; None: the limits."""
+    ranges = evaluation["joint_box"]["joints_deg"]
+    if ranges is None:
+        return None
+    low, high = robot.in_own_units(arm, np.array(ranges, dtype=float).T)
+    return low, high
+
+
 def cylinder(evaluation: Mapping) -> Cylinder:
     """The cylinder of the ``evaluation`` settings."""
     section = evaluation["cylinder"]
