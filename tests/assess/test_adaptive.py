@@ -16,7 +16,12 @@ from kinacc.assess.looks import share
 from kinacc.assess.paper_methods import InvalidationAt, OncePerPoint
 from kinacc.assess.population import largest_size
 from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
-from kinacc.assess.search_and_confirm import SearchAndConfirm, companions, records
+from kinacc.assess.search_and_confirm import (
+    SearchAndConfirm,
+    companions,
+    hardly_missed,
+    records,
+)
 from kinacc.assess.sequential import Sequential
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS
@@ -227,6 +232,8 @@ def test_records_and_companions_against_counting():
     missed = [np.mean(orders[:, :8].max(axis=1) < 20 - c) for c in (count - 1, count)]
     assert missed[0] > 0.1 > missed[1]
     assert companions(20, 20, 0.1) == 1
+    assert hardly_missed(20, 0.1) == 18
+    assert [companions(20, seen, 0.1) for seen in (17, 18)] == [2, 1]
 
 
 def coverage(assessor, errors, sigma, draws, target=MEASURED):
@@ -286,6 +293,16 @@ def test_an_error_that_stands_alone_is_seen_to_break_the_assumption():
     about = said.statements()[1]
     assert about.target == CANDIDATES
     assert "more than 1.25 times all others" in about.withheld
+
+
+def test_with_a_reading_for_nearly_every_candidate_the_recommended_bound_assumes_nothing():
+    # The largest error all alone: whoever misses it knows nothing of it.
+    errors = np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(59)])
+    upper, _ = coverage(SearchAndConfirm(60), errors, 0.1, 400, CANDIDATES)
+    assert upper >= least(400)
+    campaign = conduct(SearchAndConfirm(60), drawn_world(errors, 0.1, key_of(5), 60))
+    assert len(campaign.ledger.visited) == 59
+    assert not campaign.statements()[1].assumption
 
 
 def test_more_budget_than_candidates_visits_them_all_and_needs_no_assumption():

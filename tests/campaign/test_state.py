@@ -89,7 +89,7 @@ def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_wo
 def test_the_route_reorders_the_first_visit_only(make_plan):
     plan = make_plan(points=60, budget=60)
     rows, first = plan.visiting(frozenset()), len(plan.route)
-    assert first == 36
+    assert first == 59  # of 60: 2 % may be missed
     assert set(rows[:first]) == set(plan.order[:first])
     np.testing.assert_array_equal(rows[:first], plan.route)
     np.testing.assert_array_equal(rows[first:], plan.order[first:])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -115,6 +115,7 @@ class KinematicCampaign(LedgerCampaign):
         crowd = 0
         if seen < points:
             crowd = companions(points, seen, MISSING_PART * (1.0 - self.settings.confidence))
+        crowd = crowd if crowd > 1 else 0  # the largest itself was hardly missed
         missed = ""
         if crowd > _CROWD * points:
             missed = f"{seen} of {points} candidates measured: {crowd} could have been missed"
@@ -126,13 +127,11 @@ class KinematicCampaign(LedgerCampaign):
     def _said(self, target: str, draws: np.ndarray, withheld: str, crowd: int = 0) -> Statement:
         confidence = self.settings.confidence
         low, value, high = (float(x) for x in np.quantile(draws, [1 - confidence, 0.5, confidence]))
-        if withheld:
-            return Statement(target, value, confidence=confidence, withheld=withheld)
         assumption = "smooth errors of single joints cause the errors, but for local ones"
         if crowd:
             assumption += f"; at least {crowd} candidates have an error above the largest divided "
             assumption += f"by {_ISOLATION:g}"
-        return Statement(
+        resting = Statement(
             target,
             value,
             low,
@@ -142,6 +141,9 @@ class KinematicCampaign(LedgerCampaign):
             crowd=crowd,
             isolation=_ISOLATION if crowd else 1.0,
         )
+        if withheld:
+            return replace(resting, lower_mm=math.nan, upper_mm=math.nan, withheld=withheld)
+        return resting
 
     def _contradiction(self, known: Posterior) -> str:
         """Why the model is not believed; empty if it is."""

@@ -16,7 +16,7 @@ import numpy as np
 from kinacc.assess.adaptive import Ledger
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 
-_FIRST_SHARES = (0.40, 0.24, 0.16, 0.10)  # of the looks at 1, 2, 4 and 8 readings; then halving
+_FIRST_SHARES = (0.60, 0.16, 0.10, 0.06)  # of the looks at 1, 2, 4 and 8 readings; then halving
 
 
 def share(look: int) -> float:

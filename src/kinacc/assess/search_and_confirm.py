@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -15,31 +15,34 @@ from kinacc.assess.sequential import bounding_point, first_points
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.errors import InputError, Problem
 
-FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything decides
+FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
 MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
 _ALONE = 0.1  # chance of so little company below which the assumption counts as broken
-_WORTH = 1.5  # times the readings the suspects have: what confirming them is expected to take
 _RESERVE = 0.04  # of the budget, kept for confirming whatever is found last
 _RECONSIDER = 0.06  # of the budget, between two estimates of the likely largest size
 
 
 @dataclass(frozen=True)
 class SearchAndConfirm:
-    """Visit new points while the suspects can still be paid for, else re-measure the suspects.
+    """Visit candidates until none can be missed, or as many as suspects allow; then confirm those.
 
-    A suspect is a point whose mean reading plus one standard deviation exceeds the likely largest
-    size. While the readings left cover reading every suspect one and a half times as often again as
-    it was, and 4 % of the budget, a new point is visited; otherwise the point with the largest
-    upper limit is measured until its next look. So little noise or one outstanding error lead to
-    many points, much noise to fewer.
+    With a budget for it, so many candidates are visited that the largest error is missed with
+    2 % at most (196 of 200), whatever is read; the rest of the budget goes to suspects. With
+    fewer measurements, the visit goes on while the readings left cover reading every suspect as
+    often again as it was, and 4 % of the budget: little noise or one outstanding error lead to
+    many points, much noise to fewer. A suspect is a point whose mean reading plus one standard
+    deviation exceeds the likely largest size; the point with the largest upper limit is measured
+    until its next look.
 
     ``measured``: the bounds of :mod:`kinacc.assess.looks`. They hold whatever the errors are,
-    for readings that are normal with known covariance (eq. 9) and points in random order. The
-    number of points is decided by readings; for this the allowed error is divided by 1 + the
-    expected number of largest-so-far points among those that come after the first 60 %.
-    ``candidates``: the bound for the measured points times ``isolation``. Holds if the largest
-    error is not isolated: at least so many candidates (stated in the assumption) have an error
-    above the largest divided by ``isolation`` that missing them all is improbable. Withheld where
+    for readings that are normal with known covariance (eq. 9) and points in random order. Where
+    readings decide the number of points, the allowed error is divided by 1 + the expected number
+    of largest-so-far points among those that come after the ones visited in any case. Stated from
+    60 % of the visit on; who ends it early must do so for other reasons than the readings.
+    ``candidates``: without an assumption where 2 % at most can have missed the largest. Otherwise
+    the bound for the measured points times ``isolation``: it holds if the largest error is not
+    isolated, at least so many candidates (stated in the assumption) having an error above the
+    largest divided by ``isolation`` that missing them all is improbable. Withheld where
     that number is more than ``crowd`` of the candidates, and where the largest error measured
     stands so far above all others that the assumption is broken by what was seen.
     The value is the median of the posterior of :mod:`kinacc.assess.population`.
@@ -70,10 +73,12 @@ class SearchAndConfirmCampaign(LedgerCampaign):
 
     def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
         super().__init__(settings, candidates)
-        budget = settings.measurements
-        self.first = first_points(budget, candidates.points, FIRST_SHARE)
-        self.most = min(budget, candidates.points)
+        budget, points = settings.measurements, candidates.points
         allowed = 1.0 - settings.confidence
+        self.first = self._speaks_from = first_points(budget, points, FIRST_SHARE)
+        if (nearly_all := hardly_missed(points, MISSING_PART * allowed)) <= budget:
+            self.first = max(self.first, nearly_all)
+        self.most = min(budget, points)
         chosen = records(self.first, self.most)
         errors = (allowed / chosen, (1.0 - MISSING_PART) * allowed / chosen)
         self.looks = Looks(self.ledger, errors, allowed / self.most)
@@ -99,8 +104,8 @@ class SearchAndConfirmCampaign(LedgerCampaign):
         """On the measured points, and on all candidates."""
         ledger, looks = self.ledger, self.looks
         visited = ledger.visited
-        if len(visited) < self.first:
-            left = f"{self.first - len(visited)} points of the first visit are left"
+        if len(visited) < self._speaks_from:
+            left = f"{self._speaks_from - len(visited)} points of the first visit are left"
             return Statement(MEASURED, withheld=left), Statement(CANDIDATES, withheld=left)
         posterior = self._posterior()
         said = Statement(
@@ -119,36 +124,25 @@ class SearchAndConfirmCampaign(LedgerCampaign):
         if seen == points:
             return known
         crowd = companions(points, seen, MISSING_PART * allowed)
+        beyond_mm = float(self.looks.upper_mm[1, self.ledger.visited].max())
+        if crowd == 1:
+            return replace(known, upper_mm=beyond_mm)
         factor = self.settings.isolation
-        if crowd > self.settings.crowd * points:
-            return Statement(
-                CANDIDATES,
-                value_mm,
-                said.lower_mm,
-                confidence=said.confidence,
-                withheld=f"{seen} of {points} candidates measured: fewer than {crowd} large errors "
-                f"could all have been missed",
-            )
-        if self._stands_alone(crowd, said.lower_mm):
-            return Statement(
-                CANDIDATES,
-                value_mm,
-                said.lower_mm,
-                confidence=said.confidence,
-                withheld=f"one measured error is more than {factor:g} times all others",
-            )
-        upper = factor * float(self.looks.upper_mm[1, self.ledger.visited].max())
-        return Statement(
-            CANDIDATES,
-            value_mm,
-            said.lower_mm,
-            upper,
-            said.confidence,
+        resting = replace(
+            known,
+            upper_mm=factor * beyond_mm,
             assumption=f"at least {crowd} of the {points} candidates have an error above the "
             f"largest divided by {factor:g}",
             crowd=crowd,
             isolation=factor,
         )
+        withheld = ""
+        if crowd > self.settings.crowd * points:
+            withheld = f"{seen} of {points} candidates measured: fewer than {crowd} large errors "
+            withheld += "could all have been missed"
+        elif self._stands_alone(crowd, said.lower_mm):
+            withheld = f"one measured error is more than {factor:g} times all others"
+        return replace(resting, upper_mm=math.nan, withheld=withheld) if withheld else resting
 
     def _stands_alone(self, crowd: int, lower_mm: float) -> bool:
         """Whether hardly any measured error can be as large as the assumption says many are."""
@@ -165,7 +159,7 @@ class SearchAndConfirmCampaign(LedgerCampaign):
         visited = self.ledger.visited
         reach = self.ledger.sizes_mm() + self.ledger.noise_mm[visited]
         readings = int(self.ledger.count[visited][reach > self._likely_mm].sum())
-        return _WORTH * readings + _RESERVE * self.settings.measurements
+        return readings + _RESERVE * self.settings.measurements
 
     def _posterior(self) -> LargestSize:
         visited = self.ledger.visited
@@ -176,6 +170,11 @@ class SearchAndConfirmCampaign(LedgerCampaign):
 def records(first: int, most: int) -> float:
     """1 + expected number of points above all before them among the first+1 .. most, by chance."""
     return 1.0 + sum(1.0 / place for place in range(first + 1, most + 1))
+
+
+def hardly_missed(points: int, error: float) -> int:
+    """Smallest number of random points that hold the largest of ``points`` but for ``error``."""
+    return next(seen for seen in range(points + 1) if points - seen <= error * points)
 
 
 def companions(points: int, seen: int, error: float) -> int:

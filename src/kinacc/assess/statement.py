@@ -24,7 +24,8 @@ class Statement:
     of the region the statement is about (1 for the other targets). ``assumption`` names what the
     bounds rest on beyond normal readings of known covariance; empty if nothing. Where it is that
     at least ``crowd`` candidates have an error above the largest divided by ``isolation``, these
-    say so in numbers. ``withheld`` says why no bound is stated; empty if one is.
+    say so in numbers. ``withheld`` says why no bound is stated; empty if one is. Where an
+    assumption was at hand, a statement that is withheld still names it.
     """
 
     target: str

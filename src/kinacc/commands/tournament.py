@@ -12,8 +12,8 @@ import click
 @click.option("--results", default="results", show_default=True, help="Results folder.")
 @click.option(
     "--size",
-    type=click.Choice(["default", "coverage", "full"]),
-    help="Minutes, hours for coverage alone, or a day and more. [configuration]",
+    type=click.Choice(["default", "coverage", "budgets", "full"]),
+    help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
 @click.option("--parts", type=click.IntRange(1), help="Number of parts. [configuration]")
 @click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")

@@ -11,7 +11,8 @@ Columns = dict[str, np.ndarray]
 
 CELL = ("assessor", "target", "field", "candidates", "noise_mm", "budget")
 FAMILY_ERROR = 0.01  # of all tests of one assessor together
-MOST_BELOW = 0.03  # coverage a cell may be below the confidence however few repetitions it has
+MOST_BELOW = 0.03  # coverage a cell may be below the confidence, significant or not
+ENOUGH = 200  # statements without which a cell cannot tell three points from chance
 
 
 def summed(rows: Mapping[str, np.ndarray]) -> Columns:
@@ -20,7 +21,8 @@ def summed(rows: Mapping[str, np.ndarray]) -> Columns:
     ``upper_holds`` and ``lower_holds`` are shares of the statements made; ``upper_low`` and
     ``upper_high`` the exact 95 % interval of the first. ``broken`` counts statements whose
     assumption is not true of the field: coverage and excess leave them out, and
-    ``broken_holds`` is their coverage alone.
+    ``broken_holds`` is their coverage alone. ``sound`` counts campaigns, with a statement or
+    without, whose assumption is true.
     """
     found = [_cell(rows, key, places) for key, places in _groups(rows).items()]
     return {name: np.array([each[name] for each in found], kind) for name, kind in KINDS.items()}
@@ -29,8 +31,10 @@ def summed(rows: Mapping[str, np.ndarray]) -> Columns:
 def judged(summary: Mapping[str, np.ndarray]) -> Columns:
     """Whether every assessor keeps what it says, over all cells of a target.
 
-    Holm's test of every cell against its confidence at a family-wise 1 %, and no cell more than
-    three points below. ``worst_holds`` is the smallest coverage.
+    Holm's test of every cell against its confidence at a family-wise 1 %, and no cell with 200
+    statements or more further than three points below. ``worst_holds`` is the smallest coverage;
+    ``withheld_sound`` the largest share of a cell's campaigns without a statement although what
+    it would rest on is true.
     """
     found = []
     for assessor, target in dict.fromkeys(zip(summary["assessor"], summary["target"], strict=True)):
@@ -42,6 +46,7 @@ def judged(summary: Mapping[str, np.ndarray]) -> Columns:
         tried = (cells["stated"] - cells["broken"]).astype(int)
         held = np.rint(cells["upper_holds"] * tried).astype(int)
         chance = bdtr(held, tried, cells["confidence"])
+        least = cells["confidence"] - MOST_BELOW
         found.append(
             {
                 "assessor": assessor,
@@ -49,10 +54,11 @@ def judged(summary: Mapping[str, np.ndarray]) -> Columns:
                 "cells": int(mine.sum()),
                 "statements": int(tried.sum()),
                 "rejected": int(holm(chance, FAMILY_ERROR).sum()),
-                "below": int(np.sum(cells["upper_holds"] < cells["confidence"] - MOST_BELOW)),
+                "below": int(np.sum((held < least * tried) & (tried >= ENOUGH))),
                 "worst_holds": float(cells["upper_holds"].min()),
                 "mean_holds": float(held.sum() / tried.sum()),
                 "withheld": _withheld(summary, assessor, target),
+                "withheld_sound": _withheld_sound(summary, assessor, target),
             }
         )
     kinds = {
@@ -65,6 +71,7 @@ def judged(summary: Mapping[str, np.ndarray]) -> Columns:
         "worst_holds": float,
         "mean_holds": float,
         "withheld": float,
+        "withheld_sound": float,
     }
     return {name: np.array([each[name] for each in found], kind) for name, kind in kinds.items()}
 
@@ -81,6 +88,14 @@ def _withheld(summary: Mapping[str, np.ndarray], assessor: str, target: str) -> 
     mine = (summary["assessor"] == assessor) & (summary["target"] == target)
     stated, all_of = (int(summary[name][mine].sum()) for name in ("stated", "repetitions"))
     return 1.0 - stated / all_of
+
+
+def _withheld_sound(summary: Mapping[str, np.ndarray], assessor: str, target: str) -> float:
+    """Largest share, over cells, of campaigns with a true assumption that state nothing."""
+    mine = (summary["assessor"] == assessor) & (summary["target"] == target)
+    mine &= summary["sound"] > 0
+    kept = (summary["stated"][mine] - summary["broken"][mine]) / summary["sound"][mine]
+    return float(np.max(1.0 - kept)) if kept.size else np.nan
 
 
 def holm(chances: np.ndarray, error: float) -> np.ndarray:
@@ -131,6 +146,7 @@ def _cell(rows: Mapping[str, np.ndarray], key: tuple, places: list[int]) -> dict
         "confidence": every,
         "stated": int(stated.sum()),
         "broken": int(broken.sum()),
+        "sound": int(np.sum(own["assumption"] != "broken")),
         "upper_holds": np.mean(excess >= 0) if tried else np.nan,
         "broken_holds": beyond.mean() if beyond.size else np.nan,
         "upper_low": low,
@@ -157,6 +173,7 @@ KINDS = {
     "confidence": float,
     "stated": np.int64,
     "broken": np.int64,
+    "sound": np.int64,
     "upper_holds": float,
     "broken_holds": float,
     "upper_low": float,
