@@ -287,6 +287,14 @@ def test_the_recommended_bound_on_all_candidates_holds_where_its_assumption_does
     assert upper >= least(120)
 
 
+def test_no_recommended_bound_is_below_its_value():
+    errors = field(40)
+    for draw in range(60):
+        campaign = conduct(SearchAndConfirm(40), drawn_world(errors, 0.3, key_of(6, draw), 40))
+        for said in campaign.statements():
+            assert said.upper_mm >= said.value_mm
+
+
 def test_an_error_that_stands_alone_is_seen_to_break_the_assumption():
     errors = np.vstack([[[3.0, 0.0, 0.0]], 0.1 * directions(79)])
     said = conduct(SearchAndConfirm(60, crowd=0.5), drawn_world(errors, 0.05, key_of(8), 60))

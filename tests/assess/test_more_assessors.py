@@ -238,6 +238,14 @@ def test_a_tolerance_is_held_to_both_bounds(tolerance, verdict):
     assert found.risk == pytest.approx(0.05)
 
 
+@pytest.mark.parametrize("value, lower, upper", [(1.1, 0.9, 1.0), (0.9, 1.2, 1.0)])
+def test_bounds_that_contradict_each_other_or_the_value_decide_nothing(value, lower, upper):
+    for tolerance in (0.8, 1.05, 1.3):
+        found = decide(Statement(MEASURED, value, lower, upper, 0.95), tolerance)
+        assert found.verdict == UNDECIDED
+        assert "contradict" in found.reason
+
+
 def test_no_bound_is_no_decision_and_no_tolerance_an_error():
     found = decide(Statement(CANDIDATES, 0.9, withheld="half the points are missing"), 1.0)
     assert (found.verdict, found.reason) == (UNDECIDED, "half the points are missing")

@@ -34,14 +34,19 @@ def decide(said: Statement, tolerance_mm: float) -> Decision:
     Accept where the upper bound is at most the tolerance, reject where the lower bound exceeds it,
     otherwise undecided. Guarded acceptance and guarded rejection of JCGM 106:2012 (8.3.2 and
     8.3.3), guard band by the bounds; as each bound holds with the statement's confidence by itself,
-    each wrong decision has at most the remaining probability. Without bounds: undecided.
+    each wrong decision has at most the remaining probability. Undecided without bounds, and where
+    the value or the lower bound is above the upper bound: such readings decide nothing.
     Raises InputError for a tolerance that is not positive.
     """
     if not (tolerance_mm > 0.0 and math.isfinite(tolerance_mm)):
         raise InputError(Problem("tolerance", f"{tolerance_mm}", "above 0, in mm"))
     band = said.upper_mm - said.value_mm
     verdict, reason = UNDECIDED, "the tolerance lies between lower and upper bound: measure more"
-    if said.upper_mm <= tolerance_mm:
+    if said.upper_mm < said.lower_mm or band < 0.0:
+        reason = (
+            "the bounds contradict each other or the value: hold the noise to repeated readings"
+        )
+    elif said.upper_mm <= tolerance_mm:
         verdict, reason = ACCEPT, "the upper bound is within the tolerance"
     elif said.lower_mm > tolerance_mm:
         verdict, reason = REJECT, "the lower bound exceeds the tolerance"

@@ -108,11 +108,13 @@ class SearchAndConfirmCampaign(LedgerCampaign):
             left = f"{self._speaks_from - len(visited)} points of the first visit are left"
             return Statement(MEASURED, withheld=left), Statement(CANDIDATES, withheld=left)
         posterior = self._posterior()
+        value_mm = posterior.quantile_mm(0.5, measured_only=True)
         said = Statement(
             MEASURED,
-            value_mm=posterior.quantile_mm(0.5, measured_only=True),
+            value_mm=value_mm,
             lower_mm=float(looks.lower_mm[visited].max()),
-            upper_mm=float(looks.upper_mm[0, visited].max()),
+            # Where unlucky readings put the bound below the likely size, that is the better bound.
+            upper_mm=max(float(looks.upper_mm[0, visited].max()), value_mm),
             confidence=self.settings.confidence,
         )
         return said, self._about_candidates(said, posterior.quantile_mm(0.5))
@@ -120,11 +122,11 @@ class SearchAndConfirmCampaign(LedgerCampaign):
     def _about_candidates(self, said: Statement, value_mm: float) -> Statement:
         points, seen = self.ledger.candidates.points, len(self.ledger.visited)
         allowed = 1.0 - self.settings.confidence
-        known = Statement(CANDIDATES, value_mm, said.lower_mm, said.upper_mm, said.confidence)
+        known = replace(said, target=CANDIDATES, value_mm=value_mm)
         if seen == points:
             return known
         crowd = companions(points, seen, MISSING_PART * allowed)
-        beyond_mm = float(self.looks.upper_mm[1, self.ledger.visited].max())
+        beyond_mm = max(float(self.looks.upper_mm[1, self.ledger.visited].max()), value_mm)
         if crowd == 1:
             return replace(known, upper_mm=beyond_mm)
         factor = self.settings.isolation
