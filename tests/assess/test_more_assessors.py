@@ -238,7 +238,7 @@ def test_a_tolerance_is_held_to_both_bounds(tolerance, verdict):
     assert found.risk == pytest.approx(0.05)
 
 
-@pytest.mark.parametrize("value, lower, upper", [(1.1, 0.9, 1.0), (0.9, 1.2, 1.0)])
+@pytest.mark.parametrize(("value", "lower", "upper"), [(1.1, 0.9, 1.0), (0.9, 1.2, 1.0)])
 def test_bounds_that_contradict_each_other_or_the_value_decide_nothing(value, lower, upper):
     for tolerance in (0.8, 1.05, 1.3):
         found = decide(Statement(MEASURED, value, lower, upper, 0.95), tolerance)
