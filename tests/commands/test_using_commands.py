@@ -78,6 +78,13 @@ def test_predict_and_compensate_undo_each_other(folder, tmp_path):
     assert np.abs(found - q_deg).max() < 1e-6
 
 
+def test_rows_without_a_pose_are_counted(folder, tmp_path):
+    path = tmp_path / "far.csv"
+    path.write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,60,0\n0,0,0,0,60,359\n")
+    done = call("predict", folder, path, "--robot", "mh180", "--model", "vec")
+    assert "1 of 2 rows without a pose" in done.output
+
+
 def test_answers_for_machines_have_units_and_nulls(folder, tmp_path):
     joints = '"0,0,0,0,60,0"'.strip('"')
     shown = call("predict", folder, "--robot", "mh180", "--model", "nominal",

@@ -48,3 +48,4 @@ def predict(
         found = poses_at(arm, given.joints, given.directions, frame, point, progress)
     choice.deliver(tables.predicted(arm, given, found, frame, point), output, as_json, force)
     rows.say_unused(given)
+    rows.say_missing(found.pose.position_mm)

@@ -211,3 +211,13 @@ def say_unused(given: Rows) -> None:
         import sys
 
         print(f"not used: {', '.join(given.unused)}", file=sys.stderr)
+
+
+def say_missing(position_mm: np.ndarray) -> None:
+    """Count the rows without an answer, positions (n, 3), on the error stream."""
+    missing = int(np.isnan(position_mm).any(axis=1).sum())
+    if missing:
+        import sys
+
+        all_of = len(position_mm)
+        print(f"{missing} of {all_of} rows without a pose: status says why", file=sys.stderr)

@@ -186,7 +186,7 @@ def _outliers(fitted: Fitted, rows: np.ndarray) -> list[Suspicion]:
                 f"{fitted.left_mm[worst]:.3g} mm (line {cells.line[worst]}){turned}, where "
                 f"{fitted.limit_mm:.3g} mm is the most to be expected",
                 cells.lines(rest),
-                "measure them again, or take them out",
+                "measure them again; take out slips, keep what repeats: that is the arm",
                 largest_mm=float(fitted.left_mm[worst]),
                 limit_mm=fitted.limit_mm,
             )
