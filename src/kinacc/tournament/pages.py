@@ -37,7 +37,7 @@ A statement is graded against its own target: `measured` (the largest error of t
 measured), `candidates` (of all that could have been), `region` (a quantile). *Holds* is the share
 of upper bounds that are not below the truth; *excess* how far they are above it on average. An
 assessor keeps its confidence if no cell is significantly below it (binomial, family-wise 1 % by
-Holm) and none more than three points.
+Holm) and none of 200 statements or more is further than three points below; fewer cannot tell.
 
 What each assessor does: [assessors](assessors/). Which to use:
 [choosing an assessor](choosing-an-assessor.md). Why the bounds hold: [theory](assessors.md).
@@ -153,15 +153,17 @@ def _run(name: str, tables: Tables) -> str:
 def _verdicts(table: Mapping, cells: Mapping) -> list[str]:
     lines = [
         "| assessor | about | cells | statements | hold | worst cell | rejected (Holm) "
-        "| more than 3 points below | no statement | worst cell, untrue assumptions counted |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| more than 3 points below | no statement | though its assumption is true, worst cell "
+        "| worst cell, untrue assumptions counted |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in _rows(table):
         lines.append(
             f"| [{row['assessor']}](assessors/{row['assessor']}.md) | {row['target']} "
             f"| {row['cells']} | {row['statements']} | {row['mean_holds']:.3f} "
             f"| {row['worst_holds']:.3f} | {row['rejected']} | {row['below']} "
-            f"| {row['withheld']:.1%} | {_worst_of_all(cells, row)} |"
+            f"| {row['withheld']:.1%} | {_share(row['withheld_sound'])} "
+            f"| {_worst_of_all(cells, row)} |"
         )
     return lines
 
