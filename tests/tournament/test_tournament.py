@@ -174,6 +174,7 @@ def test_a_cell_is_summed_up_as_by_hand():
         for values in zip(*summary.summed(said).values(), strict=True)
     ]
     assert (cell["repetitions"], cell["stated"], cell["broken"]) == (5, 4, 1)
+    assert cell["sound"] == 4
     assert cell["upper_holds"] == pytest.approx(2 / 3)
     assert cell["excess_mm"] == pytest.approx((0.2 - 0.2 + 0.4) / 3)
     assert cell["lower_holds"] == pytest.approx(3 / 4)
@@ -197,3 +198,18 @@ def test_an_assessor_that_claims_too_much_is_caught():
     found = summary.judged(summary.summed(bold))
     assert (found["rejected"][0], found["below"][0]) == (1, 1)
     assert found["worst_holds"][0] == pytest.approx(0.8)
+
+
+def test_silence_counts_where_what_it_would_rest_on_is_true():
+    said = graded(
+        upper_mm=[1.2, np.nan, np.nan, np.nan, 1.3],
+        assumption=np.array(["holds", "holds", "broken", "broken", "broken"], object),
+    )
+    found = summary.judged(summary.summed(said))
+    assert found["withheld"].tolist() == [pytest.approx(3 / 5)]
+    assert found["withheld_sound"].tolist() == [pytest.approx(1 / 2)]
+
+
+def test_few_campaigns_do_not_tell_three_points_from_chance():
+    few = graded(upper_mm=[1.2, 1.2, 1.2, 1.2, 0.9])
+    assert summary.judged(summary.summed(few))["below"].tolist() == [0]
