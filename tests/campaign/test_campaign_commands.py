@@ -93,6 +93,16 @@ def test_help_has_an_example(name):
     assert f"kinacc campaign {name} " in shown.output.split("Example:")[1]
 
 
+def test_a_budget_below_the_candidates_is_told_what_more_would_bring(calibration, tmp_path):
+    def start(budget):
+        return call("campaign", "start", tmp_path / str(budget), "--calibration", calibration,
+                    "--robot", "mh180", "--model", "dh", "--drawn", 60, "--budget", budget,
+                    "--noise-mm", SIGMA_MM).output  # fmt: skip
+
+    assert "with 59 readings, the bound on all candidates would need no assumption" in start(58)
+    assert "need no assumption" not in start(59)
+
+
 def test_a_whole_campaign_ends_as_in_memory(begun):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     arm = Arm(folder)

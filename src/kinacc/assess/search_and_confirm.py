@@ -63,6 +63,10 @@ class SearchAndConfirm:
         if problems:
             raise InputError(problems, f"{self.name} cannot work with these settings")
 
+    def enough_for_all(self, points: int) -> int:
+        """Measurements with which the statement on all ``points`` candidates assumes nothing."""
+        return hardly_missed(points, MISSING_PART * (1.0 - self.confidence))
+
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
         return SearchAndConfirmCampaign(self, candidates)
@@ -76,7 +80,7 @@ class SearchAndConfirmCampaign(LedgerCampaign):
         budget, points = settings.measurements, candidates.points
         allowed = 1.0 - settings.confidence
         self.first = self._speaks_from = first_points(budget, points, FIRST_SHARE)
-        if (nearly_all := hardly_missed(points, MISSING_PART * allowed)) <= budget:
+        if (nearly_all := settings.enough_for_all(points)) <= budget:
             self.first = max(self.first, nearly_all)
         self.most = min(budget, points)
         chosen = records(self.first, self.most)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.assess.conformity import decide
+from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, instrument, words
 from kinacc.campaign.plan import Plan
@@ -48,10 +49,22 @@ def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
         f"instruments: {named}",
         f"{begun.assessor.name}: {begun.assessor.measurements} readings, the first at "
         f"{len(begun.route)} points whatever they say",
+        *_too_few(begun),
         f"a reading is refused {_refusals(begun)}",
         f"next: kinacc campaign next {folder}",
     ]
     return "\n".join(lines)
+
+
+def _too_few(begun: Plan) -> list[str]:
+    """What a larger budget would be good for."""
+    assessor = begun.assessor
+    if not isinstance(assessor, SearchAndConfirm):
+        return []
+    enough = assessor.enough_for_all(len(begun.points))
+    if assessor.measurements >= enough:
+        return []
+    return [f"with {enough} readings, the bound on all candidates would need no assumption"]
 
 
 def _refusals(begun: Plan) -> str:
