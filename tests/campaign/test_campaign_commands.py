@@ -94,13 +94,14 @@ def test_help_has_an_example(name):
 
 
 def test_a_budget_below_the_candidates_is_told_what_more_would_bring(calibration, tmp_path):
-    def start(budget):
+    def start(budget, *more):
         return call("campaign", "start", tmp_path / str(budget), "--calibration", calibration,
                     "--robot", "mh180", "--model", "dh", "--drawn", 60, "--budget", budget,
-                    "--noise-mm", SIGMA_MM).output  # fmt: skip
+                    "--noise-mm", SIGMA_MM, *more).output  # fmt: skip
 
     assert "with 59 readings, the bound on all candidates would need no assumption" in start(58)
     assert "need no assumption" not in start(59)
+    assert "no bound will be stated: that takes 84 points" in start(57, "--assessor", "kinematic")
 
 
 def test_a_whole_campaign_ends_as_in_memory(begun):

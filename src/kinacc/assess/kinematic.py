@@ -15,6 +15,7 @@ from kinacc.assess.kinematic_model import (
     Scales,
     fitted_scales,
     largest_draws,
+    points_needed,
     posterior,
 )
 from kinacc.assess.search_and_confirm import MISSING_PART, companions
@@ -149,8 +150,7 @@ class KinematicCampaign(LedgerCampaign):
         """Why the model is not believed; empty if it is."""
         from scipy.special import chdtrc
 
-        if 3 * self.first < known.mean.size:
-            needed = math.ceil(known.mean.size / 3)
+        if self.first < (needed := points_needed(self.ledger.candidates.q_rad.shape[1])):
             return f"{self.first} points in the first visit; the model needs {needed}"
         worst = float(known.odd.max())
         chance = -math.expm1(known.odd.size * math.log1p(-float(chdtrc(3, worst))))

@@ -10,6 +10,7 @@ All scales are fitted to the readings by maximum marginal likelihood (EM).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,11 @@ _ROUNDS = 40
 _FLOOR = 1e-8  # of the mean square reading: least variance of a scale
 _PSEUDO = 4.0  # points' worth of belief that local errors are of the bulk
 _SCALES = 6  # of local errors, each twice the one before
+
+
+def points_needed(joints: int) -> int:
+    """Points with as many components of readings as there are coefficients for so many joints."""
+    return math.ceil(CAUSES_PER_JOINT * joints * (ORDER + 1) / 3)
 
 
 @dataclass(frozen=True)

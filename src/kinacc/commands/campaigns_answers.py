@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.assess.conformity import decide
+from kinacc.assess.kinematic import Kinematic
+from kinacc.assess.kinematic_model import points_needed
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, instrument, words
@@ -58,13 +60,16 @@ def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
 
 def _too_few(begun: Plan) -> list[str]:
     """What a larger budget would be good for."""
-    assessor = begun.assessor
-    if not isinstance(assessor, SearchAndConfirm):
-        return []
-    enough = assessor.enough_for_all(len(begun.points))
-    if assessor.measurements >= enough:
-        return []
-    return [f"with {enough} readings, the bound on all candidates would need no assumption"]
+    assessor, first = begun.assessor, len(begun.route)
+    if isinstance(assessor, SearchAndConfirm):
+        enough = assessor.enough_for_all(len(begun.points))
+        if assessor.measurements < enough:
+            return [f"with {enough} readings, the bound on all candidates would need no assumption"]
+    if isinstance(assessor, Kinematic):
+        needed = points_needed(begun.points.joints.shape[1])
+        if first < needed:
+            return [f"no bound will be stated: that takes {needed} points in the first visit"]
+    return []
 
 
 def _refusals(begun: Plan) -> str:
