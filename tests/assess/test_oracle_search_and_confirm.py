@@ -112,6 +112,7 @@ def campaign(points, budget, large, noise_mm):
         (200, 140, 60, 0.03, range(84, 141)),
         (200, 400, 5, 0.1, {200}),
         (50, 50, 1, 0.05, {49}),
+        (50, 60, 1, 0.05, {50}),  # all are visited, but only because the readings said so
     ],
 )
 def test_bounds_follow_from_the_raw_readings(points, budget, large, noise_mm, read):

@@ -127,7 +127,9 @@ class SearchAndConfirmCampaign(LedgerCampaign):
         points, seen = self.ledger.candidates.points, len(self.ledger.visited)
         allowed = 1.0 - self.settings.confidence
         known = replace(said, target=CANDIDATES, value_mm=value_mm)
-        if seen == points:
+        # Visiting all only where the readings say so is no certainty: they may say so where the
+        # largest error was met and not where it was missed, and what was allowed is then spent.
+        if self.first == points:
             return known
         crowd = companions(points, seen, MISSING_PART * allowed)
         beyond_mm = max(float(self.looks.upper_mm[1, self.ledger.visited].max()), value_mm)
