@@ -287,6 +287,16 @@ def test_the_recommended_bound_on_all_candidates_holds_where_its_assumption_does
     assert upper >= least(120)
 
 
+def test_a_visit_ended_early_says_nothing_of_the_rest_without_an_assumption():
+    campaign = SearchAndConfirm(40).begin(Candidates.with_equal_noise(np.full(40, 0.05)))
+    for row, reading in enumerate(field(40)[:30]):
+        assert campaign.next() == row
+        campaign.record(row, reading)
+    about = campaign.statements()[1]
+    assert about.crowd > 1
+    assert about.assumption
+
+
 def test_no_recommended_bound_is_below_its_value():
     errors = field(40)
     for draw in range(60):

@@ -129,7 +129,7 @@ class SearchAndConfirmCampaign(LedgerCampaign):
         known = replace(said, target=CANDIDATES, value_mm=value_mm)
         # Visiting all only where the readings say so is no certainty: they may say so where the
         # largest error was met and not where it was missed, and what was allowed is then spent.
-        if self.first == points:
+        if seen == self.first == points:
             return known
         crowd = companions(points, seen, MISSING_PART * allowed)
         beyond_mm = max(float(self.looks.upper_mm[1, self.ledger.visited].max()), value_mm)
