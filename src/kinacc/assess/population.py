@@ -3,7 +3,7 @@
 Empirical Bayes: the density of the true sizes is a mixture of smooth bumps of fixed relative width
 whose weights are fitted to the readings by maximum likelihood (EM). Given it, every point's true
 size has a posterior, and so has the largest.
-It gives values, not guarantees: no bound rests on it.
+It gives values, not guarantees: it can raise an upper bound, never lower one.
 """
 
 from __future__ import annotations
