@@ -57,6 +57,8 @@ def main(given: Iterable[str] = ()) -> None:
         (DOCS / path).parent.mkdir(exist_ok=True)
         (DOCS / path).write_text(text, encoding="utf-8")
     for name, tables in known.items():
+        if not pages.is_pictured(tables["tournament_cells"]):
+            continue
         for quantity in tournament.QUANTITIES:
             picture = tournament.draw(tables["tournament_cells"], quantity, *pages.SHOWN)
             save.write(picture, {"png": DOCS / "tournament" / name / f"{quantity}.png"})

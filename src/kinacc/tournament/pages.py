@@ -111,10 +111,11 @@ def _run(name: str, tables: Tables) -> str:
     counts = sorted({int(cells["repetitions"].min()), int(cells["repetitions"].max())})
     repetitions = " to ".join(f"{each:,}" for each in counts)
     levels = ", ".join(f"{1e3 * each:g}" for each in np.unique(cells["noise_mm"]))
-    pictures = [
-        f"![{quantity}](tournament/{name}/{quantity}.png)"
-        for quantity in ("bias", "rmse", "coverage", "width")
-    ]
+    pictures = []
+    if is_pictured(cells):
+        quantities = ("bias", "rmse", "coverage", "width")
+        pictures = [f"![{quantity}](tournament/{name}/{quantity}.png)" for quantity in quantities]
+        pictures = [*_by_field(cells), "", *pictures, ""]
     return "\n".join(
         [
             f"## {name}",
@@ -139,10 +140,7 @@ def _run(name: str, tables: Tables) -> str:
             "",
             *_ratios(cells),
             "",
-            *_by_field(cells),
-            "",
             *pictures,
-            "",
             "### Fields",
             "",
             *_fields(tables["tournament_fields"]),
@@ -261,6 +259,11 @@ def _over(cells: Mapping, here, column: str, target: str, other: str) -> dict[st
 def _row(cells: Mapping, here, name: str, target: str) -> dict | None:
     places = np.flatnonzero(here & (cells["assessor"] == name) & (cells["target"] == target))
     return {key: column[places[0]] for key, column in cells.items()} if places.size else None
+
+
+def is_pictured(cells: Mapping) -> bool:
+    """Whether a tournament holds the size of pictures and of the table by field."""
+    return bool(_shown(cells).any())
 
 
 def _shown(cells: Mapping) -> np.ndarray:
