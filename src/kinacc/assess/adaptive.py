@@ -116,7 +116,8 @@ class Campaign(Protocol):
 class AdaptiveAssessor(Protocol):
     """A method of assessment: ``name`` in tables, ``measurements`` it may spend.
 
-    ``is_slow``, where there is one, says that a campaign of 200 takes more than 50 ms.
+    ``is_slow``, where there is one, says that a campaign of 200 takes more than 50 ms;
+    ``shortfall(points, joints)``, where there is one, what the budget is too small for.
     """
 
     name: ClassVar[str]

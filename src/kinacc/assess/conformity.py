@@ -43,9 +43,7 @@ def decide(said: Statement, tolerance_mm: float) -> Decision:
     band = said.upper_mm - said.value_mm
     verdict, reason = UNDECIDED, "the tolerance lies between lower and upper bound: measure more"
     if said.upper_mm < said.lower_mm or band < 0.0:
-        reason = (
-            "the bounds contradict each other or the value: hold the noise to repeated readings"
-        )
+        reason = "the bounds contradict each other or the value: is the noise stated too small?"
     elif said.upper_mm <= tolerance_mm:
         verdict, reason = ACCEPT, "the upper bound is within the tolerance"
     elif said.lower_mm > tolerance_mm:

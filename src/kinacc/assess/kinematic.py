@@ -64,6 +64,13 @@ class Kinematic:
         if problems:
             raise InputError(problems, f"{self.name} cannot work with these settings")
 
+    def shortfall(self, points: int, joints: int) -> str:
+        """Why this budget leads to no statement on an arm of so many joints; empty if it may."""
+        needed = points_needed(joints)
+        if first_points(self.measurements, points, self.visited) >= needed:
+            return ""
+        return f"no bound will be stated: that takes {needed} points in the first visit"
+
     def begin(self, candidates: Candidates) -> KinematicCampaign:
         """A new campaign. InputError without joints and effects of the candidates."""
         missing = [

@@ -67,6 +67,12 @@ class SearchAndConfirm:
         """Measurements with which the statement on all ``points`` candidates assumes nothing."""
         return hardly_missed(points, MISSING_PART * (1.0 - self.confidence))
 
+    def shortfall(self, points: int, joints: int) -> str:
+        """What a larger budget would be good for with so many candidates; empty if nothing."""
+        if self.measurements >= (enough := self.enough_for_all(points)):
+            return ""
+        return f"with {enough} readings, the bound on all candidates would need no assumption"
+
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
         return SearchAndConfirmCampaign(self, candidates)

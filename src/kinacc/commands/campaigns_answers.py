@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.assess.conformity import decide
-from kinacc.assess.kinematic import Kinematic
-from kinacc.assess.kinematic_model import points_needed
-from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, instrument, words
 from kinacc.campaign.plan import Plan
@@ -59,17 +56,10 @@ def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
 
 
 def _too_few(begun: Plan) -> list[str]:
-    """What a larger budget would be good for."""
-    assessor, first = begun.assessor, len(begun.route)
-    if isinstance(assessor, SearchAndConfirm):
-        enough = assessor.enough_for_all(len(begun.points))
-        if assessor.measurements < enough:
-            return [f"with {enough} readings, the bound on all candidates would need no assumption"]
-    if isinstance(assessor, Kinematic):
-        needed = points_needed(begun.points.joints.shape[1])
-        if first < needed:
-            return [f"no bound will be stated: that takes {needed} points in the first visit"]
-    return []
+    """What the assessor says of a budget this small, if anything."""
+    shortfall = getattr(begun.assessor, "shortfall", None)
+    said = shortfall(*begun.points.joints.shape) if shortfall else ""
+    return [said] if said else []
 
 
 def _refusals(begun: Plan) -> str:

@@ -111,11 +111,11 @@ def _run(name: str, tables: Tables) -> str:
     counts = sorted({int(cells["repetitions"].min()), int(cells["repetitions"].max())})
     repetitions = " to ".join(f"{each:,}" for each in counts)
     levels = ", ".join(f"{1e3 * each:g}" for each in np.unique(cells["noise_mm"]))
-    pictures = []
+    shown = []
     if is_pictured(cells):
         quantities = ("bias", "rmse", "coverage", "width")
-        pictures = [f"![{quantity}](tournament/{name}/{quantity}.png)" for quantity in quantities]
-        pictures = [*_by_field(cells), "", *pictures, ""]
+        drawn = [f"![{quantity}](tournament/{name}/{quantity}.png)" for quantity in quantities]
+        shown = [*_by_field(cells), "", *drawn, ""]
     return "\n".join(
         [
             f"## {name}",
@@ -140,7 +140,7 @@ def _run(name: str, tables: Tables) -> str:
             "",
             *_ratios(cells),
             "",
-            *pictures,
+            *shown,
             "### Fields",
             "",
             *_fields(tables["tournament_fields"]),
