@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from kinacc.assess.adaptive import conduct
+from kinacc.assess.binomial import binomial_interval
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign import folder
 from kinacc.campaign.forecast import draw_errors, forecast, population, why_none
 from kinacc.campaign.reading import Reading
-from kinacc.campaign.simulate import Deviates, binomial_interval, carry_on, quantiles
+from kinacc.campaign.simulate import Deviates, carry_on, quantiles
 from kinacc.campaign.state import restore
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.assess.adaptive import covariance_faults
-from kinacc.data.text import numbers_of
+from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
 
 BASE, INSTRUMENT = "base", "instrument"

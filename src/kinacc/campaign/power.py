@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.assess.binomial import binomial_interval
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
-from kinacc.campaign.simulate import Outcome, binomial_interval, quantiles
+from kinacc.campaign.simulate import Outcome, quantiles
 
 VERDICTS = (ACCEPT, REJECT, UNDECIDED)
 _MOST_REPETITIONS = 2000

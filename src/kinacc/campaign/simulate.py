@@ -152,16 +152,6 @@ def outcomes(
     return found
 
 
-def binomial_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact two-sided limits on a probability (Clopper and Pearson)."""
-    from scipy.special import betaincinv
-
-    half = 0.5 * (1.0 - confidence)
-    low = 0.0 if hits == 0 else float(betaincinv(hits, trials - hits + 1, half))
-    high = 1.0 if hits == trials else float(betaincinv(hits + 1, trials - hits, 1.0 - half))
-    return low, high
-
-
 def quantiles(values: Iterable[float], at: Sequence[float]) -> list[float]:
     """Quantiles of values of which some may be infinite: of order, without interpolation."""
     ordered = np.sort(np.array(list(values), dtype=float))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor
+from kinacc.assess.binomial import binomial_interval
 from kinacc.campaign import power, simulate
 from kinacc.campaign.power import Aim, Row
 from kinacc.campaign.simulate import Pool
@@ -213,7 +214,7 @@ def in_words(asked: Question, found: list[Row]) -> str:
         return _none_did(asked, found, said)
     share = min(row.reaches(aim) for row in found if row.budget == enough)
     hits = round(share * asked.repetitions)
-    low, _ = simulate.binomial_interval(hits, asked.repetitions)
+    low, _ = binomial_interval(hits, asked.repetitions)
     counted = f"{hits} of {asked.repetitions}"
     if low >= aim.power:
         return (
@@ -234,7 +235,7 @@ def _none_did(asked: Question, found: list[Row], said: str) -> str:
     aim, most = asked.aim, max(row.budget for row in found)
     best = min(row.reaches(aim) for row in found if row.budget == most)
     hits = round(best * asked.repetitions)
-    _, high = simulate.binomial_interval(hits, asked.repetitions)
+    _, high = binomial_interval(hits, asked.repetitions)
     few = f"; so few repetitions do not rule out {high:.0%}" if high >= aim.power else ""
     return (
         f"no budget up to {most} gave {said} in {aim.power:.0%} of the simulated campaigns on all "

@@ -18,7 +18,7 @@ from kinacc.commands.campaigns import say_doubts
 from kinacc.commands.campaigns_answers import as_facts
 from kinacc.commands.rows import ANGLE, LENGTH, Reader, open_table
 from kinacc.data.table import RawTable
-from kinacc.data.text import numbers_of
+from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
 
 

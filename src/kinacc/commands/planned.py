@@ -13,7 +13,7 @@ from kinacc.commands import rows
 from kinacc.commands.sheet import Field, Sheet
 from kinacc.commands.spaces import Settings, inside_box, joint_ranges, ranges, settings_of
 from kinacc.commands.tables import joint_fields
-from kinacc.data.text import numbers_of
+from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose
 from kinacc.inverse.limits import travel_unit

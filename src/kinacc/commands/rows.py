@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.data.table import RawTable, load, numbers
-from kinacc.data.text import numbers_of
+from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.robot import Robot

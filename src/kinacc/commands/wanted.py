@@ -13,7 +13,7 @@ from kinacc.commands import rows
 from kinacc.commands.rows import Rows
 from kinacc.commands.sheet import Field, Sheet
 from kinacc.commands.tables import facts, joint_fields, joints_in_words, pose_fields
-from kinacc.data.text import numbers_of
+from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import bdtr, betaincinv
+from scipy.special import bdtr
+
+from kinacc.assess.binomial import binomial_interval
 
 Columns = dict[str, np.ndarray]
 
@@ -109,14 +111,6 @@ def holm(chances: np.ndarray, error: float) -> np.ndarray:
     return rejected
 
 
-def interval(held: int, tried: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact (Clopper-Pearson) interval of a share."""
-    tail = 0.5 * (1.0 - confidence)
-    low = float(betaincinv(held, tried - held + 1, tail)) if held else 0.0
-    high = float(betaincinv(held + 1, tried - held, 1.0 - tail)) if held < tried else 1.0
-    return low, high
-
-
 def _groups(rows: Mapping[str, np.ndarray]) -> dict[tuple, list[int]]:
     groups: dict[tuple, list[int]] = {}
     for place, key in enumerate(zip(*(rows[name].tolist() for name in CELL), strict=True)):
@@ -135,7 +129,7 @@ def _cell(rows: Mapping[str, np.ndarray], key: tuple, places: list[int]) -> dict
     excess = (own["upper_mm"] - own["true_mm"])[counted]
     above = (own["lower_mm"] - own["true_mm"])[~np.isnan(own["lower_mm"])]
     beyond = (own["upper_mm"] >= own["true_mm"])[broken]
-    low, high = interval(int(np.sum(excess >= 0)), tried) if tried else (np.nan, np.nan)
+    low, high = binomial_interval(int(np.sum(excess >= 0)), tried) if tried else (np.nan, np.nan)
     every = np.nanmax(own["confidence"]) if not np.isnan(own["confidence"]).all() else np.nan
     return {
         **dict(zip(CELL, key, strict=True)),
