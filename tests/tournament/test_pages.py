@@ -74,6 +74,19 @@ def test_every_picture_has_a_panel_for_each_noise_and_all_fields(tables, quantit
     assert save.render(picture, ("png",))["png"][:4] == b"\x89PNG"
 
 
+def test_an_assessor_looks_the_same_whoever_else_takes_part(tables):
+    def marks(keep):
+        cells = tables["tournament_cells"]
+        rows = np.isin(cells["assessor"], keep)
+        own = {name: np.asarray(column)[rows] for name, column in cells.items()}
+        axes = tournament.draw(own, "rmse", 200, 200, pages.NAMES).axes[0]
+        return {each.get_label(): (each.get_marker(), each.get_color()) for each in axes.lines}
+
+    few, all_of = marks(["single_shot", "search_and_confirm"]), marks(list(pages.NAMES))
+    for words in ("Single shot", "Search and confirm"):
+        assert few[words] == all_of[words]
+
+
 def test_a_picture_of_nothing_is_refused(tables):
     with pytest.raises(InputError, match="no rmse for 200 candidates and a budget of 7"):
         tournament.draw(tables["tournament_cells"], "rmse", 200, 7)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -23,10 +25,13 @@ QUANTITIES = {
 }
 
 
-def draw(cells: Table, quantity: str, candidates: int, budget: int) -> Figure:
+def draw(
+    cells: Table, quantity: str, candidates: int, budget: int, known: Sequence[str] = ()
+) -> Figure:
     """Draw one quantity of ``tournament_cells`` for one candidate count and budget.
 
-    ``quantity`` is a name of :data:`QUANTITIES`. An assessor without the quantity is left out.
+    ``quantity`` is a name of :data:`QUANTITIES`; ``known`` names all assessors there are, so that
+    each looks the same in every tournament. An assessor without the quantity is left out.
     Raises InputError where a column is missing or no row is left.
     """
     column, words, targets, level = QUANTITIES[quantity]
@@ -40,7 +45,7 @@ def draw(cells: Table, quantity: str, candidates: int, budget: int) -> Figure:
     levels = np.unique(noise[chosen])
     shown = sorted(set(fields[chosen]))
     taking_part = set(names[chosen])
-    looks = {name: look for name, look in _looks(set(names)).items() if name in taking_part}
+    looks = {name: look for name, look in _looks({*names, *known}).items() if name in taking_part}
     with style.house():
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.1)
         axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]
@@ -59,7 +64,7 @@ def draw(cells: Table, quantity: str, candidates: int, budget: int) -> Figure:
 
 
 def _looks(names: set[str]) -> dict[str, tuple[str, str, str]]:
-    """Label, colour and marker of every name of the table, the same in all its pictures.
+    """Label, colour and marker of every name, the same in all pictures of the same names.
 
     Where there are more names than spare colours, a colour comes again with another marker.
     """

@@ -60,7 +60,8 @@ def main(given: Iterable[str] = ()) -> None:
         if not pages.is_pictured(tables["tournament_cells"]):
             continue
         for quantity in tournament.QUANTITIES:
-            picture = tournament.draw(tables["tournament_cells"], quantity, *pages.SHOWN)
+            cells = tables["tournament_cells"]
+            picture = tournament.draw(cells, quantity, *pages.SHOWN, pages.NAMES)
             save.write(picture, {"png": DOCS / "tournament" / name / f"{quantity}.png"})
 
 
