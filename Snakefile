@@ -43,3 +43,8 @@ include: "workflow/rules/study.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/claims.smk"
 include: "workflow/rules/tournament.smk"
+
+
+onsuccess:
+    for told in plan.remarks():
+        logger.info(told)

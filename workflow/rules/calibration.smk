@@ -22,8 +22,31 @@ rule measurements:
         "../scripts/measurements.py"
 
 
+# What the check finds stops the fits, and its table is not read: `ancient`, so that they are not
+# made anew when it is.
+rule data_check:
+    input:
+        unpack(lambda w: plan.inputs("data_check", w.dataset)),
+    output:
+        **plan.outputs("data_check", "{dataset}"),
+    log:
+        plan.log("data_check", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
+    params:
+        code=plan.code("data_check"),
+        contents=lambda w: plan.contents("data_check", w.dataset),
+        seed=lambda w: plan.seed(w.dataset),
+        settings=lambda w: plan.settings("data_check", w.dataset),
+    message:
+        plan.message("data_check")
+    script:
+        "../scripts/data_check.py"
+
+
 rule vec:
     input:
+        ancient(lambda w: plan.gates("vec", w.dataset)),
         unpack(lambda w: plan.inputs("vec", w.dataset)),
     output:
         **plan.outputs("vec", "{dataset}"),
@@ -79,3 +102,23 @@ rule residuals:
         plan.message("residuals")
     script:
         "../scripts/residuals.py"
+
+
+rule excluded_rows:
+    input:
+        unpack(lambda w: plan.inputs("excluded_rows", w.dataset)),
+    output:
+        **plan.outputs("excluded_rows", "{dataset}"),
+    log:
+        plan.log("excluded_rows", "{dataset}"),
+    conda:
+        "../envs/kinacc.yaml"
+    params:
+        code=plan.code("excluded_rows"),
+        contents=lambda w: plan.contents("excluded_rows", w.dataset),
+        seed=lambda w: plan.seed(w.dataset),
+        settings=lambda w: plan.settings("excluded_rows", w.dataset),
+    message:
+        plan.message("excluded_rows")
+    script:
+        "../scripts/excluded_rows.py"

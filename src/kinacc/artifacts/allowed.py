@@ -8,6 +8,7 @@ QUANTITIES = ("position", "orientation")
 UNITS_OF_RESIDUALS = ("mm", "mrad")
 COMPARISONS = ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured")
 ESTIMATES = ("train", "cross_validated")
+FINDING_LEVELS = ("stops", "warning", "note")
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
 ASSESSORS = ("maximum", "outlier_rejection", "model_invalidation")
 ASSESSOR_PATTERN = "[a-z][a-z0-9_]*"

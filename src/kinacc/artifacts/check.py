@@ -8,6 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from kinacc.artifacts import campaign_tables, store, tournament_tables
 from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
 from kinacc.artifacts.conformity import check_file
@@ -138,7 +140,7 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
             marks[name] = store.read_metadata(path)
         except InputError:
             continue
-    left_out = _left_out(folder, marks, plan)
+    left_out = _left_out(folder, marks, tables, plan)
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
         f"{reason}"
@@ -213,10 +215,23 @@ def _tables_there(folder: Path) -> Iterator[tuple[str, Path]]:
             yield from ((name, Path(part)) for part in own)
 
 
-def _left_out(folder: Path, marks: dict, plan: Plan | None) -> dict[str, str]:
+def _left_out(folder: Path, marks: dict, tables: dict, plan: Plan | None) -> dict[str, str]:
     """Stages the data set rightly does without, each with the reason."""
     if plan is not None:
         return dict(plan.left_out(folder.name))
+    return _without_file(folder, tables) | _without_map(folder, marks)
+
+
+def _without_file(folder: Path, tables: dict) -> dict[str, str]:
+    """Stages of a measured file that a synthetic arm, or one without exclusions, has not."""
+    if "measurements" in tables and np.isnan(tables["measurements"]["row"]).all():
+        return dict.fromkeys(("data_check", "excluded_rows"), "the measurements are synthetic")
+    if not (folder / "excluded_rows.parquet").exists():
+        return {"excluded_rows": "no row is excluded"}
+    return {}
+
+
+def _without_map(folder: Path, marks: dict) -> dict[str, str]:
     drawn = any((folder / FIGURE_FOLDER / f"fig3.{kind}").exists() for kind in FORMATS)
     if drawn or (folder / "accuracy_map.parquet").exists():
         return {}

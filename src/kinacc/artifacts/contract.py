@@ -28,6 +28,7 @@ ARTEFACTS: dict[str, Artefact] = {
     for artefact in (
         calibration_tables.MEASUREMENTS,
         robot_table.ROBOT,
+        worth_tables.DATA_CHECK,
         calibration_tables.VEC_MODEL,
         calibration_tables.VEC_FRAMES,
         calibration_tables.VEC_FIT,
@@ -40,6 +41,7 @@ ARTEFACTS: dict[str, Artefact] = {
         covariance_tables.DH_IDENTIFIED,
         calibration_tables.RESIDUALS,
         calibration_tables.POSE_ERRORS,
+        worth_tables.EXCLUDED_ROWS,
         worth_tables.MODEL_SELECTION,
         worth_tables.JOINT_BIAS,
         worth_tables.WORST_ROWS,

@@ -45,10 +45,9 @@ def check_data(
 
 def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = None) -> int:
     """Check every data set (complete configurations by name), print, and say the exit code."""
-    from kinacc import robot
     from kinacc.errors import InputError
-    from kinacc.inspection import check
     from kinacc.inspection.report import UNUSABLE, to_json
+    from kinacc.stages.data_check import examined
     from kinacc.stages.progress import reporting
 
     worst, told = 0, []
@@ -56,8 +55,7 @@ def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = Non
         file = config["measurements"]["file"]
         try:
             with reporting(f"check-data {name}", bar=True) as progress:
-                arm = robot.load(config["robot"])
-                report = check.check_file(file, arm, name, progress)
+                report = examined(config, name, progress)
         except InputError as error:
             worst = UNUSABLE
             told.append(_unusable(name, file["path"], error))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+IF_THERE = ("data_check", "excluded_rows")
 TABLES = ("residuals", "model_selection", "dh_identified", "vec_model", "worst_rows")
 _MODELS = ("nominal", "dh", "vec")
 _FIGURES = ("n", "rms", "mean", "max")
@@ -50,13 +51,17 @@ def read(folder: Path) -> dict[str, dict]:
     ]
     if missing:
         raise InputError(missing, f"{folder} holds no fits")
+    more = {name: folder / f"{name}.parquet" for name in IF_THERE}
+    paths |= {name: path for name, path in more.items() if path.is_file()}
     return {name: store.read(path) for name, path in paths.items()}
 
 
 def summary(tables: Mapping[str, Mapping]) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
     from kinacc.calibration import identified
+    from kinacc.stages import data_check
 
+    excluded = tables.get("excluded_rows")
     choice, told = tables["model_selection"], tables["dh_identified"]
     selected = next(
         str(name) for name, yes in zip(choice["model"], choice["selected"], strict=True) if yes
@@ -82,6 +87,11 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
         },
         "undetermined": identified.recorded(told),
         "worst_rows": _worst(tables["worst_rows"], selected),
+        "data": data_check.in_words(tables["data_check"]) if "data_check" in tables else [],
+        "excluded": None if excluded is None else _excluded(excluded),
+        "position_error_with_excluded_mm": None
+        if excluded is None
+        else {model: _with_excluded(tables["residuals"], excluded, model) for model in _MODELS},
     }
 
 
@@ -91,6 +101,30 @@ def _errors(table: Mapping, model: str, subset: str) -> dict | None:
         if wanted and table["quantity"][i] == "position" and table["fold"][i] != table["fold"][i]:
             return {name: _plain(table[name][i]) for name in _FIGURES}
     return None
+
+
+def _excluded(table: Mapping) -> list[dict]:
+    lines = dict(zip(table["line"].tolist(), table["reason"], strict=True))
+    return [{"line": line, "reason": str(reason)} for line, reason in sorted(lines.items())]
+
+
+def _with_excluded(residuals: Mapping, excluded: Mapping, model: str) -> dict | None:
+    """Held-out figures with the rows that the configuration leaves out of all fits."""
+    import numpy as np
+
+    held_out = _errors(residuals, model, "validation")
+    rows = excluded["comparison"] == f"{model}_vs_measured"
+    size = np.linalg.norm([excluded[f"e{axis}_mm"][rows] for axis in "xyz"], axis=0)
+    size = size[np.isfinite(size)]
+    if held_out is None:
+        return None
+    n, more = held_out["n"], len(size)
+    return {
+        "n": n + more,
+        "rms": float(np.sqrt((n * held_out["rms"] ** 2 + np.sum(size**2)) / (n + more))),
+        "mean": float((n * held_out["mean"] + np.sum(size)) / (n + more)),
+        "max": float(max(held_out["max"], *size, 0.0)),
+    }
 
 
 def _worst(table: Mapping, model: str) -> list[dict]:
@@ -127,6 +161,12 @@ def in_words(name: str, answer: Mapping) -> str:
         figures = [train.get("rms"), *(out.get(each) for each in ("rms", "mean", "max"))]
         shown = ["       -" if each is None else f"{each:8.3f}" for each in figures]
         lines.append(f"{called:20} {shown[0]:>13}   {shown[1]:>13} {shown[2]} {shown[3]}")
+        if more := (answer["position_error_with_excluded_mm"] or {}).get(model):
+            shown = [f"{more[each]:8.3f}" for each in _FIGURES[1:]]
+            lines.append(f"  with excluded rows {'':13}   {shown[0]:>13} {shown[1]} {shown[2]}")
+    if answer["excluded"]:
+        lines += ["", "rows excluded by the configuration:"]
+        lines += [f"  line {each['line']}: {each['reason']}" for each in answer["excluded"]]
     count = {status: len(names) for status, names in answer["parameters"].items()}
     listed = ", ".join(f"{number} {status}" for status, number in count.items())
     lines += ["", f"parameters of the DH fit: {listed}"]
@@ -137,6 +177,9 @@ def in_words(name: str, answer: Mapping) -> str:
     for row in answer["worst_rows"]:
         where = f"row {row['row']}" if row["line"] is None else f"line {row['line']:.0f}"
         lines.append(f"  {where}, pose {row['pose']}, {row['target']}: {row['error_mm']:.3f} mm")
+    if answer["data"]:
+        lines += ["", "what the check of the data found:"]
+        lines += [f"  - {text}" for text in answer["data"]]
     return "\n".join(lines)
 
 

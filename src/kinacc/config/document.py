@@ -77,7 +77,7 @@ def _note(key: Key) -> str:
     unit = f"[{key.unit}] " if key.unit else ""
     words = (
         f" ({' | '.join(map(_word, key.choices))})"
-        if key.choices and key.kind not in ("names", "parameters")
+        if key.choices and key.kind not in ("names", "parameters", "rows")
         else ""
     )
     return f"{unit}{key.about}{words}"

@@ -10,7 +10,7 @@ from typing import Any
 
 DATASET_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]*"  # with - first it would read as an option
 KINDS = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair", "pairs", "names")
-KINDS += ("parameters",)
+KINDS += ("parameters", "rows")
 NUMERIC = {
     "int": "a whole number",
     "float": "a number",
@@ -53,6 +53,8 @@ class Key:
                 f"a mapping of names ({names[self.choices[0]]}) to free, fixed or "
                 "{value_mm: .., prior_std_mm: ..}, with mm, mrad, rad or deg"
             )
+        elif self.kind == "rows":
+            parts.append("a list of {lines: [8, 12], reason: ..}")
         elif self.kind == "texts" and self.choices:
             parts.append("a list of " + ", ".join(self.choices))
         elif self.choices:
@@ -72,7 +74,9 @@ class Key:
     @property
     def names(self) -> str:
         """The names a mapping takes, in words."""
-        behind = f"; of a target, or of one named before it (mA_{self.behind[0]}), {{}}"
+        behind = ""
+        if self.behind:
+            behind = f"; of a target, or of one named before it (mA_{self.behind[0]}), {{}}"
         return ", ".join(self.choices) + (
             behind.format(", ".join(self.behind)) if self.behind else ""
         )

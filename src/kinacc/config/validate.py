@@ -17,6 +17,7 @@ _MAPPINGS = (
     ("measurements", "file", "columns"),
     ("calibration", "dh", "parameters"),
     ("calibration", "frames"),
+    ("data_check", "accept"),
 )
 ROBOT = Key("robot", "text", None, "name of a shipped robot, or path of a robot file")
 

@@ -231,8 +231,37 @@ def _names(key, value, path, place):
             fix = f"did you mean {close}?" if close else ""
             problems.append(Problem(here, f"unknown name {shown(name)}", key.names, fix))
         if not isinstance(each, str) or not each:
-            problems.append(Problem(here, f"{shown(each)} is not text", "name of a column"))
+            wanted = "name of a column" if key.behind else "the reason, in words"
+            problems.append(Problem(here, f"{shown(each)} is not text", wanted))
     return (INVALID if problems else dict(value)), problems
+
+
+def _rows(key, value, path, place):
+    if not isinstance(value, list):
+        return _refuse(key, path, place, f"{shown(value)} is not a list")
+    lines = Key("lines", "ints", None, "", low=1, high=1e9, length=(1, 100_000))
+    reason = Key("reason", "text", None, "")
+    items, problems = [], []
+    for number, each in enumerate(value):
+        here = (*path, number)
+        if not isinstance(each, dict) or set(each) != {"lines", "reason"}:
+            problems += _refuse(key, here, place, f"{shown(each)} does not give lines and reason")[
+                1
+            ]
+            continue
+        given = each["lines"] if isinstance(each["lines"], list) else [each["lines"]]
+        numbers, wrong = _CHECKS["ints"](lines, given, (*here, "lines"), place)
+        why, wrong_too = check(reason, each["reason"], (*here, "reason"), place)
+        problems += wrong + wrong_too
+        items.append({"lines": numbers, "reason": why})
+    if problems:
+        return INVALID, problems
+    every = [line for item in items for line in item["lines"]]
+    twice = sorted({line for line in every if every.count(line) > 1})
+    if twice:
+        what = f"names line {', '.join(map(str, twice))} more than once"
+        return _refuse(key, path, place, what, "give every line one reason")
+    return items, []
 
 
 def _parameters(key, value, path, place):
@@ -256,4 +285,5 @@ _CHECKS = {
     "pairs": lambda key, value, path, place: _list(key, value, path, place, _pair),
     "names": _names,
     "parameters": _parameters,
+    "rows": _rows,
 }

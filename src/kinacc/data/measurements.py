@@ -52,6 +52,38 @@ def read(section: Mapping, robot: Robot, strict: bool = True) -> Reading:
     millimetres) are refused too, and so are readings that are there twice. Raises InputError
     listing everything that is wrong with the file.
     """
+    table = _loaded(section)
+    used = np.flatnonzero(~np.isin(table.line, list(excluded_lines(section))))
+    if used.size == len(table):
+        return convert(table, Layout.of(section), robot, strict)
+    return convert(table.select(used), Layout.of(section), robot, strict)
+
+
+def read_excluded(section: Mapping, robot: Robot) -> tuple[Reading | None, list[Problem]]:
+    """The rows that ``section`` excludes, as far as they can be read, and what of them cannot.
+
+    None where no row can be. Raises InputError where the file itself cannot be read.
+    """
+    table = _loaded(section)
+    layout, readable, problems = Layout.of(section), [], []
+    for row in np.flatnonzero(np.isin(table.line, list(excluded_lines(section)))):
+        try:
+            convert(table.select(np.array([row])), layout, robot, strict=False)
+            readable.append(row)
+        except InputError as error:
+            problems += error.problems
+    if not readable:
+        return None, problems
+    return convert(table.select(np.array(readable)), layout, robot, strict=False), problems
+
+
+def excluded_lines(section: Mapping) -> dict[int, str]:
+    """The lines that ``section`` (``measurements.file``) excludes, each with its reason."""
+    return {line: item["reason"] for item in section.get("exclude", ()) for line in item["lines"]}
+
+
+def _loaded(section: Mapping) -> RawTable:
+    """The whole file. Raises InputError where it excludes lines that hold no reading."""
     table = load(
         section["path"],
         section["delimiter"],
@@ -59,7 +91,19 @@ def read(section: Mapping, robot: Robot, strict: bool = True) -> Reading:
         section.get("source"),
         (section.get("skip_lines", 0), section.get("skip_under_names", 0)),
     )
-    return convert(table, Layout.of(section), robot, strict)
+    excluded = excluded_lines(section)
+    absent = sorted(set(excluded) - set(table.line.tolist()))
+    problems = []
+    if absent:
+        what = f"line{'s' if len(absent) > 1 else ''} {', '.join(map(str, absent))} hold no reading"
+        allowed = f"lines {table.line[0]} to {table.line[-1]} of {table.path}"
+        problems.append(Problem("measurements.file.exclude", what, allowed))
+    elif len(excluded) == len(table):
+        what = f"every row of {table.path} is excluded"
+        problems.append(Problem("measurements.file.exclude", what, "some of them"))
+    if problems:
+        raise InputError(problems)
+    return table
 
 
 def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> Reading:

@@ -38,6 +38,11 @@ class RawTable:
         """True (n,) where the cell of column ``name`` is empty."""
         return np.array([_is_gap(cell) for cell in self.columns[name]], dtype=bool)
 
+    def select(self, rows: np.ndarray) -> RawTable:
+        """The table of the rows at indices ``rows``."""
+        columns = {name: [cells[row] for row in rows] for name, cells in self.columns.items()}
+        return RawTable(self.path, columns, self.line[rows], self.decimal)
+
     def rows_in_words(self, rows: np.ndarray) -> str:
         """Lines of the rows at indices ``rows``, the first few by number."""
         lines = [str(self.line[row]) for row in rows[:_SHOWN]]

@@ -26,7 +26,7 @@ from kinacc.inspection import (
     turns,
 )
 from kinacc.inspection.cells import Cells
-from kinacc.inspection.facts import facts_of, remarks_of
+from kinacc.inspection.facts import coverage_of, facts_of, remarks_of
 from kinacc.inspection.fitting import Fitted, Jump
 from kinacc.inspection.report import Report
 from kinacc.inspection.suspicion import Suspicion, suspicion
@@ -38,6 +38,7 @@ _FROM_THERE_ON = ("base_jump", "target_moved")
 NO_TURN = "orientations"
 _SYMPTOMS = ("outliers", "outside_limits")
 _FAR = 0.02  # of the points' spread: what no meaning of the file explains
+_GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
 def check_file(section: Mapping, robot: Robot, dataset: str, progress: Progress) -> Report:
@@ -80,14 +81,18 @@ def check(
         known += [_jump(fitted, jump) for jump in fitted.jumps]
         known += _commanded(fitted, reading, raw, first, robot)
         known += rows.found(fitted, raw)
+        known += _largest(fitted)
     known += _scattered(every, repeats)
+    known += doubles.stale(every, equal, scatter)
+    gross = _gross_lines(fitted)
     facts = facts_of(every, robot, repeats, distances, fitted)
     return Report(
         dataset,
         path,
         facts,
-        remarks_of(every, reading, repeats, distances, equal, facts["joint_coverage"]),
-        tuple(_once(known, np.unique(every.line).size)),
+        remarks_of(every, reading, repeats, distances),
+        tuple(each.held_to(gross) for each in _once(known, np.unique(every.line).size)),
+        coverage_of(facts["joint_coverage"]),
         *(() if fitted is None else (fitted.seen.cells.line, fitted.left_mm)),
     )
 
@@ -230,6 +235,34 @@ def _jump(fitted: Fitted, jump: Jump) -> Suspicion:
         shift_mm=[float(value) for value in jump.shift_mm],
         turn_mrad=1e3 * jump.turn_rad,
     )
+
+
+def _largest(fitted: Fitted) -> list[Suspicion]:
+    """Readings that are no outliers, and stand apart from the others all the same."""
+    good = np.flatnonzero(~fitted.bad)
+    poses, number = np.unique(fitted.seen.cells.pose[good], return_inverse=True)
+    worst = np.zeros(len(poses))
+    np.maximum.at(worst, number.ravel(), fitted.left_mm[good])
+    count = tails.detached(worst)
+    if not count:
+        return []
+    ordered = np.sort(worst)[::-1]
+    apart = good[worst[number.ravel()] >= ordered[count - 1]]
+    what = (
+        f"{count} pose{'s are' if count > 1 else ' is'} off by "
+        f"{', '.join(f'{value:.3g}' for value in ordered[:count])} mm, where the next is off by "
+        f"{ordered[count]:.3g} mm: the largest error hangs on {'them' if count > 1 else 'it'}"
+    )
+    fix = "measure them again; exclude slips, keep what repeats: that is the arm"
+    return [suspicion("largest_rows", what, fitted.seen.cells.lines(apart), fix)]
+
+
+def _gross_lines(fitted: Fitted | None) -> list[int]:
+    """Lines of readings more than 20 robust spreads off."""
+    if fitted is None:
+        return []
+    off = np.flatnonzero(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
+    return fitted.seen.cells.lines(off)
 
 
 def _commanded(fitted: Fitted, reading: Reading, raw: rows.Raw, first, robot: Robot):

@@ -36,6 +36,32 @@ def found(cells: Cells, noise_mm: float) -> list[Suspicion]:
     ]
 
 
+def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Suspicion]:
+    """Rows whose readings are those of an earlier row of other joints, to the last digit.
+
+    ``equal`` (n,) as ``earlier`` gives it; ``noise_mm`` as for ``found``.
+    """
+    again = np.unique(cells.line[equal > 0])
+    if not again.size or not _unlikely(cells, noise_mm):
+        return []
+    first = equal[np.searchsorted(cells.line, again)] if np.all(np.diff(cells.line) >= 0) else None
+    pairs = (
+        [f"line {line} repeats {of}" for line, of in zip(again[:4], first[:4], strict=True)]
+        if first is not None
+        else [f"line {line}" for line in again[:4]]
+    )
+    more = f" and {again.size - 4} more" if again.size > 4 else ""
+    return [
+        suspicion(
+            "repeated_reading",
+            f"{again.size} row{'s hold' if again.size > 1 else ' holds'} the reading of an earlier "
+            f"row, equal in every digit, at other joints: {', '.join(pairs)}{more}",
+            again,
+            "the instrument was not read anew: measure them again, or exclude the rows",
+        )
+    ]
+
+
 def earlier(cells: Cells) -> np.ndarray:
     """Line (n,) of an earlier row of other joints whose readings are equal in every digit, or 0."""
     rows, reading = _by_line(cells)

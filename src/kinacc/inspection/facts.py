@@ -8,6 +8,7 @@ from kinacc.data.measurements import Reading
 from kinacc.inspection.cells import Cells
 from kinacc.inspection.fitting import Fitted
 from kinacc.inspection.noise import Distance, Repeats, Revisits, revisits
+from kinacc.inspection.suspicion import NOTE, Suspicion
 from kinacc.robot import Robot
 
 _WEAK = 0.1  # of a joint's range
@@ -107,22 +108,28 @@ def _coverage(every: Cells, robot: Robot) -> list[dict[str, object]]:
     return found
 
 
+def coverage_of(coverage: list[dict[str, object]]) -> tuple[Suspicion, ...]:
+    """A note on every joint that hardly moves."""
+    return tuple(
+        Suspicion(
+            "thin_coverage",
+            f"joint {joint['joint']} moves through {100 * joint['share']:.2g} % of its range "
+            "only: what belongs to it is weakly determined",
+            (),
+            "measure poses in which it moves further",
+            {"joint": joint["joint"], "share": joint["share"]},
+            NOTE,
+        )
+        for joint in coverage
+        if joint["share"] < _WEAK
+    )
+
+
 def remarks_of(
-    every: Cells,
-    reading: Reading,
-    repeats: Repeats,
-    distances: list[Distance],
-    earlier: np.ndarray,
-    coverage: list[dict[str, object]],
+    every: Cells, reading: Reading, repeats: Repeats, distances: list[Distance]
 ) -> tuple[str, ...]:
-    """What to know about the file, in words."""
+    """What else to know about the file, in words."""
     remarks = list(reading.left_out())
-    for joint in coverage:
-        if joint["share"] < _WEAK:
-            remarks.append(
-                f"joint {joint['joint']} moves through {100 * joint['share']:.2g} % of its range "
-                "only: what belongs to it is weakly determined"
-            )
     if len(every.target_names) > 1:
         how = (
             f": their repeats go together (correlation {repeats.common:.2f})"
@@ -140,11 +147,4 @@ def remarks_of(
                 f"repeats scatter by {whole:.3g} mm, targets against each other by only "
                 f"{between:.3g} mm: the scatter is the arm's or the set-up's, not the instrument's"
             )
-    same = np.unique(every.line[earlier > 0])
-    if same.size:
-        lines = ", ".join(str(line) for line in same[:6])
-        more = f" and {same.size - 6} more" if same.size > 6 else ""
-        remarks.append(
-            f"readings equal to an earlier one in every digit, at other joints: line {lines}{more}"
-        )
     return tuple(remarks)

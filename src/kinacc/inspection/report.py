@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kinacc.inspection.suspicion import Suspicion
+from kinacc.inspection.suspicion import STOPS, Suspicion
 
 CLEAN, SUSPICIOUS, UNUSABLE = 0, 1, 2
 VERDICTS = ("clean", "suspicions", "unusable")
@@ -18,9 +18,10 @@ VERDICTS = ("clean", "suspicions", "unusable")
 class Report:
     """What ``kinacc check-data`` says of one data set.
 
-    ``facts`` are what is there, ``remarks`` what to know about it, in words. For a picture:
-    ``line`` (n,) of the readings as compared and ``left_mm`` (n,) what a quick fit leaves of each,
-    empty where nothing was fitted.
+    ``facts`` are what is there, ``remarks`` what to know about it, in words; ``notes`` say where
+    the data are thin. ``accepted`` are kinds of suspicions the configuration goes on with, each
+    with its reason. For a picture: ``line`` (n,) of the readings as compared and ``left_mm`` (n,)
+    what a quick fit leaves of each, empty where nothing was fitted.
     """
 
     dataset: str
@@ -28,8 +29,20 @@ class Report:
     facts: Mapping[str, object]
     remarks: tuple[str, ...]
     suspicions: tuple[Suspicion, ...]
+    notes: tuple[Suspicion, ...] = ()
     line: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     left_mm: np.ndarray = field(default_factory=lambda: np.empty(0))
+    accepted: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def findings(self) -> tuple[Suspicion, ...]:
+        """Suspicions and notes."""
+        return (*self.suspicions, *self.notes)
+
+    @property
+    def stopping(self) -> tuple[Suspicion, ...]:
+        """The suspicions that stop a workflow, unless they are accepted."""
+        return tuple(e for e in self.suspicions if e.level == STOPS and e.kind not in self.accepted)
 
     @property
     def code(self) -> int:
@@ -43,10 +56,12 @@ class Report:
             "path": self.path,
             "verdict": VERDICTS[self.code],
             "facts": plain(self.facts),
-            "remarks": list(self.remarks),
+            "remarks": [*self.remarks, *(each.what for each in self.notes)],
             "suspicions": [
                 {
                     "kind": each.kind,
+                    "level": each.level,
+                    "accepted": self.accepted.get(each.kind),
                     "what": each.what,
                     "fix": each.fix,
                     "lines": list(each.lines),
@@ -62,15 +77,22 @@ class Report:
         for name, value in self.facts.items():
             lines += _fact(name.replace("_", " "), value)
         lines += ["", *(f"note: {remark}" for remark in self.remarks)]
+        lines += [f"note: {each.what}" for each in self.notes]
         if not self.suspicions:
             return "\n".join([*lines, "", "nothing suspicious"])
         count = len(self.suspicions)
-        lines += ["", f"{count} suspicion{'s' if count > 1 else ''}"]
+        stop = len(self.stopping)
+        stops = f"{stop} of which stop{'s' if stop == 1 else ''} the workflow" if stop else ""
+        whether = stops or "none of which stops the workflow"
+        lines += ["", f"{count} suspicion{'s' if count > 1 else ''}, {whether}"]
         for each in self.suspicions:
             lines.append(f"  - {each.kind}: {each.what}")
-            lines.append(f"    {each.where}")
-            if each.fix:
-                lines.append(f"    {each.fix}")
+            lines += [f"    {each.where}"] if each.lines else []
+            lines += [f"    {each.fix}"] if each.fix else []
+            if each.kind in self.accepted:
+                lines.append(f"    accepted (data_check.accept): {self.accepted[each.kind]}")
+            elif each.level == STOPS:
+                lines.append("    stops the workflow")
         return "\n".join(lines)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,8 +27,20 @@ KINDS = {
     "base_jump": "a base frame that jumps",
     "commanded_joints": "joints as commanded, not as read back",
     "outliers": "readings far from all the others",
+    "largest_rows": "readings on which the largest error hangs",
     "does_not_fit": "a robot that is not the one described",
+    "few_poses": "fewer poses than the model asks for",
+    "thin_coverage": "joints that hardly move",
 }
+STOPS, WARNING, NOTE = "stops", "warning", "note"
+# Numbers that mean something else, a base or target that moved, a model that asks for more.
+_WRONG = {
+    *("joint_units", "length_units", "angle_units", "left_handed", "transposed_rotation"),
+    *("euler_convention", "orientations", "joint_sign", "joint_coupling", "joint_zero"),
+    *("joint_order", "target_moved", "base_jump", "does_not_fit", "few_poses"),
+}
+_NEVER_STOP = {"largest_rows", "thin_coverage"}
+STOPPING = tuple(kind for kind in KINDS if kind not in _NEVER_STOP)  # some of them by their size
 _RANGES_SHOWN = 6
 
 
@@ -37,6 +49,7 @@ class Suspicion:
     """One thing that looks wrong: ``kind`` of ``KINDS``, in words, with its lines of the file.
 
     ``fix`` says what to do about it; ``values`` are the numbers behind it, units in their names.
+    ``level``: whether it stops a workflow that fits the data, warns, or is a note beside it.
     """
 
     kind: str
@@ -44,11 +57,19 @@ class Suspicion:
     lines: tuple[int, ...]
     fix: str = ""
     values: Mapping[str, object] = field(default_factory=dict)
+    level: str = WARNING
 
     @property
     def where(self) -> str:
         """The lines in words."""
         return lines_in_words(self.lines)
+
+    def held_to(self, gross: Iterable[int]) -> Suspicion:
+        """The suspicion with its level; rows at the lines ``gross`` are too far off for any fit."""
+        if self.kind in _NEVER_STOP:
+            return self
+        stops = self.kind in _WRONG or not set(gross).isdisjoint(self.lines)
+        return replace(self, level=STOPS if stops else WARNING)
 
 
 def suspicion(kind: str, what: str, lines: Iterable[int], fix: str = "", **values) -> Suspicion:

@@ -33,6 +33,25 @@ def limit(lengths: np.ndarray, dimensions: int, count: int | None = None) -> flo
     return float(middle * tail / _length(0.5, dimensions, freedom))
 
 
+def detached(lengths: np.ndarray) -> int:
+    """How many of the largest ``lengths`` (m,) stand apart from all the others.
+
+    Gaps between the largest values of an exponential tail are independent: the k-th gap times k is
+    exponential with the tail's mean excess (Renyi 1953). The tail of the values without the largest
+    decides; lighter tails have smaller gaps. 0 where none stands apart, or there are too few.
+    """
+    ordered = np.sort(lengths[np.isfinite(lengths)])[::-1]
+    tail = ordered.size // 10
+    most = min(tail // 3, 10)
+    for count in range(most, 0, -1):
+        rest = ordered[count : count + tail]
+        excess = float(np.mean(rest[:-1] - rest[-1]))
+        gap = ordered[count - 1] - ordered[count]
+        if excess > 0.0 and np.exp(-count * gap / excess) < FAMILY_WISE / most:
+            return count
+    return 0
+
+
 def _length(probability: float, dimensions: int, freedom: float) -> float:
     """Quantile of the length of a standard t vector."""
     return float(np.sqrt(dimensions * fdtri(dimensions, freedom, probability)))

@@ -18,7 +18,8 @@ class Stage:
     ``message`` says in words what it does. ``inputs`` and ``outputs`` are artefact names of the
     data set. ``settings`` are dotted key paths of the data set's configuration, ``files`` those
     whose values name files it reads; nothing else of the configuration reaches the stage.
-    ``optional`` inputs are used by data sets that have them. ``scattered`` stages run once per
+    ``optional`` inputs are used by data sets that have them. ``after`` are artefacts that have to
+    be there, where the data set has them, and are not read. ``scattered`` stages run once per
     part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
     part of a plain run.
     """
@@ -30,6 +31,7 @@ class Stage:
     settings: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
     scattered: bool = False
     on_request: bool = False
 
@@ -58,6 +60,14 @@ STAGES: dict[str, Stage] = {
             files=("robot", "measurements.file.path"),
         ),
         Stage(
+            "data_check",
+            "checking the measured file before anything is fitted to it",
+            (),
+            ("data_check",),
+            ("robot", "measurements", "calibration", "data_check"),
+            files=("robot", "measurements.file.path"),
+        ),
+        Stage(
             "vec",
             "fitting the volumetric error compensation (VEC) model to the training poses",
             ("measurements",),
@@ -70,6 +80,7 @@ STAGES: dict[str, Stage] = {
                 "calibration.vec",
             ),
             files=("robot",),
+            after=("data_check",),
         ),
         Stage(
             "dh",
@@ -92,6 +103,14 @@ STAGES: dict[str, Stage] = {
             ("residuals", "pose_errors", "model_selection", "joint_bias", "worst_rows"),
             ("robot", "calibration"),
             files=("robot",),
+        ),
+        Stage(
+            "excluded_rows",
+            "saying how far off the excluded rows are",
+            ("measurements", *_MODELS),
+            ("excluded_rows",),
+            ("robot", "measurements"),
+            files=("robot", "measurements.file.path"),
         ),
         Stage(
             "accuracy_map",

@@ -89,6 +89,11 @@ class Plan:
         if config["measurements"]["source"] != "synthetic":
             for name in ("robustness_chunk", "robustness_table"):
                 reasons[name] = "no further draws of a measured arm"
+            if "exclude" not in config["measurements"]["file"]:
+                reasons["excluded_rows"] = "no row is excluded"
+        else:
+            for name in ("data_check", "excluded_rows"):
+                reasons[name] = "the measurements are synthetic"
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
     def targets(self, dataset: str, on_request: bool = False) -> list[str]:
@@ -123,6 +128,11 @@ class Plan:
             found[artefact] = paths if maker.scattered else paths[0]
         return found | self._files(stage, self.datasets[dataset])
 
+    def gates(self, name: str, dataset: str) -> list[str]:
+        """Tables that have to be there before a stage runs, and that it does not read."""
+        made = {each for stage in self.stages(dataset).values() for each in stage.outputs}
+        return [self._table(each, dataset) for each in STAGES[name].after if each in made]
+
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""
         return {
@@ -155,6 +165,21 @@ class Plan:
                 problems += error.problems
         if problems:
             raise InputError(problems)
+
+    def remarks(self) -> list[str]:
+        """What whoever started a run should know of its data at the end, a line each."""
+        told = []
+        for dataset in self.datasets:
+            path = self._table("data_check", dataset)
+            if "data_check" in self.left_out(dataset) or not os.path.exists(path):
+                continue
+            from kinacc.artifacts.store import read
+            from kinacc.stages.data_check import in_words
+
+            found = in_words(read(path))
+            told += [f"{dataset}: the check of the data found:"] if found else []
+            told += [f"  - {words}" for words in found]
+        return told
 
     def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
         """Files a stage leaves: artefact -> path, or picture format -> path."""
@@ -248,9 +273,12 @@ def _read_words(values: object) -> object:
 
 
 def _in_use(config: dict) -> dict:
-    """The configuration without the section of the source of measurements that is not used."""
+    """The configuration without what is not used: the other source of measurements, no exclusion."""
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
+    if "file" in measurements and not measurements["file"]["exclude"]:
+        file = {k: v for k, v in measurements["file"].items() if k != "exclude"}
+        measurements = {**measurements, "file": file}
     return {**config, "measurements": measurements}
 
 

@@ -35,7 +35,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     arm = robot.load(settings["robot"])
     options = shared.options(settings["calibration"], arm)
     every, train = shared.observed(inputs, arm)
-    delivered = _delivered(inputs, arm.dh, every)
+    delivered = delivered_models(inputs, arm.dh, every)
     joint_range = delivered.vec.q_min_rad, delivered.vec.q_max_rad
 
     def refit(observations: Observations, fold: int) -> FittedModels:
@@ -55,7 +55,8 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     }
 
 
-def _delivered(inputs: Mapping, nominal: DHModel, every: Observations) -> FittedModels:
+def delivered_models(inputs: Mapping, nominal: DHModel, every: Observations) -> FittedModels:
+    """The models of ``vec_model``, ``dh_model`` and ``frames``; ``every``: what they were fitted to."""
     frames = {
         model: tables.frames_of(inputs["frames"], model, every.target_names, every.session_names)
         for model in ("vec", "dh", "nominal")
