@@ -273,7 +273,7 @@ def _read_words(values: object) -> object:
 
 
 def _in_use(config: dict) -> dict:
-    """The configuration without what is not used: the other source of measurements, no exclusion."""
+    """The configuration without the source of measurements that is not used, or an empty list."""
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
     if "file" in measurements and not measurements["file"]["exclude"]:

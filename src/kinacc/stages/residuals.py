@@ -56,7 +56,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
 
 
 def delivered_models(inputs: Mapping, nominal: DHModel, every: Observations) -> FittedModels:
-    """The models of ``vec_model``, ``dh_model`` and ``frames``; ``every``: what they were fitted to."""
+    """The models of the tables ``inputs``, fitted to targets and sessions of ``every``."""
     frames = {
         model: tables.frames_of(inputs["frames"], model, every.target_names, every.session_names)
         for model in ("vec", "dh", "nominal")
