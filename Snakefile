@@ -13,6 +13,7 @@ sys.modules.setdefault("pandas", None)
 sys.executable = shlex.quote(sys.executable)
 
 from kinacc.errors import InputError
+from kinacc.stages.catalogue import STAGES
 from kinacc.stages.plan import planned
 
 try:
@@ -22,7 +23,8 @@ except InputError as error:
     raise WorkflowError(str(error)) from None
 for dataset in plan.datasets:
     for stage, reason in plan.left_out(dataset).items():
-        logger.info(f"{dataset}: {stage} is left out, {reason}")
+        if not STAGES[stage].measured:
+            logger.info(f"{dataset}: {stage} is left out, {reason}")
 
 
 wildcard_constraints:

@@ -27,8 +27,8 @@ def configuration(tmp_path):
         config = tmp_path / "data.yaml"
         config.write_text(
             f"datasets: {{cell: {{robot: {ROBOT}, measurements: {{source: file, file: {{path: "
-            f"{path}, orientation: {{kind: none}}}}}}, calibration: {{base_and_tool: estimated}}, "
-            "evaluation: {space: measured}}}\n"
+            f"{path}, orientation: {{kind: none}}}}}}, calibration: {{base_and_tool: "
+            "estimated, vec: {order: 0}}, evaluation: {space: measured}}}\n"
         )
         return config
 

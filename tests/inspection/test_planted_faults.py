@@ -10,6 +10,9 @@ import plants
 import pytest
 from good_files import File, measured, simulated
 
+from kinacc.config.schema import settings
+from kinacc.inspection.suspicion import STOPPING
+
 
 def good(name: str) -> File:
     """A good file: measured (every fourth pose of a series will do), or of a simulated arm."""
@@ -37,11 +40,23 @@ def only(report, kind, rows, unsure=0):
 QUICK = ("fanuc", "arm")
 
 
-@pytest.mark.parametrize("name", ["ur10_a", "ur10_b", "ur10_c", "ur10_d", "fanuc"])
+@pytest.mark.parametrize("name", ["ur10_a", "ur10_c", "ur10_d", "fanuc"])
 def test_measured_files_raise_no_suspicion(name, tmp_path):
     report = measured(name).check(tmp_path)
     assert report.suspicions == ()
     assert report.code == 0
+
+
+def test_a_measured_file_whose_largest_error_hangs_on_three_rows(tmp_path):
+    """UR10 B: line 534 repeats 533 at other joints, and three rows make the maximum."""
+    report = measured("ur10_b").check(tmp_path)
+    found = {each.kind: each for each in report.suspicions}
+    assert set(found) == {"repeated_reading", "largest_rows"}
+    assert found["repeated_reading"].lines == (534, 1065)
+    assert "line 534 repeats 533" in found["repeated_reading"].what
+    assert found["largest_rows"].lines == (534, 856, 857)
+    assert not report.stopping
+    assert report.code == 1
 
 
 @pytest.mark.parametrize(
@@ -251,6 +266,21 @@ def test_commanded_joints_that_part_from_those_read_back(tmp_path):
     assert file.but(**columns).check(tmp_path).suspicions == ()
     bad = plants.rounded(file, plants.some(file), 0).but(**columns)
     only(bad.check(tmp_path), "commanded_joints", plants.some(file))
+
+
+@pytest.mark.parametrize(
+    ("measured_on", "said"), [("mh180", "fanuc_r2000ic_165f"), ("fanuc_r2000ic_165f", "mh180")]
+)
+def test_a_robot_of_the_same_build_and_other_lengths(measured_on, said, tmp_path):
+    file = replace(simulated(measured_on, poses=100, share=0.4), robot=said)
+    found = only(file.check(tmp_path), "does_not_fit", plants.every(file))
+    assert "other lengths" in found.what
+    assert found.level == "stops"
+
+
+def test_what_stops_a_workflow_can_be_accepted_in_the_configuration():
+    key = settings().entry("data_check").entry("accept")
+    assert set(key.choices) == set(STOPPING)
 
 
 @pytest.mark.parametrize("name", ["arm"])

@@ -144,7 +144,7 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
         f"{reason}"
-        for reason in dict.fromkeys(left_out.values())
+        for reason in dict.fromkeys(r for n, r in left_out.items() if not STAGES[n].measured)
     ]
     problems += _missing(folder, left_out)
     for picture in _pictures(folder, plan, left_out):
@@ -225,7 +225,9 @@ def _left_out(folder: Path, marks: dict, tables: dict, plan: Plan | None) -> dic
 def _without_file(folder: Path, tables: dict) -> dict[str, str]:
     """Stages of a measured file that a synthetic arm, or one without exclusions, has not."""
     if "measurements" in tables and np.isnan(tables["measurements"]["row"]).all():
-        return dict.fromkeys(("data_check", "excluded_rows"), "the measurements are synthetic")
+        return {
+            n: "the measurements are synthetic" for n, stage in STAGES.items() if stage.measured
+        }
     if not (folder / "excluded_rows.parquet").exists():
         return {"excluded_rows": "no row is excluded"}
     return {}

@@ -67,6 +67,7 @@ class Artefact:
     meaning: str
     columns: tuple[Column, ...]
     key: tuple[str, ...]
+    may_be_empty: bool = False
 
     @property
     def file_name(self) -> str:

@@ -129,6 +129,8 @@ def _unique(path: Path, artefact: Artefact, columns: Columns) -> list[Problem]:
             values = np.array(["\0" if value is None else value for value in values], dtype=object)
         codes.append(np.unique(values.astype(str), return_inverse=True)[1])
     if not codes or not len(codes[0]):
+        if artefact.may_be_empty:
+            return []
         return [Problem(str(path), "has no rows", "at least one row")]
     _, inverse, counts = np.unique(np.stack(codes), axis=1, return_inverse=True, return_counts=True)
     repeated = counts[inverse.ravel()] > 1

@@ -33,6 +33,7 @@ DATA_CHECK = Artefact(
         whole("rows", "number of lines it concerns"),
     ),
     ("finding", "what"),
+    may_be_empty=True,
 )
 EXCLUDED_ROWS = Artefact(
     "excluded_rows",

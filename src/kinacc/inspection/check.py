@@ -38,6 +38,7 @@ _FROM_THERE_ON = ("base_jump", "target_moved")
 NO_TURN = "orientations"
 _SYMPTOMS = ("outliers", "outside_limits")
 _FAR = 0.02  # of the points' spread: what no meaning of the file explains
+_OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a tenth of that
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
@@ -118,6 +119,7 @@ def _meant(one: Cells, reading: Reading, layout: Layout, robot: Robot, first, pr
     if fitted.trial.sigma_mm > _FAR * spread * finding.meaning.scale:
         suspicions.append(_no_fit(one, fitted, robot))
         return fitted, raw, suspicions
+    suspicions += _of_other_lengths(one, fitted, robot)
     if seen.cells.turned.any():
         return _turned(one, fitted, raw, robot, suspicions)
     return fitted, raw, suspicions
@@ -210,6 +212,31 @@ def _no_fit(one: Cells, fitted: Fitted, robot: Robot) -> Suspicion:
         "of the same rows",
         sigma_mm=fitted.trial.sigma_mm,
     )
+
+
+def _of_other_lengths(one: Cells, fitted: Fitted, robot: Robot) -> list[Suspicion]:
+    """An arm that fits with other lengths alone is another one of the same build."""
+    found, stated = fitted.trial.arm.model, robot.dh
+    lengths = {"a": (found.a_mm, stated.a_mm), "d": (found.d_mm, stated.d_mm)}
+    whole_mm = float(np.sum(np.abs(stated.a_mm)) + np.sum(np.abs(stated.d_mm)))
+    apart = [
+        (abs(new - old), f"{name} of joint {joint} {new:.4g} for {old:.4g} mm")
+        for name, pair in lengths.items()
+        for joint, (new, old) in enumerate(zip(*pair, strict=True), 1)
+    ]
+    far = sorted((each for each in apart if each[0] > _OTHER_LENGTHS * whole_mm), reverse=True)
+    if not far:
+        return []
+    return [
+        suspicion(
+            "does_not_fit",
+            f"{robot.name} fits with other lengths only ({', '.join(words for _, words in far)}): "
+            "the arm is another one of the same build, or its description is wrong",
+            one.lines(np.arange(len(one))),
+            "name the robot that was measured, or correct its description",
+            largest_mm=float(far[0][0]),
+        )
+    ]
 
 
 def _jump(fitted: Fitted, jump: Jump) -> Suspicion:

@@ -102,7 +102,8 @@ def with_jumps(seen: Seen, model: DHModel, progress: Progress) -> Fitted:
 
 def _next(fitted: Fitted, model: DHModel) -> tuple[Jump, Fitted] | None:
     """The next jump and the fit without it; None where there is none."""
-    few = np.unique(fitted.seen.cells.pose).size < _FEW
+    # Poses of equal joints are one: read often, they make no jump any surer.
+    few = len(np.unique(np.round(fitted.seen.q, 6), axis=0)) < _FEW
     best, least = None, _PLAIN if few else 1.0
     tried = set()
     for row, kind in _places(fitted):

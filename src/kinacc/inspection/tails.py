@@ -14,6 +14,7 @@ from scipy.special import fdtri
 FAMILY_WISE = 0.01
 _MOST_FREEDOM, _LEAST_FREEDOM = 10.0, 4.0
 _BULK = 0.9
+_APART = 1.25  # of the next: what is less makes no difference to the largest
 
 
 def limit(lengths: np.ndarray, dimensions: int, count: int | None = None) -> float:
@@ -37,17 +38,19 @@ def detached(lengths: np.ndarray) -> int:
     """How many of the largest ``lengths`` (m,) stand apart from all the others.
 
     Gaps between the largest values of an exponential tail are independent: the k-th gap times k is
-    exponential with the tail's mean excess (Renyi 1953). The tail of the values without the largest
-    decides; lighter tails have smaller gaps. 0 where none stands apart, or there are too few.
+    exponential with the tail's mean excess (Renyi 1953), so over the mean excess of the m values
+    behind it, it has the distribution F(2, 2m). Lighter tails have smaller gaps. 0 where none
+    stands apart, by as much as ``_APART``, or there are too few.
     """
     ordered = np.sort(lengths[np.isfinite(lengths)])[::-1]
     tail = ordered.size // 10
     most = min(tail // 3, 10)
     for count in range(most, 0, -1):
-        rest = ordered[count : count + tail]
+        rest = ordered[count : count + tail + 1]
         excess = float(np.mean(rest[:-1] - rest[-1]))
         gap = ordered[count - 1] - ordered[count]
-        if excess > 0.0 and np.exp(-count * gap / excess) < FAMILY_WISE / most:
+        chance = (1.0 + count * gap / (tail * excess)) ** -tail if excess > 0.0 else 1.0
+        if chance < FAMILY_WISE / most and ordered[count - 1] > _APART * ordered[count]:
             return count
     return 0
 

@@ -21,7 +21,7 @@ class Stage:
     ``optional`` inputs are used by data sets that have them. ``after`` are artefacts that have to
     be there, where the data set has them, and are not read. ``scattered`` stages run once per
     part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
-    part of a plain run.
+    part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Stage:
     after: tuple[str, ...] = ()
     scattered: bool = False
     on_request: bool = False
+    measured: bool = False
 
     @property
     def module(self) -> str:
@@ -66,6 +67,7 @@ STAGES: dict[str, Stage] = {
             ("data_check",),
             ("robot", "measurements", "calibration", "data_check"),
             files=("robot", "measurements.file.path"),
+            measured=True,
         ),
         Stage(
             "vec",
@@ -111,6 +113,7 @@ STAGES: dict[str, Stage] = {
             ("excluded_rows",),
             ("robot", "measurements"),
             files=("robot", "measurements.file.path"),
+            measured=True,
         ),
         Stage(
             "accuracy_map",

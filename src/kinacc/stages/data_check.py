@@ -90,7 +90,7 @@ def _few_poses(reading: Reading, arm: Robot, calibration: Mapping) -> list[Suspi
             "measure more poses, lower calibration.vec.order, or let it be chosen (order: auto)",
             poses=len(components),
             coefficients=coefficients,
-        )
+        ).held_to(())
     ]
 
 

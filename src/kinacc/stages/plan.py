@@ -92,8 +92,8 @@ class Plan:
             if "exclude" not in config["measurements"]["file"]:
                 reasons["excluded_rows"] = "no row is excluded"
         else:
-            for name in ("data_check", "excluded_rows"):
-                reasons[name] = "the measurements are synthetic"
+            made_here = (name for name, stage in STAGES.items() if stage.measured)
+            reasons |= dict.fromkeys(made_here, "the measurements are synthetic")
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
     def targets(self, dataset: str, on_request: bool = False) -> list[str]:
