@@ -246,7 +246,7 @@ def _set_right(guess: Guess, settings: dict) -> Guess:
 
 def _how(report: Report | None) -> str:
     """How far what the file does not state was held against its readings."""
-    return "assumed" if report is None or report.code else "assumed, and the readings agree"
+    return "assumed" if report is None or report.stopping else "assumed, and the readings agree"
 
 
 def _dataset(
