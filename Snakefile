@@ -39,11 +39,7 @@ rule all:
         "every table and figure is up to date"
 
 
-include: "workflow/rules/calibration.smk"
-include: "workflow/rules/accuracy_map.smk"
-include: "workflow/rules/study.smk"
-include: "workflow/rules/figures.smk"
-include: "workflow/rules/claims.smk"
+include: "workflow/rules/stages.smk"
 include: "workflow/rules/tournament.smk"
 
 

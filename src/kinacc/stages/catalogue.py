@@ -21,7 +21,8 @@ class Stage:
     ``optional`` inputs are used by data sets that have them. ``after`` are artefacts that have to
     be there, where the data set has them, and are not read. ``scattered`` stages run once per
     part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
-    part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file.
+    part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file;
+    ``shared`` ones take long enough to be kept for other folders (Snakemake's cache).
     """
 
     name: str
@@ -35,6 +36,7 @@ class Stage:
     scattered: bool = False
     on_request: bool = False
     measured: bool = False
+    shared: bool = False
 
     @property
     def module(self) -> str:
@@ -83,6 +85,7 @@ STAGES: dict[str, Stage] = {
             ),
             files=("robot",),
             after=("data_check",),
+            shared=True,
         ),
         Stage(
             "dh",
@@ -97,6 +100,7 @@ STAGES: dict[str, Stage] = {
                 "calibration.dh",
             ),
             files=("robot",),
+            shared=True,
         ),
         Stage(
             "residuals",
@@ -155,6 +159,7 @@ STAGES: dict[str, Stage] = {
                 "study.visiting_order",
             ),
             scattered=True,
+            shared=True,
         ),
         Stage(
             "study",
@@ -256,6 +261,7 @@ STAGES: dict[str, Stage] = {
             files=("robot",),
             scattered=True,
             on_request=True,
+            shared=True,
         ),
         Stage(
             "robustness_table",

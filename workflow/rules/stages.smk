@@ -1,0 +1,39 @@
+# One rule for every stage of the catalogue: what it reads, leaves and depends on stands there.
+
+for stage in STAGES.values():
+    part = "{part}" if stage.scattered else None
+
+    # What has to be there and is not read is `ancient`: a stage is not made anew when that is.
+    rule:
+        name:
+            stage.name
+        input:
+            ancient(lambda w, name=stage.name: plan.gates(name, w.dataset)),
+            unpack(lambda w, name=stage.name: plan.inputs(name, w.dataset)),
+        output:
+            **plan.outputs(stage.name, "{dataset}", part),
+        log:
+            plan.log(stage.name, "{dataset}", part),
+        cache: stage.shared
+        conda:
+            "../envs/kinacc.yaml"
+        # The content of files is a parameter, so that one copied here with an old date is noticed.
+        params:
+            stage=stage.name,
+            code=plan.code(stage.name),
+            part=part,
+            contents=lambda w, name=stage.name: plan.contents(name, w.dataset),
+            seed=lambda w: plan.seed(w.dataset),
+            settings=lambda w, name=stage.name: plan.settings(name, w.dataset),
+        message:
+            plan.message(stage.name)
+        script:
+            "../scripts/stage.py"
+
+
+# Once robustness.parquet is there, the next plain run takes its shares into claims.parquet.
+rule robustness:
+    input:
+        [plan.targets(dataset, on_request=True) for dataset in plan.datasets],
+    message:
+        "how often each claim holds on further draws of the arm is in robustness.parquet"

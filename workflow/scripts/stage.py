@@ -1,0 +1,18 @@
+"""Run one stage of the catalogue for a job of the workflow."""
+
+from kinacc.stages.catalogue import STAGES
+from kinacc.stages.runner import Job, execute
+
+stage, part = snakemake.params.stage, snakemake.params.get("part")
+execute(
+    Job(
+        STAGES[stage].module,
+        inputs=dict(snakemake.input.items()),
+        outputs=dict(snakemake.output.items()),
+        settings=snakemake.params.settings,
+        seed=snakemake.params.seed,
+        part=part,
+        label=" ".join(filter(None, [snakemake.wildcards.dataset, stage, part])),
+        log=snakemake.log[0],
+    )
+)
