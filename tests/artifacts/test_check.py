@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 ON_EVERY_RUN = [
     name
     for stage in STAGES.values()
-    if not (stage.is_figure or stage.scattered or stage.on_request)
+    if not (stage.is_figure or stage.scattered or stage.on_request or stage.measured)
     for name in stage.outputs
 ]
 

@@ -97,7 +97,11 @@ def assert_same(some, others):
 )
 def test_a_value_is_told_to_the_stages_that_depend_on_it(plan_of, change, stages):
     before, after = plan_of(), plan_of(change)
-    told = {name for name in STAGES if before.settings(name, "arm") != after.settings(name, "arm")}
+    told = {
+        name
+        for name in before.stages("arm")
+        if before.settings(name, "arm") != after.settings(name, "arm")
+    }
     assert told == stages
 
 
