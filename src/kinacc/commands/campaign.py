@@ -129,7 +129,7 @@ def next_(folder, every, output, as_json, force) -> None:
 @click.option("--again", is_flag=True, help="Take what was taken before, to the last digit.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 def record(**given) -> None:
-    """Take a reading, or all readings of a CSV or Parquet FILE.
+    """Take a reading, or all readings of a CSV, Parquet or JSON FILE.
 
     A file has x_mm, y_mm, z_mm (or _m) and says which point by a column `pose` or by joints
     q1_deg ..; further columns are `instrument`, and std_x_mm .. std_z_mm. All rows are checked

@@ -21,6 +21,8 @@ from kinacc.data.table import RawTable
 from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
 
+_COMPUTED = {"predict": "unexplained_mm", "compensate": "position_error_mm"}  # columns of theirs
+
 
 def record(given: Mapping) -> None:
     """Take what the options give, or nothing."""
@@ -186,6 +188,10 @@ def _rows(table: RawTable, instrument: str | None, before: State):
     position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
     kinds = [LENGTH if slides else ANGLE for slides in plan.slides]
     names = [f"q{joint + 1}" for joint in range(len(plan.slides))]
+    for command, own in _COMPUTED.items():
+        if own in table.columns:
+            what = f"was written by kinacc {command}: its positions are computed, not measured"
+            problems.append(Problem(table.path, what, "positions as the instrument read them"))
     joints = reader.group(names, kinds, False)
     std = reader.group(["std_x", "std_y", "std_z"], [LENGTH] * 3, False)
     if "pose" not in table.columns and joints is None and not problems:
@@ -196,7 +202,7 @@ def _rows(table: RawTable, instrument: str | None, before: State):
         problems.append(Problem("--instrument", f"{instrument!r}", ", ".join(known)))
     if problems:
         raise InputError(problems, "Nothing was recorded")
-    place = {name: number for number, name in enumerate(plan.points.label)}
+    place = {name.strip(): number for number, name in enumerate(plan.points.label)}
     rows: list[Reading | Problem] = []
     for i in range(len(table)):
         where = f"{table.path}, line {table.line[i]}"
