@@ -15,6 +15,7 @@ from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
 from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
+from kinacc.names import in_markdown
 
 Columns = dict[str, np.ndarray]
 _STATEMENTS = 150  # stated at so many moments of a campaign, at most
@@ -171,7 +172,7 @@ def _kind(rows: list[dict], name: str) -> type:
 def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: str) -> str:
     """The report as text."""
     plan = state.plan
-    about = plan.about
+    about = {key: in_markdown(value) for key, value in plan.about.items()}
     said = state.statements()
     lines = [
         f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
@@ -213,13 +214,14 @@ def _conformity(state: State) -> list[str]:
 def _facts(opened: Opened, state: State) -> list[str]:
     plan = state.plan
     visited = len({each.reading.point for each in state.told})
-    joints = f"{len(plan.points) - len(state.left_out)} candidates ({plan.about['candidates']})"
+    source = in_markdown(plan.about["candidates"])
+    joints = f"{len(plan.points) - len(state.left_out)} candidates ({source})"
     lines = [
         f"{len(state.told)} readings of {plan.assessor.measurements} at {visited} of {joints}, "
         f"order drawn with seed {plan.seed}",
-        f"point measured: {plan.about['point']}",
+        f"point measured: {in_markdown(plan.about['point'])}",
         *(
-            f"instrument {each.name}: {noise(each)}, {each.frame} frame"
+            f"instrument {in_markdown(each.name)}: {noise(each)}, {each.frame} frame"
             for each in plan.instruments
         ),
         f"assessor {plan.assessor.name}: {(type(plan.assessor).__doc__ or '').splitlines()[0]}",
@@ -234,7 +236,7 @@ def _facts(opened: Opened, state: State) -> list[str]:
         lines.append(
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
-    lines += words.not_counted(state)
+    lines += map(in_markdown, words.not_counted(state))
     found = consistency.scatter(state)
     return lines if found is None else [*lines, consistency.in_words(found)]
 
@@ -246,10 +248,8 @@ def _largest(points: Columns) -> list[str]:
     for row in order:
         if not math.isnan(size[row]):
             lower, upper = (float(points[name][row]) for name in ("lower_mm", "upper_mm"))
-            lines.append(
-                f"| {points['point'][row]} | {int(points['readings'][row])} | {size[row]:.3f} | "
-                f"{lower:.3f} | {upper:.3f} |"
-            )
+            label, readings = in_markdown(points["point"][row]), int(points["readings"][row])
+            lines.append(f"| {label} | {readings} | {size[row]:.3f} | {lower:.3f} | {upper:.3f} |")
     return lines
 
 
