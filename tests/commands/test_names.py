@@ -58,6 +58,14 @@ def test_the_name_of_a_results_folder_is_text_in_the_exported_tables(folder, tmp
     assert r"cell|3\_\$x\$ *new*" in printed
 
 
+def test_a_name_with_two_dashes_is_exported_to_urdf(folder, tmp_path):
+    renamed = tmp_path / "cell---3"
+    shutil.copytree(folder, renamed)
+    done = call("export", renamed, "--to", tmp_path / "out", "--format", "urdf")
+    assert done.exit_code == 0, done.output
+    assert robot.load(tmp_path / "out" / "cell---3.urdf").dh.joints == 6
+
+
 def test_a_campaign_report_shows_names_and_reasons_as_they_were_given(folder, tmp_path):
     own = tmp_path / "arm.yaml"
     text = robot.as_yaml(robot.load("mh180"))
