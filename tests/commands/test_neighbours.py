@@ -106,6 +106,22 @@ def test_poses_that_predict_wrote_are_wanted_of_compensate(folder, written, kind
             assert one[f"q{joint}_deg"] == pytest.approx(other[f"q{joint}_deg"], abs=1e-6)
 
 
+def test_rows_without_an_answer_are_told_and_left_out(folder, tmp_path):
+    wanted, joints, back = (tmp_path / name for name in ("wanted.csv", "joints.csv", "back.csv"))
+    near = "1500,200,900,0,1,0,0"
+    wanted.write_text(f"x_mm,y_mm,z_mm,qw,qx,qy,qz\n{near}\n9000,0,0,1,0,0,0\n{near}\n")
+    assert call("compensate", folder, wanted, "--model", "dh", "-o", joints).exit_code == 1
+    done = call("predict", folder, joints, "--model", "dh", "-o", back)
+    assert done.exit_code == 0, done.output
+    assert "left out, without joints by their status: line 3" in done.stderr
+    assert [row["row"] for row in csv.DictReader(back.open())] == ["2", "4"]
+    own = joints.read_text().replace("status", "remark")
+    joints.write_text(own)
+    done = call("predict", folder, joints, "--model", "dh")
+    assert done.exit_code == 2
+    assert "q1_deg, line 3: not a finite number" in done.output
+
+
 def test_the_visit_with_its_readings_beside_it_is_recorded(folder, tmp_path):
     campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
     begin(folder, campaign, "--drawn", 8)
@@ -120,6 +136,9 @@ def test_the_visit_with_its_readings_beside_it_is_recorded(folder, tmp_path):
     done = call("campaign", "record", campaign, visit)
     assert done.exit_code == 0, done.output
     assert "recorded: 8 readings" in done.output
+    done = call("init", visit, "--robot", "mh180", "--out", tmp_path, "--name", "own", "--json")
+    assert done.exit_code == 0, done.output
+    assert "tool" in json.loads(done.stdout)["targets"]
 
 
 def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.data.layout import ROUNDED_MM, ROUNDED_RAD
 from kinacc.data.table import RawTable, load, numbers
 from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
@@ -18,8 +19,6 @@ from kinacc.robot import Robot
 
 ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
 LENGTH = {"mm": 1.0, "m": 1e3}
-# By so much may a quantity given in two units differ: rounding to the digits commands show.
-_ROUNDED_RAD, _ROUNDED_MM = 1e-6, 1e-3
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
 
@@ -50,14 +49,13 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
     ``rx_deg`` .. (or rad). A quantity may stand in both units where they say the same. Raises
     InputError listing every problem.
     """
-    table = open_table(path)
-    reader = Reader(table)
     slides = robot.dh.prismatic
-    q_rad = reader.group(
-        [f"q{i + 1}" for i in range(len(slides))],
-        [LENGTH if each else ANGLE for each in slides],
-        joints,
-    )
+    names = [f"q{i + 1}" for i in range(len(slides))]
+    table = open_table(path)
+    table = _answered(table, names, "joints") if joints else table
+    table = _answered(table, ["x", "y", "z"], "a pose") if pose else table
+    reader = Reader(table)
+    q_rad = reader.group(names, [LENGTH if each else ANGLE for each in slides], joints)
     if any(f"q{len(slides) + 1}_{unit}" in table.columns for unit in (*ANGLE, *LENGTH)):
         what = f"has a joint q{len(slides) + 1}, {robot.name} has {len(slides)} joints"
         reader.problems.append(Problem(table.path, what))
@@ -71,6 +69,28 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
         raise InputError(reader.problems, f"{table.path} cannot be used")
     unused = tuple(name for name in table.columns if name not in reader.used)
     return Rows(len(table), label, q_rad, directions, wanted, unused)
+
+
+def _answered(table: RawTable, names: list[str], what: str) -> RawTable:
+    """The rows that hold an answer, of a file that says in a column ``status`` why others do not.
+
+    They are told on the error stream; an empty cell without a status stays, to be refused.
+    """
+    units = (*ANGLE, *LENGTH)
+    columns = [f"{name}_{unit}" for name in names for unit in units]
+    columns = [each for each in columns if each in table.columns]
+    if "status" not in table.columns or not columns:
+        return table
+    none = np.all([table.gaps(each) for each in columns], axis=0) & ~table.gaps("status")
+    if none.all() or not none.any():
+        return table
+    import sys
+
+    rows = table.rows_in_words(np.flatnonzero(none))
+    print(f"left out, without {what} by their status: {rows}", file=sys.stderr)
+    kept = np.flatnonzero(~none)
+    cells = {name: [own[row] for row in kept] for name, own in table.columns.items()}
+    return replace(table, columns=cells, line=table.line[kept])
 
 
 def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -> np.ndarray:
@@ -135,7 +155,7 @@ class Reader:
                 self.problems.append(Problem(where, "is missing", fix=listed))
         if not all(present):
             return None
-        rounded = [_ROUNDED_MM if own is LENGTH else _ROUNDED_RAD for own in units]
+        rounded = [ROUNDED_MM if own is LENGTH else ROUNDED_RAD for own in units]
         return np.stack([self._one(*each) for each in zip(names, found, rounded, strict=True)], 1)
 
     def _columns(self, name: str, units: dict) -> dict[str, float]:
