@@ -177,6 +177,14 @@ def test_a_row_whose_reading_was_struck_does_not_come_back(day):
     assert day.taken() == 2
 
 
+def test_a_row_that_was_changed_is_found_in_a_file_that_was_sorted(day):
+    rows = [day.row(place) for place in range(5)]
+    day.takes(rows[:4], 4)
+    now = [rows[3], rows[2], other(rows[0]), rows[1], rows[4]]
+    assert "line 4: stands where reading 1 was" in day.refuses(now)
+    day.takes([*rows[3::-1], rows[4]], 1)
+
+
 def test_a_row_that_was_taken_out_of_the_file_is_told(day):
     rows = [day.row(place) for place in range(5)]
     day.takes(rows[:3], 3)
@@ -221,6 +229,8 @@ def test_a_reading_given_alone_and_written_down_as_well_is_taken_once(day):
     done = call("campaign", "record", day.folder, "--point", point, "--position-mm", position)
     assert done.exit_code == 0, done.output
     assert "known: 1 row recorded before, as reading 1" in day.takes(rows, 2)
+    assert "known: 3 rows" in day.takes([*rows, rows[2]], 1, "--again")
+    assert len(set(day.positions())) == 3
 
 
 def test_a_campaign_of_an_earlier_version_goes_on(day):

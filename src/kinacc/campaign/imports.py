@@ -27,13 +27,14 @@ class Compared:
 
     ``known`` rows were recorded before; ``changed`` stand where a reading was that is missing;
     ``gone`` readings are missing, and nothing stands in their place. ``grown``: the file holds
-    rows that were taken of it before.
+    rows that were taken of it before; ``adopted`` readings, that were taken otherwise.
     """
 
     known: Mapping[int, int]
     changed: Mapping[int, int]
     gone: tuple[int, ...]
     grown: bool
+    adopted: tuple[int, ...]
 
 
 def digits(reading: Reading) -> tuple:
@@ -57,9 +58,15 @@ def compare(rows: Mapping[int, Reading], state: State, path: str, again: bool) -
     if not grown and not _rewritten(rows, [every[each] for each in sorted(own)]):
         first = others
     missing = (first & there.keys()).difference(known.values())
-    changed = {} if again else _in_place_of(missing, list(rows), first, known)
+    if again:
+        changed = {}
+    elif list(known.values()) == sorted(known.values()):
+        changed = _in_place_of(missing, list(rows), first, known)
+    else:
+        changed = _at_points_of(missing, rows, every, known)
     gone = sorted((missing & own).difference(changed.values())) if grown else []
-    return Compared(known, changed, tuple(gone), grown)
+    adopted = sorted(set(known.values()) - own)
+    return Compared(known, changed, tuple(gone), grown, tuple(adopted))
 
 
 def unlike(one: Reading, other: Reading, slides: np.ndarray) -> str:
@@ -131,6 +138,15 @@ def _rewritten(rows: Mapping[int, Reading], before: Sequence[Reading]) -> bool:
     if len(before) > 1:
         return True
     return int(np.sum(now[0].position_mm == before[0].position_mm)) == 2
+
+
+def _at_points_of(missing: Numbers, rows, every, known) -> dict[int, int]:
+    """New rows at the points of missing readings, with these: of a file that was sorted anew."""
+    lost: dict[int, list[int]] = {}
+    for number in sorted(missing, reverse=True):
+        lost.setdefault(every[number].point, []).append(number)
+    new = (index for index in rows if index not in known and lost.get(rows[index].point))
+    return {index: lost[rows[index].point].pop() for index in new}
 
 
 def _in_place_of(

@@ -32,12 +32,14 @@ class Told:
 
 @dataclass(frozen=True)
 class Import:
-    """Readings that were taken of a file: its digest, its path from the campaign's folder (None in
-    campaigns of earlier versions), their numbers, and whether it held rows taken before."""
+    """Readings that were taken of a file, and others that rows of it were, by their ``numbers``.
 
-    digest: str
+    ``path`` leads from the campaign's folder to the file; None in campaigns of earlier versions.
+    ``grown``: the file held rows that were taken of it before.
+    """
+
     path: str | None
-    numbers: range
+    numbers: frozenset[int]
     grown: bool
 
 
@@ -112,9 +114,8 @@ def restore(
             before = len(readings)
             readings += [Reading.of_entry(each) for each in entry["readings"]]
             if entry.get("file"):
-                numbers = range(before + 1, len(readings) + 1)
-                grown = bool(entry.get("grown"))
-                imports.append(Import(entry["file"], entry.get("path"), numbers, grown))
+                numbers = frozenset([*range(before + 1, len(readings) + 1), *entry.get("was", ())])
+                imports.append(Import(entry.get("path"), numbers, bool(entry.get("grown"))))
         elif entry["kind"] == LEAVE_OUT:
             left_out[int(entry["point"])] = str(entry["reason"])
         elif entry["kind"] == STRIKE:

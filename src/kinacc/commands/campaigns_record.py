@@ -45,8 +45,11 @@ def record(given: Mapping) -> None:
 
 @dataclass(frozen=True)
 class _Made:
-    """Readings that are taken, what is wrong with rows that are not, numbers of readings whose rows
-    are ``known`` and of those ``gone`` from the file; ``source`` is its digest, path and growth."""
+    """Readings that are taken, and what is wrong with rows that are not.
+
+    Numbers of readings whose rows are ``known``, and of those ``gone`` from the file. ``source`` is
+    what the journal keeps of the file.
+    """
 
     taken: list[Reading]
     skipped: Sequence[Problem] = ()
@@ -199,7 +202,8 @@ def _of_file(given: Mapping, before: State) -> _Made:
     if problems and not given["skip_bad"]:
         raise InputError(problems, "Nothing was recorded")
     known = tuple(sorted(compared.known.values()))
-    return _Made(good, problems, known, compared.gone, (mark, place, compared.grown))
+    source = mark, place, compared.grown, compared.adopted
+    return _Made(good, problems, known, compared.gone, source)
 
 
 def _numbered(before: State) -> dict[int, Reading]:
