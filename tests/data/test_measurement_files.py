@@ -159,8 +159,15 @@ def test_all_missing_columns_are_named_at_once(tmp_path, good):
         assert f"column {name}: is missing" in text
 
 
-def test_a_column_in_two_units_is_refused(tmp_path, good):
-    assert "is given in two units" in problems_of(tmp_path, good | {"x_m": good["x_mm"] / 1000})
+def test_a_quantity_in_two_units_has_to_say_the_same(tmp_path, good, truth):
+    alike = good | {"x_m": np.round(good["x_mm"] / 1000, 6)}
+    reading = read(SECTION | {"path": written(tmp_path, alike)}, ARM)
+    assert_is_truth(reading.columns, truth)
+    assert reading.unused == ("x_m",)
+    off = alike["x_m"].copy()
+    off[3] += 2e-6
+    said = "column x_mm or x_m: is given in two units that do not say the same"
+    assert said in problems_of(tmp_path, good | {"x_m": off})
 
 
 def test_a_mapped_column_that_is_not_there(tmp_path, good):

@@ -15,6 +15,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose, invert
 from kinacc.inverse.limits import travel_unit
 from kinacc.models.vec import VECModel
+from kinacc.names import not_in_a_line
 from kinacc.planning import travel
 
 _ROUTED = 400  # points beyond which the route is built in stretches of so many
@@ -40,6 +41,7 @@ def points_of(
     joints, label = joints[kept], [str(label[i]) for i in kept]
     directions = None if directions is None else directions[kept]
     problems = _outside(arm, joints, label)
+    problems += [fault for each in label for fault in not_in_a_line("candidates, pose", each)]
     if doubled := sorted({each for each in label if label.count(each) > 1}):
         what = f"names given to different joints: {', '.join(doubled[:5])}"
         problems.append(Problem("candidates", what, "one name per point"))

@@ -73,10 +73,24 @@ def writing(folder: Path | str) -> Iterator[Opened]:
         yield open_(folder)
 
 
-def readings_entry(readings: Sequence[Reading], file: str | None = None) -> dict:
-    """The entry of readings that are taken together; ``file`` is the digest of their file."""
-    entry = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
-    return entry if file is None else {**entry, "file": file}
+def readings_entry(
+    readings: Sequence[Reading],
+    file: str | None = None,
+    path: str | None = None,
+    grown: bool = False,
+    was: Sequence[int] = (),
+) -> dict:
+    """The entry of readings that are taken together.
+
+    ``file`` is the digest of their file, ``path`` where it lies from the campaign's folder,
+    ``grown`` says that it held rows that were taken of it before; rows of it ``was`` readings, by
+    number, that were taken otherwise.
+    """
+    entry: dict = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
+    entry |= {"file": file} if file is not None else {}
+    entry |= {"path": path} if path is not None else {}
+    entry |= {"grown": True} if grown else {}
+    return {**entry, "was": list(was)} if was else entry
 
 
 def strike_entry(number: int, reason: str) -> dict:

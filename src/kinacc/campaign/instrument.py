@@ -10,6 +10,7 @@ import numpy as np
 from kinacc.assess.adaptive import covariance_faults
 from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
+from kinacc.names import not_in_a_line
 
 BASE, INSTRUMENT = "base", "instrument"
 FRAMES = (BASE, INSTRUMENT)
@@ -52,6 +53,7 @@ def instruments(texts: Iterable[str], frame: str) -> tuple[Instrument, ...]:
             continue
         if name in found:
             problems.append(Problem(f"instrument {name}", "is given twice"))
+        problems += not_in_a_line("--instrument", name)
         covariance = covariance_of(numbers, f"noise of {name}", problems)
         if covariance is not None:
             found[name] = Instrument(name, covariance, frame)

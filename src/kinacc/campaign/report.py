@@ -10,15 +10,20 @@ import numpy as np
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
+from kinacc.assess.statement import REGION
 from kinacc.campaign import consistency, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
 from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
+from kinacc.names import in_markdown
 
 Columns = dict[str, np.ndarray]
 _STATEMENTS = 150  # stated at so many moments of a campaign, at most
 _LARGEST = 10
+_SIZES = ("error", "lower", "upper")
+_DECIMALS = 3  # of mm, as shown
+_UNLIKELY = 3.0  # standard deviations of a mean reading
 
 
 def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dict[str, Columns]]:
@@ -171,19 +176,23 @@ def _kind(rows: list[dict], name: str) -> type:
 def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: str) -> str:
     """The report as text."""
     plan = state.plan
-    about = plan.about
+    about = {key: in_markdown(value) for key, value in plan.about.items()}
     said = state.statements()
     lines = [
         f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
         "",
         *(f"- {words.statement(each, state)}" for each in said),
+        *(f"- {in_markdown(each)}" for each in read_above(state, found["campaign_points"])),
         "",
     ]
     if plan.limits.tolerance_mm is not None:
         lines += ["## Conformity", "", *_conformity(state), ""]
     lines += [f"![sizes of the errors, and the bounds as they grew]({picture})", ""]
     lines += ["## What was measured", "", *(f"- {each}" for each in _facts(opened, state)), ""]
-    lines += ["## Largest errors", "", *_largest(found["campaign_points"]), ""]
+    points = found["campaign_points"]
+    shown = _shown(points)
+    lines += ["## Largest errors", "", *_largest(points, shown), ""]
+    lines += _beyond_limits(points, shown)
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in _grounds(state)), ""]
     lines += [f"Campaign {opened.digest}, readings {opened.journal.last}."]
     return "\n".join(lines) + "\n"
@@ -213,13 +222,14 @@ def _conformity(state: State) -> list[str]:
 def _facts(opened: Opened, state: State) -> list[str]:
     plan = state.plan
     visited = len({each.reading.point for each in state.told})
-    joints = f"{len(plan.points) - len(state.left_out)} candidates ({plan.about['candidates']})"
+    source = in_markdown(plan.about["candidates"])
+    joints = f"{len(plan.points) - len(state.left_out)} candidates ({source})"
     lines = [
         f"{len(state.told)} readings of {plan.assessor.measurements} at {visited} of {joints}, "
         f"order drawn with seed {plan.seed}",
-        f"point measured: {plan.about['point']}",
+        f"point measured: {in_markdown(plan.about['point'])}",
         *(
-            f"instrument {each.name}: {noise(each)}, {each.frame} frame"
+            f"instrument {in_markdown(each.name)}: {noise(each)}, {each.frame} frame"
             for each in plan.instruments
         ),
         f"assessor {plan.assessor.name}: {(type(plan.assessor).__doc__ or '').splitlines()[0]}",
@@ -234,22 +244,91 @@ def _facts(opened: Opened, state: State) -> list[str]:
         lines.append(
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
-    lines += words.not_counted(state)
+    lines += map(in_markdown, words.not_counted(state))
     found = consistency.scatter(state)
     return lines if found is None else [*lines, consistency.in_words(found)]
 
 
-def _largest(points: Columns) -> list[str]:
+def read_above(state: State, points: Columns) -> list[str]:
+    """What is to be said where points read more than an upper bound that is stated."""
+    size = _as_shown(points["error_mm"])
+    measured = int(np.sum(~np.isnan(size)))
+    lines = []
+    for said in state.statements():
+        above = np.flatnonzero(size > round(said.upper_mm, _DECIMALS))
+        if not above.size:
+            continue
+        top = above[np.argmax(size[above])]
+        noise_mm, count = float(points["noise_mm"][top]), int(points["readings"][top])
+        if said.target == REGION:
+            why = f"the bound leaves out {1.0 - said.share:.1%} of the region"
+        elif size[top] - said.upper_mm > _UNLIKELY * noise_mm:
+            why = (
+                f"its noise, {noise_mm:.3f} mm per axis, does not explain that: the noise is "
+                "stated too small, or this is one of the few campaigns the confidence allows to be "
+                "wrong"
+            )
+        else:
+            readings = "1 reading" if count == 1 else f"{count} readings"
+            why = (
+                "the bound is on the error that stays when a pose is measured again, and this is "
+                f"the mean of {readings} with noise of {noise_mm:.3f} mm per axis"
+            )
+        lines.append(
+            f"At most {said.upper_mm:.3f} mm for {words.TARGETS[said.target]}: {above.size} of the "
+            f"{measured} measured points read more than that, point {points['point'][top]} the "
+            f"most, {size[top]:.3f} mm; {why}."
+        )
+    return lines
+
+
+def _as_shown(values: np.ndarray) -> np.ndarray:
+    return np.round(np.asarray(values, dtype=float), _DECIMALS)
+
+
+def _shown(points: Columns) -> np.ndarray:
+    """Rows of the largest errors read, largest first."""
     size = np.asarray(points["error_mm"], dtype=float)
     order = np.argsort(-np.where(np.isnan(size), -1.0, size), kind="stable")[:_LARGEST]
+    return order[~np.isnan(size[order])]
+
+
+def _largest(points: Columns, shown: np.ndarray) -> list[str]:
     lines = ["| point | readings | error mm | at least mm | at most mm |", "|---|---|---|---|---|"]
-    for row in order:
-        if not math.isnan(size[row]):
-            lower, upper = (float(points[name][row]) for name in ("lower_mm", "upper_mm"))
-            lines.append(
-                f"| {points['point'][row]} | {int(points['readings'][row])} | {size[row]:.3f} | "
-                f"{lower:.3f} | {upper:.3f} |"
+    for row in shown:
+        size, lower, upper = (float(points[f"{name}_mm"][row]) for name in _SIZES)
+        label, readings = in_markdown(points["point"][row]), int(points["readings"][row])
+        lines.append(f"| {label} | {readings} | {size:.3f} | {lower:.3f} | {upper:.3f} |")
+    return lines
+
+
+def _beyond_limits(points: Columns, shown: np.ndarray) -> list[str]:
+    """What is to be said where rows that are shown read more than their limit, or limits cross."""
+    size, lower, upper = (_as_shown(points[f"{name}_mm"])[shown] for name in _SIZES)
+    once = np.asarray(points["readings"], dtype=float)[shown] == 1.0
+
+    def named(rows: np.ndarray) -> str:
+        return ", ".join(in_markdown(points["point"][row]) for row in shown[rows])
+
+    lines = []
+    if (above := size > upper).any():
+        text = (
+            f"Read above their own limit: {named(above)}. A limit is on the error that stays when "
+            "a pose is measured again, and the narrowest of those after 1, 2, 4, .. readings; the "
+            "error shown is the mean of what was read, with its noise."
+        )
+        if (quiet := above & once).any():
+            text += (
+                f" Read once, and less than the noise stated nearly always brings: {named(quiet)}; "
+                "the noise may be stated too large."
             )
+        lines += [text, ""]
+    if (crossed := lower > upper).any():
+        lines += [
+            f"Limits that contradict each other: {named(crossed)}. Either the noise is stated too "
+            "small, or something moved between the readings.",
+            "",
+        ]
     return lines
 
 

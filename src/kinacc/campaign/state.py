@@ -30,13 +30,26 @@ class Told:
     error_mm: np.ndarray
 
 
+@dataclass(frozen=True)
+class Import:
+    """Readings that were taken of a file, and others that rows of it were, by their ``numbers``.
+
+    ``path`` leads from the campaign's folder to the file; None in campaigns of earlier versions.
+    ``grown``: the file held rows that were taken of it before.
+    """
+
+    path: str | None
+    numbers: frozenset[int]
+    grown: bool
+
+
 @dataclass
 class State:
     """A campaign with its readings.
 
     ``rows`` are points in the order in which the assessor numbers them. ``asked`` is the point it
     wants next, None where it wants none. ``in_hand`` are readings it has not asked for. ``struck``
-    are readings declared void, and why; ``files`` the digests of the files that were taken.
+    are readings declared void, and why; ``imports`` the files that readings were taken of.
     """
 
     plan: Plan
@@ -47,7 +60,7 @@ class State:
     asked: int | None
     left_out: Mapping[int, str]
     struck: list[tuple[Told, str]] = field(default_factory=list)
-    files: frozenset[str] = field(default_factory=frozenset)
+    imports: tuple[Import, ...] = ()
 
     @property
     def taken(self) -> int:
@@ -95,11 +108,14 @@ def restore(
     watch: Callable[[Campaign, Told], None] | None = None,
 ) -> State:
     """The state after the entries of a journal; ``watch`` sees every reading once it is told."""
-    readings, left_out, void, files = [], {}, {}, set()
+    readings, left_out, void, imports = [], {}, {}, []
     for entry in entries:
         if entry["kind"] == READINGS:
+            before = len(readings)
             readings += [Reading.of_entry(each) for each in entry["readings"]]
-            files |= {entry["file"]} if entry.get("file") else set()
+            if entry.get("file"):
+                numbers = frozenset([*range(before + 1, len(readings) + 1), *entry.get("was", ())])
+                imports.append(Import(entry.get("path"), numbers, bool(entry.get("grown"))))
         elif entry["kind"] == LEAVE_OUT:
             left_out[int(entry["point"])] = str(entry["reason"])
         elif entry["kind"] == STRIKE:
@@ -128,7 +144,7 @@ def restore(
         if watch is not None:
             watch(campaign, known)
     in_hand = sorted((each for queue in waiting.values() for each in queue), key=_number)
-    return State(plan, campaign, rows, told, in_hand, asked, left_out, struck, frozenset(files))
+    return State(plan, campaign, rows, told, in_hand, asked, left_out, struck, tuple(imports))
 
 
 def _number(each: Told) -> int:

@@ -126,14 +126,16 @@ def next_(folder, every, output, as_json, force) -> None:
 @click.option("--std-mm", help="Noise of this reading where it is not the instrument's.")
 @click.option("--accept-implausible", is_flag=True, help="Take it however large the error is.")
 @click.option("--skip-bad", is_flag=True, help="Take the good rows of a file, name the others.")
-@click.option("--again", is_flag=True, help="Take what was taken before, to the last digit.")
+@click.option("--again", is_flag=True,
+              help="They are new readings, though they repeat or replace others.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 def record(**given) -> None:
-    """Take a reading, or all readings of a CSV or Parquet FILE.
+    """Take a reading, or all readings of a CSV, Parquet or JSON FILE.
 
     A file has x_mm, y_mm, z_mm (or _m) and says which point by a column `pose` or by joints
     q1_deg ..; further columns are `instrument`, and std_x_mm .. std_z_mm. All rows are checked
-    before any is taken. When the command returns, what it took is on disk.
+    before any is taken. When the command returns, what it took is on disk. A file that has grown
+    may be recorded again: its new rows are taken, and a row that was changed is asked about.
 
     \b
     Example:

@@ -97,10 +97,18 @@ def pool_of(name: str) -> Pool:
         missing = [each for each in names if each not in table.columns]
         if missing:
             raise InputError(Problem(name, f"has no column {', '.join(missing)}", ", ".join(names)))
-        errors = np.stack([numbers(table, each, problems) for each in names], axis=1)
+        # A point that was not measured has no error: it is no fault, and nothing to simulate with.
+        measured = ~np.all([table.gaps(each) for each in names], axis=0)
+        errors = np.stack([numbers(table, each, problems, gaps=True) for each in names], axis=1)
+        partly = np.flatnonzero(measured & np.isnan(errors).any(axis=1))
+        if partly.size and not problems:
+            where = f"{name}: {table.rows_in_words(partly)}"
+            problems.append(Problem(where, "an error is not complete", ", ".join(names)))
+        if not measured.any():
+            problems.append(Problem(name, "holds no measured error", ", ".join(names)))
         if problems:
             raise InputError(problems)
-        return Pool(path.stem, errors)
+        return Pool(path.stem, errors[measured])
     allowed = f"a results folder, a file, {', '.join(fields.FAMILIES)}"
     raise InputError(Problem("--errors", f"{name!r} is not there", allowed))
 

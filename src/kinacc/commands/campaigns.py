@@ -169,7 +169,8 @@ def write_report(given: Mapping) -> None:
         facts = answers.as_facts(state, state.plan.limits.tolerance_mm)
         click.echo(json.dumps({**facts, "folder": str(to), "files": written}, indent=1))
         return
-    click.echo("\n".join(words.statement(said, state) for said in state.statements()))
+    lines = [words.statement(said, state) for said in state.statements()]
+    click.echo("\n".join(lines + report.read_above(state, tables["campaign_points"])))
     click.echo(f"{to}: {', '.join(written)}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,7 +51,7 @@ def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
         f"{len(begun.route)} points whatever they say",
         *_too_few(begun),
         f"a reading is refused {_refusals(begun)}",
-        f"next: kinacc campaign next {folder}",
+        f"next: kinacc campaign next {shlex.quote(folder)}",
     ]
     return "\n".join(lines)
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+import os
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 import numpy as np
 
-from kinacc.campaign import folder, reading, words
+from kinacc.campaign import folder, imports, reading, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import State
@@ -20,6 +23,8 @@ from kinacc.commands.rows import ANGLE, LENGTH, Reader, open_table
 from kinacc.data.table import RawTable
 from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
+
+_COMPUTED = {"predict": "unexplained_mm", "compensate": "position_error_mm"}  # columns of theirs
 
 
 def record(given: Mapping) -> None:
@@ -31,14 +36,26 @@ def record(given: Mapping) -> None:
     with folder.writing(given["folder"]) as opened:
         before = opened.state()
         say_doubts(opened)
-        if one:
-            taken, skipped, mark = [_single(given, before)], [], None
-        else:
-            taken, skipped, mark = _of_file(given, before)
-        if taken:
-            opened.write(folder.readings_entry(taken, mark))
+        made = _Made([_single(given, before)]) if one else _of_file(given, before)
+        if made.taken:
+            opened.write(folder.readings_entry(made.taken, *made.source))
         after = folder.open_(given["folder"]).state()
-    _say_taken(given, taken, skipped, before, after)
+    _say_taken(given, made, before, after)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """Readings that are taken, and what is wrong with rows that are not.
+
+    Numbers of readings whose rows are ``known``, and of those ``gone`` from the file. ``source`` is
+    what the journal keeps of the file.
+    """
+
+    taken: list[Reading]
+    skipped: Sequence[Problem] = ()
+    known: tuple[int, ...] = ()
+    gone: tuple[int, ...] = ()
+    source: tuple = ()
 
 
 def leave_out(path: str, name: str, reason: str, as_json: bool) -> None:
@@ -126,27 +143,23 @@ def _single(given: Mapping, before: State) -> Reading:
     return found
 
 
-def _digits(found: Reading) -> tuple:
-    return found.point, *found.position_mm.tolist()
-
-
 def _recorded(before: State) -> dict[tuple, str]:
     """What readings there are, by their digits."""
     there = (*before.told, *before.in_hand)
-    return {_digits(each.reading): f"reading {each.number}" for each in there}
+    return {imports.digits(each.reading): f"reading {each.number}" for each in there}
 
 
 def _repeated(found: Reading, where: str, earlier: Mapping[tuple, str]) -> list[Problem]:
     """The problem with a reading that is an earlier one to the last digit: it tells nothing new."""
-    same = earlier.get(_digits(found))
+    same = earlier.get(imports.digits(found))
     if same is None:
         return []
-    what = f"is {same}, to the last digit: it was recorded before"
-    return [Problem(where, what, fix="give --again if it is a new one")]
+    fix = "give --again if it is a reading of its own"
+    return [Problem(where, f"is {same}, to the last digit", fix=fix)]
 
 
-def _of_file(given: Mapping, before: State) -> tuple[list[Reading], list[Problem], str]:
-    """Readings of a file that are taken, what is wrong with the others, digest of the file."""
+def _of_file(given: Mapping, before: State) -> _Made:
+    """What is taken of a file, and what is not. InputError where nothing may be."""
     path = given["file"]
     for option in ("point", "joints_deg", "joints_rad", "std_mm"):
         if given[option] is not None:
@@ -154,27 +167,85 @@ def _of_file(given: Mapping, before: State) -> tuple[list[Reading], list[Problem
             raise InputError(Problem(f"--{option}", "is given with a file", "a column of the file"))
     table = open_table(path)
     mark = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
-    if mark in before.files and not given["again"]:
-        fix = "give --again if these are new readings"
-        raise InputError(Problem(path, "was recorded before", fix=fix), "Nothing was recorded")
+    place = Path(os.path.relpath(Path(path).resolve(), Path(given["folder"]).resolve())).as_posix()
     rows, problems = _rows(table, given["instrument"], before)
+    read = {number: row for number, row in enumerate(rows) if isinstance(row, Reading)}
+    compared = imports.compare(read, before, place, given["again"])
+    readings = _numbered(before)
     left_out = frozenset(before.left_out)
     earlier = _recorded(before)
     good = []
     for number, row in enumerate(rows):
-        if isinstance(row, Problem):
-            problems.append(row)
-            continue
         where = f"{table.path}, line {table.line[number]}"
-        wrong = reading.problems_of(before.plan, row, where, left_out, given["accept_implausible"])
-        if not given["again"]:
-            wrong += _repeated(row, where, earlier)
-            earlier.setdefault(_digits(row), f"line {table.line[number]}")
+        if isinstance(row, Problem):
+            wrong = [row]
+        elif number in compared.known:
+            one = compared.known[number]
+            wrong = _altered(row, where, one, readings[one], before)
+        elif number in compared.changed:
+            one = compared.changed[number]
+            wrong = [_in_place(where, one, readings[one], given["folder"], before)]
+        else:
+            wrong = reading.problems_of(
+                before.plan, row, where, left_out, given["accept_implausible"]
+            )
+            if not given["again"]:
+                wrong += _repeated(row, where, earlier)
+            good += [] if wrong else [row]
+        if isinstance(row, Reading):
+            earlier.setdefault(imports.digits(row), f"line {table.line[number]}")
         problems += wrong
-        good += [] if wrong else [row]
+    if not good and not problems:
+        what = f"was recorded before: {_listed(compared.known.values())}, no row is new"
+        fix = "a reading that is equal to another to the last digit is a further row of the file"
+        raise InputError(Problem(path, what, fix=fix), "Nothing was recorded")
     if problems and not given["skip_bad"]:
         raise InputError(problems, "Nothing was recorded")
-    return good, problems, mark
+    known = tuple(sorted(compared.known.values()))
+    source = mark, place, compared.grown, compared.adopted
+    return _Made(good, problems, known, compared.gone, source)
+
+
+def _numbered(before: State) -> dict[int, Reading]:
+    struck = (each for each, _ in before.struck)
+    return {each.number: each.reading for each in (*before.told, *before.in_hand, *struck)}
+
+
+def _altered(row: Reading, where: str, number: int, known: Reading, before: State) -> list[Problem]:
+    """The problem with a row that is a reading by its position, and says else of it."""
+    differs = imports.unlike(row, known, before.plan.slides)
+    if not differs:
+        return []
+    what = f"is reading {number} by its position, and was recorded with another {differs}"
+    fix = f"bring the row back, or strike reading {number} and record the file again"
+    return [Problem(where, what, fix=fix)]
+
+
+def _in_place(where: str, number: int, known: Reading, path: str, before: State) -> Problem:
+    """The problem with a row that stands where another was when the file was recorded."""
+    seen = ", ".join(f"{each:g}" for each in known.position_mm)
+    what = (
+        f"stands where reading {number} was, which the file does not hold any more: point "
+        f"{before.plan.points.label[known.point]}, ({seen}) mm"
+    )
+    strike = shlex.join(["kinacc", "campaign", "strike", path, str(number), "--reason", ".."])
+    fix = (
+        "bring the row back if it was changed by mistake; if it was wrong before, run "
+        f"`{strike}` and record the file again; give --again if this is a reading of its own"
+    )
+    return Problem(where, what, fix=fix)
+
+
+def _listed(numbers: Iterable[int]) -> str:
+    """Numbers of readings in words: readings 1 to 4, 7."""
+    spans: list[list[int]] = []
+    for number in sorted(numbers):
+        if spans and number == spans[-1][1] + 1:
+            spans[-1][1] = number
+        else:
+            spans.append([number, number])
+    shown = ", ".join(f"{low} to {high}" if high > low else f"{low}" for low, high in spans)
+    return f"reading{'' if shown.isdigit() else 's'} {shown}"
 
 
 def _rows(table: RawTable, instrument: str | None, before: State):
@@ -186,6 +257,10 @@ def _rows(table: RawTable, instrument: str | None, before: State):
     position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
     kinds = [LENGTH if slides else ANGLE for slides in plan.slides]
     names = [f"q{joint + 1}" for joint in range(len(plan.slides))]
+    for command, own in _COMPUTED.items():
+        if own in table.columns:
+            what = f"was written by kinacc {command}: its positions are computed, not measured"
+            problems.append(Problem(table.path, what, "positions as the instrument read them"))
     joints = reader.group(names, kinds, False)
     std = reader.group(["std_x", "std_y", "std_z"], [LENGTH] * 3, False)
     if "pose" not in table.columns and joints is None and not problems:
@@ -196,7 +271,7 @@ def _rows(table: RawTable, instrument: str | None, before: State):
         problems.append(Problem("--instrument", f"{instrument!r}", ", ".join(known)))
     if problems:
         raise InputError(problems, "Nothing was recorded")
-    place = {name: number for number, name in enumerate(plan.points.label)}
+    place = {name.strip(): number for number, name in enumerate(plan.points.label)}
     rows: list[Reading | Problem] = []
     for i in range(len(table)):
         where = f"{table.path}, line {table.line[i]}"
@@ -247,22 +322,24 @@ def _joints(
     return values * np.where(slides, 1.0, ANGLE[unit])
 
 
-def _say_taken(given, taken, skipped, before: State, after: State) -> None:
+def _say_taken(given: Mapping, made: _Made, before: State, after: State) -> None:
     label = after.plan.points.label
     if given["as_json"]:
         content = {
-            "taken": len(taken),
-            "skipped": [str(each) for each in skipped],
+            "taken": len(made.taken),
+            "skipped": [str(each) for each in made.skipped],
+            "known": list(made.known),
+            "gone": list(made.gone),
             "next": None if after.asked is None else label[after.asked],
             "readings": after.taken,
             "last_reading": after.numbered,
         }
         click.echo(json.dumps(content, indent=1))
         return
-    for each in skipped:
+    for each in made.skipped:
         click.echo(f"not taken: {each}", err=True)
     if given["file"] is None:
-        found = taken[0]
+        found = made.taken[0]
         size = float(np.linalg.norm(reading.error_mm(after.plan, found)))
         click.echo(
             f"recorded: reading {after.numbered}, point {label[found.point]}, {size:.3f} mm from "
@@ -271,5 +348,11 @@ def _say_taken(given, taken, skipped, before: State, after: State) -> None:
         if before.asked is not None and found.point != before.asked:
             click.echo(f"point {label[before.asked]} was asked for: this reading is kept in hand")
     else:
-        click.echo(f"recorded: {len(taken)} readings of {given['file']}")
+        if made.known:
+            rows = f"{len(made.known)} row{'s' if len(made.known) > 1 else ''}"
+            click.echo(f"known: {rows} recorded before, as {_listed(made.known)}")
+        if made.gone:
+            said = f"not in the file any more, and still in the campaign: {_listed(made.gone)}"
+            click.echo(f"{said}; strike what is void", err=True)
+        click.echo(f"recorded: {len(made.taken)} readings of {given['file']}")
     click.echo("\n".join(words.standing(after)))

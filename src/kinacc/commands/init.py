@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -258,16 +259,15 @@ def _dataset(
     note = [f"Written by kinacc init. Robot: {chosen}."]
     how = _how(report).capitalize()
     note += [f"{how}: {words}." for words in guess.assumed.values()]
-    note.append(f"Everything not given here is as in config.yaml.\n    kinacc check-data {path}")
+    check = f"kinacc check-data {shlex.quote(str(path))}"
+    note.append(f"Everything not given here is as in config.yaml.\n    {check}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
 
 
 def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None:
-    commands = [
-        f"kinacc check-data {dataset}",
-        f"snakemake -c2 --configfile config.yaml {dataset}",
-    ]
+    file = shlex.quote(str(dataset))
+    commands = [f"kinacc check-data {file}", f"snakemake -c2 --configfile config.yaml {file}"]
     if as_json:
         answer = {
             "written": [str(path) for path in written],

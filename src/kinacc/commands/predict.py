@@ -20,8 +20,8 @@ def predict(
 ) -> None:  # fmt: skip
     """Predict the pose of the tool at given joints, with how sure that is.
 
-    FOLDER is the results folder of a data set, JOINTS a CSV or Parquet file with columns q1_deg or
-    q1_rad and so on (q1_mm where a joint slides).
+    FOLDER is the results folder of a data set, JOINTS a CSV, Parquet or JSON file with columns
+    q1_deg or q1_rad and so on (q1_mm where a joint slides).
 
     \b
     std_*           standard deviation by the covariance of the fitted parameters

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from kinacc.data.layout import ROUNDED_MM, ROUNDED_RAD
 from kinacc.data.table import RawTable, load, numbers
 from kinacc.data.written_numbers import numbers_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
+from kinacc.names import of_csv
 from kinacc.robot import Robot
 
 ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
 LENGTH = {"mm": 1.0, "m": 1e3}
+_DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
 
 
@@ -35,22 +40,22 @@ class Rows:
 
 
 def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False) -> Rows:
-    """Rows of a CSV or Parquet file, which must have ``joints`` or ``pose`` where asked for.
+    """Rows of a file, as ``open_table`` reads it; it must have ``joints`` or ``pose`` if asked for.
 
     Poses are not looked for where they are not asked for.
 
     Joints: ``q1_deg``, ``q1_rad`` (``q1_mm``, ``q1_m`` where a joint slides). Poses: ``x_mm`` or
     ``x_m`` .., and ``qw`` .. ``qz``, or a rotation vector ``rvx_deg`` .. , or intrinsic XYZ angles
-    ``rx_deg`` .. (or rad). Raises InputError listing every problem.
+    ``rx_deg`` .. (or rad). A quantity may stand in both units where they say the same. Raises
+    InputError listing every problem.
     """
-    table = open_table(path)
-    reader = Reader(table)
     slides = robot.dh.prismatic
-    q_rad = reader.group(
-        [f"q{i + 1}" for i in range(len(slides))],
-        [LENGTH if each else ANGLE for each in slides],
-        joints,
-    )
+    names = [f"q{i + 1}" for i in range(len(slides))]
+    table = open_table(path)
+    table = _answered(table, names, "joints") if joints else table
+    table = _answered(table, ["x", "y", "z"], "a pose") if pose else table
+    reader = Reader(table)
+    q_rad = reader.group(names, [LENGTH if each else ANGLE for each in slides], joints)
     if any(f"q{len(slides) + 1}_{unit}" in table.columns for unit in (*ANGLE, *LENGTH)):
         what = f"has a joint q{len(slides) + 1}, {robot.name} has {len(slides)} joints"
         reader.problems.append(Problem(table.path, what))
@@ -64,6 +69,28 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
         raise InputError(reader.problems, f"{table.path} cannot be used")
     unused = tuple(name for name in table.columns if name not in reader.used)
     return Rows(len(table), label, q_rad, directions, wanted, unused)
+
+
+def _answered(table: RawTable, names: list[str], what: str) -> RawTable:
+    """The rows that hold an answer, of a file that says in a column ``status`` why others do not.
+
+    They are told on the error stream; an empty cell without a status stays, to be refused.
+    """
+    units = (*ANGLE, *LENGTH)
+    columns = [f"{name}_{unit}" for name in names for unit in units]
+    columns = [each for each in columns if each in table.columns]
+    if "status" not in table.columns or not columns:
+        return table
+    none = np.all([table.gaps(each) for each in columns], axis=0) & ~table.gaps("status")
+    if none.all() or not none.any():
+        return table
+    import sys
+
+    rows = table.rows_in_words(np.flatnonzero(none))
+    print(f"left out, without {what} by their status: {rows}", file=sys.stderr)
+    kept = np.flatnonzero(~none)
+    cells = {name: [own[row] for row in kept] for name, own in table.columns.items()}
+    return replace(table, columns=cells, line=table.line[kept])
 
 
 def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -> np.ndarray:
@@ -117,8 +144,8 @@ class Reader:
 
     def group(self, names: list[str], units: list[dict], needed: bool) -> np.ndarray | None:
         """Columns (n, m) of quantities that come together, or None where none is there."""
-        found = [self._column(name, own) for name, own in zip(names, units, strict=True)]
-        present = [each is not None for each in found]
+        found = [self._columns(name, own) for name, own in zip(names, units, strict=True)]
+        present = [bool(each) for each in found]
         if not any(present) and not needed:
             return None
         for name, own, there in zip(names, units, present, strict=True):
@@ -128,22 +155,37 @@ class Reader:
                 self.problems.append(Problem(where, "is missing", fix=listed))
         if not all(present):
             return None
-        columns = []
-        for name, factor in found:
-            self.used.add(name)
-            columns.append(numbers(self.table, name, self.cells) * factor)
-        return np.stack(columns, axis=1)
+        rounded = [ROUNDED_MM if own is LENGTH else ROUNDED_RAD for own in units]
+        return np.stack([self._one(*each) for each in zip(names, found, rounded, strict=True)], 1)
 
-    def _column(self, name: str, units: dict) -> tuple[str, float] | None:
-        present = {
+    def _columns(self, name: str, units: dict) -> dict[str, float]:
+        """Columns that hold a quantity, each with the factor of its unit."""
+        return {
             each: factor
             for unit, factor in units.items()
             if (each := f"{name}_{unit}" if unit else name) in self.table.columns
         }
-        if len(present) > 1:
-            where = f"{self.table.path}: columns {', '.join(present)}"
-            self.problems.append(Problem(where, f"{name} is given in two units"))
-        return next(iter(present.items()), None)
+
+    def _one(self, name: str, columns: dict[str, float], rounded: float) -> np.ndarray:
+        """Values (n,) of a quantity; all columns it is given in have to say the same."""
+        self.used.update(columns)
+        values = {
+            column: numbers(self.table, column, self.cells) * factor
+            for column, factor in columns.items()
+        }
+        first, *others = columns
+        value = values[first]
+        for other in others:
+            apart = np.flatnonzero(np.abs(value - values[other]) > rounded)
+            if apart.size:
+                cells = (self.table.columns[each][apart[0]] for each in (first, other))
+                lines = self.table.rows_in_words(apart)
+                where = f"{self.table.path}: columns {first} and {other}, {lines}"
+                what = f"{name} is given twice and differs: {' and '.join(map(str, cells))}"
+                fix = "leave out the column that is wrong"
+                self.problems.append(Problem(where, what, "the same in both units", fix))
+            value = np.where(np.isnan(value), values[other], value)
+        return value
 
     def directions(self, joints: int) -> np.ndarray | None:
         names = [f"s{i + 1}" for i in range(joints)]
@@ -185,20 +227,62 @@ class Reader:
 
 
 def open_table(path: str | Path) -> RawTable:
-    """The file with the delimiter its first line shows: , or ; (decimal comma) or tab."""
+    """The file with the delimiter its first line shows: , or ; (decimal comma) or tab.
+
+    What commands write is read as well: JSON, units that stand in the description of a Parquet
+    column, and text of a CSV with the apostrophe that keeps it from being a formula.
+    """
     path = Path(path)
-    delimiter, decimal = ",", "."
-    if path.is_file() and path.suffix.lower() not in (".parquet", ".pq"):
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            head, first = file.readline(), file.readline()
-        if ";" in head:
-            delimiter = ";"
-            decimal = "," if "," in first and "." not in first else "."
-        elif "\t" in head:
-            delimiter = "\t"
     if not path.is_file():
-        raise InputError(Problem(str(path), "no such file", "a CSV or Parquet file"))
-    return load(path, delimiter, decimal)
+        raise InputError(Problem(str(path), "no such file", "a CSV, Parquet or JSON file"))
+    kind = path.suffix.lower()
+    if kind == ".json":
+        return _of_json(path)
+    if kind in (".parquet", ".pq"):
+        return _with_units(load(path, ",", "."))
+    delimiter, decimal = ",", "."
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        head, first = file.readline(), file.readline()
+    if ";" in head:
+        delimiter = ";"
+        decimal = "," if "," in first and "." not in first else "."
+    elif "\t" in head:
+        delimiter = "\t"
+    table = load(path, delimiter, decimal)
+    columns = {name: [of_csv(cell) for cell in cells] for name, cells in table.columns.items()}
+    return replace(table, columns=columns)
+
+
+def _of_json(path: Path) -> RawTable:
+    """The rows of an answer that a command gave as JSON."""
+    try:
+        rows = json.loads(path.read_bytes(), parse_int=_whole)["rows"]
+        names = list(rows[0])
+        columns = {name: [row.get(name) for row in rows] for name in names}
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
+        what, allowed = "holds no rows", "a table of rows, as commands write with -o NAME.json"
+        raise InputError(Problem(str(path), what, allowed)) from None
+    return RawTable(str(path), columns, np.arange(1, len(rows) + 1))
+
+
+def _whole(digits: str) -> int | float:
+    return int(digits) if len(digits) <= _DIGITS else float(digits)
+
+
+def _with_units(table: RawTable) -> RawTable:
+    """A Parquet table whose joints carry the unit in their names: in tables of results and of
+    campaigns it stands in the columns' descriptions."""
+    import pyarrow.parquet as pq
+
+    schema = pq.read_schema(table.path)
+
+    def called(name: str) -> str:
+        unit = ((schema.field(name).metadata or {}).get(b"unit") or b"").decode()
+        whole = f"{name}_{unit}"
+        is_joint = re.fullmatch(r"q\d+", name) and unit in (*ANGLE, *LENGTH)
+        return whole if is_joint and whole not in table.columns else name
+
+    return replace(table, columns={called(name): each for name, each in table.columns.items()})
 
 
 def _names(name: str, units: dict) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.errors import InputError, Problem
+from kinacc.names import in_csv
 
 KINDS = (".csv", ".json", ".parquet")
 _SHOWN_ROWS = 24
@@ -159,7 +160,7 @@ def _cell(value: object) -> str:
     if value is None:
         return ""
     # Twelve digits: a nanometre in ten metres, and a text that ends where the digits end.
-    return f"{value:.12g}" if isinstance(value, float) else str(value)
+    return f"{value:.12g}" if isinstance(value, float) else in_csv(str(value))
 
 
 def _short(value: object) -> str:

@@ -16,13 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.data.table import RawTable
+from kinacc.data.table import RawTable, numbers
 from kinacc.errors import Problem
 
 TOOL = "tool"  # name of the target whose columns carry no name
 
 ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
 LENGTH = {"mm": 1.0, "m": 1000.0}
+# By so much may a quantity given in two units differ: rounding to the digits commands show.
+ROUNDED_RAD, ROUNDED_MM = 1e-6, 1e-3
 AREA = {"mm2": 1.0, "m2": 1.0e6}
 CELSIUS = {"c": 1.0, "C": 1.0}
 PURE = {"": 1.0}
@@ -169,16 +171,24 @@ class _Finder:
     problems: list[Problem]
 
     def any(self, name: str, units: Mapping[str, float], mapped_unit: str) -> Place | None:
-        """The column of ``name``, if there is one; given twice is a problem."""
+        """The column of ``name``, if there is one; in two units it has to say the same twice."""
         if name in self.layout.columns:
             foreign = self.layout.columns[name]
             # A mapped column that is not there is named once, by refuse_unknown_columns.
             return Place(foreign, units[mapped_unit]) if foreign in self.table.columns else None
         own = {f"{name}_{unit}" if unit else name: factor for unit, factor in units.items()}
         present = [each for each in own if each in self.table.columns]
-        if len(present) > 1:
-            self._problem(" or ".join(present), "is given in two units")
+        if len(present) > 1 and not self._alike([(each, own[each]) for each in present], units):
+            self._problem(" or ".join(present), "is given in two units that do not say the same")
         return Place(present[0], own[present[0]]) if present else None
+
+    def _alike(self, columns: list[tuple[str, float]], units: Mapping[str, float]) -> bool:
+        """Whether columns of one quantity say the same, each with its factor, but for rounding."""
+        first, *others = (
+            numbers(self.table, each, [], gaps=True) * factor for each, factor in columns
+        )
+        rounded = ROUNDED_RAD if units is ANGLE else ROUNDED_MM if units is LENGTH else 0.0
+        return all(np.allclose(first, each, 0.0, rounded, equal_nan=True) for each in others)
 
     def required(self, name: str, units: Mapping[str, float], mapped_unit: str) -> Place | None:
         place = self.any(name, units, mapped_unit)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc import names
 from kinacc.artifacts import store
 from kinacc.calibrated import folder as results
 from kinacc.calibration import identified
@@ -38,8 +39,14 @@ def contents(
 
     Raises InputError for what cannot be exported.
     """
-    found = results.read_tables(folder)
     dataset = Path(folder).resolve().name
+    if name is None:
+        problems = names.not_in_a_line("the results folder", dataset)
+    else:
+        problems = names.not_of_a_file("--name", name)
+    if problems:
+        raise InputError(problems, "Nothing was written")
+    found = results.read_tables(folder)
     arm = results.calibration(found, robot, "dh", dataset)
     std = _deviations(found["dh_model"])
     told = found.get("dh_identified")
@@ -59,7 +66,7 @@ def contents(
             text = urdf.generated(arm, dh_joints)
         else:
             text = _tables(found, robot, dataset, unseen or (), each)
-        made[f"{name or dataset}{_ENDINGS[each]}"] = text
+        made[f"{dataset if name is None else name}{_ENDINGS[each]}"] = text
     return made
 
 

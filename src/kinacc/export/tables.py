@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.models.dh import PARAMETERS
+from kinacc.names import in_markdown
 
 Columns = Mapping[str, np.ndarray]
 
@@ -52,10 +53,10 @@ def markdown(tables: Sequence[Table]) -> str:
     parts = []
     for table in tables:
         heads = [f"{text} [{unit}]" if unit else text for text, unit in table.headers]
-        lines = [f"**{table.caption}**", "", _markdown_row(heads)]
+        lines = [f"**{in_markdown(table.caption)}**", "", _markdown_row(heads)]
         lines.append(_markdown_row(["---", *["---:"] * (len(heads) - 1)]))
         lines += [_markdown_row(row) for row in table.rows]
-        lines += ["", *table.notes] if table.notes else []
+        lines += ["", *map(in_markdown, table.notes)] if table.notes else []
         parts.append("\n".join(lines))
     return "\n\n".join(parts) + "\n"
 
@@ -167,6 +168,7 @@ def _tex_cell(text: str) -> str:
 def _tex(text: str) -> str:
     for plain, tex in (
         ("\\", r"\textbackslash "), ("&", r"\&"), ("%", r"\%"), ("_", r"\_"), ("#", r"\#"),
+        ("$", r"\$"), ("{", r"\{"), ("}", r"\}"), ("^", r"\^{}"), ("~", r"\~{}"),
         ("±", r"$\pm$"), ("†", r"$^\dagger$"), ("theta", r"$\theta$"), ("alpha", r"$\alpha$"),
         ("beta", r"$\beta$"),
     ):  # fmt: skip

@@ -5,6 +5,7 @@ URDF has metres and radians; ``rpy`` turns about the fixed x, y and z axes in th
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +40,9 @@ def generated(arm: Calibration, dh_joints: bool = False) -> str:
     frames, end = links.origins(dh)
     frames[0] = compose(robot.base, frames[0])
     root = etree.Element("robot", name=_name(robot_name(arm)))
-    root.append(etree.Comment(f" calibrated from {robot.name} with data set {arm.name}; "
-                              "effort and velocity are placeholders "))  # fmt: skip
+    about = f"calibrated from {robot.name} with data set {arm.name}"
+    about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
+    root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
     etree.SubElement(root, "link", name="base_link")
     low, high = _limits(robot, senses, dh_joints)
     for i, origin in enumerate(frames):

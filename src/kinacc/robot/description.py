@@ -23,6 +23,7 @@ from kinacc.geometry import (
     rotation_z,
 )
 from kinacc.models.dh import DHModel
+from kinacc.names import not_in_a_line
 from kinacc.robot.forms import from_modified
 from kinacc.robot.reader import ANGLE, LENGTH, Reader
 from kinacc.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
@@ -301,6 +302,8 @@ def _about(reader: Reader, name: str) -> dict[str, str]:
     if isinstance(content["date"], date):
         content["date"] = content["date"].isoformat()
     content["name"] = content["name"] or name
+    for fault in not_in_a_line("name", str(content["name"])):
+        reader.fault(("name",), fault.what, fault.allowed)
     return {key: "" if value is None else str(value) for key, value in content.items()}
 
 

@@ -1,0 +1,192 @@
+"""What one command writes, the commands a person would take it to next can read."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from command_line import call, small_study
+
+from kinacc.artifacts import store
+
+KINDS = ("csv", "json", "parquet")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a small synthetic study, made by the workflow's own stages."""
+    return small_study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.fixture(scope="module")
+def written(folder, tmp_path_factory):
+    """A file of every command that writes joints or poses, in every form, by command and kind."""
+    base = tmp_path_factory.mktemp("written by others")
+    campaign = base / "check"
+    begin(folder, campaign, "--drawn", 8)
+    record_all(campaign, base / "readings.csv")
+    assert call("campaign", "report", campaign).exit_code == 0
+    again = base / "again"
+    begin(folder, again, "--drawn", 8)
+    made = {}
+    for kind in KINDS:
+        commands = {
+            "plan-poses": ("plan-poses", "mh180", "--poses", 8, "--drawn", 60, "--joints-deg",
+                           "-30:30,-20:20,-20:20,-30:30,40:70,-30:30", "--hayati", "2"),
+            "campaign next": ("campaign", "next", again, "--all"),
+            "predict": ("predict", folder, base / f"plan-poses.{kind}", "--model", "dh"),
+            "compensate": ("compensate", folder, base / f"predict.{kind}", "--model", "dh"),
+        }  # fmt: skip
+        for name, words in commands.items():
+            made[name, kind] = base / f"{name}.{kind}"
+            done = call(*words, "-o", made[name, kind])
+            assert done.exit_code == 0, (name, kind, done.output)
+    made["campaign report", "parquet"] = campaign / "report" / "campaign_points.parquet"
+    made["measurements", "parquet"] = folder / "measurements.parquet"
+    return made
+
+
+def begin(folder, campaign, *words):
+    done = call("campaign", "start", campaign, "--calibration", folder, "--model", "dh",
+                "--noise-mm", 0.05, "--frame", "base", "--budget", 8, *words)  # fmt: skip
+    assert done.exit_code == 0, done.output
+
+
+def record_all(campaign, file):
+    """Measure the whole visit 0.1 mm off and record it."""
+    rows = json.loads(call("campaign", "next", campaign, "--all", "--json").stdout)["rows"]
+    with file.open("w", newline="") as stream:
+        out = csv.writer(stream)
+        out.writerow(["pose", "x_mm", "y_mm", "z_mm"])
+        for row in rows:
+            out.writerow([row["pose"], *(row[f"expected_{axis}_mm"] + 0.1 for axis in "xyz")])
+    done = call("campaign", "record", campaign, file)
+    assert done.exit_code == 0, done.output
+
+
+JOINTS = [
+    *((name, kind) for name in ("plan-poses", "campaign next", "predict", "compensate")
+      for kind in KINDS),
+    ("campaign report", "parquet"),
+    ("measurements", "parquet"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("wrote", JOINTS, ids=" ".join)
+@pytest.mark.parametrize("reads", ["predict", "compensate --program", "plan-poses --candidates",
+                                   "campaign start --candidates", "compare --joints"])  # fmt: skip
+def test_joints_that_a_command_wrote_are_read_by_the_others(
+    folder, written, tmp_path, wrote, reads
+):
+    file = written[wrote]
+    words = {
+        "predict": ("predict", folder, file, "--model", "dh"),
+        "compensate --program": ("compensate", folder, "--program", file, "--model", "dh"),
+        "plan-poses --candidates": ("plan-poses", "mh180", "--candidates", file, "--poses", 7),
+        "campaign start --candidates": (
+            "campaign", "start", tmp_path / "new", "--calibration", folder, "--model", "dh",
+            "--noise-mm", 0.05, "--candidates", file,
+        ),
+        "compare --joints": ("compare", "mh180", folder, "--joints", file),
+    }[reads]  # fmt: skip
+    done = call(*words, "--json")
+    assert done.exit_code == 0, done.output
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_poses_that_predict_wrote_are_wanted_of_compensate(folder, written, kind):
+    done = call("compensate", folder, written["predict", kind], "--model", "dh", "--json")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)["rows"]
+    planned = json.loads(written["plan-poses", "json"].read_text())["rows"]
+    for one, other in zip(found, planned, strict=True):
+        for joint in range(1, 7):
+            assert one[f"q{joint}_deg"] == pytest.approx(other[f"q{joint}_deg"], abs=1e-6)
+
+
+def test_rows_without_an_answer_are_told_and_left_out(folder, tmp_path):
+    wanted, joints, back = (tmp_path / name for name in ("wanted.csv", "joints.csv", "back.csv"))
+    near = "1500,200,900,0,1,0,0"
+    wanted.write_text(f"x_mm,y_mm,z_mm,qw,qx,qy,qz\n{near}\n9000,0,0,1,0,0,0\n{near}\n")
+    assert call("compensate", folder, wanted, "--model", "dh", "-o", joints).exit_code == 1
+    done = call("predict", folder, joints, "--model", "dh", "-o", back)
+    assert done.exit_code == 0, done.output
+    assert "left out, without joints by their status: line 3" in done.stderr
+    assert [row["row"] for row in csv.DictReader(back.open())] == ["2", "4"]
+    own = joints.read_text().replace("status", "remark")
+    joints.write_text(own)
+    done = call("predict", folder, joints, "--model", "dh")
+    assert done.exit_code == 2
+    assert "q1_deg, line 3: not a finite number" in done.output
+
+
+def test_the_visit_with_its_readings_beside_it_is_recorded(folder, tmp_path):
+    campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
+    begin(folder, campaign, "--drawn", 8)
+    assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
+    rows = list(csv.DictReader(visit.open()))
+    for row in rows:
+        row |= {f"{axis}_mm": float(row[f"expected_{axis}_mm"]) + 0.1 for axis in "xyz"}
+    with visit.open("w", newline="") as stream:
+        out = csv.DictWriter(stream, list(rows[0]))
+        out.writeheader()
+        out.writerows(rows)
+    done = call("campaign", "record", campaign, visit)
+    assert done.exit_code == 0, done.output
+    assert "recorded: 8 readings" in done.output
+    done = call("init", visit, "--robot", "mh180", "--out", tmp_path, "--name", "own", "--json")
+    assert done.exit_code == 0, done.output
+    assert "tool" in json.loads(done.stdout)["targets"]
+
+
+def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tmp_path):
+    campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
+    begin(folder, campaign, "--drawn", 8)
+    assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
+    for command in (("predict", folder, visit), ("compensate", folder, "--program", visit)):
+        made = tmp_path / f"{command[0]}.csv"
+        assert call(*command, "--model", "dh", "-o", made).exit_code == 0
+        done = call("campaign", "record", campaign, made)
+        assert done.exit_code == 2, done.output
+        assert f"written by kinacc {command[0]}" in done.output
+        assert not (campaign / "readings.jsonl").exists()
+
+
+def test_two_units_that_do_not_say_the_same_are_refused(folder, tmp_path):
+    file = tmp_path / "joints.csv"
+    head = ",".join(f"q{i}_deg" for i in range(1, 7)) + ",q2_rad"
+    file.write_text(f"{head}\n0,0,0,0,60,0,0\n0,10,0,0,60,0,0.1745329\n0,20,0,0,60,0,0.17\n")
+    done = call("predict", folder, file)
+    assert done.exit_code == 2
+    assert "columns q2_deg and q2_rad, line 4" in done.output
+    assert "20 and 0.17" in done.output
+    file.write_text("\n".join(file.read_text().splitlines()[:3]) + "\n")
+    assert call("predict", folder, file).exit_code == 0
+
+
+def test_measured_errors_of_a_campaign_plan_the_next_one(folder, tmp_path):
+    campaign = tmp_path / "check"
+    begin(folder, campaign, "--drawn", 12)
+    record_all(campaign, tmp_path / "readings.csv")
+    assert call("campaign", "report", campaign).exit_code == 0
+    points = campaign / "report" / "campaign_points.parquet"
+    assert np.isnan(store.read(points)["ex_mm"]).any()
+    for name in ("campaign_points", "campaign_readings"):
+        errors = campaign / "report" / f"{name}.parquet"
+        done = call("plan-campaign", "--noise-mm", 0.05, "--poses", 5, "--budget", 5,
+                    "--errors", errors, "--repetitions", 2, "--json")  # fmt: skip
+        assert done.exit_code == 0, done.output
+        (row,) = json.loads(done.stdout)["rows"]
+        assert row["true_mm"] == pytest.approx(0.1 * 3**0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 100_000, '{"rows": []}', '{"rows": "abc"}',
+                                  '{"rows": [1]}', '{"rows": [{"a": 1}, 2]}'])  # fmt: skip
+def test_json_that_holds_no_table_is_refused(folder, tmp_path, text):
+    file = tmp_path / "joints.json"
+    file.write_text(text)
+    done = call("predict", folder, file)
+    assert done.exit_code == 2, done.output
+    assert "holds no rows" in done.output
