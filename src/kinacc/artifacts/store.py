@@ -25,6 +25,7 @@ _ARROW_TYPES = {
     "int8": pa.int8(),
     "text": pa.string(),
 }
+_MOST_VALUES = 100_000_000
 
 
 class TableToWrite(NamedTuple):
@@ -138,8 +139,17 @@ def read(path: Path | str) -> dict[str, np.ndarray]:
     Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
     Raises InputError if the file is absent or not Parquet.
     """
-    table = _open(path, lambda file: file.read(use_threads=False))
+    table = _open(path, lambda file: _unpacked(file, path))
     return {name: _to_numpy(table.schema.field(name), table[name]) for name in table.column_names}
+
+
+def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
+    """All of a file, if its footer says that it can be held: few bytes may unpack to many."""
+    rows, columns = file.metadata.num_rows, file.metadata.num_columns
+    if rows * columns > _MOST_VALUES:
+        allowed = f"at most {_MOST_VALUES} values"
+        raise InputError(Problem(str(path), f"{rows} rows of {columns} columns", allowed))
+    return file.read(use_threads=False)
 
 
 def read_schema(path: Path | str) -> pa.Schema:
@@ -159,7 +169,7 @@ def _open(path, opening):
             return opening(file)
     except FileNotFoundError:
         raise InputError(Problem(str(path), "no such file")) from None
-    except (pa.ArrowInvalid, OSError) as error:
+    except (pa.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(Problem(str(path), f"not a readable Parquet file: {reason}")) from None
 

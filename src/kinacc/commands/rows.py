@@ -16,6 +16,7 @@ from kinacc.robot import Robot
 ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
 LENGTH = {"mm": 1.0, "m": 1e3}
 _UNIT_QUATERNION = 1e-3
+_HEAD = 1_000_000  # characters of a line looked at
 
 
 @dataclass(frozen=True)
@@ -190,7 +191,7 @@ def open_table(path: str | Path) -> RawTable:
     delimiter, decimal = ",", "."
     if path.is_file() and path.suffix.lower() not in (".parquet", ".pq"):
         with path.open(encoding="utf-8-sig", errors="replace") as file:
-            head, first = file.readline(), file.readline()
+            head, first = file.readline(_HEAD), file.readline(_HEAD)
         if ";" in head:
             delimiter = ";"
             decimal = "," if "," in first and "." not in first else "."

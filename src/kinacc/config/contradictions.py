@@ -6,6 +6,7 @@ Every rule yields problems; ``place(*keys)`` words where a setting of the data s
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -169,8 +170,8 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
             f"data set {name} reads a file, but measurements.file.path is not given",
             "path of a CSV or Parquet file",
         )
-    elif not (folder / file["path"]).is_file():
-        is_folder = (folder / file["path"]).is_dir()
+    elif not os.path.isfile(folder / file["path"]):
+        is_folder = os.path.isdir(folder / file["path"])
         origin = file["source"]
         yield Problem(
             place("measurements", "file", "path"),
