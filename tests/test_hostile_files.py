@@ -132,7 +132,7 @@ COMMANDS = {
 def much(tmp_path_factory) -> Path:
     """A folder with files of too many rows."""
     folder = tmp_path_factory.mktemp("much")
-    zeros = pa.array(np.zeros(3_000_000))
+    zeros = pa.array(np.zeros(3_000_000, np.int8))
     repeated(folder / "much.parquet", dict.fromkeys(COLUMNS, zeros), 20)
     row = ",".join(["1"] * 9) + "\n"
     (folder / "much.csv").write_text(",".join(COLUMNS) + "\n" + row * 1_050_000)

@@ -117,11 +117,16 @@ def write_all(tables: Sequence[TableToWrite]) -> None:
             pq.write_table(each, place, compression="zstd", version="2.6")
 
 
+def unfinished(path: Path | str, process: int) -> Path:
+    """Where a process writes a file before it is whole."""
+    return Path(path).with_name(f".{Path(path).name}.{process}.partial")
+
+
 @contextmanager
 def replacing(paths: Sequence[Path | str]) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths``; renamed to them on success, removed on any failure."""
     targets = [Path(path) for path in paths]
-    temporary = [path.with_name(f".{path.name}.{os.getpid()}.partial") for path in targets]
+    temporary = [unfinished(path, os.getpid()) for path in targets]
     for path in targets:
         path.parent.mkdir(parents=True, exist_ok=True)
     try:
