@@ -199,3 +199,45 @@ def test_a_parquet_file_with_a_column_twice_is_refused(tmp_path):
     pq.write_table(table, tmp_path / "twice.parquet")
     said = refused(tmp_path, "check-data", data_set(tmp_path, "twice.parquet"))
     assert "column names given twice: x_mm" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        (("plan-poses", "ur10", "--drawn", 10**9), "--drawn"),
+        (("plan-poses", "ur10", "--poses", 10**6, "--drawn", 10**5), "--poses"),
+        (("plan-campaign", "--noise-mm", "0.05", "--poses", 10**9), "--poses"),
+        (("plan-campaign", "--noise-mm", "0.05", "--poses", 50_000), "--poses, --budget"),
+        (("plan-campaign", "--noise-mm", "0.05", "--repetitions", 10**9), "--repetitions"),
+        (("campaign", "start", "x", "--drawn", 10**9), "--drawn"),
+        (("tournament", "--parts", 10**9), "--parts"),
+    ],
+    ids=lambda given: " ".join(map(str, given)) if isinstance(given, tuple) else "",
+)
+def test_an_option_beyond_any_machine_is_refused_with_what_is_allowed(tmp_path, words, option):
+    said = refused(tmp_path, *words)
+    assert option in said
+    assert "range" in said or "at most" in said
+
+
+def test_settings_that_multiply_beyond_any_machine_are_named_together(tmp_path):
+    (tmp_path / "own.yaml").write_text(
+        "datasets: {own: {robot: mh180}}\n"
+        "study: {repetitions: 100000, measurements: 100000, noise_mm: [0.1, 0.2]}\n"
+        "evaluation: {points: 100000}\n"
+        "map: {grid_mm: 1, slices_deg: [0, 10, 20, 30, 40]}\n"
+        "measurements: {synthetic: {poses: 100000}}\ncalibration: {vec: {order: 40}}\n"
+    )
+    said = refused(tmp_path, "run", "study", "--dataset", "own", "--config", "own.yaml")
+    assert "own.yaml:2, study.repetitions (data set own): 100000 repetitions at 2 noises" in said
+    assert "own.yaml:2, study.measurements (data set own): 100000 measurements, of which" in said
+    assert "own.yaml:4, map.grid_mm" in said
+    assert "own.yaml:5, measurements.synthetic.poses" in said
+    assert said.count("at most") == 4
+
+
+def test_more_candidates_than_can_be_compared_are_refused(tmp_path):
+    zeros = pa.array(np.zeros(150_000, np.int8))
+    pq.write_table(pa.table(dict.fromkeys(COLUMNS, zeros)), tmp_path / "many.parquet")
+    said = refused(tmp_path, "plan-poses", "ur10", "--candidates", "many.parquet")
+    assert "many.parquet: 150000 candidates; allowed: at most 100000" in said

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     type=click.Choice(["default", "coverage", "budgets", "full"]),
     help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
-@click.option("--parts", type=click.IntRange(1), help="Number of parts. [configuration]")
+@click.option("--parts", type=click.IntRange(1, 10_000), help="Number of parts. [configuration]")
 @click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
 @click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
 @click.option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")
 @click.option(
-    "--cores", type=click.IntRange(1), default=1, show_default=True, help="Parts at a time."
+    "--cores", type=click.IntRange(1, 1000), default=1, show_default=True, help="Parts at a time."
 )
 @click.option("--times", is_flag=True, help="Also measure the time of a campaign of each.")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
