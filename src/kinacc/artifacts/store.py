@@ -144,8 +144,7 @@ def read(path: Path | str) -> dict[str, np.ndarray]:
     Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
     Raises InputError if the file is absent or not Parquet.
     """
-    table = _open(path, lambda file: _unpacked(file, path))
-    return {name: _to_numpy(table.schema.field(name), table[name]) for name in table.column_names}
+    return _open(path, lambda file: _columns(_unpacked(file, path)))
 
 
 def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
@@ -165,7 +164,7 @@ def read_schema(path: Path | str) -> pa.Schema:
 def read_metadata(path: Path | str) -> dict[str, str]:
     """Provenance of a table's file as text; InputError if absent or not Parquet."""
     raw = read_schema(path).metadata or {}
-    return {key.decode(): value.decode() for key, value in raw.items()}
+    return {key.decode(errors="replace"): raw[key].decode(errors="replace") for key in raw}
 
 
 def _open(path, opening):
@@ -174,9 +173,14 @@ def _open(path, opening):
             return opening(file)
     except FileNotFoundError:
         raise InputError(Problem(str(path), "no such file")) from None
-    except (pa.ArrowException, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(Problem(str(path), f"not a readable Parquet file: {reason}")) from None
+
+
+def _columns(table: pa.Table) -> dict[str, np.ndarray]:
+    names = zip(table.schema, table.columns, strict=True)
+    return {field.name: _to_numpy(field, column) for field, column in names}
 
 
 def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
