@@ -241,3 +241,37 @@ def test_more_candidates_than_can_be_compared_are_refused(tmp_path):
     pq.write_table(pa.table(dict.fromkeys(COLUMNS, zeros)), tmp_path / "many.parquet")
     said = refused(tmp_path, "plan-poses", "ur10", "--candidates", "many.parquet")
     assert "many.parquet: 150000 candidates; allowed: at most 100000" in said
+
+
+def test_a_line_of_units_that_does_not_fit_the_names_is_named(tmp_path):
+    row = ",".join(["1.5"] * 9)
+    units = "deg,deg,deg,deg,deg,deg,mm,mm"
+    text = "\n".join([",".join(COLUMNS), units, *[row] * 5])
+    (tmp_path / "units.csv").write_text(text + "\n")
+    said = refused(tmp_path, "init", "units.csv", "--name", "own", "--robot", "ur10")
+    assert "units" in said
+
+
+def test_a_damaged_results_table_is_no_traceback(tmp_path):
+    from kinacc.artifacts.store import read, read_metadata
+    from kinacc.errors import InputError
+
+    names = pa.Array.from_buffers(
+        pa.string(), 1, [None, pa.py_buffer(b"\0\0\0\0\2\0\0\0"), pa.py_buffer(b"\xff\xfe")]
+    )
+    path = tmp_path / "robot.parquet"
+    table = pa.table({"name": names}).replace_schema_metadata({b"seed": b"\xff"})
+    pq.write_table(table, path)
+    with pytest.raises(InputError, match=r"robot\.parquet: not a readable Parquet file"):
+        read(path)
+    assert set(read_metadata(path)) >= {"seed"}
+
+
+def test_a_results_table_of_a_billion_values_is_refused_before_it_is_unpacked(tmp_path):
+    from kinacc.artifacts.store import read
+    from kinacc.errors import InputError
+
+    zeros = pa.array(np.zeros(3_000_000, np.int8))
+    repeated(tmp_path / "much.parquet", dict.fromkeys(COLUMNS, zeros), 4)
+    with pytest.raises(InputError, match="12000000 rows of 9 columns"):
+        read(tmp_path / "much.parquet")

@@ -216,66 +216,73 @@ def _parquet(path: Path) -> RawTable:
 
     try:
         with pq.ParquetFile(path) as file:
-            names, problem = file.schema_arrow.names, _too_large(str(path), file.metadata)
-            # The same text in a million rows is held once.
-            texts = [
-                field.name
-                for field in file.schema_arrow
-                if pa.types.is_string(field.type) or pa.types.is_large_string(field.type)
-            ]
-        doubled = _doubled(names)
-        if doubled:
-            problem = problem or Problem(str(path), f"column names given twice: {doubled}")
+            schema, problem = file.schema_arrow, _too_large(str(path), file.metadata)
+        doubled = _doubled(schema.names)
+        if doubled and not problem:
+            problem = Problem(str(path), f"column names given twice: {doubled}")
         if problem:
             raise InputError(problem)
+        flat = [field.name for field in schema if not pa.types.is_nested(field.type)]
+        # The same text in a million rows is held once.
+        texts = [name for name in flat if _is_text(schema.field(name).type)]
         with pq.ParquetFile(path, read_dictionary=texts) as file:
-            table = file.read()
+            table = file.read(columns=flat)
+            rows = table.num_rows if flat else file.metadata.num_rows
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(Problem(str(path), f"not a Parquet file: {reason}")) from None
-    if not table.num_rows:
+    if not rows:
         raise InputError(Problem(str(path), "the table has no rows", "at least one row"))
-    columns = {name: _cells(table.column(name), str(path)) for name in table.column_names}
-    return RawTable(str(path), columns, np.arange(1, table.num_rows + 1))
+    columns = {
+        field.name: _cells(table.column(field.name), str(path))
+        if field.name in flat
+        else [f"<{field.type}>"] * rows  # one cell of a list may hold a million values
+        for field in schema
+    }
+    return RawTable(str(path), columns, np.arange(1, rows + 1))
+
+
+def _is_text(kind) -> bool:
+    import pyarrow as pa
+
+    return pa.types.is_string(kind) or pa.types.is_large_string(kind)
 
 
 def _too_large(where: str, footer) -> Problem | None:
     """What the footer of a Parquet file says of its size, before anything is unpacked."""
-    groups, width = footer.num_row_groups, footer.num_columns
-    if footer.num_rows > _MOST_ROWS or width > _MOST_COLUMNS or groups > _MOST_ROWS // 100:
-        what = f"{footer.num_rows} rows of {width} columns in {groups} groups"
-        return Problem(where, what, _ALLOWED, _SMALLER)
-    told = [footer.row_group(number) for number in range(groups)]
-    cells = sum(group.column(i).num_values for group in told for i in range(width))
-    size = sum(group.total_byte_size for group in told)
-    if cells > _MOST_CELLS or size > _MOST_BYTES:
-        what = f"{cells} cells of {size / 1e6:.0f} MB"
-        return Problem(where, what, _ALLOWED, _SMALLER)
-    return None
+    rows, width, groups = footer.num_rows, footer.num_columns, footer.num_row_groups
+    what = ""
+    if rows > _MOST_ROWS or width > _MOST_COLUMNS or rows * width > _MOST_CELLS:
+        what = f"{rows} rows of {width} columns"
+    elif groups > _MOST_ROWS // 100:
+        what = f"{groups} groups of rows"
+    else:
+        size = sum(footer.row_group(number).total_byte_size for number in range(groups))
+        what = f"{size / 1e6:.0f} MB" if size > _MOST_BYTES else ""
+    return Problem(where, what, _ALLOWED, _SMALLER) if what else None
 
 
 def _cells(column, where: str) -> list:
-    """Values of a Parquet column; the column's type as text where a cell is no single value.
+    """Values of a Parquet column; the column's type as text where Python has no such value.
 
     Raises InputError where a few long texts, repeated, are more than could be worked through.
     """
     import pyarrow as pa
 
-    if not pa.types.is_nested(column.type):
-        try:
-            if not pa.types.is_dictionary(column.type):
-                return column.to_pylist()
-            cells: list = []
-            for chunk in column.chunks:
-                words = chunk.dictionary.to_pylist()
-                places = chunk.indices.to_pylist()
-                lengths = [len(word) if isinstance(word, str) else 0 for word in words]
-                size = sum(lengths[place] for place in places if place is not None)
-                if size > _MOST_BYTES:
-                    what = f"texts of {size / 1e6:.0f} MB in one column"
-                    raise InputError(Problem(where, what, _ALLOWED, _SMALLER))
-                cells += [None if place is None else words[place] for place in places]
-            return cells
-        except (pa.ArrowException, ArithmeticError, LookupError, ValueError):
-            pass  # a date outside the calendar, text that is not UTF-8
-    return [f"<{column.type}>"] * len(column)
+    try:
+        if not pa.types.is_dictionary(column.type):
+            return column.to_pylist()
+        cells: list = []
+        for chunk in column.chunks:
+            words = chunk.dictionary.to_pylist()
+            places = chunk.indices.to_pylist()
+            lengths = [len(word) if isinstance(word, str) else 0 for word in words]
+            size = sum(lengths[place] for place in places if place is not None)
+            if size > _MOST_BYTES:
+                what = f"texts of {size / 1e6:.0f} MB in one column"
+                raise InputError(Problem(where, what, _ALLOWED, _SMALLER))
+            cells += [None if place is None else words[place] for place in places]
+        return cells
+    except (pa.ArrowException, ArithmeticError, LookupError, ValueError):
+        # A date outside the calendar, text that is not UTF-8.
+        return [f"<{column.type}>"] * len(column)
