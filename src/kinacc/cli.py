@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import click
 
@@ -50,16 +53,39 @@ SECTIONS = {
 }
 
 
+class Terminated(KeyboardInterrupt):
+    """The system asked the command to end (SIGTERM)."""
+
+
 class Commands(click.Group):
     """A group whose commands report bad input as a list of problems, without a traceback."""
 
     def invoke(self, context: click.Context) -> object:
-        """Run the command; exit code 2 on bad input."""
+        """Run the command; exit code 2 on bad input, 130 and 143 where it was stopped.
+
+        What the machine refuses (memory, a disk that is full) is 1, in one sentence as well.
+        """
         try:
-            return super().invoke(context)
+            with _ended_in_order():
+                return super().invoke(context)
         except InputError as error:
-            click.echo(str(error), err=True)
-            context.exit(2)
+            code, said = 2, str(error)
+        except Terminated:
+            code, said = 143, "stopped by the system"
+        except KeyboardInterrupt:
+            code, said = 130, "stopped"
+        except MemoryError as error:
+            code, said = 1, f"there is not enough memory for this: {error or 'ask for less'}"
+        except RecursionError:
+            code, said = 1, "something given to this command is nested too deeply to be read"
+        except BrokenPipeError:
+            raise  # whoever reads our output has seen enough: click ends quietly
+        except OSError as error:
+            if error.filename is None or error.strerror is None:
+                raise
+            code, said = 1, f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
+        click.echo(said, err=True)
+        context.exit(code)
 
     def list_commands(self, context: click.Context) -> list[str]:
         """The commands in the order of the work."""
@@ -79,6 +105,23 @@ class Commands(click.Group):
             if rows:
                 with formatter.section(title):
                     formatter.write_dl(rows)
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """SIGTERM ends the block as Ctrl-C does, so that what it began is tidied up."""
+
+    def end(*_: object) -> None:
+        raise Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the first thread of a program may say what signals do
+        return
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -28,6 +28,9 @@ class Problem:
         return "; ".join(parts)
 
 
+_MOST_SHOWN = 100  # nobody reads more, and a file may hold a hundred thousand faults
+
+
 class KinaccError(Exception):
     """Base of every error kinacc raises on purpose."""
 
@@ -43,7 +46,10 @@ class InputError(KinaccError):
     def __str__(self) -> str:
         count = len(self.problems)
         head = self.title or f"{count} problem{'s' if count != 1 else ''} in the input"
-        return "\n".join([head, *(f"  - {problem}" for problem in self.problems)])
+        lines = [f"  - {problem}" for problem in self.problems[:_MOST_SHOWN]]
+        if count > _MOST_SHOWN:
+            lines.append(f"  - and {count - _MOST_SHOWN} more")
+        return "\n".join([head, *lines])
 
 
 class FitError(KinaccError):

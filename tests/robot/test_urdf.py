@@ -262,3 +262,57 @@ def test_nearly_parallel_axes_keep_parameters_of_the_arms_size(tmp_path):
     assert np.abs(arm.dh.beta_rad).max() > 1e-6
     assert compare(path, arm, "l7", 3)[0] < 1e-9
     assert isinstance(arm.dh, dh.DHModel)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        "<?xml-stylesheet href='x'?>",
+        '<link name="other"><visual><geometry><sphere/></geometry></visual></link>'
+        '<joint name="side" type="fixed"><parent link="l0"/><child link="other"/></joint>',
+        '<link name="other"><inertial><mass value="heavy"/></inertial></link>'
+        '<joint name="side" type="fixed"><parent link="l0"/><child link="other"/></joint>',
+    ],
+    ids=["a processing instruction", "a sphere without radius", "a mass in words"],
+)
+def test_what_a_chain_does_not_need_is_no_reason_to_refuse_a_file(tmp_path, extra):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text_of(UR10, extra))
+    assert robot.load(path).dh.joints == 6
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("?>\n", '?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]>\n'), "entities"),
+        (("0 0 0.1273", "0 0 1e308"), "origin xyz='0 0 1e308'; allowed: 3 finite numbers"),
+        (("0 0 0.1273", f"0 0 {'9' * 500_000}"), "origin xyz='0 0 999"),
+        (("0 0 0.1273", "0 0 0_1"), "origin xyz='0 0 0_1'"),
+        (('lower="-2.5"', 'lower="-1e308"'), "limit lower='-1e308'"),
+        (('<link name="l1"/>', '<link name="l1"/>' + "<link>" * 1000), "depth"),
+    ],
+    ids=["entities", "far away", "long digits", "underscores", "limits", "nesting"],
+)
+def test_a_urdf_file_made_to_do_harm_is_refused_in_a_line(tmp_path, change, words):
+    path = tmp_path / "arm.urdf"
+    text = text_of(UR10).replace(*change, 1)
+    assert change[1] in text
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        robot.load(path)
+    assert words in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_tens_of_thousands_of_joints_are_refused_at_once(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text_of([("fixed", "0 0 0", "0 0 0", None)] * 20_000))
+    with pytest.raises(InputError, match="has 20000 joints; allowed: at most 2000"):
+        robot.load(path)
+
+
+def test_a_large_file_is_refused_before_it_is_read_to_its_end(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text_of(UR10, " " * 11_000_000))
+    with pytest.raises(InputError, match="at most 10 MB"):
+        robot.load(path)

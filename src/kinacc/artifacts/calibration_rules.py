@@ -186,9 +186,9 @@ def _turns(name: str, columns: tuple[str, ...]) -> Rule:
 
 def _slides(table: Columns) -> list[int]:
     """Joints (from 1) of the described arm that slide."""
-    import yaml
+    from kinacc.config.reading import parsed
 
-    rows = yaml.safe_load(str(table["description"][0]))["dh"]
+    rows = parsed(str(table["description"][0]), "robot.parquet, description")[0].data["dh"]
     return [joint for joint, row in enumerate(rows, 1) if row.get("joint") == "prismatic"]
 
 

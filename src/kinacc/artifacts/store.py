@@ -25,6 +25,7 @@ _ARROW_TYPES = {
     "int8": pa.int8(),
     "text": pa.string(),
 }
+_MOST_VALUES = 100_000_000
 
 
 class TableToWrite(NamedTuple):
@@ -116,11 +117,16 @@ def write_all(tables: Sequence[TableToWrite]) -> None:
             pq.write_table(each, place, compression="zstd", version="2.6")
 
 
+def unfinished(path: Path | str, process: int) -> Path:
+    """Where a process writes a file before it is whole."""
+    return Path(path).with_name(f".{Path(path).name}.{process}.partial")
+
+
 @contextmanager
 def replacing(paths: Sequence[Path | str]) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths``; renamed to them on success, removed on any failure."""
     targets = [Path(path) for path in paths]
-    temporary = [path.with_name(f".{path.name}.{os.getpid()}.partial") for path in targets]
+    temporary = [unfinished(path, os.getpid()) for path in targets]
     for path in targets:
         path.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -138,8 +144,16 @@ def read(path: Path | str) -> dict[str, np.ndarray]:
     Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
     Raises InputError if the file is absent or not Parquet.
     """
-    table = _open(path, lambda file: file.read(use_threads=False))
-    return {name: _to_numpy(table.schema.field(name), table[name]) for name in table.column_names}
+    return _open(path, lambda file: _columns(_unpacked(file, path)))
+
+
+def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
+    """All of a file, if its footer says that it can be held: few bytes may unpack to many."""
+    rows, columns = file.metadata.num_rows, file.metadata.num_columns
+    if rows * columns > _MOST_VALUES:
+        allowed = f"at most {_MOST_VALUES} values"
+        raise InputError(Problem(str(path), f"{rows} rows of {columns} columns", allowed))
+    return file.read(use_threads=False)
 
 
 def read_schema(path: Path | str) -> pa.Schema:
@@ -150,7 +164,7 @@ def read_schema(path: Path | str) -> pa.Schema:
 def read_metadata(path: Path | str) -> dict[str, str]:
     """Provenance of a table's file as text; InputError if absent or not Parquet."""
     raw = read_schema(path).metadata or {}
-    return {key.decode(): value.decode() for key, value in raw.items()}
+    return {key.decode(errors="replace"): raw[key].decode(errors="replace") for key in raw}
 
 
 def _open(path, opening):
@@ -159,9 +173,14 @@ def _open(path, opening):
             return opening(file)
     except FileNotFoundError:
         raise InputError(Problem(str(path), "no such file")) from None
-    except (pa.ArrowInvalid, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(Problem(str(path), f"not a readable Parquet file: {reason}")) from None
+
+
+def _columns(table: pa.Table) -> dict[str, np.ndarray]:
+    names = zip(table.schema, table.columns, strict=True)
+    return {field.name: _to_numpy(field, column) for field, column in names}
 
 
 def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:

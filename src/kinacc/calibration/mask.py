@@ -30,7 +30,8 @@ _COMPONENTS = {name: f"{name}_mm" for name in "xyz"}
 _COMPONENTS |= {f"r{name}": f"r{name}_rad" for name in "xyz"}
 _UNITS = {"mm": ("mm", 1.0), "rad": ("rad", 1.0), "mrad": ("rad", 1e-3)}
 _UNITS["deg"] = ("rad", math.pi / 180.0)
-_JOINT = re.compile(r"(?:joint ?|j)(\d+)(?:[ .](\w+))?")
+_LARGEST = 1e100  # beyond, squares overflow
+_JOINT = re.compile(r"(?:joint ?|j)(\d{1,9})(?:[ .](\w+))?")
 _SUBJECT = ("joint", "frame", "parameter")
 JOINTS, FRAMES = "joints", "frames"
 KEYS = {JOINTS: "calibration.dh.parameters", FRAMES: "calibration.frames"}
@@ -172,7 +173,7 @@ def _said(says: Any, parameter: str | None) -> tuple[bool, dict, dict, list[str]
         into = value if head == "value" else std
         if kind in into:
             faults.append(f"{key} is stated in two units")
-        if not math.isfinite(number) or (head == "prior_std" and number <= 0.0):
+        if not abs(number) < _LARGEST or (head == "prior_std" and number <= 0.0):
             faults.append(f"{key}: {number!r} is not {'positive' if into is std else 'finite'}")
         if parameter and unit(parameter) != kind:
             faults.append(f"{key}: {parameter} is in {unit(parameter)}")

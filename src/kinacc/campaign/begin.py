@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,7 +43,7 @@ def points_of(
     directions = None if directions is None else directions[kept]
     problems = _outside(arm, joints, label)
     problems += [fault for each in label for fault in not_in_a_line("candidates, pose", each)]
-    if doubled := sorted({each for each in label if label.count(each) > 1}):
+    if doubled := sorted(each for each, count in Counter(label).items() if count > 1):
         what = f"names given to different joints: {', '.join(doubled[:5])}"
         problems.append(Problem("candidates", what, "one name per point"))
     if problems:

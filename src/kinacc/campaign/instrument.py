@@ -16,6 +16,7 @@ BASE, INSTRUMENT = "base", "instrument"
 FRAMES = (BASE, INSTRUMENT)
 _FORMS = "1 standard deviation, 3 (x, y, z), or 9 numbers of a covariance in mm^2, row by row"
 _LARGEST_STD_MM = 1e3
+_SMALLEST_STD_MM = 1e-9  # below the size of an atom; squares of less vanish
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,10 @@ def covariance_of(text: str, where: str, problems: list[Problem]) -> np.ndarray 
     if not (values > 0.0).all():
         allowed = "above 0, in mm: no instrument is without noise"
         problems.append(Problem(where, f"standard deviation {text.strip()}", allowed))
+        return None
+    if (values < _SMALLEST_STD_MM).any():
+        allowed = f"at least {_SMALLEST_STD_MM:g} mm"
+        problems.append(Problem(where, f"standard deviation {text.strip()} mm", allowed))
         return None
     if (values > _LARGEST_STD_MM).any():
         problems.append(Problem(where, f"standard deviation {text.strip()} mm", "below 1 m"))

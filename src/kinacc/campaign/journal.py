@@ -49,7 +49,7 @@ def read(path: Path, seed: str) -> Journal:
         try:
             parsed = json.loads(line)
             entry, chain = parsed["entry"], parsed["chain"]
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             if number == len(whole) and b"\0" in line:
                 break  # a machine that lost power may leave zeros where nothing was written yet
             raise _damaged(path, number, "cannot be read") from None

@@ -145,9 +145,18 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
         for each in settings
         if each not in known
     ]
+    problems += [
+        Problem(f"setting {each} of {name}", f"{value!r}"[:60], "a number")
+        for each, value in settings.items()
+        if each in known and _is_number(known[each].default) and not _is_number(value)
+    ]
     if problems:
         raise InputError(problems)
     return ADAPTIVE[name](**settings)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def to_json(plan: Plan) -> bytes:
@@ -198,8 +207,15 @@ def from_json(text: bytes, where: str) -> Plan:
         if content["format"] != FORMAT:
             what = f"format {content['format']!r}"
             raise InputError(Problem(where, what, f"format {FORMAT}", "use a later kinacc"))
-        return _plan(content)
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+        return _checked(_plan(content))
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        RecursionError,
+        TypeError,
+        ValueError,
+    ) as error:
         what = f"is no campaign: {type(error).__name__}: {error}"
         raise InputError(Problem(where, what, fix="bring it back from a copy")) from None
 
@@ -228,6 +244,35 @@ def _plan(content: Mapping) -> Plan:
         content["seed"],
         content["about"],
     )
+
+
+def _checked(plan: Plan) -> Plan:
+    """The plan, where its arrays fit each other; ValueError where they do not."""
+    points, (count, joints) = plan.points, plan.points.joints.shape
+    fits = {
+        "points": joints == plan.arm.dh.joints
+        and points.modelled_mm.shape == (count, 3)
+        and points.slope.shape == (count, 3, joints)
+        and (points.directions is None or points.directions.shape == (count, joints))
+        and all(np.isfinite(each).all() for each in (points.joints, points.slope)),
+        "order": np.array_equal(np.sort(plan.order), np.arange(count)),
+        "route": np.isin(plan.route, plan.order).all(),
+        "instruments": bool(plan.instruments)
+        and all(
+            each.covariance_mm2.shape == (3, 3) and np.isfinite(each.covariance_mm2).all()
+            for each in plan.instruments
+        ),
+        "to_base": plan.to_base.rotation.shape == (3, 3) and plan.to_base.position_mm.shape == (3,),
+        "arm": plan.arm.joint_map.shape == (joints, joints)
+        and plan.arm.turn.shape == (3, 3)
+        and plan.arm.point_mm.shape == (3,),
+    }
+    fits["seed"] = isinstance(plan.seed, int) and plan.seed >= 0
+    fits["limits"] = _is_number(plan.limits.joint_rad) and _is_number(plan.limits.implausible_mm)
+    for name, fit in fits.items():
+        if not fit:
+            raise ValueError(f"{name} does not fit the rest")
+    return plan
 
 
 def digest(text: bytes) -> str:

@@ -38,7 +38,7 @@ def campaign() -> None:
 @click.option("--session", help="Session whose instrument placement is meant. [the first]")
 @click.option("--point", help="Target that is measured, or flange. [the tool]")
 @click.option("--candidates", type=click.Path(), help="File of joints that may be measured.")
-@click.option("--drawn", default=200, show_default=True, type=click.IntRange(1),
+@click.option("--drawn", default=200, show_default=True, type=click.IntRange(1, 20_000),
               help="Candidates drawn where there is no file.")  # fmt: skip
 @click.option(
     "--region",
@@ -56,7 +56,8 @@ def campaign() -> None:
               show_default=True, help="Frame of readings and covariances.")  # fmt: skip
 @click.option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]")
 @click.option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE.")
-@click.option("--budget", default=200, show_default=True, type=int, help="Readings in all.")
+@click.option("--budget", default=200, show_default=True, type=click.IntRange(max=1_000_000),
+              help="Readings in all.")  # fmt: skip
 @click.option("--confidence", default=0.95, show_default=True, type=float,
               help="How surely each bound is to hold.")  # fmt: skip
 @click.option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have.")
@@ -195,7 +196,7 @@ def strike(folder, number, reason, as_json) -> None:
 @click.option("--tolerance-mm", type=float, help="Largest error allowed. [as begun]")
 @click.option("--target", type=click.Choice(["candidates", "measured"]),
               help="Which largest error the forecast is about. [as begun]")  # fmt: skip
-@click.option("--simulations", default=20, show_default=True, type=click.IntRange(0),
+@click.option("--simulations", default=20, show_default=True, type=click.IntRange(0, 10_000),
               help="Simulated ends for the forecast; 0 for none.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 def status(**given) -> None:

@@ -16,6 +16,7 @@ from kinacc.inverse import limits
 from kinacc.planning.candidates import spread
 
 _MOST_DRAWS = 256  # joint values drawn per candidate before the region is called too wide
+_MOST_CANDIDATES = 20_000
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,9 @@ def candidates(given: Mapping, arm: Calibration) -> Found:
         found = rows.limit_problems(arm.robot, file.joints, file.label, given["candidates"])
         if found:
             raise InputError(found, "Candidates outside the robot's limits")
+        if len(file.joints) > _MOST_CANDIDATES:
+            what = f"{len(file.joints)} candidates"
+            raise InputError(Problem(given["candidates"], what, f"at most {_MOST_CANDIDATES}"))
         label = [str(each) for each in file.label]
         source = f"rows of {Path(given['candidates']).name}"
         return Found(file.joints, label, file.directions, source)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypeVar
@@ -14,6 +13,7 @@ from kinacc.campaign import instrument, plan
 from kinacc.errors import InputError, Problem
 
 Made = TypeVar("Made")
+_LARGEST_MM = 1e6
 
 
 def instruments(given: Mapping) -> tuple[instrument.Instrument, ...]:
@@ -41,7 +41,7 @@ def assessor(given: Mapping) -> AdaptiveAssessor:
             raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
         try:
             settings[name.strip()] = json.loads(value)
-        except ValueError:
+        except (ValueError, RecursionError):
             settings[name.strip()] = value.strip()
     try:
         return plan.assessor_of(given["assessor"] or RECOMMENDED, settings)
@@ -54,11 +54,11 @@ def assessor(given: Mapping) -> AdaptiveAssessor:
 
 
 def not_positive(given: Mapping, name: str) -> list[Problem]:
-    """A problem where an option is given and not above 0."""
+    """A problem where an option is given and not above 0, or beyond all arms."""
     value = given[name]
-    if value is None or (math.isfinite(value) and value > 0.0):
+    if value is None or 0.0 < value <= _LARGEST_MM:
         return []
-    return [Problem(f"--{name.replace('_', '-')}", f"{value:g}", "above 0")]
+    return [Problem(f"--{name.replace('_', '-')}", f"{value:g}", f"above 0, to {_LARGEST_MM:g}")]
 
 
 def gathered(

@@ -21,6 +21,7 @@ from kinacc.errors import InputError, Problem
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 _SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 _DRAW = 0
+_MOST_READINGS = 50_000_000  # a gigabyte: any pose may be the one that is read again and again
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,10 @@ def question(given: Mapping) -> Question:
         problems += campaign_options.not_positive(given, name)
     points = given["poses"]
     budgets = given["budget"] or [max(round(share * points), 2) for share in _SHARES]
+    if points * max(budgets) > _MOST_READINGS:
+        what = f"{points} poses with up to {max(budgets)} readings each"
+        allowed = f"at most {_MOST_READINGS:g}, poses times the largest budget"
+        problems.append(Problem("--poses, --budget", what, allowed))
     assessors = [
         campaign_options.gathered(
             problems, lambda each=each: campaign_options.assessor({**given, "budget": each})

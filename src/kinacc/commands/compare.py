@@ -14,7 +14,12 @@ PICTURES = (".svg", ".png", ".pdf")
 @click.argument("second", type=click.Path())
 @click.option("--joints", type=click.Path(), help="Joints to compare poses at. [as measured]")
 @click.option(
-    "--poses", "count", default=500, show_default=True, type=click.IntRange(10), help="At most."
+    "--poses",
+    "count",
+    default=500,
+    show_default=True,
+    type=click.IntRange(10, 100_000),
+    help="At most.",
 )
 @click.option("--picture", type=click.Path(), help="Draw to a .svg, .png or .pdf file.")
 @click.option(

@@ -11,9 +11,9 @@ from kinacc.commands.plan_poses import PICTURES
 @click.command("plan-campaign")
 @click.option("--noise-mm", help="Standard deviation per axis: one number, or three.")
 @click.option("--covariance-mm2", help="Covariance of a reading: nine numbers, row by row.")
-@click.option("--poses", default=200, show_default=True, type=click.IntRange(2),
+@click.option("--poses", default=200, show_default=True, type=click.IntRange(2, 100_000),
               help="Candidates the statement is to be about.")  # fmt: skip
-@click.option("--budget", multiple=True, type=click.IntRange(1),
+@click.option("--budget", multiple=True, type=click.IntRange(1, 1_000_000),
               help="Readings in all; may be repeated. [1/4 to 3 times the poses]")  # fmt: skip
 @click.option("--width-mm", type=float, help="Wanted distance of upper from lower bound.")
 @click.option("--tolerance-mm", type=float, help="Largest error allowed.")
@@ -28,7 +28,7 @@ from kinacc.commands.plan_poses import PICTURES
 @click.option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE.")
 @click.option("--confidence", default=0.95, show_default=True, type=float,
               help="How surely each bound is to hold.")  # fmt: skip
-@click.option("--repetitions", default=30, show_default=True, type=click.IntRange(2),
+@click.option("--repetitions", default=30, show_default=True, type=click.IntRange(2, 100_000),
               help="Simulated campaigns per budget.")  # fmt: skip
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0),
               help="Decides every random draw.")  # fmt: skip

@@ -7,20 +7,30 @@ import click
 from kinacc.commands import choice
 
 PICTURES = (".svg", ".png", ".pdf")
+MOST_CANDIDATES = 100_000
 INDICES = ("O1", "O2", "O3", "O4", "O5")
 
 
 @click.command("plan-poses")
 @click.argument("robot", required=False)
 @click.option(
-    "--poses", "count", default=40, show_default=True, type=click.IntRange(1), help="Poses chosen."
+    "--poses",
+    "count",
+    default=40,
+    show_default=True,
+    type=click.IntRange(1, 2000),
+    help="Poses chosen.",
 )
 @click.option(
     "--index", type=click.Choice(INDICES), default="O1", show_default=True, help="What is best."
 )
 @click.option("--candidates", type=click.Path(), help="File of joints to choose from.")
 @click.option(
-    "--drawn", default=1000, show_default=True, type=click.IntRange(10), help="Candidates drawn."
+    "--drawn",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(10, MOST_CANDIDATES),
+    help="Candidates drawn.",
 )
 @click.option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...". [limits]')
 @click.option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')

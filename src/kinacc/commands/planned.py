@@ -10,6 +10,7 @@ import numpy as np
 
 from kinacc import robot as robots
 from kinacc.commands import rows
+from kinacc.commands.plan_poses import MOST_CANDIDATES
 from kinacc.commands.sheet import Field, Sheet
 from kinacc.commands.spaces import Settings, inside_box, joint_ranges, ranges, settings_of
 from kinacc.commands.tables import joint_fields
@@ -91,6 +92,9 @@ def question(given: Mapping) -> Question:
         found = rows.limit_problems(robot, file.joints, file.label, given["candidates"])
         if found:
             raise InputError(found, "Candidates outside the robot's limits")
+        if len(file.joints) > MOST_CANDIDATES:
+            what = f"{len(file.joints)} candidates"
+            raise InputError(Problem(given["candidates"], what, f"at most {MOST_CANDIDATES}"))
         joints, label = file.joints, file.label
     else:
         inside = settings.inside if space is None else inside_box(space)

@@ -21,6 +21,7 @@ ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
 LENGTH = {"mm": 1.0, "m": 1e3}
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
+_HEAD = 1_000_000  # characters of a line looked at
 
 
 @dataclass(frozen=True)
@@ -242,7 +243,7 @@ def open_table(path: str | Path) -> RawTable:
         return _with_units(load(path, ",", "."))
     delimiter, decimal = ",", "."
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        head, first = file.readline(), file.readline()
+        head, first = file.readline(_HEAD), file.readline(_HEAD)
     if ";" in head:
         delimiter = ";"
         decimal = "," if "," in first and "." not in first else "."

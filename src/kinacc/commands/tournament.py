@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from kinacc.stages.runner import Job
 
 
 @click.command("tournament")
@@ -15,12 +19,12 @@ import click
     type=click.Choice(["default", "coverage", "budgets", "full"]),
     help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
-@click.option("--parts", type=click.IntRange(1), help="Number of parts. [configuration]")
+@click.option("--parts", type=click.IntRange(1, 10_000), help="Number of parts. [configuration]")
 @click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
 @click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
 @click.option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")
 @click.option(
-    "--cores", type=click.IntRange(1), default=1, show_default=True, help="Parts at a time."
+    "--cores", type=click.IntRange(1, 1000), default=1, show_default=True, help="Parts at a time."
 )
 @click.option("--times", is_flag=True, help="Also measure the time of a campaign of each.")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
@@ -55,29 +59,37 @@ def tournament(
     left = [job for job in waiting if not is_done(job)]
     if len(left) < len(waiting):
         click.echo(f"{len(waiting) - len(left)} of {len(waiting)} parts are there", err=True)
-    _carry_out(left, cores)
-    if part is not None:
-        return
-    execute(contest.tables_job(), bar=True)
+    finished = len(waiting) - len(left)
+    try:
+        for job in _carried_out(left, cores):
+            finished += 1
+            if len(left) > 1 and cores > 1:
+                click.echo(f"{job.label}: done, {finished} of {len(waiting)}", err=True)
+        if part is not None:
+            return
+        execute(contest.tables_job(), bar=True)
+    except KeyboardInterrupt:
+        click.echo(
+            f"tournament: {finished} of {len(waiting)} parts are done and kept; the same command "
+            "goes on from there",
+            err=True,
+        )
+        raise
     _tell(contest.outputs, _times(contest) if times else {}, as_json)
 
 
-def _carry_out(jobs, cores: int) -> None:
-    from kinacc.stages.runner import execute
-
+def _carried_out(jobs: Sequence[Job], cores: int) -> Iterator[Job]:
+    """Run the jobs and yield each when it is done."""
     if cores == 1 or len(jobs) < 2:
+        from kinacc.stages.runner import execute
+
         for job in jobs:
             execute(job, bar=True)
+            yield job
         return
-    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from kinacc.stages.side_by_side import execute_all
 
-    with ProcessPoolExecutor(cores) as pool:
-        started = {pool.submit(execute, job): job for job in jobs}
-        for done, future in enumerate(as_completed(started), 1):
-            if future.exception() is not None:  # said and logged by the part itself
-                pool.shutdown(cancel_futures=True)
-                raise SystemExit(1)
-            click.echo(f"{started[future].label}: done, {done} of {len(jobs)}", err=True)
+    yield from execute_all(jobs, cores)
 
 
 def _times(contest) -> dict[str, float]:

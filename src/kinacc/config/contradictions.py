@@ -6,6 +6,7 @@ Every rule yields problems; ``place(*keys)`` words where a setting of the data s
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ from kinacc.errors import InputError, Problem
 
 Place = Callable[..., str]
 _SYNTHESISED = "mh180"
+# A few gigabytes, or a day of work, each.
+_MOST_CELLS, _MOST_TERMS = 2_000_000, 1_000_000
+_MOST_SIMULATIONS, _MOST_READINGS, _MOST_HELD = 200_000, 10**9, 10**8
 _FOLDS_TO_CHOOSE = 3  # one held out of the choice, one to try candidates on, one to fit them to
 
 
@@ -61,7 +65,14 @@ def _space(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
     evaluation = full["evaluation"]
     if evaluation["space"] != "cylinder":
         return
-    low, high = evaluation["cylinder"]["angle_deg"]
+    cylinder, grid_mm = evaluation["cylinder"], full["map"]["grid_mm"]
+    sides = [math.ceil(cylinder[key] / grid_mm) + 1 for key in ("radial_span_mm", "height_mm")]
+    cells = len(full["map"]["slices_deg"]) * sides[0] * sides[1]
+    if cells > _MOST_CELLS:
+        what = f"{grid_mm:g} mm between {cells} cells of all slices"
+        allowed = f"a grid of at most {_MOST_CELLS} cells (map.slices_deg, evaluation.cylinder)"
+        yield Problem(place("map", "grid_mm"), what, allowed)
+    low, high = cylinder["angle_deg"]
     outside = [f"{each:g}" for each in full["map"]["slices_deg"] if not low <= each <= high]
     if outside:
         yield Problem(
@@ -72,6 +83,7 @@ def _space(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
 
 
 def _study(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
+    yield from _work(full, place)
     for section, key in (("study", "noise_mm"), ("map", "slices_deg")):
         values = full[section][key]
         if sorted(set(values)) != list(values):
@@ -84,6 +96,33 @@ def _study(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
             f"{histories['eta_ratio_larger']:g} is not larger than eta_ratio_rejected",
             f"above {histories['eta_ratio_rejected']:g}",
         )
+
+
+def _work(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
+    """Numbers that are each fine and multiply to what no machine holds or finishes."""
+    study, points = full["study"], full["evaluation"]["points"]
+    noises, repetitions = len(study["noise_mm"]), study["repetitions"]
+    measurements = study["measurements"]
+    if noises * repetitions > _MOST_SIMULATIONS:
+        what = f"{repetitions} simulations at each of {noises} noises"
+        allowed = f"at most {_MOST_SIMULATIONS} in all (study.noise_mm)"
+        yield Problem(place("study", "repetitions"), what, allowed)
+    elif noises * repetitions * measurements > _MOST_READINGS:
+        what = f"{repetitions} repetitions at {noises} noises of {measurements} measurements"
+        allowed = f"at most {_MOST_READINGS:.0e} measurements in all (study.measurements)"
+        yield Problem(place("study", "repetitions"), what, allowed)
+    if min(points, measurements) * measurements > _MOST_HELD:
+        what = f"{measurements} measurements, of which any of {points} points may take all"
+        allowed = f"at most {_MOST_HELD:.0e}, points times measurements (evaluation.points)"
+        yield Problem(place("study", "measurements"), what, allowed)
+    if full["measurements"]["source"] == "synthetic":
+        poses, volumetric = full["measurements"]["synthetic"]["poses"], full["calibration"]["vec"]
+        order = volumetric["order"]
+        order = volumetric["order_highest"] if order == "auto" else order
+        if poses * (order + 1) > _MOST_TERMS:
+            what = f"{poses} poses to fit polynomials of order {order} to"
+            allowed = f"at most {_MOST_TERMS}, poses times order + 1 (calibration.vec)"
+            yield Problem(place("measurements", "synthetic", "poses"), what, allowed)
 
 
 def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Iterator[Problem]:
@@ -169,8 +208,8 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
             f"data set {name} reads a file, but measurements.file.path is not given",
             "path of a CSV or Parquet file",
         )
-    elif not (folder / file["path"]).is_file():
-        is_folder = (folder / file["path"]).is_dir()
+    elif not os.path.isfile(folder / file["path"]):
+        is_folder = os.path.isdir(folder / file["path"])
         origin = file["source"]
         yield Problem(
             place("measurements", "file", "path"),

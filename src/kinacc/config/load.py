@@ -22,6 +22,7 @@ from kinacc.config.values import shown
 from kinacc.errors import InputError, Problem
 
 COMMAND_LINE = "command line"
+_MOST_DATASETS = 500
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
 
@@ -95,6 +96,10 @@ def _resolve(
         fix = f"known at the top level: {', '.join(names)}"
         problems.append(Problem(where, what, "datasets: with a section for each data set", fix))
         return {}, problems
+    if len(datasets) > _MOST_DATASETS:
+        what = f"{len(datasets)} data sets are given"
+        allowed = f"at most {_MOST_DATASETS} in one run"
+        return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
     resolved = {}
     for name, content in datasets.items():
         problems += check_dataset_name(name, place)

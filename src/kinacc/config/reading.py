@@ -13,11 +13,25 @@ from kinacc.errors import Problem
 
 KeyPath = tuple[Any, ...]
 
-_CONSTRUCTOR = yaml.constructor.SafeConstructor()
+# No description that a person writes comes near these; what does would take minutes or all memory.
+_MOST_BYTES = 1_000_000
+_MOST_VALUES = 20_000
 _DEEPEST = 12
+_LONGEST_TEXT = 10_000
+_LONGEST_NUMBER = 100
+
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_CONSTRUCTOR = yaml.constructor.SafeConstructor()
+_MAKERS = {
+    tag: yaml.constructor.SafeConstructor.yaml_constructors[tag]
+    for tag in (
+        f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "timestamp")
+    )
+}
 
 # YAML 1.1 reads 1e-6 (no point, no sign) as text; nobody who writes it means a text.
-_FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
+_FLOAT = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+")
+_LIKE_A_NUMBER = re.compile(r"[-+]?(0[xb][\da-fA-F_]+|[\d.][\d._:]*([eE][-+]?\d*)?)")
 
 
 @dataclass(frozen=True)
@@ -61,7 +75,10 @@ def read(path: Path | str) -> tuple[Document, list[Problem]]:
     """One YAML file; problems instead of exceptions for all that is wrong with it as YAML."""
     name = str(path)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        # No more is read than is needed to see that it is too much: the file may be a device.
+        with open(path, "rb") as stream:
+            content = stream.read(_MOST_BYTES + 1)
+        text = content.decode("utf-8-sig") if len(content) <= _MOST_BYTES else ""
     except FileNotFoundError:
         fix = "give the path of a configuration file, e.g. config.yaml"
         return Document(name, {}), [Problem(name, "no such file", fix=fix)]
@@ -70,28 +87,73 @@ def read(path: Path | str) -> tuple[Document, list[Problem]]:
     except UnicodeDecodeError as error:
         what = f"is not text in UTF-8 (byte {error.start})"
         return Document(name, {}), [Problem(name, what, "a YAML file")]
-    except OSError as error:
-        return Document(name, {}), [Problem(name, f"cannot be read: {error.strerror}")]
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        return Document(name, {}), [Problem(name, f"cannot be read: {reason}")]
+    if len(content) > _MOST_BYTES:
+        allowed = f"a YAML file of at most {_MOST_BYTES // 1000} kB"
+        return Document(name, {}), [Problem(name, "is too large for a description", allowed)]
     return parsed(text, name)
 
 
 def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
     """YAML text, as ``read``; ``name`` is what problems call it."""
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)(text)
+    problem = unreadable(text, name)
+    if problem:
+        return Document(name, {}), [problem]
     try:
-        node = loader.get_single_node()
+        node = yaml.compose(text, Loader=_LOADER)
     except yaml.YAMLError as error:
         return Document(name, {}), [_yaml_problem(name, error)]
-    finally:
-        loader.dispose()
     if node is None:
         return Document(name, {}), [Problem(name, "is empty", "at least one key")]
     if not isinstance(node, yaml.MappingNode):
         return Document(name, {}), [Problem(name, "holds no keys", "a mapping such as seed: 1")]
-    lines: dict[KeyPath, int] = {}
-    problems: list[Problem] = []
-    data = _plain(name, node, (), lines, problems)
-    return Document(name, data, lines), problems
+    walk = _Walk(name)
+    data = walk.plain(node, ())
+    if walk.left < 0:
+        what = "its aliases (*name) stand for too many values"
+        allowed = f"at most {_MOST_VALUES} values, aliases counted as what they stand for"
+        return Document(name, {}), [Problem(name, what, allowed, "write the values out")]
+    return Document(name, data, walk.lines), walk.problems
+
+
+def unreadable(text: str, name: str) -> Problem | None:
+    """Why a text is not YAML, or too much of it to be read safely; None where nothing is wrong.
+
+    Looks at one event after another: to build values of nested ones takes a step of the machine's
+    own stack for each level, which ends the process where the text is nested deeply enough.
+    """
+    depth = values = 0
+    try:
+        for event in yaml.parse(text, Loader=_LOADER):
+            what = allowed = ""
+            if isinstance(event, yaml.CollectionStartEvent):
+                depth, values = depth + 1, values + 1
+            elif isinstance(event, yaml.CollectionEndEvent):
+                depth -= 1
+            elif isinstance(event, yaml.ScalarEvent):
+                values += 1
+                what, allowed = _too_long(event)
+            if depth > _DEEPEST:
+                what, allowed = "is nested without end", f"at most {_DEEPEST} levels"
+            elif values > _MOST_VALUES:
+                what, allowed = "holds too many values", f"at most {_MOST_VALUES} in a file"
+            if what:
+                return Problem(f"{name}:{event.start_mark.line + 1}", what, allowed)
+    except (yaml.YAMLError, ValueError) as error:
+        return _yaml_problem(name, error)
+    return None
+
+
+def _too_long(event: yaml.ScalarEvent) -> tuple[str, str]:
+    """What is wrong with the length of a text or number, and what is allowed; empty if nothing."""
+    length = len(event.value)
+    if length > _LONGEST_NUMBER and event.implicit[0] and _LIKE_A_NUMBER.fullmatch(event.value):
+        return f"a number of {length} characters", f"numbers of at most {_LONGEST_NUMBER}"
+    if length > _LONGEST_TEXT:
+        return f"a text of {length} characters", f"texts of at most {_LONGEST_TEXT}"
+    return "", ""
 
 
 def _yaml_problem(name: str, error: Exception) -> Problem:
@@ -103,34 +165,57 @@ def _yaml_problem(name: str, error: Exception) -> Problem:
     return Problem(f"{name}{line}", f"is not YAML: {reason}", fix=fix)
 
 
-def _plain(name: str, node, path: KeyPath, lines: dict, problems: list[Problem]) -> Any:
-    """Plain value of a YAML node; notes lines and repeated keys on the way."""
-    if len(path) > _DEEPEST:
-        problems.append(Problem(f"{name}, {dotted(path[:3])}", "is nested without end"))
-        return None
-    if isinstance(node, yaml.MappingNode):
+class _Walk:
+    """From nodes to plain values; notes lines and repeated keys on the way.
+
+    ``left`` counts down the values that may still come; below zero, no more are made.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.lines: dict[KeyPath, int] = {}
+        self.problems: list[Problem] = []
+        self.left = _MOST_VALUES
+
+    def plain(self, node, path: KeyPath) -> Any:
+        """Plain value of a YAML node."""
+        self.left -= 1
+        if self.left < 0:
+            return None
+        if len(path) > _DEEPEST:
+            where = f"{self.name}:{node.start_mark.line + 1}, {dotted(path[:3])}"
+            self.problems.append(Problem(where, "is nested without end"))
+            return None
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, path)
+        if not isinstance(node, yaml.SequenceNode):
+            return _scalar(node)
+        items = []
+        for number, item in enumerate(node.value):
+            here = (*path, number)
+            self.lines[here] = item.start_mark.line + 1
+            items.append(self.plain(item, here))
+            if self.left < 0:
+                break
+        return items
+
+    def _mapping(self, node, path: KeyPath) -> dict[Any, Any]:
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             key, line = _scalar(key_node), key_node.start_mark.line + 1
             here = (*path, key)
             if key in mapping:
-                what = f"{key!r} is given twice, first in line {lines[here]}"
+                what = f"{key!r} is given twice, first in line {self.lines[here]}"
                 if path == ("datasets",):
                     what = f"data set {what}"
-                place = f"{name}:{line}, {dotted(here)}"
-                problems.append(Problem(place, what, "every name once", "keep one of the two"))
+                place = f"{self.name}:{line}, {dotted(here)}"
+                self.problems.append(Problem(place, what, "every name once", "keep one of the two"))
                 continue
-            lines[here] = line
-            mapping[key] = _plain(name, value_node, here, lines, problems)
+            self.lines[here] = line
+            mapping[key] = self.plain(value_node, here)
+            if self.left < 0:
+                break
         return mapping
-    if isinstance(node, yaml.SequenceNode):
-        items = []
-        for number, item in enumerate(node.value):
-            here = (*path, number)
-            lines[here] = item.start_mark.line + 1
-            items.append(_plain(name, item, here, lines, problems))
-        return items
-    return _scalar(node)
 
 
 def _scalar(node) -> Any:
@@ -139,7 +224,11 @@ def _scalar(node) -> Any:
         return f"<{node.id}>"
     if not node.style and _FLOAT.fullmatch(node.value):
         return float(node.value)
+    make = _MAKERS.get(node.tag)
+    # A tag (!!int) may stand before any text, and the constructors trust it.
+    if make is None or len(node.value) > _LONGEST_NUMBER:
+        return node.value
     try:
-        return _CONSTRUCTOR.construct_object(node)
-    except (yaml.YAMLError, ValueError):
+        return make(_CONSTRUCTOR, node)
+    except (ArithmeticError, AttributeError, LookupError, ValueError):
         return node.value

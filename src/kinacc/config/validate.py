@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -67,7 +68,7 @@ def check_dataset_name(name: Any, place: Place) -> list[Problem]:
 def check_robot(robot: str, path: KeyPath, place: Place, folder: Path) -> list[Problem]:
     """A robot is one that is shipped, or a file that exists."""
     shipped = tuple(sorted(item.stem for item in ROBOTS.glob("*.yaml")))
-    if robot in shipped or (folder / robot).is_file():
+    if robot in shipped or os.path.isfile(folder / robot):
         return []
     allowed = f"{', '.join(shipped)}, or the path of a robot file"
     if robot.endswith((".yaml", ".yml")) or "/" in robot:

@@ -14,6 +14,7 @@ from kinacc.errors import Problem
 
 Place = Callable[[KeyPath], str]
 
+_LARGEST = 10**300  # a whole number beyond may have no float, and a million digits
 _ITEM = {"ints": "int", "floats": "float", "texts": "text", "pairs": "pair"}
 INVALID = object()  # what a value that cannot be used is replaced by
 
@@ -27,6 +28,8 @@ _MIXED_UP = (
     ("mrad", "deg", 1.0e3 * math.pi / 180.0),
     ("mm/rad", "m/rad", 1.0e3),
 )
+_LONGEST_WORD = 100  # to compare words takes their lengths multiplied
+_MOST_NAMES = 2000  # of one mapping: they are held against each other
 _UNIT_ENDINGS = ("nm", "um", "mm", "cm", "m", "deg", "rad", "mrad", "urad", "percent")
 
 
@@ -45,6 +48,8 @@ def shown(value: Any) -> str:
     """A value as it stands in the file, shortened."""
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, int) and abs(value) >= _LARGEST:
+        return "a number of more than 300 digits"
     text = repr(value) if isinstance(value, (str, dict, list)) else str(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -52,6 +57,8 @@ def shown(value: Any) -> str:
 def nearest(word: object, known: tuple[str, ...]) -> str:
     """The known word most like ``word``; empty if none is."""
     text = str(word)
+    if len(text) > _LONGEST_WORD:
+        return ""
     stem = _stem(text)
     same = [each for each in known if _stem(each) == stem]
     found = same or difflib.get_close_matches(text, known, n=1, cutoff=0.6)
@@ -61,7 +68,7 @@ def nearest(word: object, known: tuple[str, ...]) -> str:
 
 def unknown_key(name: object, section: Section, top: Section) -> tuple[str, str]:
     """What to say of a key that is not known: the fault, and what to do about it."""
-    what = f"unknown key {shown(name) if isinstance(name, str) else str(name)}"
+    what = f"unknown key {shown(name)}"
     close = nearest(name, section.names)
     if close:
         entry = section.entry(close)
@@ -92,7 +99,7 @@ def _number(key: Key, value: Any, path: KeyPath, place: Place, whole: bool):
         if isinstance(value, str):
             fix = _number_in_text(value)
         return _refuse(key, path, place, f"{shown(value)} is not a number", fix)
-    if not math.isfinite(value):
+    if not abs(value) < _LARGEST:
         return _refuse(key, path, place, f"{shown(value)} is not a finite number")
     if whole and value != int(value):
         return _refuse(key, path, place, f"{shown(value)} is not a whole number")
@@ -217,6 +224,8 @@ def _distinct(item):
 def _names(key, value, path, place):
     if not isinstance(value, dict):
         return _refuse(key, path, place, f"{shown(value)} is not a mapping")
+    if len(value) > _MOST_NAMES:
+        return _refuse(key, path, place, f"has {len(value)} names, more than {_MOST_NAMES}")
     problems = []
     turned = [name for name, each in value.items() if not key.takes(name) and key.takes(each)]
     if turned and not any(key.takes(name) for name in value):
@@ -269,6 +278,8 @@ def _parameters(key, value, path, place):
 
     if not isinstance(value, dict):
         return _refuse(key, path, place, f"{shown(value)} is not a mapping")
+    if len(value) > _MOST_NAMES:
+        return _refuse(key, path, place, f"has {len(value)} names, more than {_MOST_NAMES}")
     problems = mask.rules(value, key.choices[0], lambda name: place((*path, name)))[1]
     return (INVALID if problems else dict(value)), problems
 

@@ -22,6 +22,8 @@ UNCERTAINTY = (
     *("std_rx_rad", "std_ry_rad", "std_rz_rad"),
 )
 
+_LARGEST_WHOLE = 2.0**53  # beyond, neighbours are the same number
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -118,6 +120,9 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     shared = _numbered(table, found, problems)
     s = _directions(table, found, len(found.joints), problems)
     parts = [_target(table, target, layout, problems) for target in found.targets]
+    if not parts:
+        problems.append(Problem(table.path, "has no columns of a measured point", "x_mm .. z_mm"))
+        raise InputError(problems, title)
     nothing = ~np.any([part["there"] for part in parts], axis=0)
     if nothing.all() and not problems:
         problems.append(Problem(table.path, "no target was measured in any row", "positions"))
@@ -289,10 +294,12 @@ def _whole(table: RawTable, column: str, problems, words: bool) -> np.ndarray:
     if words and not np.isfinite(values).any():
         labels = _labels(table, column, problems)
         return _by_appearance(labels.tolist())
-    bad = np.flatnonzero(np.isfinite(values) & ((values < 0) | (values % 1 != 0)))
+    wrong = (values < 0) | (values > _LARGEST_WHOLE) | (values % 1 != 0)
+    bad = np.flatnonzero(np.isfinite(values) & wrong)
     if bad.size:
         where = f"{table.path}: column {column}, {table.rows_in_words(bad)}"
         found.append(Problem(where, f"{values[bad[0]]:g}", "whole numbers from 0"))
+        values[bad] = 0
     problems += found
     return np.where(np.isfinite(values), values, 0).astype(np.int64)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,17 @@ import numpy as np
 from kinacc.errors import InputError, Problem
 
 _NOTHING = ("", "nan", "na", "n/a", "null", "none", "#n/a")
+_LONGEST_NOTHING = max(map(len, _NOTHING))
 _SHOWN = 5  # rows named per problem; the rest is counted
+
+# What is held at once; calibrations are made from some hundred to some ten thousand rows.
+_MOST_ROWS, _MOST_COLUMNS, _MOST_CELLS = 1_000_000, 10_000, 10_000_000
+_MOST_BYTES = 500_000_000
+_ALLOWED = (
+    f"at most {_MOST_ROWS} rows, {_MOST_COLUMNS} columns, {_MOST_CELLS} cells and "
+    f"{_MOST_BYTES // 1_000_000} MB unpacked"
+)
+_SMALLER = "give the rows and columns of the measurements alone"
 
 
 @dataclass(frozen=True)
@@ -81,7 +92,7 @@ def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool =
     if gaps:
         bad = np.array([row for row in bad if not _is_gap(cells[row])], dtype=int)
     if bad.size:
-        shown = ", ".join(repr(cells[row]) for row in bad[:_SHOWN])
+        shown = ", ".join(_shortened(repr(cells[row])) for row in bad[:_SHOWN])
         problems.append(
             Problem(
                 f"{table.path}: column {name}, {table.rows_in_words(bad)}",
@@ -93,10 +104,14 @@ def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool =
     return values
 
 
+def _shortened(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def _converted(cells: list, decimal: str) -> np.ndarray:
     try:
         return np.array([_number(cell, decimal) for cell in cells])
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         return np.array([_number_or_nan(cell, decimal) for cell in cells])
 
 
@@ -112,24 +127,32 @@ def _number(cell: object, decimal: str) -> float:
 def _number_or_nan(cell: object, decimal: str) -> float:
     try:
         return _number(cell, decimal)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         return float("nan")
 
 
 def _is_gap(cell: object) -> bool:
     """Empty, or not a number in one of the ways numerical programs write it."""
     if isinstance(cell, str):
-        return cell.strip().lower() in _NOTHING
+        word = cell.strip()
+        return len(word) <= _LONGEST_NOTHING and word.lower() in _NOTHING
     return cell is None or cell != cell
 
 
 def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> RawTable:
     above, under = skip
+    if path.stat().st_size > _MOST_BYTES:
+        what = f"{path.stat().st_size / 1e6:.0f} MB"
+        raise InputError(Problem(str(path), what, _ALLOWED, _SMALLER))
     with open(path, newline="", encoding="utf-8-sig", errors="replace") as stream:
         reader = csv.reader(stream, delimiter=delimiter)
         header: list[str] = []
-        rows, lines = [], []
-        for cells in reader:
+        rows, lines, count = [], [], 0
+        for cells in _lines(reader, path):
+            count += len(cells)
+            if len(rows) >= _MOST_ROWS or count > _MOST_CELLS or len(cells) > _MOST_COLUMNS:
+                what = f"more than {len(rows)} rows of {len(header) or len(cells)} columns"
+                raise InputError(Problem(str(path), what, _ALLOWED, _SMALLER))
             if reader.line_num <= above or not any(cell.strip() for cell in cells):
                 continue
             if not header:
@@ -159,6 +182,21 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
     return RawTable(str(path), columns, np.array(lines), decimal)
 
 
+def _lines(reader, path: Path):
+    """Rows of a csv reader. Raises InputError where a cell has no end."""
+    try:
+        yield from reader
+    except csv.Error as error:
+        where = f"{path}: line {reader.line_num}"
+        allowed = "cells of at most 131072 characters, each quotation mark with its second"
+        raise InputError(Problem(where, f"cannot be read: {error}", allowed)) from None
+
+
+def _doubled(names: list[str]) -> str:
+    """Names that are there more than once, in words."""
+    return ", ".join(sorted(name for name, count in Counter(names).items() if count > 1))
+
+
 def _header_problems(path: Path, header: list[str], rows: list, delimiter: str) -> list[Problem]:
     if not header:
         return [Problem(str(path), "the file is empty", "a line of column names, then rows")]
@@ -171,9 +209,9 @@ def _header_problems(path: Path, header: list[str], rows: list, delimiter: str) 
         found.append(
             Problem(f"{path}: line 1", f"only one column, {header[0][:60]!r}", "several", hint)
         )
-    doubled = sorted({name for name in header if header.count(name) > 1})
+    doubled = _doubled(header)
     if doubled:
-        found.append(Problem(f"{path}: line 1", f"column names given twice: {', '.join(doubled)}"))
+        found.append(Problem(f"{path}: line 1", f"column names given twice: {doubled}"))
     return found
 
 
@@ -182,10 +220,74 @@ def _parquet(path: Path) -> RawTable:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(path)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise InputError(Problem(str(path), f"not a Parquet file: {error}")) from None
-    if not table.num_rows:
+        with pq.ParquetFile(path) as file:
+            schema, problem = file.schema_arrow, _too_large(str(path), file.metadata)
+        doubled = _doubled(schema.names)
+        if doubled and not problem:
+            problem = Problem(str(path), f"column names given twice: {doubled}")
+        if problem:
+            raise InputError(problem)
+        flat = [field.name for field in schema if not pa.types.is_nested(field.type)]
+        # The same text in a million rows is held once.
+        texts = [name for name in flat if _is_text(schema.field(name).type)]
+        with pq.ParquetFile(path, read_dictionary=texts) as file:
+            table = file.read(columns=flat)
+            rows = table.num_rows if flat else file.metadata.num_rows
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(Problem(str(path), f"not a Parquet file: {reason}")) from None
+    if not rows:
         raise InputError(Problem(str(path), "the table has no rows", "at least one row"))
-    columns = {name: table.column(name).to_pylist() for name in table.column_names}
-    return RawTable(str(path), columns, np.arange(1, table.num_rows + 1))
+    columns = {
+        field.name: _cells(table.column(field.name), str(path))
+        if field.name in flat
+        else [f"<{field.type}>"] * rows  # one cell of a list may hold a million values
+        for field in schema
+    }
+    return RawTable(str(path), columns, np.arange(1, rows + 1))
+
+
+def _is_text(kind) -> bool:
+    import pyarrow as pa
+
+    return pa.types.is_string(kind) or pa.types.is_large_string(kind)
+
+
+def _too_large(where: str, footer) -> Problem | None:
+    """What the footer of a Parquet file says of its size, before anything is unpacked."""
+    rows, width, groups = footer.num_rows, footer.num_columns, footer.num_row_groups
+    what = ""
+    if rows > _MOST_ROWS or width > _MOST_COLUMNS or rows * width > _MOST_CELLS:
+        what = f"{rows} rows of {width} columns"
+    elif groups > _MOST_ROWS // 100:
+        what = f"{groups} groups of rows"
+    else:
+        size = sum(footer.row_group(number).total_byte_size for number in range(groups))
+        what = f"{size / 1e6:.0f} MB" if size > _MOST_BYTES else ""
+    return Problem(where, what, _ALLOWED, _SMALLER) if what else None
+
+
+def _cells(column, where: str) -> list:
+    """Values of a Parquet column; the column's type as text where Python has no such value.
+
+    Raises InputError where a few long texts, repeated, are more than could be worked through.
+    """
+    import pyarrow as pa
+
+    try:
+        if not pa.types.is_dictionary(column.type):
+            return column.to_pylist()
+        cells: list = []
+        for chunk in column.chunks:
+            words = chunk.dictionary.to_pylist()
+            places = chunk.indices.to_pylist()
+            lengths = [len(word) if isinstance(word, str) else 0 for word in words]
+            size = sum(lengths[place] for place in places if place is not None)
+            if size > _MOST_BYTES:
+                what = f"texts of {size / 1e6:.0f} MB in one column"
+                raise InputError(Problem(where, what, _ALLOWED, _SMALLER))
+            cells += [None if place is None else words[place] for place in places]
+        return cells
+    except (pa.ArrowException, ArithmeticError, LookupError, ValueError):
+        # A date outside the calendar, text that is not UTF-8.
+        return [f"<{column.type}>"] * len(column)

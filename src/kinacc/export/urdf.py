@@ -99,7 +99,7 @@ def corrected(
         frame = compose(frame, origin)
         # How the file's link sits on the axis; it sits there still after the correction.
         anchors.append(compose(invert(frame), there))
-    tree = etree.parse(str(path), etree.XMLParser(remove_blank_text=False))
+    tree = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
     elements = {each.get("name"): each for each in tree.getroot().findall("joint")}
     before = invert(base)
     for joint, gap, origin, anchor in zip(moving, fixed, better, anchors, strict=True):

@@ -47,6 +47,10 @@ def look(path: str | Path) -> Guess:
     written = text.look(path)
     table = written.load(path)
     units = written.units or ("",) * len(table.columns)
+    if len(units) != len(table.columns):
+        what = f"{len(units)} units under {len(table.columns)} column names"
+        where = f"{path}: line {written.skip_lines + 2}"
+        raise InputError(Problem(where, what, "a unit, or nothing, for each"))
     names = [name_of(c, u) for c, u in zip(table.columns, units, strict=True)]
     found = columns.recognise(names)
     _refuse(str(path), found)

@@ -10,7 +10,7 @@ from kinacc.data.table import RawTable, load
 from kinacc.errors import InputError, Problem
 
 DELIMITERS = (";", "\t", ",", " ")
-_LINES = 200  # looked at
+_LINES, _CHARACTERS = 200, 1_000_000  # looked at
 _POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?(\d+(,\d*)?|,\d+)([eE][+-]?\d+)?")
 
@@ -42,7 +42,11 @@ def look(path: str | Path) -> Written:
     if path.suffix.lower() in (".parquet", ".pq"):
         return Written()
     with open(path, encoding="utf-8-sig", errors="replace") as stream:
-        lines = [line.rstrip("\r\n") for line, _ in zip(stream, range(_LINES), strict=False)]
+        head = stream.read(_CHARACTERS)
+    lines = head.split("\n")
+    if lines and (len(head) == _CHARACTERS or not lines[-1]):
+        lines = lines[:-1] or lines  # the last one may have been cut
+    lines = lines[:_LINES]
     best = max(_score(lines, mark, decimal) for mark in DELIMITERS for decimal in ".,")
     numbers, columns, _, mark, decimal = best
     if not numbers or columns < 2:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import date
@@ -110,7 +111,7 @@ def files(name_or_path: str | Path) -> list[Path]:
         return [path]
     inner = read(path)[0].data.get("urdf")
     named = [path.parent / inner] if isinstance(inner, str) else []
-    return [path, *(file for file in named if file.is_file())]
+    return [path, *(file for file in named if os.path.isfile(file))]
 
 
 def _path(name_or_path: str | Path) -> Path:
@@ -118,7 +119,7 @@ def _path(name_or_path: str | Path) -> Path:
     if name in shipped():
         return _SHIPPED / f"{name}.yaml"
     path = Path(name)
-    if not path.is_file():
+    if not os.path.isfile(path):  # false, too, for a name no file can have
         allowed = f"one of {', '.join(shipped())}, or the path of a robot YAML or URDF"
         raise InputError(Problem(name, "is neither a shipped robot nor a file", allowed))
     return path
@@ -136,6 +137,8 @@ def _from_table(reader: Reader) -> Robot | None:
         return None
     if not FEWEST_JOINTS <= len(rows) <= MOST_JOINTS:
         reader.fault(("dh",), f"has {len(rows)} joints", f"{FEWEST_JOINTS} to {MOST_JOINTS}")
+        if len(rows) > MOST_JOINTS:
+            return None
     table = _rows(reader, rows)
     limits = _limits(reader, content, rows, table.prismatic)
     joint_map = _joint_map(reader, content, rows)
@@ -323,7 +326,7 @@ def _from_urdf(reader: Reader, path: Path) -> Robot | None:
     if reader.problems:
         return None
     file = path.parent / texts["urdf"]
-    if not file.is_file():
+    if not os.path.isfile(file):
         reader.fault(("urdf",), "there is no such file", "a path from this file", value=str(file))
         return None
     robot = urdf.load(file, texts["base_link"], texts["tip_link"])

@@ -16,6 +16,8 @@ ANGLE = {"deg": math.pi / 180.0, "rad": 1.0}
 _QUARTER = math.pi / 2.0
 _LONGEST_M = 20.0  # no arm has a link this long, so it was meant in mm
 _MOST_TURNS_RAD = 4.0 * math.pi
+_LARGEST = 1e9  # of any number: beyond, nothing about an arm is meant, and products overflow
+_SUGGESTIONS = 20
 
 
 class Reader:
@@ -56,16 +58,18 @@ class Reader:
 
     def known_keys(self, table: Mapping, allowed: Sequence[str], path: Sequence[Any] = ()) -> None:
         """Note keys of a table that are none of ``allowed``, with the nearest one that is."""
-        for key in table:
-            if key not in allowed:
-                self.fault(
-                    (*path, key), "unknown key", ", ".join(allowed), _nearest(str(key), allowed)
-                )
+        unknown = [key for key in table if key not in allowed]
+        for number, key in enumerate(unknown):
+            near = _nearest(str(key), allowed) if number < _SUGGESTIONS else ""
+            self.fault((*path, key), "unknown key", ", ".join(allowed), near)
 
     def number(self, value: Any, path: Sequence[Any], allowed: str = "a finite number") -> float:
-        """A finite number; NaN, with a problem, for anything else."""
-        if is_number(value):
+        """A number an arm may have; NaN, with a problem, for anything else."""
+        if is_number(value) and abs(value) <= _LARGEST:
             return float(value)
+        if is_number(value):
+            self.fault(path, "is beyond all arms", f"at most {_LARGEST:g}", value=value)
+            return math.nan
         fix = ""
         if isinstance(value, str):
             try:
@@ -145,13 +149,16 @@ class Reader:
 
 def is_number(value: Any) -> bool:
     """Whether a value is a finite number (and not true or false)."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and abs(value) < math.inf  # isfinite fails for a whole number without a float
 
 
 def shown(value: Any) -> str:
     """A value as it stands in the file, shortened."""
     if isinstance(value, float):
         return f"{value:.9g}"
+    if isinstance(value, int) and abs(value) > _LARGEST:
+        return f"{float(value):.9g}" if abs(value) < 1e300 else "a number of more than 300 digits"
     text = value if value == "null" else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -165,5 +172,6 @@ def _nearest(name: str, known: Sequence[str]) -> str:
     same = [each for each in measured if each.rpartition("_")[0] == stem]
     if same:
         return f"the unit is part of the name: {' or '.join(same)}"
-    close = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.55)
+    # To compare words takes their lengths multiplied.
+    close = difflib.get_close_matches(name[:100].lower(), known, n=1, cutoff=0.55)
     return f"did you mean {close[0]}?" if close else ""

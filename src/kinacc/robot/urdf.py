@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,9 @@ MOVING = ("revolute", "continuous", "prismatic")
 
 _TURN_RAD = 2.0 * math.pi  # the range given to a joint that turns without end, either way
 _MM_PER_M = 1e3
+_MOST_BYTES, _MOST_JOINTS = 10_000_000, 2000
+_FARTHEST = 1e6  # of lengths in m and angles in rad: beyond, nothing about an arm is meant
+_NO_LIMIT = 1e20  # some write limits of 1e16 where they mean none
 
 
 @dataclass(frozen=True)
@@ -209,22 +213,15 @@ def _parse(path: Path) -> tuple[list[Joint], list[str], str]:
     from pytransform3d import urdf as library
 
     place, title = str(path), f"{path} cannot be used as a robot"
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise InputError(Problem(place, (error.strerror or "").lower(), "a URDF file")) from None
-    try:
-        root = etree.fromstring(text, etree.XMLParser(remove_comments=True, resolve_entities=False))
-    except etree.XMLSyntaxError as error:
-        line = getattr(error, "lineno", None) or 1
-        raise InputError(Problem(f"{place}:{line}", f"is not XML: {error.msg}"), title) from None
+    root = _root(path, title)
     problems = list(_faults_of_text(root, place))
     if problems:
         raise InputError(problems, title)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # on meshes it cannot find, which we do not need
-            name, links, joints = library.parse_urdf(text.decode("utf-8"))
+            text = etree.tostring(_joints_alone(root), encoding="unicode")
+            name, links, joints = library.parse_urdf(text)
     except (library.UrdfException, ValueError) as error:
         raise InputError(Problem(place, str(error).rstrip(".")), title) from None
     elements = {element.get("name"): element for element in root.findall("joint")}
@@ -249,6 +246,49 @@ def _parse(path: Path) -> tuple[list[Joint], list[str], str]:
     return records, [link.name for link in links], name
 
 
+def _root(path: Path, title: str):
+    """The root of an XML file that is no larger than robots are and defines no entities."""
+    from lxml import etree
+
+    place = str(path)
+    try:
+        with open(path, "rb") as stream:
+            text = stream.read(_MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError(Problem(place, (error.strerror or "").lower(), "a URDF file")) from None
+    if len(text) > _MOST_BYTES:
+        allowed = f"at most {_MOST_BYTES // 1_000_000} MB"
+        raise InputError(Problem(place, "is too large for a robot", allowed), title)
+    parser = etree.XMLParser(
+        remove_comments=True, remove_pis=True, resolve_entities=False, no_network=True
+    )
+    try:
+        root = etree.fromstring(text, parser)
+    except etree.XMLSyntaxError as error:
+        line = getattr(error, "lineno", None) or 1
+        raise InputError(Problem(f"{place}:{line}", f"is not XML: {error.msg}"), title) from None
+    definitions = root.getroottree().docinfo.internalDTD
+    if definitions is not None and any(True for _ in definitions.iterentities()):
+        what = "defines entities, which can stand for anything"
+        raise InputError(Problem(place, what, "plain URDF", "write out what they stand for"), title)
+    return root
+
+
+def _joints_alone(root):
+    """The robot without what a chain does not need: shapes, masses, materials, plugins."""
+    from lxml import etree
+
+    alone = etree.Element("robot", dict(root.attrib))
+    for link in root.findall("link"):
+        etree.SubElement(alone, "link", dict(link.attrib))
+    for joint in root.findall("joint"):
+        kept = etree.SubElement(alone, "joint", dict(joint.attrib))
+        for tag in ("origin", "parent", "child", "axis", "limit"):
+            if (child := joint.find(tag)) is not None:
+                etree.SubElement(kept, tag, dict(child.attrib))
+    return alone
+
+
 def _faults_of_text(root, place: str) -> Iterator[Problem]:
     """What a lenient parser would read as something else: macros, wrong numbers, double names."""
     if root.tag != "robot":
@@ -259,9 +299,12 @@ def _faults_of_text(root, place: str) -> Iterator[Problem]:
         yield Problem(where, "holds xacro macros", "plain URDF", "expand it with xacro first")
         return
     names = [element.get("name") for element in root.findall("joint")]
+    if len(names) > _MOST_JOINTS:
+        yield Problem(place, f"has {len(names)} joints", f"at most {_MOST_JOINTS}, fixed included")
+        return
     children = [each.get("link") for each in root.findall("joint/child")]
     for what, given in (("joint", names), ("child link", children)):
-        for name in sorted({str(name) for name in given if given.count(name) > 1}):
+        for name in sorted(str(name) for name, count in Counter(given).items() if count > 1):
             yield Problem(place, f"{what} {name} is given more than once", "every name once")
     for element in root.findall("joint"):
         where = f"{place}:{element.sourceline}, joint {element.get('name')}"
@@ -270,23 +313,26 @@ def _faults_of_text(root, place: str) -> Iterator[Problem]:
             yield Problem(where, f"its type is {element.get('type')!r}", kinds)
         if element.get("type") in ("planar", "floating"):
             yield Problem(where, f"is {element.get('type')}", ", ".join((*MOVING, "fixed")))
-        for tag, key, count in (
-            ("origin", "xyz", 3),
-            ("origin", "rpy", 3),
-            ("axis", "xyz", 3),
-            ("limit", "lower", 1),
-            ("limit", "upper", 1),
+        for tag, key, count, most in (
+            ("origin", "xyz", 3, _FARTHEST),
+            ("origin", "rpy", 3, _FARTHEST),
+            ("axis", "xyz", 3, _FARTHEST),
+            ("limit", "lower", 1, _NO_LIMIT),
+            ("limit", "upper", 1, _NO_LIMIT),
         ):
             child = element.find(tag)
             value = None if child is None else child.get(key)
-            if value is not None and not _are_numbers(value, count):
-                allowed = f"{count} finite number{'s' if count > 1 else ''}"
-                yield Problem(where, f"{tag} {key}={value!r}", allowed)
+            if value is not None and not _are_numbers(value, count, most):
+                allowed = f"{count} finite number{'s' if count > 1 else ''} of at most {most:g}"
+                said = repr(value if len(value) <= 60 else f"{value[:57]}...")
+                yield Problem(where, f"{tag} {key}={said}", allowed)
 
 
-def _are_numbers(text: str, count: int) -> bool:
+def _are_numbers(text: str, count: int, most: float) -> bool:
+    if not text.isascii() or "_" in text:  # Python takes more for a number than others do
+        return False
     try:
         values = [float(word) for word in text.split()]
     except ValueError:
         return False
-    return len(values) == count and all(map(math.isfinite, values))
+    return len(values) == count and all(abs(value) <= most for value in values)

@@ -269,7 +269,15 @@ def _read_words(values: object) -> object:
         return {key: _read_words(value) for key, value in values.items()}
     if isinstance(values, (list, tuple)):
         return [_read_words(value) for value in values]
-    return yaml.safe_load(values) if isinstance(values, str) else values
+    if not isinstance(values, str):
+        return values
+    from kinacc.config.load import COMMAND_LINE
+    from kinacc.config.reading import unreadable
+
+    problem = unreadable(values, COMMAND_LINE)
+    if problem:
+        raise InputError(problem)
+    return yaml.safe_load(values)
 
 
 def _in_use(config: dict) -> dict:

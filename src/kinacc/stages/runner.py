@@ -52,6 +52,8 @@ def execute(job: Job, bar: bool = False) -> None:
             return
         except KinaccError as error:
             reason = f"{label}: {error}\n"
+        except MemoryError as error:
+            reason = f"{label}: there is not enough memory: {error or 'ask for less'}\n"
         except Exception:
             reason = f"{label} failed:\n{traceback.format_exc()}"
         for stream in filter(None, (sys.stderr, log)):
