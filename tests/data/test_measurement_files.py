@@ -282,3 +282,14 @@ def test_what_programs_write_for_nothing_is_an_empty_cell(tmp_path, good, nothin
     assert "nothing was measured in line 5" in " ".join(reading.left_out())
     columns["q2_deg"][4] = nothing
     assert "not a finite number" in problems_of(tmp_path, columns)
+
+
+def test_a_list_of_no_targets_asks_for_a_name(tmp_path, good):
+    assert "no target is asked for" in problems_of(tmp_path, good, targets=[])
+
+
+def test_a_pose_number_that_stands_for_its_neighbours_too_is_refused(tmp_path, good):
+    rows = len(good["x_mm"])
+    good["pose"] = np.arange(rows, dtype=float)
+    good["pose"][3] = 1e300
+    assert "column pose, line 5: 1e+300; allowed: whole numbers" in problems_of(tmp_path, good)

@@ -36,8 +36,8 @@ def tournament(
     The error fields are those of the configuration's data sets, whose tables have to be there
     already, and families of synthetic arms. Leaves tournament_cells, tournament_verdicts and
     tournament_fields in RESULTS/tournament. Parts that are there, made from the same inputs and
-    code, are kept: started again, it goes on where it was stopped. The number of parts changes
-    nothing in the results.
+    code, are kept: Ctrl-C stops it at once, and started again, it goes on from them. The number of
+    parts changes nothing in the results.
 
     \b
     Example:

@@ -121,7 +121,9 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     s = _directions(table, found, len(found.joints), problems)
     parts = [_target(table, target, layout, problems) for target in found.targets]
     if not parts:
-        problems.append(Problem(table.path, "has no columns of a measured point", "x_mm .. z_mm"))
+        problems.append(
+            Problem(table.path, "no target is asked for", "names in measurements.file.targets")
+        )
         raise InputError(problems, title)
     nothing = ~np.any([part["there"] for part in parts], axis=0)
     if nothing.all() and not problems:
