@@ -4,7 +4,8 @@ A quantity of a row is ``q1``, ``q1_cmd`` (as commanded), ``s1``, ``pose``, ``re
 ``session`` or ``temperature``. A quantity of a target is ``x``, ``rx``, ``qw``, ``std_x``,
 ``cov_xy`` and the like, alone or behind the target's name (``mA_x``). A column of the file carries
 the unit in its name (``q1_deg``, ``mA_x_mm``), or is mapped to our name and then has the layout's
-unit.
+unit. A name that says another unit than the layout is refused, and a point that its name calls
+nominal, a deviation or an uncertainty is read only where ``targets`` or ``columns`` name it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.data import roles
+from kinacc.data.names import KNOWN, name_of
 from kinacc.data.table import RawTable
 from kinacc.errors import Problem
 
@@ -46,6 +49,9 @@ _TARGET_QUANTITIES = (
     *ANGLES_IN_ORDER,
 )
 _POINT = re.compile(r"(?P<name>.+_x)_(?:mm|m)")
+_JOINT = re.compile(r"q(?P<number>\d)(?:_cmd)?")
+_READ = (roles.MEASURED, roles.REPORTED, roles.PLAIN)
+_UNSTATED = {"joint_unit": "deg", "length_unit": "mm", "orientation.unit": "deg"}
 
 
 @dataclass(frozen=True)
@@ -147,8 +153,10 @@ def find(
     single["temperature"] = finder.any("temperature", CELSIUS, "C") or finder.any(
         "temp", CELSIUS, "C"
     )
-    targets = tuple(finder.target(name) for name in finder.targets())
+    names = finder.targets()
+    targets = tuple(finder.target(name, alone=len(names) == 1) for name in names)
     finder.refuse_unknown_columns()
+    finder.refuse_contradicted_units(prismatic)
     if len(problems) > before:
         return None
     found = Found(
@@ -204,24 +212,51 @@ class _Finder:
         return () if None in places else tuple(places)
 
     def targets(self) -> list[str]:
-        """Names of the targets to read, in order of their columns."""
+        """Names of the targets to read, in order of their columns.
+
+        A point whose name leaves open whether it was measured is a problem, unless it is named.
+        """
         if self.layout.targets is not None:
             return list(self.layout.targets)
-        names = []
+        mapped = [split(name) for name in self.layout.columns]
+        named = [target or TOOL for target, quantity in mapped if quantity == "x"]
+        there = list(dict.fromkeys(self._points()))
+        says = {name: roles.role(name_of(f"{name} x").words) for name in there}
+        letters = [n for n in there if len(n) == 1 and says[n] == roles.PLAIN]
+        read = [n for n in there if says[n] in _READ or n in named or (letters and len(n) == 1)]
+        frames = [n for n in there if n not in read and roles.is_frame(name_of(n).words)]
+        if not read and not named and len(frames) == 1:
+            read = frames  # the tool centre point, under its usual name
+        unclear = [n for n in there if n not in read and says[n] == roles.OPEN]
+        if unclear or (there and not read and not named):
+            self._unclear(unclear or there, read)
+        return list(dict.fromkeys([*read, *named])) or [TOOL]
+
+    def _points(self) -> Iterator[str]:
+        """Names of the points whose columns have our names."""
         for column in self.table.columns:
             if column in ("x_mm", "x_m"):
-                names.append(TOOL)
+                yield TOOL
             match = _POINT.fullmatch(column)
             if match and split(match["name"])[1] == "x":
-                names.append(split(match["name"])[0])
-        for name in self.layout.columns:
-            target, quantity = split(name)
-            if quantity == "x":
-                names.append(target or TOOL)
-        return list(dict.fromkeys(names)) or [TOOL]
+                yield split(match["name"])[0]
 
-    def target(self, name: str) -> Target:
-        prefix = "" if name == TOOL and not self._has_prefix(TOOL) else f"{name}_"
+    def _unclear(self, names: list[str], read: list[str]) -> None:
+        columns = [c for c in self.table.columns for n in names if c in (f"{n}_x_mm", f"{n}_x_m")]
+        said = [roles.role(name_of(column).words) for column in columns]
+        told = ", ".join("open" if each == roles.OPEN else each for each in said)
+        named = ", ".join(dict.fromkeys([*read, *names]))
+        self._problem(
+            ", ".join(columns),
+            f"the name does not say that this was measured ({told})",
+            "measured points",
+            f"name those that were measured in measurements.file.targets (of: {named})",
+        )
+
+    def target(self, name: str, alone: bool) -> Target:
+        """Columns of a target; ``alone`` it must have an orientation, where there is a kind."""
+        bare = name == TOOL and ("x" in self.layout.columns or not self._has_prefix(TOOL))
+        prefix = "" if bare else f"{name}_"
         length, angle = self.layout.length_unit, self.layout.angle_unit
         position = [self.required(f"{prefix}{axis}", LENGTH, length) for axis in POSITION]
         covariance = self._all(prefix, COVARIANCE, AREA, f"{length}2")
@@ -232,7 +267,7 @@ class _Finder:
         return Target(
             name,
             tuple(place for place in position if place),
-            self._turn(prefix),
+            self._turn(prefix, alone),
             std,
             self._all(prefix, STD_TURN, ANGLE, angle),
             covariance,
@@ -243,7 +278,7 @@ class _Finder:
             f"{name}_x" in self.layout.columns
         )
 
-    def _turn(self, prefix: str) -> tuple[Place, ...]:
+    def _turn(self, prefix: str, alone: bool) -> tuple[Place, ...]:
         kind = self.layout.orientation
         if kind == "none":
             return ()
@@ -261,7 +296,7 @@ class _Finder:
             if kind == "euler":
                 names = in_order_of(self.layout.convention)
         # A single target must have its orientation; one of several may be a bare point.
-        look = self.required if len(self.targets()) == 1 else self.any
+        look = self.required if alone else self.any
         own = [f"{prefix}{name}" for name in names]
         places = [self.any(name, units, unit) for name in own]
         if look == self.required and not any(places) and not set(own) & set(self.layout.columns):
@@ -303,6 +338,52 @@ class _Finder:
                 what = f"is not there, but measurements.file.columns maps {name} to it"
                 self._problem(foreign, what, _listed(self.table))
 
+    def refuse_contradicted_units(self, prismatic: np.ndarray) -> None:
+        """A key that states another unit than the columns it is about."""
+        keys = {
+            "joint_unit": self.layout.joint_unit,
+            "length_unit": self.layout.length_unit,
+            "orientation.unit": self.layout.angle_unit,
+        }
+        for key, unit in keys.items():
+            mapped, own = self._stated(key, prismatic)
+            # Columns of our names say their unit; a key that is the default may not be meant.
+            if unit != _UNSTATED[key] and all(each is not None for each in mapped.values()):
+                others = mapped | own
+            else:
+                others = mapped
+            wrong = {c: said for c, said in others.items() if said not in (None, unit)}
+            for said in dict.fromkeys(wrong.values()):
+                columns = ", ".join(column for column, each in wrong.items() if each == said)
+                what = f"says {said}, but measurements.file.{key} says {unit}"
+                fix = "correct the key, or the name where it is the one that is wrong"
+                self._problem(columns, what, "the same in both places", fix)
+
+    def _stated(self, key: str, prismatic) -> tuple[dict, dict]:
+        """Units that the columns ``key`` is about state, None for none: mapped ones, our names."""
+        mapped = {}
+        for ours, column in self.layout.columns.items():
+            if column in self.table.columns and _key_of(ours, prismatic) == key:
+                mapped[column] = self._unit_of(column)
+        own = {}
+        for column in self.table.columns:
+            ours, _, unit = column.rpartition("_")
+            plain = split(ours)[1] in (*POSITION, *ANGLES, *ANGLES_IN_ORDER) or _JOINT.fullmatch(
+                ours
+            )
+            if plain and ours not in self.layout.columns and unit in (*ANGLE, *LENGTH):
+                fits = unit in (ANGLE if _key_of(ours, prismatic) != "length_unit" else LENGTH)
+                if fits and _key_of(ours, prismatic) == key:
+                    own[column] = unit
+        return mapped, own
+
+    def _unit_of(self, column: str) -> str | None:
+        """The unit a column states in its name or under it, None for none that is known."""
+        place = list(self.table.columns).index(column)
+        under = self.table.under[place] if place < len(self.table.under) else ""
+        said = name_of(column, under if name_of("x", under).unit in KNOWN else "").unit
+        return said if said in KNOWN or " or " in said else None
+
     def refuse_shared_columns(self, found: Found) -> None:
         """A column that is taken for two measured quantities, as a slip in a mapping makes it."""
         measured = [*found.joints, *found.commanded, *found.directions.values()]
@@ -315,6 +396,18 @@ class _Finder:
 
     def _problem(self, column: str, what: str, allowed: str = "", fix: str = "") -> None:
         self.problems.append(Problem(f"{self.table.path}: column {column}", what, allowed, fix))
+
+
+def _key_of(name: str, prismatic) -> str:
+    """The key that states the unit of a quantity of our name, empty where none does."""
+    joint = _JOINT.fullmatch(name)
+    if joint:
+        number = int(joint["number"])
+        return "length_unit" if number <= len(prismatic) and prismatic[number - 1] else "joint_unit"
+    quantity = split(name)[1]
+    if quantity in (*POSITION, *STD):
+        return "length_unit"
+    return "orientation.unit" if quantity in (*ANGLES, *ANGLES_IN_ORDER, *STD_TURN) else ""
 
 
 def in_order_of(convention: str) -> tuple[str, ...]:

@@ -19,12 +19,14 @@ class RawTable:
     """Columns of a measurement file as read: text cells of a CSV, or values of a Parquet file.
 
     ``line`` (n,) is the line in the file a row stands on (CSV) or its row number from 1 (Parquet).
+    ``under`` are the cells of the line left out under the names, such as a line of units.
     """
 
     path: str
     columns: dict[str, list]
     line: np.ndarray
     decimal: str = "."
+    under: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.line)
@@ -123,6 +125,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
     with open(path, newline="", encoding="utf-8-sig", errors="replace") as stream:
         reader = csv.reader(stream, delimiter=delimiter)
         header: list[str] = []
+        left_out: list[str] = []
         rows, lines = [], []
         for cells in reader:
             if reader.line_num <= above or not any(cell.strip() for cell in cells):
@@ -131,6 +134,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
                 header = [cell.strip() for cell in cells]
             elif under > 0:
                 under -= 1
+                left_out = cells
             else:
                 rows.append(cells)
                 lines.append(reader.line_num)
@@ -151,7 +155,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
     columns = {
         name: list(cells) for name, cells in zip(header, zip(*rows, strict=True), strict=True)
     }
-    return RawTable(str(path), columns, np.array(lines), decimal)
+    return RawTable(str(path), columns, np.array(lines), decimal, tuple(left_out))
 
 
 def _header_problems(path: Path, header: list[str], rows: list, delimiter: str) -> list[Problem]:
