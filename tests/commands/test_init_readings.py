@@ -13,9 +13,8 @@ from kinacc.cli import main
 from kinacc.config.load import load
 from kinacc.data.measurements import read
 from kinacc.errors import InputError
-from kinacc.intake import guess
 
-ROWS = 24
+ROWS = 14
 ARM = robot.load("ur10")
 AXES = "xyz"
 
@@ -75,18 +74,22 @@ def file(tmp_path):
     return write
 
 
-def as_read(found):
-    """The points (n, 3) in mm and joints (n, 6) in deg that a run would take."""
-    columns = read(found.section, ARM, strict=False).columns
+def described(path, *options):
+    """What a run would read, where init finds it without a question."""
+    folder = path.parent / "cell"
+    done = call("init", path, "--robot", "ur10", "--out", folder, "--yes", *options)
+    assert done.exit_code == 0, done.output
+    return file_section(folder)
+
+
+def assert_measured(section):
+    """The run takes the measured points and the joints as they were; returns all columns."""
+    columns = read(section, ARM, strict=False).columns
     point = np.stack([columns[f"{axis}_mm"] for axis in AXES], axis=1)
-    return point, np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, 7)], axis=1)), columns
-
-
-def assert_measured(found):
-    assert not found.found.questions
-    point, q, _ = as_read(found)
+    q_deg = np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, 7)], axis=1))
     np.testing.assert_allclose(point, IT.measured, atol=1e-3)
-    np.testing.assert_allclose(q, IT.q, atol=1e-4)
+    np.testing.assert_allclose(q_deg, IT.q, atol=1e-4)
+    return columns
 
 
 RIGHT = {
@@ -169,7 +172,7 @@ RIGHT = {
 
 @pytest.mark.parametrize("case", RIGHT)
 def test_what_was_measured_is_read_whatever_stands_beside_it(case, file):
-    assert_measured(guess.look(file(*RIGHT[case])))
+    assert_measured(described(file(*RIGHT[case])))
 
 
 def test_a_column_that_init_calls_not_used_is_not_used(file, tmp_path):
@@ -189,9 +192,9 @@ def test_a_column_that_init_calls_not_used_is_not_used(file, tmp_path):
 def test_what_was_reported_is_read_and_what_was_commanded_goes_beside_it(file):
     joints = (numbered("actual_q_{}", first=0), np.deg2rad(IT.q))
     wanted = (numbered("target_q_{}", first=0), np.deg2rad(IT.rounded))
-    found = guess.look(file(wanted, joints, X))
-    assert_measured(found)
-    reading = read(found.section, ARM)
+    section = described(file(wanted, joints, X))
+    assert_measured(section)
+    reading = read(section, ARM)
     np.testing.assert_allclose(reading.commanded, np.deg2rad(IT.rounded), atol=1e-6)
 
 
@@ -199,15 +202,10 @@ def test_what_was_reported_is_read_and_what_was_commanded_goes_beside_it(file):
 def test_q1_to_q4_beside_joints_are_a_quaternion(file, tmp_path, order):
     four = IT.quaternion if order == "wxyz" else IT.quaternion[:, [1, 2, 3, 0]]
     path = file((numbered("rax_{}"), IT.q), X, (numbered("q{}", 4), four))
-    assert_measured(guess.look(path))
-    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "cell", "--yes")
-    assert done.exit_code == 0, done.output
-    section = file_section(tmp_path / "cell")
-    assert (section["orientation"]["kind"], section["orientation"]["order"]) == (
-        "quaternion",
-        order,
-    )
-    columns = read(section, ARM).columns
+    section = described(path)
+    assert section["orientation"]["kind"] == "quaternion"
+    assert section["orientation"]["order"] == order
+    columns = assert_measured(section)
     found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
     both = np.abs(np.sum(found * IT.quaternion, axis=1))
     np.testing.assert_allclose(both, 1.0, atol=1e-6)
@@ -215,20 +213,20 @@ def test_q1_to_q4_beside_joints_are_a_quaternion(file, tmp_path, order):
 
 def test_a_drehung_is_an_orientation_and_no_target(file):
     turn = (by_axis("Drehung {A} [°]"), IT.turn.as_euler("XYZ", degrees=True))
-    found = guess.look(file(Q, (by_axis("{A} [mm]"), IT.measured), turn))
-    assert found.targets == ("tool",)
-    assert found.section["orientation"]["kind"] == "euler"
-    assert found.section["orientation"]["unit"] == "deg"
-    assert_measured(found)
+    section = described(file(Q, (by_axis("{A} [mm]"), IT.measured), turn))
+    assert section["orientation"]["kind"] == "euler"
+    assert section["orientation"]["unit"] == "deg"
+    columns = assert_measured(section)
+    assert set(columns["target"]) == {"tool"}
+    assert np.isfinite(columns["qw"]).all()
 
 
 def test_standard_deviations_are_those_of_the_measured_point(file):
     measured = (by_axis("Measured {A} [mm]"), IT.measured)
     spread = (by_axis("Measured std {A} [mm]"), IT.spread)
     wide = (by_axis("U95 {A} [mm]"), 2 * IT.spread)
-    found = guess.look(file(Q, wide, measured, spread, (by_axis("Dev {A} [mm]"), IT.deviation)))
-    assert_measured(found)
-    columns = as_read(found)[2]
+    deviation = (by_axis("Dev {A} [mm]"), IT.deviation)
+    columns = assert_measured(described(file(Q, wide, measured, spread, deviation)))
     given = np.stack([columns[f"std_{axis}_mm"] for axis in AXES], axis=1)
     np.testing.assert_allclose(given, IT.spread, rtol=1e-6)
 
@@ -393,8 +391,8 @@ def test_degrees_under_the_names_contradict_a_key_in_radians(tmp_path):
     path = tmp_path / "readings.csv"
     path.write_text("\n".join([*lines, *(",".join(map(str, row)) for row in rows)]) + "\n")
     columns = dict(zip([*numbered("q{}"), *AXES], names, strict=True))
-    section = guess.look(path).section
-    assert_measured(guess.look(path))
+    section = described(path)
+    assert_measured(section)
     with pytest.raises(InputError, match=r"J1.*says deg.*joint_unit says rad"):
         read(section | {"joint_unit": "rad", "columns": columns}, ARM)
 
@@ -421,3 +419,10 @@ def load_defaults():
 
     section = defaults()["measurements"]["file"]
     return section | {"orientation": section["orientation"] | {"kind": "none"}}
+
+
+def test_points_that_a_controller_calculated_are_remarked_on(file, tmp_path):
+    path = file(Q, (by_axis("{a}_mm"), IT.controller))
+    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "cell", "--yes")
+    assert done.exit_code == 0, done.output
+    assert "closer than an instrument measures" in done.output

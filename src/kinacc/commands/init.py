@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from kinacc.errors import Problem
     from kinacc.inspection.report import Report
-    from kinacc.intake.columns import Question
     from kinacc.intake.guess import Guess
 
 _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
@@ -60,10 +58,11 @@ def init(measurement_file: str, **options) -> None:
       kinacc init log.csv --take actual_q_0 --take X
     """
     from kinacc import robot as robots
+    from kinacc.commands.init_questions import looked
     from kinacc.intake.write import plain_name
 
     ask = not (options["yes"] or options["as_json"])
-    guess = _stated(_looked(measurement_file, options, ask), options)
+    guess = _stated(looked(measurement_file, options, ask), options)
     name = options["name"] or plain_name(measurement_file)
     folder = Path(options["out"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
@@ -81,68 +80,6 @@ def init(measurement_file: str, **options) -> None:
     for path, text in texts.items():
         path.write_text(text, encoding="utf-8")
     _tell(options["as_json"], guess, robot or own, chosen, report, list(texts), paths[0])
-
-
-def _looked(path: str, options: dict, ask: bool) -> Guess:
-    """The guess at a file without open questions: answered by ``--take``, or by a person."""
-    from kinacc.errors import InputError
-    from kinacc.intake import guess as guesses
-
-    take, turned = list(options["take"]), options["orientation"] != "none"
-    while True:
-        guess = guesses.look(path, take, turned)
-        questions = guess.found.questions
-        if not questions:
-            return guess
-        if not ask:
-            raise InputError(
-                [_open(path, each) for each in questions], f"{path} leaves open what is to be read"
-            )
-        answer = _which(path, questions[0])
-        take += answer
-        turned = turned and bool(answer)
-
-
-def _which(path: str, question: Question) -> list[str]:
-    """Columns to take, as answered; none only where that is an answer too."""
-    from kinacc.errors import InputError, Problem
-
-    click.echo(f"The names do not tell {question.about}: {question.why}.")
-    for number, reading in enumerate(question.readings, 1):
-        click.echo(f"  {number}: {reading.in_words()}")
-    several = question.about == "the measured point" and len(question.readings) > 1
-    hint = ", as 1,2 if several were measured" if several else ""
-    count = len(question.readings)
-    while True:
-        try:
-            answer = click.prompt(f"Number (0 for none of them{hint})", type=str)
-        except click.Abort:
-            raise InputError(_open(path, question)) from None
-        numbers = [int(word) for word in answer.replace(",", " ").split() if word.isdigit()]
-        if numbers == [0] and question.without:
-            return []
-        if numbers == [0]:
-            what = f"does not hold {question.about}, by the answer given"
-            raise InputError(Problem(path, what, fix="add the columns to the file"))
-        if numbers and all(1 <= n <= count for n in numbers) and (several or len(numbers) == 1):
-            return [question.readings[number - 1].names[0] for number in numbers]
-        click.echo(f"a number from 0 to {count}")
-
-
-def _open(path: str, question: Question) -> Problem:
-    """What the file leaves open, with the options that decide it."""
-    import shlex
-
-    from kinacc.errors import Problem
-
-    readings = "; or ".join(each.in_words() for each in question.readings)
-    options = [f"--take {shlex.quote(each.names[0])}" for each in question.readings]
-    options += ["--orientation none"] if question.without else []
-    return Problem(
-        path,
-        f"the names do not tell {question.about}: {question.why}: {readings}",
-        fix=f"give {' or '.join(options)}",
-    )
 
 
 _FOLDS_UNKNOWN = 60

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.data import roles
-from kinacc.data.names import KNOWN, name_of
+from kinacc.data.names import name_of
 from kinacc.data.table import RawTable
 from kinacc.errors import Problem
 
@@ -49,9 +49,7 @@ _TARGET_QUANTITIES = (
     *ANGLES_IN_ORDER,
 )
 _POINT = re.compile(r"(?P<name>.+_x)_(?:mm|m)")
-_JOINT = re.compile(r"q(?P<number>\d)(?:_cmd)?")
 _READ = (roles.MEASURED, roles.REPORTED, roles.PLAIN)
-_UNSTATED = {"joint_unit": "deg", "length_unit": "mm", "orientation.unit": "deg"}
 
 
 @dataclass(frozen=True)
@@ -156,7 +154,6 @@ def find(
     names = finder.targets()
     targets = tuple(finder.target(name, alone=len(names) == 1) for name in names)
     finder.refuse_unknown_columns()
-    finder.refuse_contradicted_units(prismatic)
     if len(problems) > before:
         return None
     found = Found(
@@ -338,52 +335,6 @@ class _Finder:
                 what = f"is not there, but measurements.file.columns maps {name} to it"
                 self._problem(foreign, what, _listed(self.table))
 
-    def refuse_contradicted_units(self, prismatic: np.ndarray) -> None:
-        """A key that states another unit than the columns it is about."""
-        keys = {
-            "joint_unit": self.layout.joint_unit,
-            "length_unit": self.layout.length_unit,
-            "orientation.unit": self.layout.angle_unit,
-        }
-        for key, unit in keys.items():
-            mapped, own = self._stated(key, prismatic)
-            # Columns of our names say their unit; a key that is the default may not be meant.
-            if unit != _UNSTATED[key] and all(each is not None for each in mapped.values()):
-                others = mapped | own
-            else:
-                others = mapped
-            wrong = {c: said for c, said in others.items() if said not in (None, unit)}
-            for said in dict.fromkeys(wrong.values()):
-                columns = ", ".join(column for column, each in wrong.items() if each == said)
-                what = f"says {said}, but measurements.file.{key} says {unit}"
-                fix = "correct the key, or the name where it is the one that is wrong"
-                self._problem(columns, what, "the same in both places", fix)
-
-    def _stated(self, key: str, prismatic) -> tuple[dict, dict]:
-        """Units that the columns ``key`` is about state, None for none: mapped ones, our names."""
-        mapped = {}
-        for ours, column in self.layout.columns.items():
-            if column in self.table.columns and _key_of(ours, prismatic) == key:
-                mapped[column] = self._unit_of(column)
-        own = {}
-        for column in self.table.columns:
-            ours, _, unit = column.rpartition("_")
-            plain = split(ours)[1] in (*POSITION, *ANGLES, *ANGLES_IN_ORDER) or _JOINT.fullmatch(
-                ours
-            )
-            if plain and ours not in self.layout.columns and unit in (*ANGLE, *LENGTH):
-                fits = unit in (ANGLE if _key_of(ours, prismatic) != "length_unit" else LENGTH)
-                if fits and _key_of(ours, prismatic) == key:
-                    own[column] = unit
-        return mapped, own
-
-    def _unit_of(self, column: str) -> str | None:
-        """The unit a column states in its name or under it, None for none that is known."""
-        place = list(self.table.columns).index(column)
-        under = self.table.under[place] if place < len(self.table.under) else ""
-        said = name_of(column, under if name_of("x", under).unit in KNOWN else "").unit
-        return said if said in KNOWN or " or " in said else None
-
     def refuse_shared_columns(self, found: Found) -> None:
         """A column that is taken for two measured quantities, as a slip in a mapping makes it."""
         measured = [*found.joints, *found.commanded, *found.directions.values()]
@@ -396,18 +347,6 @@ class _Finder:
 
     def _problem(self, column: str, what: str, allowed: str = "", fix: str = "") -> None:
         self.problems.append(Problem(f"{self.table.path}: column {column}", what, allowed, fix))
-
-
-def _key_of(name: str, prismatic) -> str:
-    """The key that states the unit of a quantity of our name, empty where none does."""
-    joint = _JOINT.fullmatch(name)
-    if joint:
-        number = int(joint["number"])
-        return "length_unit" if number <= len(prismatic) and prismatic[number - 1] else "joint_unit"
-    quantity = split(name)[1]
-    if quantity in (*POSITION, *STD):
-        return "length_unit"
-    return "orientation.unit" if quantity in (*ANGLES, *ANGLES_IN_ORDER, *STD_TURN) else ""
 
 
 def in_order_of(convention: str) -> tuple[str, ...]:
