@@ -307,6 +307,7 @@ def _dataset(
     note = [f"Written by kinacc init. Robot: {chosen}."]
     how = _how(report).capitalize()
     note += [f"{how}: {words}." for words in guess.assumed.values()]
+    note += [f"Not read: {', '.join(names)} ({why})." for names, why in guess.unused() if why]
     note.append(f"Everything not given here is as in config.yaml.\n    kinacc check-data {path}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
