@@ -85,6 +85,7 @@ def described(path, *options):
 def assert_measured(section):
     """The run takes the measured points and the joints as they were; returns all columns."""
     columns = read(section, ARM, strict=False).columns
+    columns = {name: values[columns["target"] == "tool"] for name, values in columns.items()}
     point = np.stack([columns[f"{axis}_mm"] for axis in AXES], axis=1)
     q_deg = np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, 7)], axis=1))
     np.testing.assert_allclose(point, IT.measured, atol=1e-3)
@@ -166,6 +167,13 @@ RIGHT = {
         (by_axis("F{a} [N]"), IT.spread),
         (numbered("J{} [deg/s]"), IT.q * 0.1),
     ],
+    "three reflectors": [
+        Q,
+        (by_axis("B1 {A} nominal"), IT.nominal),
+        X,
+        (by_axis("B1_{a}_mm"), IT.measured + IT.turn.apply([90, 0, 0])),
+        (by_axis("B2_{a}_mm"), IT.measured + IT.turn.apply([0, 90, 0])),
+    ],
     "axes by letters": [(list("SLURBT"), IT.q), X],
 }
 
@@ -238,6 +246,12 @@ ASKED = {
         (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
         (by_axis("actual_{a}"), IT.controller),
     ],
+    "set point and actual point": [
+        Q,
+        (by_axis("{A} Soll"), IT.nominal),
+        (by_axis("{A} Ist"), IT.controller),
+    ],
+    "a point and the length of its deviation": [Q, X, (["3D error [mm]"], IT.spread[:, :1])],
     "a target beside a point": [Q, X, (by_axis("target_{a}_mm"), IT.nominal)],
     "a reference beside a point": [Q, X, (by_axis("ref_{a}_mm"), IT.nominal)],
     "a point and how far it is off": [
@@ -264,6 +278,12 @@ ASKED = {
     "commanded joints alone": [(numbered("joint_{}_cmd"), IT.rounded), X],
     "joints of two arms": [(numbered("left_j{}"), IT.q), (numbered("right_j{}"), IT.rounded), X],
     "numbers without a word for joints": [(numbered("position[{}]", first=0), IT.q), X],
+    "the controller's orientation beside a tracker's point": [
+        (numbered("robax_{}"), IT.q),
+        (by_axis("trans_{a}"), IT.controller),
+        (numbered("rot_q{}", 4), IT.quaternion),
+        (by_axis("tracker_{a}"), IT.measured),
+    ],
     "two orientations": [
         Q,
         X,
@@ -323,6 +343,10 @@ REFUSED = {
             (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
             (numbered("actual_TCP_pose_{}", first=0), np.hstack([IT.controller / 1000.0] * 2)),
         ],
+        "never a measurement",
+    ),
+    "the controller's own kinematics by axes": (
+        [Q, (by_axis("actual_TCP_pose_{a}"), IT.controller / 1000.0)],
         "never a measurement",
     ),
     "only nominal points": ([Q, (by_axis("soll_{a}"), IT.nominal)], "nominal"),

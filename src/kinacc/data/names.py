@@ -35,6 +35,7 @@ _HUMP = re.compile(
 )
 _SIGNS = str.maketrans({"º": "°", "˚": "°", "∆": "Δ", "µ": "μ", "ß": "ss"})
 _AXIS = re.compile(r"(?:r|q)?[xyzw]|q|j")
+_T_MAC = re.compile(r"t-mac", re.IGNORECASE)
 _JOINED = re.compile(r"(.{1,4}?)(mm|deg|rad|grad|cm|um|μm)")
 _PLACE_TEXT = "pos position rot rotation quat ori trans tool euler"
 _BESIDE_TEXT = """
@@ -67,7 +68,7 @@ class Name:
 def name_of(column: str, unit: str = "") -> Name:
     """The name taken apart; ``unit`` is what a line of units says of it."""
     stated = [unit_of(unit)] if unit_of(unit) else []
-    text = column.translate(_SIGNS)
+    text = _T_MAC.sub("tmac", column.translate(_SIGNS))
     for inside in _BRACKET.findall(text):
         if _says_more(inside):
             continue

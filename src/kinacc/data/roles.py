@@ -19,14 +19,14 @@ SPREAD = "an uncertainty"
 OTHER = "another quantity"
 
 _OTHER = """
-velocity vel speed geschwindigkeit vitesse velocidad velocita qd qdd dq ddq acceleration acc accel
-beschleunigung aceleracion accelerazione jerk torque tau drehmoment couple coppia par force forces
-kraft fuerza forza ft wrench moment moments momento current currents strom courant corriente
-corrente voltage voltages spannung temperature temperatures temp temperatur temperatura temps mode
-modes status state gain output outputs input inputs digital analog control accelerometer gyro imu
-payload cog inertia normal direction dir vector distance dist abstand azimuth elevation intensity
-quality quaternionnorm station instrument frame uframe utool offset origin ursprung speedscaling
-load time zeit stamp timestamp date
+effort efforts dot velocity vel speed geschwindigkeit vitesse velocidad velocita qd qdd dq ddq
+acceleration acc accel beschleunigung aceleracion accelerazione jerk torque tau drehmoment couple
+coppia par force forces kraft fuerza forza ft wrench moment moments momento current currents strom
+courant corriente corrente voltage voltages spannung temperature temperatures temp temperatur
+temperatura temps mode modes status state gain output outputs input inputs digital analog control
+accelerometer gyro imu payload cog inertia normal direction dir vector distance dist abstand
+azimuth elevation intensity quality quaternionnorm station instrument frame uframe utool offset
+origin ursprung speedscaling load time zeit stamp timestamp date
 """
 _SPREAD = """
 std sigma stddev stdev sd uncertainty uncertainties unc uncert unsicherheit messunsicherheit
@@ -144,6 +144,11 @@ def speaks(word: str) -> bool:
 def commands(words: Collection[str]) -> bool:
     """Whether words of joints say that these were commanded."""
     return role(words) in (NOMINAL, OPEN) and bool(_COMMANDS & set(words))
+
+
+def is_own_pose(words: Collection[str]) -> bool:
+    """Whether the words are those of a pose that the controller calculates from its joints."""
+    return bool(_FRAMES & set(words)) and any(_ROLE.get(word) == REPORTED for word in words)
 
 
 def is_frame(words: Collection[str]) -> bool:

@@ -21,6 +21,7 @@ from kinacc.data.roles import (
     PLAIN,
     REPORTED,
     SPREAD,
+    is_own_pose,
     role,
 )
 from kinacc.intake import groups
@@ -28,6 +29,8 @@ from kinacc.intake.groups import JOINTS, POINT, POSE, TURN, Group, Values
 
 _LENGTHS, _ANGLES = {"mm", "m"}, {"deg", "rad"}
 _NOT_MEASURED = (NOMINAL, CALCULATED, DEVIATION, SPREAD, OTHER)
+# Words of records of measurement; a controller writes target, command or set point.
+_OF_PROTOCOLS = frozenset(("nominal", "nom", "nominell", "nominale", "nenn", "nennwert"))
 _POSE = (
     "a pose in numbered columns, which are not read",
     "the controller's own forward kinematics, never a measurement",
@@ -91,6 +94,7 @@ def recognise(
     are read whatever their names say. ``turned``: orientations are wanted.
     """
     choice = _Choice(groups.found(names, values), values, frozenset(take))
+    choice.off = any(groups.is_deviation(name) for name in names)
     joints = choice.joints()
     points = choice.points(joints)
     turns = choice.turns(points) if turned else {}
@@ -122,6 +126,8 @@ def _all(group: Group | None) -> tuple[Name, ...]:
 class _Choice:
     """One look at the groups of a file: ``aside`` and ``questions`` grow as it goes."""
 
+    off = False  # whether a column by itself says how far off the points were
+
     def __init__(self, found: Sequence[Group], values: Values | None, take: frozenset[str]) -> None:
         self.values = values
         self.take = take
@@ -152,7 +158,7 @@ class _Choice:
         ]
 
     def _taken(self, kind: str) -> list[Group]:
-        wrong = (DEVIATION, SPREAD, OTHER)
+        wrong = (DEVIATION, SPREAD, OTHER, CALCULATED)
         every = [each for each in self._of(kind) if each.role not in wrong]
         return [each for each in every if self.take & {*each.names}]
 
@@ -218,7 +224,8 @@ class _Choice:
         if taken := self._taken(POINT):
             self._leave([each for each in self._of(POINT) if each not in taken], "others are taken")
             return self._named_apart(taken)
-        self._leave(self._of(POINT, *_NOT_MEASURED))
+        for each in self._of(POINT, *_NOT_MEASURED):
+            self._leave([each], _POSE[1] if is_own_pose(each.columns["x"].words) else each.role)
         measured, reported = self._of(POINT, MEASURED), self._of(POINT, REPORTED)
         plain, unclear = self._of(POINT, PLAIN), self._of(POINT, OPEN)
         if measured:
@@ -232,12 +239,16 @@ class _Choice:
             if joints is not None and joints.role == REPORTED:
                 why = "beside joints read back it may be what the controller calculated from them"
                 return self._chosen(reported, why)
+            if not self._protocol():
+                why = "nothing says that an instrument measured it, and no controller calculated it"
+                return self._chosen(reported, why)
             self._leave(wanted, NOMINAL)
             return self._one_each(reported)
         if plain and unclear:
             why = "the names do not say which of them an instrument measured"
             return self._chosen([*plain, *unclear], why)
-        if plain and self._of(POINT, DEVIATION) and not self._of(POINT, NOMINAL):
+        off = self.off or self._of(POINT, DEVIATION)
+        if plain and off and not self._of(POINT, NOMINAL):
             why = "beside a deviation it may be the nominal point as well as the measured one"
             return self._chosen(plain, why)
         if plain:
@@ -245,6 +256,12 @@ class _Choice:
         if unclear:
             return self._chosen(unclear, "nothing says that an instrument measured it")
         return []
+
+    def _protocol(self) -> bool:
+        """Whether actual points stand in a record of measurement: nominal, actual, deviation."""
+        nominal = self._of(POINT, NOMINAL)
+        named = any({*each.columns["x"].words} & _OF_PROTOCOLS for each in nominal)
+        return named or bool(nominal and self._of(POINT, DEVIATION))
 
     def _one_each(self, candidates: list[Group]) -> list[Group]:
         """The candidates, unless two of them may be the same point."""
@@ -310,7 +327,7 @@ class _Choice:
         named = [each for each in own if each.target == point.target]
         certain = self._distinct([each for each in named if each.role == MEASURED])
         one = certain or self._distinct(list(own))
-        aside = self._of(POINT, NOMINAL, DEVIATION, CALCULATED)
+        aside = self._other_points(point)
         if len(one) == 1 and one[0] in named:
             plain = one[0].role == PLAIN and not aside
             if plain or one[0].role in (MEASURED, point.role):
@@ -318,6 +335,11 @@ class _Choice:
                 return one[0]
         why = "the names do not say which was measured with the point"
         return self._ask(f"the orientation of {point.target}", one, why, without=True)
+
+    def _other_points(self, point: Group) -> list[Group]:
+        """Points of other roles, whose orientation one without a word may be."""
+        every = [each for each in self._of(POINT) if each.role not in (SPREAD, OTHER, point.role)]
+        return [e for e in every if not groups.same(e, point, self.values)]
 
     def spreads(self, points: Sequence[Group], turns: dict[str, Group]) -> dict[str, dict]:
         """Standard deviations by target, in the unit of what they are of."""

@@ -20,7 +20,7 @@ Values = Callable[[Name], np.ndarray]
 
 _JOINT_TEXT = """
 q joint joints j axis a theta θ th achse achsen gelenk gelenkwinkel axe eje asse giunto articulacion
-articulation junta jnt jt rax jpos jointangle angle angles winkel angulo angolo
+articulation junta jnt jt rax robax jpos jointangle angle angles winkel angulo angolo
 """
 _TURN_TEXT = """
 r rot rotation rotations rotacion rotazione orientation orient ori orientierung orientacion
@@ -96,9 +96,13 @@ def found(names: Sequence[Name], values: Values | None = None) -> list[Group]:
     return [*groups, *_by_word(names, points)]
 
 
-def of_single(names: Sequence[Name], label: str) -> Name | None:
-    """The column whose name is this word alone."""
-    return next((name for name in names if name.words == (label,)), None)
+def is_deviation(name: Name) -> bool:
+    """Whether a column by itself says how far off a point was: error, 3D deviation."""
+    told = [
+        w for w in name.words if w not in _FILLING and not w.isdigit() and w not in ("d", "total")
+    ]
+    said = roles.role(name.words) == roles.DEVIATION or {*name.words} == {"deviation"}
+    return said and len(told) <= 1 and name.unit not in ("deg", "rad")
 
 
 def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
@@ -339,7 +343,7 @@ def rigid(groups: Sequence[Group], values: Values | None) -> bool:
             usual = float(np.median(length))
             off = float(np.median(np.abs(length - usual)))
             turned = float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))
-            if off > 0.01 * usual or turned < 5.0 * off or turned < 0.02 * usual:
+            if off > 0.01 * usual or turned < 5.0 * off or turned < 1e-3 * usual:
                 return False
     return True
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinacc.data.layout import TOOL, Layout, find
 from kinacc.data.names import Name, name_of
-from kinacc.data.roles import CALCULATED, NOMINAL
+from kinacc.data.roles import NOMINAL
 from kinacc.data.table import RawTable, numbers
 from kinacc.errors import InputError, Problem
 from kinacc.intake import columns, text
@@ -159,8 +159,7 @@ def _refuse(path: str, table: RawTable, found: Columns, take: Sequence[str]) -> 
             continue
         left = [(group, why) for group, why in found.aside if group.kind in kinds]
         told = "; ".join(f"{group.in_words()}: {why}" for group, why in left)
-        roles = (NOMINAL, CALCULATED)
-        takeable = [g.names[0] for g, _ in left if g.kind == "point" and g.role in roles]
+        takeable = [g.names[0] for g, _ in left if g.kind == "point" and g.role == NOMINAL]
         fix = f"name them {fix}, {by_hand}"
         if takeable:
             fix += f"; --take {shlex.quote(takeable[0])} reads them all the same"
