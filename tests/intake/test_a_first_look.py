@@ -2,10 +2,10 @@
 
 import pytest
 
+from kinacc.data.names import name_of
 from kinacc.errors import InputError
 from kinacc.intake import guess, text
 from kinacc.intake.columns import recognise
-from kinacc.intake.names import name_of
 
 KUKA = """exported by a controller
 Nr;A1;A2;A3;A4;A5;A6;X;Y;Z;A;B;C
@@ -56,16 +56,17 @@ def test_units_by_name_and_by_size(file):
     assert found.section["length_unit"] == "m"
     assert "1.5" in found.assumed["length_unit"]
     assert "joint_unit" not in found.assumed
-    assert (
-        found.section["columns"] == {"x": "x", "y": "y", "z": "z"} or not found.section["columns"]
-    )
+    assert [found.section["columns"][axis] for axis in "xyz"] == ["x", "y", "z"]
 
 
-def test_targets_keep_their_names_and_native_columns_need_no_mapping(file):
+def test_targets_keep_their_names_and_every_column_read_is_named(file):
     head = "config,repeat,q1_deg,q2_deg,q3_deg,q4_deg,mA_x_mm,mA_y_mm,mA_z_mm,b_x_mm,b_y_mm,b_z_mm"
     found = guess.look(file(head + "\n" + "1,0,10,20,30,40,1,2,3,4,5,6\n" * 3))
     assert found.targets == ("mA", "b")
-    assert found.section["columns"] == {"pose": "config"}
+    assert found.section["targets"] == ["mA", "b"]
+    columns = found.section["columns"]
+    assert (columns["pose"], columns["q4"], columns["b_z"]) == ("config", "q4_deg", "b_z_mm")
+    assert set(columns.values()) == set(head.split(","))
 
 
 def test_commanded_joints_and_wanted_poses_are_no_readings():

@@ -27,28 +27,43 @@ _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "z
 @click.option("--angle-unit", type=click.Choice(["deg", "rad"]), help="Unit of orientations.")
 @click.option(
     "--orientation",
-    help="quaternion, rotation_vector, none, or an Euler convention such as XYZ.",
+    help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "
+    "convention such as XYZ.",
 )
-@click.option("--yes", is_flag=True, help="Ask nothing; take the guesses, which are stated.")
+@click.option(
+    "--take",
+    multiple=True,
+    metavar="COLUMN",
+    help="Read this column, and those that go with it, where the names leave several readings "
+    "open. May be given again.",
+)
+@click.option(
+    "--yes",
+    is_flag=True,
+    help="Ask nothing; take the guesses, which are stated. Stops where there is no guess.",
+)
 @click.option("--force", is_flag=True, help="Replace files that are there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON; asks nothing.")
 def init(measurement_file: str, **options) -> None:
     """Describe MEASUREMENT_FILE: write its data set and, where needed, its robot.
 
     Looks at the names and numbers of the file, asks what they do not say, and tries the answer on
-    the readings themselves. Writes NAME.yaml and NAME.robot.yaml, and overwrites nothing.
+    the readings themselves. What was measured is read, and not what was wanted or how far off it
+    was; joints read back are read, and not commanded ones. Writes NAME.yaml and NAME.robot.yaml,
+    which name every column that is read, and overwrites nothing.
 
     \b
     Example:
       kinacc init ../shared/data/ur10_tmac/series_D.csv --robot ur10 --name ur10_d
       kinacc init tracker.csv --robot arm.urdf --orientation ZYX --out cell3 --yes
+      kinacc init log.csv --take actual_q_0 --take X
     """
     from kinacc import robot as robots
-    from kinacc.intake import guess as guesses
+    from kinacc.commands.init_questions import looked
     from kinacc.intake.write import plain_name
 
     ask = not (options["yes"] or options["as_json"])
-    guess = _stated(guesses.look(measurement_file), options)
+    guess = _stated(looked(measurement_file, options, ask), options)
     name = options["name"] or plain_name(measurement_file)
     folder = Path(options["out"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
@@ -87,6 +102,20 @@ def _robot_file(robot: str | None, joints: int, name: str, path: Path) -> tuple[
 
 def _stated(guess: Guess, options: dict) -> Guess:
     """The guess with what the options say, which is no assumption then."""
+    from kinacc.errors import InputError, Problem
+
+    problems = []
+    for option in ("joint_unit", "length_unit", "angle_unit"):
+        unit, listed = guess.stated.get(option, ("", ""))
+        if options[option] and unit not in ("", options[option]):
+            where = f"--{option.replace('_', '-')} {options[option]}"
+            what = f"columns {listed} of {guess.section['path']} say {unit}"
+            fix = (
+                "leave the option out, or correct the names where they are the ones that are wrong"
+            )
+            problems.append(Problem(where, what, "the same in both places", fix))
+    if problems:
+        raise InputError(problems)
     settings: dict = {}
     turn: dict = {}
     for option, setting in (("joint_unit", "joint_unit"), ("length_unit", "length_unit")):
@@ -99,7 +128,7 @@ def _stated(guess: Guess, options: dict) -> Guess:
     if turn:
         settings["orientation"] = turn
     known = {name for name in ("joint_unit", "length_unit", "angle_unit") if options[name]}
-    known |= {"orientation"} if options["orientation"] else set()
+    known |= {"orientation", "order"} if options["orientation"] else set()
     kept = {k: v for k, v in guess.assumed.items() if k not in known}
     return replace(guess.but(settings), assumed=kept)
 
@@ -110,9 +139,11 @@ def _orientation(word: str) -> dict:
 
     if word in ("none", "quaternion", "rotation_vector"):
         return {"kind": word}
+    if word == "quaternion_xyzw":
+        return {"kind": "quaternion", "order": "xyzw"}
     if word in CONVENTIONS:
         return {"kind": "euler", "convention": word}
-    allowed = f"none, quaternion, rotation_vector, {', '.join(CONVENTIONS)}"
+    allowed = f"none, quaternion, quaternion_xyzw, rotation_vector, {', '.join(CONVENTIONS)}"
     raise InputError(Problem("--orientation", repr(word), allowed))
 
 
@@ -145,6 +176,9 @@ def _asked(guess: Guess) -> Guess:
                 default=guess.section["orientation"]["convention"],
             )
             guess = guess.but({"orientation": _orientation(answer)})
+        elif setting == "order":
+            order = _prompt("Order", type=click.Choice(["wxyz", "xyzw"]), default="wxyz")
+            guess = guess.but({"orientation": {"order": order}})
         else:
             units = ["mm", "m"] if setting == "length_unit" else ["deg", "rad"]
             now = guess.section["orientation"]["unit"]
@@ -220,7 +254,7 @@ def _contradicted(guess: Guess, report: Report) -> dict:
     for each in report.suspicions:
         wanted = dict(each.values.get("setting", {}))
         turn = dict(wanted.pop("orientation", {}))
-        about = "angle_unit" if "unit" in turn else "orientation"
+        about = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
         if turn and about in guess.assumed:
             settings |= {"orientation": turn}
             settings |= {"e": wanted["e"]} if "e" in wanted else {}
@@ -239,10 +273,25 @@ def _set_right(guess: Guess, settings: dict) -> Guess:
         settings["columns"] = columns
     told = {key: "found by trying it on the readings" for key in settings if key in guess.assumed}
     if "orientation" in settings:
-        key = "angle_unit" if "unit" in settings["orientation"] else "orientation"
+        turn = settings["orientation"]
+        key = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
         told[key] = "found by trying it on the readings"
     kept = {k: v for k, v in guess.assumed.items() if k not in told}
     return replace(guess.but(settings), assumed=kept)
+
+
+_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
+
+
+def _remarks(report: Report | None) -> list[str]:
+    """What has to be said of the points though nothing contradicts them."""
+    left = report.facts.get("quick_fit", {}).get("left_per_axis_mm") if report else None
+    if left is None or left > _CALCULATED_MM:
+        return []
+    return [
+        f"the points follow the joints to {left:.1g} mm, closer than an instrument measures: if a "
+        "controller or a simulation calculated them, they say nothing of the arm"
+    ]
 
 
 def _how(report: Report | None) -> str:
@@ -259,10 +308,29 @@ def _dataset(
     note = [f"Written by kinacc init. Robot: {chosen}."]
     how = _how(report).capitalize()
     note += [f"{how}: {words}." for words in guess.assumed.values()]
+    note += [f"Not read: {', '.join(names)} ({why})." for names, why in guess.unused() if why]
     check = f"kinacc check-data {shlex.quote(str(path))}"
     note.append(f"Everything not given here is as in config.yaml.\n    {check}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
+
+
+def _listed(names) -> str:
+    columns = [name.column for name in names]
+    return f"{columns[0]} .. {columns[-1]}" if len(columns) > 4 else ", ".join(columns)
+
+
+def _point(target: dict) -> str:
+    return _listed([target[axis] for axis in "xyz"])
+
+
+def _turned(guess: Guess) -> str:
+    """The columns of the orientation of the first target that has one."""
+    for target in guess.found.targets.values():
+        names = [n for q, n in target.items() if q[0] in "rq"]
+        if names and guess.section["orientation"]["kind"] != "none":
+            return f": {_listed(names)}"
+    return ""
 
 
 def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None:
@@ -277,26 +345,35 @@ def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None
             "targets": list(guess.targets),
             "file": guess.section,
             "assumed": guess.assumed,
-            "unused_columns": list(guess.unused),
+            "unused_columns": [name for names, _ in guess.unused() for name in names],
+            "left_aside": [
+                {"columns": list(names), "because": why} for names, why in guess.unused() if why
+            ],
             "suspicions": [] if report is None else [s.kind for s in report.suspicions],
+            "remarks": _remarks(report),
             "next": commands,
         }
         click.echo(json.dumps(answer, indent=1))
         return
     section, turn = guess.section, guess.section["orientation"]
     click.echo(f"robot: {robot} ({chosen})")
-    click.echo(f"joints: {guess.joints}, in {section['joint_unit']}")
-    click.echo(f"targets: {', '.join(guess.targets)}, in {section['length_unit']}")
+    click.echo(f"joints: {guess.joints}, in {section['joint_unit']}: {_listed(guess.found.joints)}")
+    if guess.found.commanded:
+        click.echo(f"joints as commanded: {_listed(guess.found.commanded)}")
+    targets = [f"{name} ({_point(each)})" for name, each in guess.found.targets.items()]
+    click.echo(f"targets, in {section['length_unit']}: {', '.join(targets)}")
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
-    click.echo(f"orientation: {kind}{unit}")
+    click.echo(f"orientation: {kind}{unit}{_turned(guess)}")
     for words in guess.assumed.values():
         click.echo(f"{_how(report)}: {words}")
-    if guess.unused:
-        click.echo(f"columns not used: {', '.join(guess.unused)}")
+    for names, why in guess.unused():
+        click.echo(f"columns not used: {', '.join(names)}" + (f" ({why})" if why else ""))
     if report is not None and report.suspicions:
         kinds = ", ".join(dict.fromkeys(each.kind for each in report.suspicions))
         click.echo(f"suspicions: {kinds} (check-data says more)")
+    for words in _remarks(report):
+        click.echo(f"note: {words}")
     for path in written:
         click.echo(f"written: {path}")
     if report is None:

@@ -4,7 +4,8 @@ A quantity of a row is ``q1``, ``q1_cmd`` (as commanded), ``s1``, ``pose``, ``re
 ``session`` or ``temperature``. A quantity of a target is ``x``, ``rx``, ``qw``, ``std_x``,
 ``cov_xy`` and the like, alone or behind the target's name (``mA_x``). A column of the file carries
 the unit in its name (``q1_deg``, ``mA_x_mm``), or is mapped to our name and then has the layout's
-unit.
+unit. A name that says another unit than the layout is refused, and a point that its name calls
+nominal, a deviation or an uncertainty is read only where ``targets`` or ``columns`` name it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.data import roles
+from kinacc.data.names import name_of
 from kinacc.data.table import RawTable, numbers
 from kinacc.errors import Problem
 
@@ -48,6 +51,7 @@ _TARGET_QUANTITIES = (
     *ANGLES_IN_ORDER,
 )
 _POINT = re.compile(r"(?P<name>.+_x)_(?:mm|m)")
+_READ = (roles.MEASURED, roles.REPORTED, roles.PLAIN)
 
 
 @dataclass(frozen=True)
@@ -149,7 +153,8 @@ def find(
     single["temperature"] = finder.any("temperature", CELSIUS, "C") or finder.any(
         "temp", CELSIUS, "C"
     )
-    targets = tuple(finder.target(name) for name in finder.targets())
+    names = finder.targets()
+    targets = tuple(finder.target(name, alone=len(names) == 1) for name in names)
     finder.refuse_unknown_columns()
     if len(problems) > before:
         return None
@@ -214,24 +219,51 @@ class _Finder:
         return () if None in places else tuple(places)
 
     def targets(self) -> list[str]:
-        """Names of the targets to read, in order of their columns."""
+        """Names of the targets to read, in order of their columns.
+
+        A point whose name leaves open whether it was measured is a problem, unless it is named.
+        """
         if self.layout.targets is not None:
             return list(self.layout.targets)
-        names = []
+        mapped = [split(name) for name in self.layout.columns]
+        named = [target or TOOL for target, quantity in mapped if quantity == "x"]
+        there = list(dict.fromkeys(self._points()))
+        says = {name: roles.role(name_of(f"{name} x").words) for name in there}
+        letters = [n for n in there if len(n) == 1 and says[n] == roles.PLAIN]
+        read = [n for n in there if says[n] in _READ or n in named or (letters and len(n) == 1)]
+        frames = [n for n in there if n not in read and roles.is_frame(name_of(n).words)]
+        if not read and not named and len(frames) == 1:
+            read = frames  # the tool centre point, under its usual name
+        unclear = [n for n in there if n not in read and says[n] == roles.OPEN]
+        if unclear or (there and not read and not named):
+            self._unclear(unclear or there, read)
+        return list(dict.fromkeys([*read, *named])) or [TOOL]
+
+    def _points(self) -> Iterator[str]:
+        """Names of the points whose columns have our names."""
         for column in self.table.columns:
             if column in ("x_mm", "x_m"):
-                names.append(TOOL)
+                yield TOOL
             match = _POINT.fullmatch(column)
             if match and split(match["name"])[1] == "x":
-                names.append(split(match["name"])[0])
-        for name in self.layout.columns:
-            target, quantity = split(name)
-            if quantity == "x":
-                names.append(target or TOOL)
-        return list(dict.fromkeys(names)) or [TOOL]
+                yield split(match["name"])[0]
 
-    def target(self, name: str) -> Target:
-        prefix = "" if name == TOOL and not self._has_prefix(TOOL) else f"{name}_"
+    def _unclear(self, names: list[str], read: list[str]) -> None:
+        columns = [c for c in self.table.columns for n in names if c in (f"{n}_x_mm", f"{n}_x_m")]
+        said = [roles.role(name_of(column).words) for column in columns]
+        told = ", ".join("open" if each == roles.OPEN else each for each in said)
+        named = ", ".join(dict.fromkeys([*read, *names]))
+        self._problem(
+            ", ".join(columns),
+            f"the name does not say that this was measured ({told})",
+            "measured points",
+            f"name those that were measured in measurements.file.targets (of: {named})",
+        )
+
+    def target(self, name: str, alone: bool) -> Target:
+        """Columns of a target; ``alone`` it must have an orientation, where there is a kind."""
+        bare = name == TOOL and ("x" in self.layout.columns or not self._has_prefix(TOOL))
+        prefix = "" if bare else f"{name}_"
         length, angle = self.layout.length_unit, self.layout.angle_unit
         position = [self.required(f"{prefix}{axis}", LENGTH, length) for axis in POSITION]
         covariance = self._all(prefix, COVARIANCE, AREA, f"{length}2")
@@ -242,7 +274,7 @@ class _Finder:
         return Target(
             name,
             tuple(place for place in position if place),
-            self._turn(prefix),
+            self._turn(prefix, alone),
             std,
             self._all(prefix, STD_TURN, ANGLE, angle),
             covariance,
@@ -253,7 +285,7 @@ class _Finder:
             f"{name}_x" in self.layout.columns
         )
 
-    def _turn(self, prefix: str) -> tuple[Place, ...]:
+    def _turn(self, prefix: str, alone: bool) -> tuple[Place, ...]:
         kind = self.layout.orientation
         if kind == "none":
             return ()
@@ -271,7 +303,7 @@ class _Finder:
             if kind == "euler":
                 names = in_order_of(self.layout.convention)
         # A single target must have its orientation; one of several may be a bare point.
-        look = self.required if len(self.targets()) == 1 else self.any
+        look = self.required if alone else self.any
         own = [f"{prefix}{name}" for name in names]
         places = [self.any(name, units, unit) for name in own]
         if look == self.required and not any(places) and not set(own) & set(self.layout.columns):

@@ -10,6 +10,7 @@ import numpy as np
 from kinacc.data import faults
 from kinacc.data.layout import STD, TOOL, Found, Layout, Place, Target, find
 from kinacc.data.orientation import quaternions, rotation_std
+from kinacc.data.stated_units import contradictions
 from kinacc.data.table import RawTable, load, numbers
 from kinacc.errors import InputError, Problem
 from kinacc.robot import Robot
@@ -113,7 +114,8 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     problems: list[Problem] = []
     title = f"{table.path} cannot be used"
     found = find(table, layout, robot.dh.prismatic, problems)
-    if found is None:
+    problems += contradictions(table, layout, robot.dh.prismatic)
+    if found is None or problems:
         raise InputError(problems, title)
     q_rad = _stacked(table, found.joints, problems)
     commanded = _stacked(table, found.commanded, problems, gaps=True) if found.commanded else None

@@ -30,12 +30,14 @@ class RawTable:
     """Columns of a measurement file as read: text cells of a CSV, or values of a Parquet file.
 
     ``line`` (n,) is the line in the file a row stands on (CSV) or its row number from 1 (Parquet).
+    ``under`` are the cells of the line left out under the names, such as a line of units.
     """
 
     path: str
     columns: dict[str, list]
     line: np.ndarray
     decimal: str = "."
+    under: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.line)
@@ -147,6 +149,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
     with open(path, newline="", encoding="utf-8-sig", errors="replace") as stream:
         reader = csv.reader(stream, delimiter=delimiter)
         header: list[str] = []
+        left_out: list[str] = []
         rows, lines, count = [], [], 0
         for cells in _lines(reader, path):
             count += len(cells)
@@ -159,6 +162,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
                 header = [cell.strip() for cell in cells]
             elif under > 0:
                 under -= 1
+                left_out = cells
             else:
                 rows.append(cells)
                 lines.append(reader.line_num)
@@ -179,7 +183,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
     columns = {
         name: list(cells) for name, cells in zip(header, zip(*rows, strict=True), strict=True)
     }
-    return RawTable(str(path), columns, np.array(lines), decimal)
+    return RawTable(str(path), columns, np.array(lines), decimal, tuple(left_out))
 
 
 def _lines(reader, path: Path):

@@ -139,6 +139,7 @@ def _readings(layout: Layout, raw: np.ndarray) -> Iterator[Turn]:
                 "euler_convention",
                 f"the quaternions are written in the order {name}, and read in another",
                 "state measurements.file.orientation.order, or exchange the columns",
+                setting={"orientation": {"order": name}},
             )
             yield Turn(change, lambda r, order=order: rotations(r[:, order], layout))
         return

@@ -1,30 +1,39 @@
-"""Which columns of a foreign file hold joints, positions, orientations and the rest.
+"""Which columns of a foreign file are read as joints, positions, orientations and the rest.
 
-Columns that go together differ in one word only: a number for joints, x, y and z for points. What a
-group holds is told by its other words; groups of commanded or wanted values are left aside.
+What was measured beats what was wanted and how far the two are apart; joints read back beat joints
+commanded. Where the names leave two readings open nothing is chosen in silence: it is a question.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from kinacc.data.layout import TOOL
-from kinacc.intake.names import Name
-
-WANTED = {"goal", "cmd", "command", "commanded", "soll", "nominal", "nom", "set", "desired", "ref"}
-_SPREAD = {"std", "sigma", "stddev", "stdev", "sd", "uncertainty"}
-_TURN = {"r", "rot", "rotation", "orientation", "angle", "euler", "rotvec"}
-_JOINT = ("q", "joint", "j", "axis", "a", "theta")
-_NO_JOINT = {*_SPREAD, "dir", "direction", "velocity", "vel", "qd", "dq", "torque", "current", "s"}
-_NAMED_JOINTS = (
-    ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"),
-    ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"),
+from kinacc.data.names import Name
+from kinacc.data.roles import (
+    CALCULATED,
+    DEVIATION,
+    MEASURED,
+    NOMINAL,
+    OPEN,
+    OTHER,
+    PLAIN,
+    REPORTED,
+    SPREAD,
+    is_own_pose,
+    role,
 )
-_TURNS = (  # words of the three angles, their order about x, y, z, and what they usually are
-    (("roll", "pitch", "yaw"), "xyz"),
-    (("w", "p", "r"), "xyz"),  # FANUC: about fixed x, y, z
-    (("c", "b", "a"), "ZYX"),  # KUKA: A about z, then B about y, then C about x
+from kinacc.intake import groups
+from kinacc.intake.groups import JOINTS, POINT, POSE, TURN, Group, Values
+
+_LENGTHS, _ANGLES = {"mm", "m"}, {"deg", "rad"}
+_NOT_MEASURED = (NOMINAL, CALCULATED, DEVIATION, SPREAD, OTHER)
+# Words of records of measurement; a controller writes target, command or set point.
+_OF_PROTOCOLS = frozenset(("nominal", "nom", "nominell", "nominale", "nenn", "nennwert"))
+_POSE = (
+    "a pose in numbered columns, which are not read",
+    "the controller's own forward kinematics, never a measurement",
 )
 _SINGLE = {
     "pose": {"pose", "config", "configuration", "point", "pt", "no", "nr", "index"},
@@ -36,12 +45,26 @@ _SINGLE = {
 
 
 @dataclass(frozen=True)
+class Question:
+    """What the names leave open: ``about`` what, the ``readings`` there are, and ``why`` it is.
+
+    ``without``: none of them is an answer too.
+    """
+
+    about: str
+    readings: tuple[Group, ...]
+    why: str
+    without: bool = False
+
+
+@dataclass(frozen=True)
 class Columns:
     """Names of ``measurements.file.columns`` and the columns they mean.
 
     ``joints`` q1 ..; ``commanded`` the same as commanded, may be empty; ``targets`` by name, each a
-    mapping of x, rx, qw, std_x and the like; ``turn`` kind and convention of the orientations as
-    their names have it; ``single`` pose, repeat, session, target, temperature.
+    mapping of x, rx, qw, quat1, std_x and the like; ``turn`` kind and convention of the
+    orientations as their names have it; ``single`` pose, repeat, session, target, temperature.
+    ``aside``: groups that are not read, and why; ``questions``: what has to be asked first.
     """
 
     joints: tuple[Name, ...]
@@ -49,128 +72,309 @@ class Columns:
     targets: dict[str, dict[str, Name]] = field(default_factory=dict)
     turn: tuple[str, str] = ("none", "XYZ")
     single: dict[str, Name] = field(default_factory=dict)
+    aside: tuple[tuple[Group, str], ...] = ()
+    questions: tuple[Question, ...] = ()
+
+    def read(self) -> set[str]:
+        """Names of the columns that are read."""
+        every = [*self.joints, *self.commanded, *self.single.values()]
+        every += [name for target in self.targets.values() for name in target.values()]
+        return {name.column for name in every}
 
 
-def recognise(names: Sequence[Name]) -> Columns:
-    """What the columns of these names hold; no joints or no targets where none were found."""
-    rows = _numbered(names) or _named(names)
-    joints = next((r for r in rows if not WANTED & _words(r)), ())
-    commanded = next((r for r in rows if WANTED & _words(r) and len(r) == len(joints)), ())
-    rest = [each for each in names if each not in joints and each not in commanded]
-    targets: dict[str, dict[str, Name]] = {}
-    turn = ("none", "XYZ")
-    turns: dict[tuple[str, ...], dict[str, Name]] = {}
-    spreads: dict[tuple[str, ...], dict[str, Name]] = {}
-    for words, stem, axes in _by_axis(rest):
-        about = {*words, stem}
-        if WANTED & about:
-            continue
-        if _SPREAD & about:
-            spun = "r" if _TURN & about or stem == "stdr" else ""
-            plain = tuple(w for w in words if w not in (*_SPREAD, *_TURN))
-            found = {f"std_{spun}{axis}": axes[axis] for axis in "xyz"}
-            spreads[plain] = spreads.get(plain, {}) | found
-        elif "w" in axes or stem == "q" or {"quat", "quaternion"} & about:
-            if "w" in axes:
-                plain = tuple(w for w in words if w not in ("quat", "quaternion", *_TURN))
-                turns[plain] = {f"q{axis}": axes[axis] for axis in "wxyz"}
-                turn = ("quaternion", "XYZ")
-        elif _TURN & about:
-            plain = tuple(w for w in words if w not in _TURN)
-            turns[plain] = {f"r{axis}": axes[axis] for axis in "xyz"}
-            vector = {"rotvec", "vector", "rvec"} & about
-            turn = ("rotation_vector" if vector else "euler", "XYZ")
+def recognise(
+    names: Sequence[Name],
+    values: Values | None = None,
+    take: Sequence[str] = (),
+    turned: bool = True,
+) -> Columns:
+    """What the columns of these names hold; no joints or no targets where none were found.
+
+    ``values`` gives a column's numbers (n,), NaN where it has none. ``take``: columns whose groups
+    are read whatever their names say. ``turned``: orientations are wanted.
+    """
+    choice = _Choice(groups.found(names, values), values, frozenset(take))
+    choice.off = any(groups.is_deviation(name) for name in names)
+    joints = choice.joints()
+    points = choice.points(joints)
+    turns = choice.turns(points) if turned else {}
+    targets = {each.target: dict(each.columns) for each in points}
+    for target, turn in turns.items():
+        targets[target] |= turn.columns
+    for target, spread in choice.spreads(points, turns).items():
+        targets[target] |= spread
+    kinds = [each.turn for each in turns.values()]
+    commanded = choice.commanded(joints)
+    used = {name.column for target in targets.values() for name in target.values()}
+    used |= {name.column for group in (joints, commanded) if group for name in _all(group)}
+    single = _singles(name for name in names if name.column not in used)
+    return Columns(
+        _all(joints),
+        _all(commanded),
+        targets,
+        kinds[0] if kinds else ("none", "XYZ"),
+        single,
+        tuple((group, why) for group, why in choice.aside if not used & {*group.names}),
+        tuple(choice.questions),
+    )
+
+
+def _all(group: Group | None) -> tuple[Name, ...]:
+    return tuple(group.columns.values()) if group else ()
+
+
+class _Choice:
+    """One look at the groups of a file: ``aside`` and ``questions`` grow as it goes."""
+
+    off = False  # whether a column by itself says how far off the points were
+
+    def __init__(self, found: Sequence[Group], values: Values | None, take: frozenset[str]) -> None:
+        self.values = values
+        self.take = take
+        self.aside: list[tuple[Group, str]] = []
+        self.questions: list[Question] = []
+        self.groups = [each for each in found if self._can_be(each)]
+
+    def _can_be(self, group: Group) -> bool:
+        """Whether its units fit what the group would be."""
+        units = {*group.units} - {""}
+        fit = {JOINTS: _ANGLES | _LENGTHS, POINT: _LENGTHS, TURN: _ANGLES, POSE: set()}
+        allowed = fit.get(group.kind, _ANGLES | _LENGTHS)
+        wrong = sorted(units - allowed)
+        if group.kind == JOINTS and units and not units & _ANGLES:
+            wrong = sorted(units)
+        if wrong and group.role not in (DEVIATION, SPREAD, OTHER):
+            what = {JOINTS: "joints", POINT: "a position", TURN: "an orientation"}
+            self.aside.append((group, f"{what.get(group.kind, 'a pose')} in {' and '.join(wrong)}"))
+            return False
+        if group.kind == POSE:
+            self.aside.append((group, _POSE[group.role == CALCULATED]))
+            return False
+        return True
+
+    def _of(self, kind: str, *said: str) -> list[Group]:
+        return [
+            each for each in self.groups if each.kind == kind and (each.role in said or not said)
+        ]
+
+    def _taken(self, kind: str) -> list[Group]:
+        wrong = (DEVIATION, SPREAD, OTHER, CALCULATED)
+        every = [each for each in self._of(kind) if each.role not in wrong]
+        return [each for each in every if self.take & {*each.names}]
+
+    def _leave(self, left: Sequence[Group], why: str = "") -> None:
+        self.aside += [(each, why or each.role) for each in left]
+
+    def _distinct(self, candidates: list[Group]) -> list[Group]:
+        """Without those whose numbers another one has too; those that state a unit stay."""
+        kept: list[Group] = []
+        for each in sorted(candidates, key=lambda each: each.units == ("",)):
+            if any(groups.same(each, other, self.values) for other in kept):
+                self._leave([each], "the same numbers as other columns")
+            else:
+                kept.append(each)
+        return [each for each in candidates if each in kept]
+
+    def joints(self) -> Group | None:
+        """The joints as reported, else as the file calls them without a word."""
+        if taken := self._taken(JOINTS):
+            self._leave([e for e in self._of(JOINTS) if e not in taken], "others are taken")
+            return taken[0]
+        strong = [each for each in self._of(JOINTS) if not each.weak]
+        weak = [each for each in self._of(JOINTS, PLAIN, REPORTED, NOMINAL, OPEN) if each.weak]
+        self._leave([each for each in strong if each.role in (DEVIATION, SPREAD, OTHER)])
+        reported = self._distinct([each for each in strong if each.role == REPORTED])
+        plain = self._distinct([each for each in strong if each.role == PLAIN])
+        unclear = [each for each in strong if each.role == OPEN]
+        wanted = [each for each in strong if each.role == NOMINAL]
+        best = reported or plain
+        if reported:
+            self._leave([*plain, *unclear, *weak], "beside joints that were read back")
+        elif best and unclear:
+            best = [*best, *unclear]
+        elif best:
+            self._leave(weak, "nothing says that they are joints")
+        if len(best) == 1:
+            return best[0]
+        if best:
+            return self._ask("the joints", best, "several columns may hold them")
+        if unclear or weak:
+            why = "nothing says that these are the joints of the arm, as they were"
+            return self._ask("the joints", [*unclear, *weak], why)
+        if wanted:
+            why = "the only joints of the file are commanded ones, not those read back"
+            return self._ask("the joints", wanted, why)
+        return None
+
+    def commanded(self, joints: Group | None) -> Group | None:
+        """The joints as commanded beside ``joints``, where there is one such group."""
+        wanted = [each for each in self._of(JOINTS, NOMINAL) if each is not joints]
+        fit = [
+            each
+            for each in wanted
+            if joints and len(each.columns) == len(joints.columns) and each.units == joints.units
+        ]
+        strict = [each for each in fit if not {"target", "ref"} & {*_all(each)[0].words}] or fit
+        chosen = strict[0] if len(strict) == 1 else None
+        self._leave([each for each in wanted if each is not chosen], "commanded")
+        return chosen
+
+    def points(self, joints: Group | None) -> list[Group]:
+        """The points that were measured, one of each target."""
+        if taken := self._taken(POINT):
+            self._leave([each for each in self._of(POINT) if each not in taken], "others are taken")
+            return self._named_apart(taken)
+        for each in self._of(POINT, *_NOT_MEASURED):
+            self._leave([each], _POSE[1] if is_own_pose(each.columns["x"].words) else each.role)
+        measured, reported = self._of(POINT, MEASURED), self._of(POINT, REPORTED)
+        plain, unclear = self._of(POINT, PLAIN), self._of(POINT, OPEN)
+        if measured:
+            self._leave([*reported, *plain, *unclear], "beside a point that was measured")
+            return self._one_each(measured)
+        if reported:
+            wanted = [each for each in unclear if "target" in each.columns["x"].words]
+            if plain or len(wanted) < len(unclear):
+                why = "the names do not say which of them an instrument measured"
+                return self._chosen([*reported, *plain, *unclear], why)
+            if joints is not None and joints.role == REPORTED:
+                why = "beside joints read back it may be what the controller calculated from them"
+                return self._chosen(reported, why)
+            if not self._protocol():
+                why = "nothing says that an instrument measured it, and no controller calculated it"
+                return self._chosen(reported, why)
+            self._leave(wanted, NOMINAL)
+            return self._one_each(reported)
+        if plain and unclear:
+            why = "the names do not say which of them an instrument measured"
+            return self._chosen([*plain, *unclear], why)
+        off = self.off or self._of(POINT, DEVIATION)
+        if plain and off and not self._of(POINT, NOMINAL):
+            why = "beside a deviation it may be the nominal point as well as the measured one"
+            return self._chosen(plain, why)
+        if plain:
+            return self._one_each(plain)
+        if unclear:
+            return self._chosen(unclear, "nothing says that an instrument measured it")
+        return []
+
+    def _protocol(self) -> bool:
+        """Whether actual points stand in a record of measurement: nominal, actual, deviation."""
+        nominal = self._of(POINT, NOMINAL)
+        named = any({*each.columns["x"].words} & _OF_PROTOCOLS for each in nominal)
+        return named or bool(nominal and self._of(POINT, DEVIATION))
+
+    def _one_each(self, candidates: list[Group]) -> list[Group]:
+        """The candidates, unless two of them may be the same point."""
+        distinct = self._distinct(candidates)
+        targets = [each.target for each in distinct]
+        if len(targets) > len(set(targets)):
+            return self._chosen(distinct, "several columns may hold it")
+        if not groups.rigid(distinct, self.values):
+            why = "they do not keep their distance as targets on one flange do"
+            return self._chosen(distinct, why)
+        return distinct
+
+    def _chosen(self, candidates: list[Group], why: str) -> list[Group]:
+        first = self._ask("the measured point", candidates, why)
+        return self._named_apart(candidates if first else [])
+
+    def _named_apart(self, taken: list[Group]) -> list[Group]:
+        """The groups under names of which no two are equal."""
+        named: dict[str, Group] = {}
+        for each in taken:
+            name, number = each.target, 1
+            while name in named:
+                number += 1
+                name = f"{each.target}{number}"
+            named[name] = groups.renamed(each, name)
+        return list(named.values())
+
+    def _ask(self, about: str, readings: Sequence[Group], why: str, without=False) -> Group:
+        self.questions.append(Question(about, tuple(readings), why, without))
+        return readings[0]
+
+    def turns(self, points: Sequence[Group]) -> dict[str, Group]:
+        """Orientations by target, all of the kind of the first."""
+        taken = self._taken(TURN)
+        every = taken or self._of(TURN)
+        if taken:
+            self._leave([each for each in self._of(TURN) if each not in taken], "others are taken")
         else:
-            targets[_target(words, names)] = {axis: axes[axis] for axis in "xyz"}
-    for letters, convention in _TURNS:
-        for words, found in _by_word(rest, letters).items():
-            if not WANTED & {*words} and not _SPREAD & {*words} and words not in turns:
-                turns[words] = dict(zip(("rx", "ry", "rz"), found, strict=True))
-                turn = ("euler", convention)
-    for extra in (turns, spreads):
-        for words, found in extra.items():
-            if (target := _target(words, names)) in targets:
-                targets[target] |= found
-    if not any({"rx", "qw"} & set(each) for each in targets.values()):
-        turn = ("none", "XYZ")
-    used = {each for target in targets.values() for each in target.values()}
-    single = _singles(each for each in rest if each not in used)
-    return Columns(joints, commanded, targets, turn, single)
+            self._leave([each for each in every if each.role in _NOT_MEASURED])
+            every = [each for each in every if each.role not in _NOT_MEASURED]
+        found: dict[str, Group] = {}
+        rest = list(every)
+        for point in points:
+            own = self._own(point, every, alone=len(points) == 1, taken=bool(taken))
+            for each in own:
+                rest.remove(each) if each in rest else None
+            if own and (chosen := self._turn(point, own, bool(taken))):
+                found[point.target] = chosen
+        self._leave(rest, "belongs to no point that is read")
+        kinds = list(dict.fromkeys(each.turn[0] for each in found.values()))
+        units = {unit for each in found.values() for unit in each.units}
+        if len(kinds) > 1 or len(units) > 1:
+            self._ask("the orientation", list(found.values()), "they are not alike", without=True)
+        return found
+
+    def _own(self, point: Group, every: Sequence[Group], alone: bool, taken: bool) -> list[Group]:
+        named = [each for each in every if each.target == point.target]
+        return named or (list(every) if alone else [])
+
+    def _turn(self, point: Group, own: Sequence[Group], taken: bool) -> Group | None:
+        if taken:
+            return own[0]
+        named = [each for each in own if each.target == point.target]
+        certain = self._distinct([each for each in named if each.role == MEASURED])
+        one = certain or self._distinct(list(own))
+        aside = self._other_points(point)
+        if len(one) == 1 and one[0] in named:
+            plain = one[0].role == PLAIN and not aside
+            if plain or one[0].role in (MEASURED, point.role):
+                self._leave([e for e in own if e is not one[0]], "beside the one that is read")
+                return one[0]
+        why = "the names do not say which was measured with the point"
+        return self._ask(f"the orientation of {point.target}", one, why, without=True)
+
+    def _other_points(self, point: Group) -> list[Group]:
+        """Points of other roles, whose orientation one without a word may be."""
+        every = [each for each in self._of(POINT) if each.role not in (SPREAD, OTHER, point.role)]
+        return [e for e in every if not groups.same(e, point, self.values)]
+
+    def spreads(self, points: Sequence[Group], turns: dict[str, Group]) -> dict[str, dict]:
+        """Standard deviations by target, in the unit of what they are of."""
+        found: dict[str, dict[str, Name]] = {}
+        for each in self._of(groups.SPREAD):
+            point = next((p for p in points if p.target == each.target), None)
+            point = point or (points[0] if len(points) == 1 and each.target == TOOL else None)
+            turned = "std_rx" in each.columns
+            of = turns.get(point.target) if point and turned else point
+            words = {word for name in each.columns.values() for word in name.words}
+            if each.weak:
+                self._leave([each], f"{SPREAD}, of which nothing says that it is one sigma")
+            elif of is None or of.turn[0] == "quaternion" or _wanted(words):
+                self._leave([each], f"{SPREAD} of nothing that is read")
+            elif each.units != of.units:
+                self._leave([each], f"{SPREAD} whose unit is not stated as that of its values")
+            elif set(each.columns) & set(found.get(point.target, {})):
+                self._leave([each], f"{SPREAD}, there twice")
+            else:
+                found[point.target] = found.get(point.target, {}) | each.columns
+        return found
 
 
-def _words(names: Iterable[Name]) -> set[str]:
-    return {word for each in names for word in each.words}
+def _wanted(words: set[str]) -> bool:
+    """Whether the words of a spread say that it is of something wanted, or of no point."""
+    return role([w for w in words if role([w]) not in (SPREAD, DEVIATION)]) in _NOT_MEASURED
 
 
-def _target(words: tuple[str, ...], names: Sequence[Name]) -> str:
-    """Name of a target from the words its columns share; those that only say 'measured' drop."""
-    spelling = {w: s for each in names for w, s in zip(each.words, each.spelled, strict=True)}
-    told = [w for w in words if w not in ("measurement", "measured", "pos", "position", "actual")]
-    return "_".join(spelling[w] for w in told) or TOOL
-
-
-def _numbered(names: Sequence[Name]) -> list[tuple[Name, ...]]:
-    """Rows of columns that differ in a number counting 0.. or 1.., those of joints first."""
-    rows: dict[tuple, dict[int, Name]] = {}
-    for each in names:
-        for place, word in enumerate(each.words):
-            if word.isdigit() and len(word) == 1:
-                rows.setdefault((place, each.without(place)), {})[int(word)] = each
-    found = []
-    for (_, words), columns in rows.items():
-        numbers = sorted(columns)
-        counted = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-        if counted and numbers[0] in (0, 1) and 4 <= len(numbers) <= 7 and not _NO_JOINT & {*words}:
-            rank = next((i for i, word in enumerate(_JOINT) if word in words), len(_JOINT))
-            if rank < len(_JOINT) or len(numbers) >= 6:
-                found.append((-len(numbers), rank, tuple(columns[n] for n in numbers)))
-    return [row for _, _, row in sorted(found, key=lambda each: each[:2])]
-
-
-def _named(names: Sequence[Name]) -> list[tuple[Name, ...]]:
-    """Rows of columns with the names joints of some arms have."""
-    rows = []
-    for series in _NAMED_JOINTS:
-        row = []
-        for joint in series:
-            words = set(joint.split("_"))
-            hits = [
-                n for n in names if words <= {*n.words} and not (WANTED | _NO_JOINT) & {*n.words}
-            ]
-            row += hits[:1]
-        if len(row) == len(series) and len(set(row)) == len(row):
-            rows.append(tuple(row))
-    return rows
-
-
-def _by_axis(names: Sequence[Name]):
-    """Words, stem and columns by axis of names that differ in x, y, z (and w) alone."""
-    groups: dict[tuple, dict[str, Name]] = {}
-    for each in names:
-        for place, word in enumerate(each.words):
-            if word[-1] in "xyzw" and len(word) <= 4:
-                key = (each.without(place), word[:-1])
-                groups.setdefault(key, {}).setdefault(word[-1], each)
-    for (words, stem), axes in groups.items():
-        if {"x", "y", "z"} <= set(axes):
-            yield words, stem, axes
-
-
-def _by_word(names: Sequence[Name], letters: tuple[str, ...]) -> dict[tuple, list[Name]]:
-    """Columns that differ in these words alone, in their order, by the words they share."""
-    groups: dict[tuple, dict[str, Name]] = {}
-    for each in names:
-        for place, word in enumerate(each.words):
-            if word in letters:
-                groups.setdefault(each.without(place), {})[word] = each
-    return {k: [g[w] for w in letters] for k, g in groups.items() if len(g) == 3}
-
-
-def _singles(names: Iterable[Name]) -> dict[str, Name]:
+def _singles(names) -> dict[str, Name]:
     found: dict[str, Name] = {}
     for each in names:
         words = [word for word in each.words if word not in ("measurement", "c", "id", "number")]
         for quantity, known in _SINGLE.items():
             if len(words) == 1 and words[0] in known:
+                if quantity == "temperature" and each.unit not in ("", "C"):
+                    continue
                 found.setdefault(quantity, each)
     return found

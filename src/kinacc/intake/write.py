@@ -42,11 +42,16 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         words["convention"] = turn["convention"]
     if turn["kind"] in ("euler", "rotation_vector"):
         words["unit"] = turn["unit"]
+    if turn["kind"] == "quaternion" and any(k.endswith("quat1") for k in section["columns"]):
+        words["order"] = turn["order"]
     listed = ", ".join(f"{key}: {scalar(value)}" for key, value in words.items())
     lines.append(f"        orientation: {{{listed}}}")
+    lines.append(f"        targets: [{', '.join(scalar(name) for name in section['targets'])}]")
     if section["columns"]:
         lines.append("        columns: # our name: the file's name")
-        lines += [f"          {ours}: {scalar(own)}" for ours, own in section["columns"].items()]
+        for ours, own in section["columns"].items():
+            key = ours if _PLAIN.fullmatch(ours) else scalar(ours)
+            lines.append(f"          {key}: {scalar(own)}")
     folds = configurations if configurations < _FEW_POSES else 5
     held = " # one configuration held out at a time" if configurations < _FEW_POSES else ""
     lines += [
