@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +54,7 @@ class RawTable:
     def select(self, rows: np.ndarray) -> RawTable:
         """The table of the rows at indices ``rows``."""
         columns = {name: [cells[row] for row in rows] for name, cells in self.columns.items()}
-        return RawTable(self.path, columns, self.line[rows], self.decimal)
+        return replace(self, columns=columns, line=self.line[rows])
 
     def rows_in_words(self, rows: np.ndarray) -> str:
         """Lines of the rows at indices ``rows``, the first few by number."""
