@@ -51,7 +51,7 @@ $(KINACC): $(PACKAGES)
 	@echo "kinacc: installing kinacc itself and compiling its kernels"
 	@$(PIP) --no-build-isolation --no-deps --editable .
 	@$(PY) -m compileall -q src
-	@$(PY) -m kinacc.stages.warm_up
+	@$(PY) -m kinacc.workflow.warm_up
 	@touch $@
 
 $(TOOLS): $(PACKAGES)

@@ -13,8 +13,8 @@ sys.modules.setdefault("pandas", None)
 sys.executable = shlex.quote(sys.executable)
 
 from kinacc.errors import InputError
-from kinacc.stages.catalogue import STAGES
-from kinacc.stages.plan import planned
+from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.plan import planned
 
 try:
     plan = planned(workflow.configfiles or ["config.yaml"], workflow.config_settings.config)

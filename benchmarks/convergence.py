@@ -21,9 +21,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "calibration"))
 
 from simulated import POINT, POSE, THREE, disturbed, far_off, joints, measure
 
-from kinacc import robot
 from kinacc.calibration import dh_fit, terms
 from kinacc.errors import FitError
+from kinacc.kinematics import robot
 
 POSES = 80
 SAME = 1e-6  # relative difference of the costs of one optimum

@@ -14,12 +14,12 @@ import sys
 
 import numpy as np
 
-from kinacc.stages.plan import planned
-from kinacc.stages.runner import read_inputs
-from kinacc.stages.tournament_plan import tournament_plan
-from kinacc.tournament.contest import Cell, Job, campaigns
-from kinacc.tournament.fields import Field, of_tables
-from kinacc.tournament.summary import summed
+from kinacc.study.tournament.contest import Cell, Job, campaigns
+from kinacc.study.tournament.fields import Field, of_tables
+from kinacc.study.tournament.summary import summed
+from kinacc.workflow.plan import planned
+from kinacc.workflow.runner import read_inputs
+from kinacc.workflow.tournament_plan import tournament_plan
 
 CANDIDATES, SHARE, SEED, CAMPAIGNS = 200, 0.6, 1, 40
 NOISE_MM = (0.05, 0.1, 0.2, 0.3)

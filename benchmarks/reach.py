@@ -17,8 +17,8 @@ import time
 import numpy as np
 import yaml
 
-from kinacc.stages import dh, measurements, residuals, vec
-from kinacc.stages.plan import planned
+from kinacc.workflow.plan import planned
+from kinacc.workflow.stages import dh, measurements, residuals, vec
 
 STAGES = {"measurements": measurements, "vec": vec, "dh": dh, "residuals": residuals}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from click.testing import CliRunner, Result
 
-from kinacc.cli import main
+from kinacc.cli.group import main
 
 
 def call(*words: object) -> Result:

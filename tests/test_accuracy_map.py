@@ -9,12 +9,11 @@ import pytest
 from oracles import inverse as brute
 from oracles import kinematics as oracle
 
-from kinacc import accuracy_map as maps
-from kinacc import region, robot
-from kinacc.accuracy_map import ModelPair
 from kinacc.geometry import Pose, rotation_y
-from kinacc.inverse import Status
-from kinacc.models import dh, vec
+from kinacc.kinematics import dh, region, robot, vec
+from kinacc.kinematics.inverse import Status
+from kinacc.study import accuracy_map as maps
+from kinacc.study.accuracy_map import ModelPair
 
 ARM = robot.load("mh180")
 SPACE = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, np.pi / 3)

@@ -9,8 +9,9 @@ import pytest
 from oracles import kinematics as oracle
 from oracles import maps
 
-from kinacc import accuracy_map, geometry, operating_points, region, robot
-from kinacc.models import dh, vec
+from kinacc import geometry
+from kinacc.kinematics import dh, region, robot, vec
+from kinacc.study import accuracy_map, operating_points
 
 REFERENCE = np.diag([1.0, -1.0, -1.0])
 TURN = math.radians(45)

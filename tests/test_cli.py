@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from kinacc import __version__
-from kinacc.cli import main
-from kinacc.stages.catalogue import STAGES
+from kinacc.cli.group import main
+from kinacc.workflow.catalogue import STAGES
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIG = str(ROOT / "config.yaml")
@@ -71,7 +71,7 @@ def test_a_stage_says_what_it_wrote(tmp_path):
 
 def test_help_loads_no_numerical_library():
     code = (
-        "import sys; from kinacc.cli import main\n"
+        "import sys; from kinacc.cli.group import main\n"
         "try: main(['run', '--help'])\n"
         "except SystemExit: pass\n"
         "print(sorted({'numpy', 'scipy', 'pyarrow', 'numba', 'matplotlib'} & set(sys.modules)))"

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
-from kinacc.cli import main
+from kinacc.cli.group import main
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

@@ -7,8 +7,8 @@ import pytest
 from scipy.special import digamma
 from scipy.stats import gamma as reference
 
+from kinacc.distributions import fit, gamma99, quantile
 from kinacc.errors import InputError
-from kinacc.gamma import fit, gamma99, quantile
 
 
 @pytest.mark.parametrize("shape", [0.05, 0.5, 1.0, 5.36, 60.0, 1e4])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles.assessors import gamma_fit
 from scipy import stats
 
-from kinacc import gamma
+from kinacc import distributions as gamma
 
 
 @settings(max_examples=60)

@@ -7,7 +7,7 @@ import pytest
 
 from kinacc.assess import ModelInvalidation
 from kinacc.errors import InputError
-from kinacc.histories import (
+from kinacc.study.histories import (
     FALLBACKS,
     KEPT,
     LARGER,
@@ -17,8 +17,8 @@ from kinacc.histories import (
     examples,
     histories,
 )
-from kinacc.stages import histories as stage
-from kinacc.study import StudySettings, world_of
+from kinacc.study.monte_carlo import StudySettings, world_of
+from kinacc.workflow.stages import histories as stage
 
 SEED = 3
 STUDY = StudySettings()

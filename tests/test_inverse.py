@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinacc import inverse, robot
 from kinacc.geometry import Pose, exp_so3
-from kinacc.inverse import BRANCHES, Status, closed_form, limits, newton
-from kinacc.models import dh, vec
-from kinacc.models.dh import DHModel
+from kinacc.kinematics import dh, inverse, robot, vec
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.inverse import BRANCHES, Status, closed_form, limits, newton
 
 ARM = robot.load("mh180")
 # Table II of the paper, q5 offset read as -3.141.

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from oracles import inverse as brute
 from oracles import kinematics as oracle
 
-from kinacc import geometry, inverse, robot
-from kinacc.inverse import closed_form
-from kinacc.models import dh, vec
+from kinacc import geometry
+from kinacc.kinematics import dh, inverse, robot, vec
+from kinacc.kinematics.inverse import closed_form
 
 LOW, HIGH = np.radians(oracle.MH180_LIMITS_DEG).T
 

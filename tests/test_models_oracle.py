@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from oracles import kinematics as oracle
 
-from kinacc import robot
-from kinacc.models import dh, vec
+from kinacc.kinematics import dh, robot, vec
 
 EXACT_MM = 1e-9
 EXACT = 1e-12  # elements of rotations

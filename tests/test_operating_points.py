@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from test_accuracy_map import ARM, DOWN, NINE, RANGE, SPACE, TABLE_II, wavy
 
-from kinacc import operating_points, region
-from kinacc.accuracy_map import ModelPair
 from kinacc.errors import InputError
-from kinacc.inverse import limits
-from kinacc.models import dh, vec
-from kinacc.operating_points import PosesWanted
+from kinacc.kinematics import dh, region, vec
+from kinacc.kinematics.inverse import limits
+from kinacc.study import operating_points
+from kinacc.study.accuracy_map import ModelPair
+from kinacc.study.operating_points import PosesWanted
 
 PAIR = ModelPair(wavy(), TABLE_II)
 WANTED = PosesWanted(SPACE, DOWN, NINE)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from kinacc import provenance
-from kinacc.stages.catalogue import STAGES
+from kinacc.artifacts import provenance
+from kinacc.workflow.catalogue import STAGES
 
 PACKAGE = provenance.PACKAGE
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "__pycache__" not in path.parts)

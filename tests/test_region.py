@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
-from kinacc import region
 from kinacc.geometry import rotation_x, rotation_y, rotation_z
+from kinacc.kinematics import region
 
 SPACE = region.Cylinder(1200.0, 900.0, -100.0, 500.0, 0.0, np.pi / 3)
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
-from kinacc import region
+from kinacc.kinematics import region
 
 CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
 

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from kinacc.errors import InputError
-from kinacc.stages import study as study_stage
-from kinacc.stages import study_chunk as chunk_stage
-from kinacc.study import (
+from kinacc.study.monte_carlo import (
     StudySettings,
     default_reading,
     part_of,
@@ -17,6 +15,8 @@ from kinacc.study import (
     summary,
     true_accuracy_mm,
 )
+from kinacc.workflow.stages import study as study_stage
+from kinacc.workflow.stages import study_chunk as chunk_stage
 
 ERROR = np.random.default_rng(11).normal(size=(40, 3)) * 0.3
 TRUE = float(np.linalg.norm(ERROR, axis=1).max())

@@ -9,8 +9,8 @@ import pytest
 from oracles import assessors as oracle
 from oracles import worlds
 
-from kinacc import study
-from kinacc.histories import HistorySettings, histories
+from kinacc.study import monte_carlo as study
+from kinacc.study.histories import HistorySettings, histories
 
 NOISE = (0.01, 0.03)
 SMALL = {

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts import allowed, store
-from kinacc.stages.catalogue import STAGES
-from kinacc.stages.plan import Plan
-from kinacc.stages.runner import Job, stage_provenance
+from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.plan import Plan
+from kinacc.workflow.runner import Job, stage_provenance
 
 SEED = 7
 NOISE_MM = (0.05, 0.3)

@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 from small_results import SmallResults
 
-from kinacc import provenance
-from kinacc.artifacts import check, rules, store
-from kinacc.stages.catalogue import STAGES
-from kinacc.stages.plan import planned
+from kinacc.artifacts import provenance, store
+from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.plan import planned
+from kinacc.workflow.verification import check, rules
 
 ROOT = Path(__file__).parents[2]
 ON_EVERY_RUN = [

@@ -9,7 +9,7 @@ import pytest
 from kinacc.artifacts import document, store
 from kinacc.artifacts.columns import Column, joint_count
 from kinacc.artifacts.contract import ARTEFACTS
-from kinacc.stages.catalogue import STAGES
+from kinacc.workflow.catalogue import STAGES
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.stats import binom, gamma
 
-from kinacc import robot
 from kinacc.assess import drawn_world
 from kinacc.assess.adaptive import Candidates, conduct
 from kinacc.assess.causes import joint_errors
@@ -24,7 +23,7 @@ from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
 from kinacc.assess.streams import key_of
 from kinacc.errors import InputError
-from kinacc.models import dh
+from kinacc.kinematics import dh, robot
 
 ARM = robot.load("mh180")
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from kinacc.calibration.observations import Observations
 from kinacc.geometry import Pose, compose, exp_so3
-from kinacc.models import dh
+from kinacc.kinematics import dh
 
 POINT, THREE, POSE = "point", "three", "pose"  # what the instrument sees of every pose
 ORIENTATION_NOISE_RAD = 1e-4

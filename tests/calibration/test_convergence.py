@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from kinacc import robot
+from kinacc.kinematics import robot
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 

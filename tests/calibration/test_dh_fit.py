@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc import robot
 from kinacc.calibration import dh_fit, frames
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, log_so3
-from kinacc.models import dh
+from kinacc.kinematics import dh, robot
 
 WEIGHT = 500.0
 FIVE_DEG = np.deg2rad(5.0)

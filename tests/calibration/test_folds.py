@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinacc.calibration import folds
+from kinacc.measurements import folds
 
 DEGREE = np.pi / 180.0
 

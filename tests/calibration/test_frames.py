@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc import robot
 from kinacc.calibration.frames import Frames, coordinates
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.start import closed_form_start
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
-from kinacc.models import dh
+from kinacc.kinematics import dh, robot
 
 ARM = robot.load("ur10")
 BASE = Pose(exp_so3(np.array([0.4, -2.0, 1.1])), np.array([2300.0, -900.0, 450.0]))

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc import robot
 from kinacc.calibration import dh_fit, identified, mask, tables, terms, uncertainty
 from kinacc.calibration.frames import MOTIONS
 from kinacc.geometry import Pose, compose, exp_so3
-from kinacc.models import dh
+from kinacc.kinematics import dh, robot
 
 
 def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, poses=80):

@@ -11,7 +11,7 @@ import yaml
 from kinacc.calibration import mask
 from kinacc.calibration.mask import FRAMES, JOINTS
 from kinacc.calibration.terms import arm_terms, free_parameters, parallel_joints
-from kinacc.robot import load, shipped
+from kinacc.kinematics.robot import load, shipped
 
 
 def joint_rules(content):

@@ -10,7 +10,7 @@ from oracles import kinematics as oracle
 from kinacc import geometry
 from kinacc.calibration import dh_fit, frames, vec_fit
 from kinacc.calibration.observations import full_poses
-from kinacc.models import dh, vec
+from kinacc.kinematics import dh, vec
 
 WEIGHT = 500.0
 LOW, HIGH = np.radians([(-12, 72), (-30, 54), (-74, 18), (-180, 180), (-122, 122), (-180, 180)]).T

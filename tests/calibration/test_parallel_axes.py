@@ -8,8 +8,8 @@ import pytest
 from kinacc.calibration import dh_fit
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3
-from kinacc.models import dh
-from kinacc.models.dh import DHModel
+from kinacc.kinematics import dh
+from kinacc.kinematics.dh import DHModel
 
 SCARA = DHModel(
     np.zeros(4),

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinacc import robot
 from kinacc.calibration import models
 from kinacc.geometry import Pose, compose
-from kinacc.models import dh
-from kinacc.stages import calibration_settings, measurements
-from kinacc.stages.plan import planned
+from kinacc.kinematics import dh, robot
+from kinacc.workflow import calibration_settings
+from kinacc.workflow.plan import planned
+from kinacc.workflow.stages import measurements
 
 ROOT = Path(__file__).resolve().parents[2]
 

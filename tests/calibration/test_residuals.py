@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc import robot
 from kinacc.calibration import residuals
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.residuals import COMPARISONS, FittedModels
 from kinacc.geometry import Pose, compose, exp_so3
-from kinacc.models import dh, vec
+from kinacc.kinematics import dh, robot, vec
 
 ARM = robot.load("mh180")
 BASE = Pose(exp_so3(np.array([0.3, -1.0, 2.0])), np.array([900.0, 100.0, -50.0]))

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc import robot
 from kinacc.calibration import frames, selection, vec_fit
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.selection import Grid
 from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import Pose, exp_so3
-from kinacc.models import vec
+from kinacc.kinematics import robot, vec
 
 ARM = robot.load("mh180")
 LOW, HIGH = np.deg2rad([(-10, 70), (-30, 54), (-74, 18), (-170, 170), (-120, 120), (-170, 170)]).T

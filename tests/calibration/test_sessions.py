@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import simulated
 
-from kinacc import robot
 from kinacc.calibration import dh_fit, frames, residuals, tables, uncertainty
 from kinacc.calibration.models import Options
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
+from kinacc.kinematics import robot
 
 ARM = robot.load("ur10")
 FREE = dh_fit.free_parameters(6, (2, 3))

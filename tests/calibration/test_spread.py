@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from test_system import Frames, coordinates, flange_models, observations, random_pose
 
-from kinacc import robot
 from kinacc.calibration import solve
 from kinacc.calibration.spread import Group, gram, spread
 from kinacc.calibration.system import PoseSystem
+from kinacc.kinematics import robot
 
 
 def test_every_parameter_is_a_motion_times_a_function():

@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc import geometry, robot
+from kinacc import geometry
 from kinacc.calibration import dh_fit, vec_fit
 from kinacc.calibration.frames import Frames, coordinates, inverse_left_jacobian, left_jacobian
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.system import FlangeModel, PoseSystem
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
-from kinacc.models import dh, vec
+from kinacc.kinematics import dh, robot, vec
 
 WEIGHT = 350.0
 

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc import robot
 from kinacc.calibration import dh_fit, frames, mask, robust, terms, uncertainty
 from kinacc.calibration.constrained import ConstrainedFrames
 from kinacc.errors import InputError
 from kinacc.geometry import compose, log_so3
-from kinacc.models import dh
+from kinacc.kinematics import dh, robot
 
 ARM = robot.load("mh180")
 FREE = dh_fit.free_parameters(6)

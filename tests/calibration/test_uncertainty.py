@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from kinacc import robot
 from kinacc.calibration import dh_fit, frames, tables, uncertainty, vec_fit
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import Pose, compose, exp_so3, invert, log_so3
-from kinacc.models import dh, vec
+from kinacc.kinematics import dh, robot, vec
 
 BASE = Pose(exp_so3(np.array([0.3, -1.1, 2.0])), np.array([2500.0, -900.0, 400.0]))
 TOOL = Pose(exp_so3(np.array([-0.4, 0.2, 0.7])), np.array([30.0, -20.0, 150.0]))

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc import robot
-from kinacc.calibrated.predict import predict
-from kinacc.calibrated.record import Calibration
 from kinacc.calibration import dh_fit, uncertainty, variances
 from kinacc.calibration.observations import full_poses
+from kinacc.deployment.predict import predict
+from kinacc.deployment.record import Calibration
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
-from kinacc.models import dh
+from kinacc.kinematics import dh, robot
 
 WEIGHT = 500.0
 TOOL = Pose(exp_so3(np.array([-0.4, 0.2, 0.7])), np.array([30.0, -20.0, 150.0]))

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 import simulated
 
-from kinacc import robot
 from kinacc.calibration import dh_fit, frames, terms, vec_fit
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import Pose, compose, exp_so3
-from kinacc.models import vec
+from kinacc.kinematics import robot, vec
 
 WEIGHT = 500.0
 ARM = robot.load("mh180")

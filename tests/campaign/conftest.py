@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc import robot as robots
 from kinacc.assess import drawn_world
 from kinacc.assess.streams import key_of
-from kinacc.calibrated.record import nominal
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, Plan, assessor_of
-from kinacc.planning.candidates import spread
+from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.record import nominal
+from kinacc.kinematics import robot as robots
 
 SIGMA_MM = 0.05
 

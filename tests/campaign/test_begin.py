@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc import robot
 from kinacc.assess.registry import ADAPTIVE
-from kinacc.calibrated.record import Anchor, nominal
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits
+from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.record import Anchor, nominal
 from kinacc.geometry import Pose, compose, exp_so3
-from kinacc.planning.candidates import spread
+from kinacc.kinematics import robot
 
 COUPLED_AND_SLIDING = """
 name: coupled

@@ -10,7 +10,6 @@ import pytest
 from command_line import call, small_study
 
 from kinacc.artifacts import store
-from kinacc.artifacts.conformity import check_file
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.assess import drawn_world
 from kinacc.assess.adaptive import conduct
@@ -18,8 +17,9 @@ from kinacc.assess.streams import key_of
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import foreseen
 from kinacc.campaign.reading import Reading
-from kinacc.commands import campaigns_answers
+from kinacc.cli import campaigns_answers
 from kinacc.geometry import Pose, exp_so3
+from kinacc.workflow.verification.conformity import check_file
 
 SIGMA_MM = 0.05
 COMMANDS = ("start", "next", "record", "leave-out", "strike", "status", "report")
@@ -218,7 +218,7 @@ def test_a_reading_at_slightly_other_joints_is_held_to_the_model_there(begun, ca
     plan = campaigns.open_(folder).plan
     point = int(plan.route[0])
     joints = plan.points.joints[point] + np.deg2rad([0.03, -0.02, 0.04, 0.01, -0.05, 0.02]) * 0.99
-    from kinacc.commands import choice
+    from kinacc.cli import choice
 
     arm = choice.calibration_of(calibration, "dh", "mh180", ())
     there = arm.pose(joints[None] @ arm.robot.joint_map.T).position_mm[0]
@@ -233,7 +233,7 @@ def test_a_reading_at_slightly_other_joints_is_held_to_the_model_there(begun, ca
 
 def test_readings_in_the_instruments_frame_say_the_same(begun, calibration):
     folder = begun("--noise-mm", SIGMA_MM)
-    from kinacc.commands import choice
+    from kinacc.cli import choice
 
     plan = campaigns.open_(folder).plan
     arm = choice.calibration_of(calibration, "dh", "mh180", ())

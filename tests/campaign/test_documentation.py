@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from kinacc.cli import main
+from kinacc.cli.group import main
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "campaigns.md"
 

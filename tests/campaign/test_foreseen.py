@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.calibrated.predict import predict
-from kinacc.calibrated.record import Residual
 from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
 from kinacc.campaign import begin
 from kinacc.campaign.foreseen import unsure
 from kinacc.campaign.instrument import instruments
-from kinacc.planning.candidates import spread
+from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.predict import predict
+from kinacc.deployment.record import Residual
 
 USED = instruments(("tracker=0.05",), "base")
 

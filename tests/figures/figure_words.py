@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from kinacc import robot
 from kinacc.figures import fig1, fig2, fig3, fig4, fig5, fig6, save
+from kinacc.kinematics import robot
 
 CYLINDER = {
     "inner_radius_mm": 1200.0,

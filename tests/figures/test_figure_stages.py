@@ -10,8 +10,8 @@ import pytest
 from figure_words import CYLINDER, problems, said
 from matplotlib.figure import Figure
 
-from kinacc import robot
-from kinacc.models.dh import PARAMETERS
+from kinacc.kinematics import robot
+from kinacc.kinematics.dh import PARAMETERS
 
 
 def points(q_rad: np.ndarray) -> dict[str, np.ndarray]:
@@ -54,19 +54,19 @@ CYLINDER_SPACE = {
 @pytest.mark.parametrize("space", ["cylinder", "joint_box", "measured"])
 def test_stage_returns_a_clean_figure(name, space):
     settings = {**CYLINDER_SPACE, "evaluation": {**CYLINDER_SPACE["evaluation"], "space": space}}
-    figure = import_module(f"kinacc.stages.{name}").run(INPUTS[name], settings)
+    figure = import_module(f"kinacc.workflow.stages.{name}").run(INPUTS[name], settings)
     assert isinstance(figure, Figure)
     assert problems(figure) == []
 
 
 @pytest.mark.parametrize("name", ["fig4", "fig5", "fig6"])
 def test_true_accuracy_is_that_of_all_points_visited_or_not(name):
-    figure = import_module(f"kinacc.stages.{name}").run(INPUTS[name], CYLINDER_SPACE)
+    figure = import_module(f"kinacc.workflow.stages.{name}").run(INPUTS[name], CYLINDER_SPACE)
     assert "1.111 mm" in said(figure)
 
 
 def test_fig2_draws_to_the_fitted_tool_or_else_to_the_configured_one():
-    fig2, arm = import_module("kinacc.stages.fig2"), robot.load("mh180")
+    fig2, arm = import_module("kinacc.workflow.stages.fig2"), robot.load("mh180")
     frames = {
         "model": np.array(["vec", "dh", "dh"], dtype=object),
         "frame": np.array(["tool", "base", "tool"], dtype=object),

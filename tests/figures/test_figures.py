@@ -8,9 +8,9 @@ import pytest
 from figure_words import CYLINDER, boxes, figures, problems, said, words
 from scipy.special import gammainc
 
-from kinacc import robot
 from kinacc.errors import InputError
 from kinacc.figures import fig1, fig2, fig3, fig4, fig5, history, style, truth
+from kinacc.kinematics import robot
 
 LONG_NAME = "laser tracker campaign of the second machining cell, spring, warm machine, series B "
 

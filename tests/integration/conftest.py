@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from kinacc.stages.catalogue import STAGES
+from kinacc.workflow.catalogue import STAGES
 
 ROOT = Path(__file__).resolve().parents[2]
 STAGE_OF = {stage.message: name for name, stage in STAGES.items()}
@@ -60,7 +60,7 @@ class Project:
     def kinacc(self, *words: str, ok: bool = True, configs: tuple[str, ...] = CONFIGS) -> str:
         """What ``kinacc`` prints when given the same configuration."""
         options = [word for name in configs for word in ("--config", name)]
-        return self.run([sys.executable, "-m", "kinacc.cli", *words, *options], ok)
+        return self.run([sys.executable, "-m", "kinacc.cli.group", *words, *options], ok)
 
     def run(self, command: list[str], ok: bool = True, **environment: str) -> str:
         """Output and errors of a command started in the project's folder."""
@@ -135,8 +135,8 @@ def write_poses(path: Path, poses: int = 60) -> None:
     """A file of measured poses: the nominal arm in joint space, shifted by a known small error."""
     import numpy as np
 
-    from kinacc import geometry, robot
-    from kinacc.models import dh
+    from kinacc import geometry
+    from kinacc.kinematics import dh, robot
 
     arm = robot.load("mh180")
     generator = np.random.default_rng(3)

@@ -88,8 +88,8 @@ def test_one_module_of_the_package(project, module, reruns):
 
 
 def test_the_cli_and_the_check_are_no_part_of_any_result(project):
-    project.append("src/kinacc/cli.py", "# changed")
-    project.append("src/kinacc/artifacts/check.py", "# changed")
+    project.append("src/kinacc/cli/group.py", "# changed")
+    project.append("src/kinacc/workflow/verification/check.py", "# changed")
     assert project.to_do() == {}
 
 
@@ -110,7 +110,7 @@ def test_a_file_of_measurements_saved_again_unchanged(project):
 
 
 def test_a_robot_file(project):
-    project.append("src/kinacc/robots/mh180.yaml", "# changed")
+    project.append("src/kinacc/kinematics/robots/mh180.yaml", "# changed")
     assert project.to_do()["mh180"] >= {"measurements", "vec", "dh", "accuracy_map"}
 
 

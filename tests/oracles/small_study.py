@@ -75,8 +75,8 @@ def write_measurements(path: Path) -> Written:
 
 def run_stages(config: Path, dataset: str, results: Path, names: tuple[str, ...] = ()) -> Path:
     """Every stage of a data set but its figures, or those named; its folder."""
-    from kinacc.stages.plan import planned
-    from kinacc.stages.runner import Job, perform
+    from kinacc.workflow.plan import planned
+    from kinacc.workflow.runner import Job, perform
 
     plan = planned([str(config)], results=str(results))
     stages = [s for s in plan.stages(dataset).values() if not s.is_figure and not s.on_request]

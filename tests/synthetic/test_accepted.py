@@ -9,9 +9,10 @@ import pytest
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
-from kinacc.stages import in_memory
-from kinacc.synthetic import acceptance, accepted, measure, search
+from kinacc.synthetic import acceptance, accepted, measure
 from kinacc.synthetic.draw import TABLE_II, Scales
+from kinacc.workflow import arm_search as search
+from kinacc.workflow import in_memory
 
 EARLIER = 3  # seeds before the shipped one that are tried again here
 
@@ -102,7 +103,7 @@ def test_search_stops_at_the_draws_wanted_and_keeps_seed_order(bench, monkeypatc
 def test_the_command_writes_a_table_of_the_draws_asked_for(bench, monkeypatch, tmp_path):
     from click.testing import CliRunner
 
-    from kinacc.cli import main
+    from kinacc.cli.group import main
 
     def quick(_, seed):
         draw = accepted.AcceptedDraw(seed, Scales(1, 1, 1, 1), TABLE_II)
@@ -148,7 +149,7 @@ def test_further_draws_leave_the_own_one_out():
 
 
 def test_another_arm_is_refused():
-    from kinacc import robot
+    from kinacc.kinematics import robot
 
     settings = {"draw": 0, "poses": 10, "tracker_noise_mm": 0.0}
     with pytest.raises(InputError, match="ur10"):
@@ -156,7 +157,7 @@ def test_another_arm_is_refused():
 
 
 def test_measurements_repeat_to_the_bit(config):
-    from kinacc import robot
+    from kinacc.kinematics import robot
 
     arm, settings = robot.load("mh180"), config["measurements"]["synthetic"]
     one, two = measure(arm, settings), measure(arm, settings)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from oracles import kinematics as oracle
 from scipy.spatial.transform import Rotation
 
-from kinacc.models.dh import DHModel
+from kinacc.kinematics.dh import DHModel
 from kinacc.synthetic import physical
 
 LOW, HIGH = np.radians(oracle.MH180_LIMITS_DEG).T

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc import robot
-from kinacc.models import dh
+from kinacc.kinematics import dh, robot
 from kinacc.synthetic import physical, plan
 from kinacc.synthetic.draw import TABLE_II, Scales, physical_robot
 from kinacc.synthetic.physical import Visits

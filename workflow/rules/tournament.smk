@@ -1,5 +1,5 @@
 # The tournament of assessors over all data sets: `snakemake -c2 tournament`, made on request.
-from kinacc.stages.tournament_plan import tournament_plan
+from kinacc.workflow.tournament_plan import tournament_plan
 
 contest = tournament_plan(plan)
 

@@ -1,7 +1,7 @@
 """Run one stage of the catalogue for a job of the workflow."""
 
-from kinacc.stages.catalogue import STAGES
-from kinacc.stages.runner import Job, execute
+from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.runner import Job, execute
 
 stage, part = snakemake.params.stage, snakemake.params.get("part")
 execute(

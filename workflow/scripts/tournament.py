@@ -1,10 +1,10 @@
 """Gathering the cells of the tournament and judging every assessor."""
 
-from kinacc.stages.runner import Job, execute
+from kinacc.workflow.runner import Job, execute
 
 execute(
     Job(
-        "kinacc.stages.tournament_tables",
+        "kinacc.workflow.stages.tournament_tables",
         inputs=snakemake.params.inputs,
         outputs=snakemake.params.outputs,
         settings=snakemake.params.settings,

@@ -1,10 +1,10 @@
 """Campaigns of every assessor in some of the tournament's cells."""
 
-from kinacc.stages.runner import Job, execute
+from kinacc.workflow.runner import Job, execute
 
 execute(
     Job(
-        "kinacc.stages.tournament_chunk",
+        "kinacc.workflow.stages.tournament_chunk",
         inputs=snakemake.params.inputs,
         outputs=snakemake.params.outputs,
         settings=snakemake.params.settings,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kinacc.artifacts.columns import Artefact, Column
 from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
-from kinacc.stages.catalogue import STAGES
+from kinacc.workflow.catalogue import STAGES
 
 _HEAD = """\
 # Artefacts

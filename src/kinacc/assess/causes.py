@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinacc import robot as _robot
-from kinacc.models import dh
-from kinacc.robot import Robot
+from kinacc.kinematics import dh
+from kinacc.kinematics import robot as _robot
+from kinacc.kinematics.robot import Robot
 
 CAUSES_PER_JOINT = 6
 

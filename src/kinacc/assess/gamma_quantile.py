@@ -53,7 +53,7 @@ class GammaCampaign(OnceCampaign):
         """The quantile, or why it means nothing."""
         from scipy.special import gammainc
 
-        from kinacc.gamma import fit, quantile
+        from kinacc.distributions import fit, quantile
 
         visited, share = self.ledger.visited, self.settings.share
         sizes = self.ledger.sizes_mm()

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.assess.assessor import Assessment, check
 from kinacc.assess.world import World
-from kinacc.gamma import gamma99
+from kinacc.distributions import gamma99
 
 
 def normal_limit(magnitudes: np.ndarray) -> float:

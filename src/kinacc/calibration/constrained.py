@@ -11,13 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration.frames import (
-    FrameCoordinates,
-    Frames,
-    coordinates,
-    left_jacobian,
-    stacked,
-)
+from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates, left_jacobian, stacked
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.system import PoseSystem
 from kinacc.geometry import Pose, compose, exp_so3, invert, log_so3

@@ -22,8 +22,8 @@ from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.calibration.terms import free_parameters  # noqa: F401 (the usual mask of a fit)
 from kinacc.calibration.truncated import unseen
 from kinacc.geometry import Pose, compose
-from kinacc.models import dh
-from kinacc.models.dh import DHModel
+from kinacc.kinematics import dh
+from kinacc.kinematics.dh import DHModel
 
 ANGLE_UNIT_RAD = 1e-3  # one mrad counts as much displacement as one mm
 DH_FIX = "measure more poses"

@@ -18,9 +18,9 @@ from kinacc.calibration.solve import Spectrum
 from kinacc.calibration.terms import ArmTerms, arm_terms, frame_terms, free_parameters
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import IDENTITY, Pose, compose
-from kinacc.models import vec
-from kinacc.models.dh import DHModel
-from kinacc.models.vec import VECModel
+from kinacc.kinematics import vec
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.vec import VECModel
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from kinacc.calibration import models
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.models import Options
 from kinacc.calibration.observations import Observations
-from kinacc.gamma import gamma99
+from kinacc.distributions import gamma99
 from kinacc.geometry import Pose, compose, log_so3
-from kinacc.models import dh, vec
-from kinacc.models.dh import DHModel
-from kinacc.models.vec import VECModel
+from kinacc.kinematics import dh, vec
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.vec import VECModel
 
 COMPARISONS = ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured")
 

@@ -20,7 +20,7 @@ from kinacc.calibration.spread import gram
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
 from kinacc.errors import InputError, Problem
-from kinacc.models.vec import VECModel
+from kinacc.kinematics.vec import VECModel
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40)
 PRIOR_STD = (0.01, 0.03, 0.1, 0.3, 1.0)  # mm and mrad

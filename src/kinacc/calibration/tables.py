@@ -14,9 +14,9 @@ from kinacc.calibration.solve import Solution, Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, is_angle, vec_parameter_names
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import quaternion_from_rotation
-from kinacc.models.dh import PARAMETERS
-from kinacc.models.tables import frame
-from kinacc.models.vec import ERRORS
+from kinacc.kinematics.dh import PARAMETERS
+from kinacc.kinematics.tables import frame
+from kinacc.kinematics.vec import ERRORS
 
 Columns = dict[str, np.ndarray]
 _DIRECTIONS = (-1, 1)

@@ -13,9 +13,9 @@ from kinacc.calibration.frames import Frames, coordinates, known
 from kinacc.calibration.mask import Rule
 from kinacc.calibration.observations import Observations
 from kinacc.errors import InputError, Problem
-from kinacc.models import dh
-from kinacc.models.dh import PARAMETERS, DHModel
-from kinacc.robot.axes import NEARLY_PARALLEL
+from kinacc.kinematics import dh
+from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.robot.axes import NEARLY_PARALLEL
 
 _BETA, _D = PARAMETERS.index("beta_rad"), PARAMETERS.index("d_mm")
 

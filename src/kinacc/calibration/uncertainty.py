@@ -16,8 +16,8 @@ import numpy as np
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD, DHFit
 from kinacc.calibration.truncated import TOUCH_SQUARED
 from kinacc.calibration.vec_fit import VECFit
-from kinacc.models.dh import PARAMETERS
-from kinacc.models.vec import ERRORS, VECModel
+from kinacc.kinematics.dh import PARAMETERS
+from kinacc.kinematics.vec import ERRORS, VECModel
 
 
 @dataclass(frozen=True)

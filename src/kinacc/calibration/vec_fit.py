@@ -13,8 +13,8 @@ from kinacc.calibration.ridge import minimise_with_prior
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
 from kinacc.calibration.spread import Group
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
-from kinacc.models import vec
-from kinacc.models.vec import ERRORS, VECModel
+from kinacc.kinematics import vec
+from kinacc.kinematics.vec import ERRORS, VECModel
 
 VEC_FIX = "measure more poses, or lower calibration.vec.order"
 FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames; holds what no pose shows

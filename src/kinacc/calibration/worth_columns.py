@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kinacc.calibration import folds, worth
+from kinacc.calibration import worth
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import COMPARISONS, Errors
+from kinacc.measurements import folds
 
 Columns = dict[str, np.ndarray]
 _SAME_CONFIGURATION_RAD = np.deg2rad(0.1)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.assess.causes import joint_errors
-from kinacc.models.dh import PARAMETERS, DHModel
-from kinacc.robot import Robot
+from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.robot import Robot
 
 if TYPE_CHECKING:
-    from kinacc.calibrated.record import Calibration
+    from kinacc.deployment.record import Calibration
 
 
 @dataclass(frozen=True)

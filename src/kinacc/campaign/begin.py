@@ -8,16 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor
-from kinacc.calibrated.record import Calibration
 from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import INSTRUMENT, Instrument
 from kinacc.campaign.plan import Limits, Plan, Points, candidates_of, fixed_visit
+from kinacc.config.names import not_in_a_line
+from kinacc.deployment.planning import travel
+from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose, invert
-from kinacc.inverse.limits import travel_unit
-from kinacc.models.vec import VECModel
-from kinacc.names import not_in_a_line
-from kinacc.planning import travel
+from kinacc.kinematics.inverse.limits import travel_unit
+from kinacc.kinematics.vec import VECModel
 
 _ROUTED = 400  # points beyond which the route is built in stretches of so many
 

@@ -7,11 +7,11 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from kinacc.calibrated.predict import predict
-from kinacc.calibrated.record import Calibration
 from kinacc.campaign.begin import needs_instrument_frame
 from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.plan import Points
+from kinacc.deployment.predict import predict
+from kinacc.deployment.record import Calibration
 
 _FAR = 3.0  # times what the calibration left unexplained: no longer explained by it
 _SIGMAS = 3.0  # a correct reading this far off is nothing unusual

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.assess.adaptive import covariance_faults
-from kinacc.data.written_numbers import numbers_of
+from kinacc.config.names import not_in_a_line
 from kinacc.errors import InputError, Problem
-from kinacc.names import not_in_a_line
+from kinacc.measurements.written_numbers import numbers_of
 
 BASE, INSTRUMENT = "base", "instrument"
 FRAMES = (BASE, INSTRUMENT)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from kinacc import __version__, provenance
+from kinacc import __version__
+from kinacc.artifacts import provenance
 from kinacc.campaign.folder import Opened
 
 

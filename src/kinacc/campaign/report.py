@@ -16,7 +16,7 @@ from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
 from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
-from kinacc.names import in_markdown
+from kinacc.config.names import in_markdown
 
 Columns = dict[str, np.ndarray]
 _STATEMENTS = 150  # stated at so many moments of a campaign, at most

@@ -134,7 +134,7 @@ def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Ite
     given = {keys: full[keys[0]][keys[1]][keys[2]] for keys in ranges}
     if not hayati and not told and not any(isinstance(pairs, list) for pairs in given.values()):
         return
-    from kinacc.robot import load, shipped
+    from kinacc.kinematics.robot import load, shipped
 
     try:
         arm = load(robot if robot in shipped() else folder / robot)

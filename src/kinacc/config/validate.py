@@ -13,7 +13,7 @@ from kinacc.config.schema import DATASET_NAME, Key, Section, defaults, settings
 from kinacc.config.values import INVALID, Place, check, nearest, shown, unknown_key
 from kinacc.errors import Problem
 
-ROBOTS = Path(__file__).parents[1] / "robots"
+ROBOTS = Path(__file__).parents[1] / "kinematics" / "robots"
 _MAPPINGS = (
     ("measurements", "file", "columns"),
     ("calibration", "dh", "parameters"),

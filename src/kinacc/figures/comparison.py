@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.calibrated.compare import Comparison, Parameters, Shift
+from kinacc.deployment.compare import Comparison, Parameters, Shift
 from kinacc.figures import style
 
 _FAR = 3.0  # standard deviations

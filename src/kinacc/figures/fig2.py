@@ -15,7 +15,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
-from kinacc.models import dh
+from kinacc.kinematics import dh
 
 SIDES = 16  # of the prisms that stand for links and joints
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth

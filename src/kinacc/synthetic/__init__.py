@@ -8,7 +8,7 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import quaternion_from_rotation
-from kinacc.robot import Robot
+from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
 from kinacc.synthetic.draw import TABLE_II, physical_robot
 from kinacc.synthetic.tracker import calibration_run, measured

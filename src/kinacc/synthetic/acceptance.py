@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from kinacc.claims.claim import Claim
-from kinacc.claims.numbers import number_claims
-from kinacc.stages import in_memory
+from kinacc.study.claims.claim import Claim
+from kinacc.study.claims.numbers import number_claims
+from kinacc.workflow import in_memory
 
 # Numbers may differ in the last digits between machines: accepted arms keep off the edge.
 SHARE_OF_TOLERANCE = 0.97

@@ -10,7 +10,7 @@ from importlib import resources
 import numpy as np
 
 from kinacc.errors import InputError, Problem
-from kinacc.models.dh import DHModel
+from kinacc.kinematics.dh import DHModel
 from kinacc.synthetic.draw import Scales
 
 FILE = "accepted_draws.csv"

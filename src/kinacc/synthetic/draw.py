@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.models.dh import DHModel
+from kinacc.kinematics.dh import DHModel
 from kinacc.synthetic.physical import Beyond, PhysicalRobot, Smooth
 
 # Table II, with 3.141 for the misprinted 3.114 of joint 5.

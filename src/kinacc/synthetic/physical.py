@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.geometry import Pose, exp_so3
-from kinacc.models import chain as frames_of
-from kinacc.models import dh
-from kinacc.models.dh import DHModel
+from kinacc.kinematics import chain as frames_of
+from kinacc.kinematics import dh
+from kinacc.kinematics.dh import DHModel
 
 # Masses of a machining arm of this class: (frame the mass hangs on, share of the way to it from
 # the frame before, kg). The last one is the spindle, beyond the flange.

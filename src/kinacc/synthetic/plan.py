@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
-from kinacc.inverse import closed_form
-from kinacc.region import Cylinder, fill, tool_poses
-from kinacc.robot import Robot
+from kinacc.kinematics.inverse import closed_form
+from kinacc.kinematics.region import Cylinder, fill, tool_poses
+from kinacc.kinematics.robot import Robot
 
 SPACE = Cylinder(1150.0, 1000.0, -50.0, 600.0, np.deg2rad(-5.0), np.deg2rad(65.0))
 TURN_DEG = 50.0

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.models import dh, vec
-from kinacc.models.vec import VECModel
+from kinacc.kinematics import dh, vec
+from kinacc.kinematics.vec import VECModel
 
 _DH_UNITS = np.tile([1e-3, 1.0, 1.0, 1e-3], 6)  # one mrad counts as much as one mm
 _DH_THRESHOLD = 1e-4

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.geometry import Pose, exp_so3
-from kinacc.robot import Robot
+from kinacc.kinematics.robot import Robot
 from kinacc.synthetic import plan
 from kinacc.synthetic.draw import noise_generator
 from kinacc.synthetic.physical import PhysicalRobot, Visits, pose

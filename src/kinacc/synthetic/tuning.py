@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.gamma import gamma99
+from kinacc.distributions import gamma99
 from kinacc.geometry import log_so3
-from kinacc.models import dh
-from kinacc.models.dh import DHModel
-from kinacc.robot import Robot
+from kinacc.kinematics import dh
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw
 from kinacc.synthetic.draw import TABLE_II, Scales, physical_robot
 from kinacc.synthetic.response import Answer, Response, answer

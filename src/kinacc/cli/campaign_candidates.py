@@ -1,0 +1,126 @@
+"""The candidates of a campaign: rows of a file, or drawn from a region."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.cli import rows, spaces
+from kinacc.cli.choice import CONFIG
+from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.record import Calibration
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics.inverse import limits
+
+_MOST_DRAWS = 256  # joint values drawn per candidate before the region is called too wide
+_MOST_CANDIDATES = 20_000
+
+
+@dataclass(frozen=True)
+class Found:
+    """Reported joints (m, k), their names and directions of travel, and where they come from."""
+
+    joints: np.ndarray
+    label: list[str]
+    directions: np.ndarray | None
+    source: str
+
+
+def candidates(given: Mapping, arm: Calibration) -> Found:
+    """The candidates the options ask for. Raises InputError."""
+    if given["candidates"] is not None:
+        file = rows.read(given["candidates"], arm.robot)
+        found = rows.limit_problems(arm.robot, file.joints, file.label, given["candidates"])
+        if found:
+            raise InputError(found, "Candidates outside the robot's limits")
+        if len(file.joints) > _MOST_CANDIDATES:
+            what = f"{len(file.joints)} candidates"
+            raise InputError(Problem(given["candidates"], what, f"at most {_MOST_CANDIDATES}"))
+        label = [str(each) for each in file.label]
+        source = f"rows of {Path(given['candidates']).name}"
+        return Found(file.joints, label, file.directions, source)
+    problems: list[Problem] = []
+    box = spaces.joint_ranges(given["joints_deg"], arm.robot, problems)
+    space = spaces.ranges("--inside-mm", given["inside_mm"], 3, problems)
+    if problems:
+        raise InputError(problems)
+    inside, source = None, "drawn evenly from the joint ranges given"
+    if box is None:
+        box, inside, source = _region(given, arm)
+    if space is not None:
+        inside = spaces.inside_box(space)
+        source += ", the tool in the box given"
+    limited = arm.robot.q_min_rad, arm.robot.q_max_rad
+    low, high = limited if given["region"] == "limits" else _covered(arm)
+    if box is not None:
+        low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
+    drawn = _spoken_of(arm, given, (low, high), inside)
+    label = [str(number) for number in range(1, len(drawn) + 1)]
+    return Found(drawn, label, None, source)
+
+
+def _spoken_of(arm: Calibration, given: Mapping, box, inside) -> np.ndarray:
+    """Joints drawn from a box, without those that a VEC model says nothing of."""
+    wanted = given["drawn"]
+    count = wanted
+    while True:
+        drawn = spread(arm.robot, count, box, inside, arm.point(given["point"]))
+        if arm.choice == "vec":  # coupled joints have no box of their own
+            drawn = drawn[~arm.outside_range(drawn @ arm.robot.joint_map.T).any(axis=1)]
+        if len(drawn) >= wanted:
+            return drawn[:wanted]
+        if count >= _MOST_DRAWS * wanted:
+            what = f"the model speaks of only {len(drawn)} of {count} joint values drawn"
+            raise InputError(Problem("candidates", what, f"{wanted}", "narrow the region"))
+        count *= 4
+
+
+def _region(given: Mapping, arm: Calibration):
+    """Joint box, test of tool positions and words of the region asked for."""
+    wanted = given["region"]
+    if wanted is None:
+        wanted = "configured" if _is_configured(given, arm) else "fitted"
+    if wanted == "limits":
+        if arm.choice == "vec":
+            what = "the VEC model says nothing beyond the joints the data cover"
+            raise InputError(Problem("--region limits", what, "fitted"))
+        return None, None, "drawn evenly from the joint limits"
+    if wanted == "fitted":
+        return None, None, "drawn evenly from the joints the calibration covers"
+    settings = spaces.settings_of(arm.name, given["config"])
+    if settings.inside is not None:
+        source = "drawn evenly in joints from the configured evaluation space"
+        return None, settings.inside, source
+    if settings.box is not None:
+        return settings.box, None, "drawn evenly from the configured joint box"
+    return None, None, "drawn evenly from the joints the calibration covers"
+
+
+def _is_configured(given: Mapping, arm: Calibration) -> bool:
+    """Whether the configuration given, or the one that lies here, has the calibration's data set.
+
+    One that was given has to be readable; one that only lies here need not be about this arm.
+    """
+    from kinacc.workflow.plan import planned as read
+
+    if given["config"]:
+        return arm.name in read(given["config"]).datasets
+    try:
+        return Path(CONFIG).is_file() and arm.name in read((CONFIG,)).datasets
+    except InputError:
+        return False
+
+
+def _covered(arm: Calibration) -> tuple[np.ndarray, np.ndarray]:
+    """Range of the reported joints that the data cover, where a joint is not coupled to others."""
+    robot = arm.robot
+    low, high = robot.q_min_rad.copy(), robot.q_max_rad.copy()
+    if arm.fitted_range_rad is None:
+        return low, high
+    for joint in np.flatnonzero(limits.uncoupled(robot)):
+        ends = [end[joint] / robot.joint_map[joint, joint] for end in arm.fitted_range_rad]
+        low[joint], high[joint] = max(low[joint], min(ends)), min(high[joint], max(ends))
+    return low, high

@@ -1,0 +1,284 @@
+"""What ``plan-campaign`` is asked, and its answer as a sheet, a picture and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.assess.adaptive import AdaptiveAssessor
+from kinacc.assess.binomial import binomial_interval
+from kinacc.campaign import power, simulate
+from kinacc.campaign.power import Aim, Row
+from kinacc.campaign.simulate import Pool
+from kinacc.cli import campaign_options, rows
+from kinacc.cli.sheet import Field, Sheet
+from kinacc.errors import InputError, Problem
+from kinacc.measurements.table import numbers
+
+DEFAULT_ERRORS = ("smooth", "workshop", "defect")
+_SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
+_DRAW = 0
+_MOST_READINGS = 50_000_000  # a gigabyte: any pose may be the one that is read again and again
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is simulated, and what for."""
+
+    pools: tuple[Pool, ...]
+    points: int
+    covariance_mm2: np.ndarray
+    assessors: tuple[AdaptiveAssessor, ...]
+    aim: Aim
+    repetitions: int
+    seed: int
+
+
+def question(given: Mapping) -> Question:
+    """The question of the command's options. Raises InputError listing what is wrong."""
+    problems: list[Problem] = []
+    instruments = campaign_options.gathered(
+        problems, lambda: campaign_options.instruments({**given, "frame": "base"})
+    )
+    for name in ("width_mm", "tolerance_mm", "largest_mm"):
+        problems += campaign_options.not_positive(given, name)
+    points = given["poses"]
+    budgets = given["budget"] or [max(round(share * points), 2) for share in _SHARES]
+    if points * max(budgets) > _MOST_READINGS:
+        what = f"{points} poses with up to {max(budgets)} readings each"
+        allowed = f"at most {_MOST_READINGS:g}, poses times the largest budget"
+        problems.append(Problem("--poses, --budget", what, allowed))
+    assessors = [
+        campaign_options.gathered(
+            problems, lambda each=each: campaign_options.assessor({**given, "budget": each})
+        )
+        for each in sorted(set(budgets))
+    ]
+    pools = [
+        campaign_options.gathered(problems, lambda each=each: pool_of(each))
+        for each in given["errors"] or DEFAULT_ERRORS
+    ]
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)), "Nothing was simulated")
+    if given["largest_mm"] is not None:
+        pools = [_scaled(pool, given["largest_mm"]) for pool in pools]
+    aim = Aim(given["target"], given["width_mm"], given["tolerance_mm"], given["power"])
+    return Question(
+        tuple(pools),
+        points,
+        instruments[0].covariance_mm2,
+        tuple(assessors),
+        aim,
+        given["repetitions"],
+        given["seed"],
+    )
+
+
+def answer(asked: Question, progress: Callable | None = None) -> list[Row]:
+    """Simulate."""
+    found = simulate.outcomes(
+        asked.pools, asked.points, asked.covariance_mm2, asked.assessors, asked.repetitions,
+        asked.seed, progress,
+    )  # fmt: skip
+    return power.rows(found, asked.aim)
+
+
+def pool_of(name: str) -> Pool:
+    """Errors by the name of a family, a results folder or a file."""
+    from kinacc.study.tournament import fields
+
+    path = Path(name)
+    if name in fields.FAMILIES:
+        made = fields.synthetic(name, _DRAW)
+        return Pool(name, made.error_mm, made.q_rad, made.effects)
+    if path.is_dir():
+        return _of_folder(path)
+    if path.is_file():
+        table, problems = rows.open_table(path), []
+        names = ("ex_mm", "ey_mm", "ez_mm")
+        missing = [each for each in names if each not in table.columns]
+        if missing:
+            raise InputError(Problem(name, f"has no column {', '.join(missing)}", ", ".join(names)))
+        # A point that was not measured has no error: it is no fault, and nothing to simulate with.
+        measured = ~np.all([table.gaps(each) for each in names], axis=0)
+        errors = np.stack([numbers(table, each, problems, gaps=True) for each in names], axis=1)
+        partly = np.flatnonzero(measured & np.isnan(errors).any(axis=1))
+        if partly.size and not problems:
+            where = f"{name}: {table.rows_in_words(partly)}"
+            problems.append(Problem(where, "an error is not complete", ", ".join(names)))
+        if not measured.any():
+            problems.append(Problem(name, "holds no measured error", ", ".join(names)))
+        if problems:
+            raise InputError(problems)
+        return Pool(path.stem, errors[measured])
+    allowed = f"a results folder, a file, {', '.join(fields.FAMILIES)}"
+    raise InputError(Problem("--errors", f"{name!r} is not there", allowed))
+
+
+def _of_folder(path: Path) -> Pool:
+    from kinacc.artifacts import store
+    from kinacc.assess.causes import joint_errors
+    from kinacc.deployment.folder import recorded_robot
+    from kinacc.study.tournament import fields
+
+    name, robot = path.resolve().name, recorded_robot(path)
+    needed = ("pose_errors", "measurements")
+    if all((path / f"{each}.parquet").is_file() for each in needed):
+        errors, seen = (store.read(path / f"{each}.parquet") for each in needed)
+        found = fields.of_measurements(name, "", errors, seen)
+    elif (path / "assessment_points.parquet").is_file():
+        found = fields.of_points(name, "", store.read(path / "assessment_points.parquet"))
+    else:
+        what = "holds neither pose_errors with measurements nor assessment_points"
+        raise InputError(Problem(str(path), what, "a results folder", "run the workflow first"))
+    effects = None if robot is None else joint_errors(robot, found.q_rad)
+    return Pool(name, found.error_mm, found.q_rad, effects)
+
+
+def _scaled(pool: Pool, largest_mm: float) -> Pool:
+    largest = float(np.linalg.norm(pool.error_mm, axis=1).max())
+    return replace(pool, error_mm=pool.error_mm * (largest_mm / largest))
+
+
+def as_sheet(asked: Question, found: list[Row]) -> Sheet:
+    """One row per kind of errors and budget."""
+    aim = asked.aim
+
+    def column(make) -> np.ndarray:
+        return np.array([make(row) for row in found], dtype=float)
+
+    def finite(values: np.ndarray) -> np.ndarray:
+        return np.where(np.isfinite(values), values, np.nan)
+
+    fields = [
+        Field("errors", np.array([row.errors for row in found], dtype=object), "", "simulated"),
+        Field("budget", np.array([row.budget for row in found]), "1", "readings allowed"),
+        Field("readings", column(lambda row: row.readings), "1", "mean readings taken", False),
+        Field("true_mm", column(lambda row: row.truth_mm), "mm", "mean largest error"),
+        *(
+            Field(f"width_{name}_mm", finite(column(lambda row, i=i: row.width_mm[i])), "mm",
+                  "upper minus lower bound; none where no bound is stated")
+            for i, name in enumerate(("q05", "median", "q95"))
+        ),
+        Field("excess_mm", column(lambda row: row.excess_mm), "mm", "mean of upper minus truth"),
+        Field("stated", column(lambda row: row.stated), "1", "share with an upper bound"),
+        Field("broken", column(lambda row: row.broken), "1",
+              "share whose bound rests on an assumption these errors break"),
+        Field("holds", column(lambda row: row.holds), "1",
+              "share of the other upper bounds that hold"),
+        Field("held", np.array([_counted(row) for row in found], dtype=object), "",
+              "the same, counted"),
+        Field("holds_low", column(lambda row: row.holds_interval[0]), "1", "95 % limits", False),
+        Field("holds_high", column(lambda row: row.holds_interval[1]), "1", "95 % limits", False),
+    ]  # fmt: skip
+    if aim.width_mm is not None:
+        fields += [
+            Field("within", column(lambda row: row.within), "1", "share as narrow as wanted"),
+            Field("within_low", column(lambda row: row.interval[0]), "1", "95 % limits", False),
+            Field("within_high", column(lambda row: row.interval[1]), "1", "95 % limits", False),
+        ]
+    if aim.tolerance_mm is not None:
+        for verdict in power.VERDICTS:
+            shares = np.array([row.decisions[verdict] for row in found])
+            fields.append(Field(verdict, shares, "1", "share decided so"))
+    std = np.sqrt(np.diag(asked.covariance_mm2))
+    facts = {
+        "assessor": asked.assessors[0].name,
+        "poses": asked.points,
+        "noise_mm": [float(each) for each in std],
+        "target": aim.target,
+        "wanted_width_mm": aim.width_mm,
+        "tolerance_mm": aim.tolerance_mm,
+        "power": aim.power,
+        "repetitions": asked.repetitions,
+        "seed": asked.seed,
+        "budget": power.smallest_budget(found, aim) if _aims(aim) else None,
+    }
+    title = (
+        f"{asked.assessors[0].name}: largest error of {_TARGETS[aim.target]} of {asked.points} "
+        f"poses, {asked.repetitions} simulated campaigns a row"
+    )
+    return Sheet(title, facts, fields, shown_rows=60)
+
+
+_TARGETS = {"candidates": "all", "measured": "those measured"}
+
+
+def _counted(row: Row) -> str | None:
+    return f"{row.holding} of {row.judged}" if row.judged else None
+
+
+def in_words(asked: Question, found: list[Row]) -> str:
+    """The budget that does, or that none did, and how surely so many repetitions show it."""
+    aim = asked.aim
+    if not _aims(aim):
+        return "give --width-mm or --tolerance-mm to be told a budget"
+    wanted = []
+    if aim.width_mm is not None:
+        wanted.append(f"bounds at most {aim.width_mm:g} mm apart")
+    if aim.tolerance_mm is not None:
+        wanted.append(f"a decision on {aim.tolerance_mm:g} mm")
+    said = " and ".join(wanted)
+    enough = power.smallest_budget(found, aim)
+    if enough is None:
+        return _none_did(asked, found, said)
+    share = min(row.reaches(aim) for row in found if row.budget == enough)
+    hits = round(share * asked.repetitions)
+    low, _ = binomial_interval(hits, asked.repetitions)
+    counted = f"{hits} of {asked.repetitions}"
+    if low >= aim.power:
+        return (
+            f"{enough} readings give {said} in at least {aim.power:.0%} of campaigns on all errors "
+            f"simulated: {counted} there (at least {low:.0%} with 97.5 % confidence)"
+        )
+    needed = power.repetitions_to_show(share, aim.power)
+    more = "only more readings would" if needed is None else f"--repetitions {needed} would, if"
+    more += "" if needed is None else " as large a share of them does"
+    return (
+        f"{enough} readings gave {said} in {counted} simulated campaigns or more on all errors; "
+        f"that shows at least {low:.0%} of campaigns with 97.5 % confidence, not yet "
+        f"{aim.power:.0%}: {more}"
+    )
+
+
+def _none_did(asked: Question, found: list[Row], said: str) -> str:
+    aim, most = asked.aim, max(row.budget for row in found)
+    best = min(row.reaches(aim) for row in found if row.budget == most)
+    hits = round(best * asked.repetitions)
+    _, high = binomial_interval(hits, asked.repetitions)
+    few = f"; so few repetitions do not rule out {high:.0%}" if high >= aim.power else ""
+    return (
+        f"no budget up to {most} gave {said} in {aim.power:.0%} of the simulated campaigns on all "
+        f"errors: {hits} of {asked.repetitions} with {most}{few}"
+    )
+
+
+def draw(asked: Question, found: list[Row], picture: str) -> None:
+    """Width against budget."""
+    from kinacc.figures import campaign_plan
+    from kinacc.figures.save import write
+
+    by_errors: dict[str, list[Row]] = {}
+    for row in found:
+        by_errors.setdefault(row.errors, []).append(row)
+    curves = [
+        campaign_plan.Curve(
+            name,
+            np.array([row.budget for row in group], dtype=float),
+            np.array([row.width_mm for row in group]),
+            np.array([row.reaches(asked.aim) for row in group]),
+        )
+        for name, group in by_errors.items()
+    ]
+    aim = asked.aim
+    enough = power.smallest_budget(found, aim) if _aims(aim) else None
+    figure = campaign_plan.draw(curves, aim.width_mm, aim.power if _aims(aim) else None, enough)
+    path = Path(picture)
+    write(figure, {path.suffix[1:]: path})
+
+
+def _aims(aim: Aim) -> bool:
+    return aim.width_mm is not None or aim.tolerance_mm is not None

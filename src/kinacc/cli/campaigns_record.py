@@ -1,0 +1,358 @@
+"""Readings from the command line and from files, on their way into the journal."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+import numpy as np
+
+from kinacc.campaign import folder, imports, reading, words
+from kinacc.campaign.folder import Opened
+from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import State
+from kinacc.cli.campaigns import say_doubts
+from kinacc.cli.campaigns_answers import as_facts
+from kinacc.cli.rows import ANGLE, LENGTH, Reader, open_table
+from kinacc.errors import InputError, Problem
+from kinacc.measurements.table import RawTable
+from kinacc.measurements.written_numbers import numbers_of
+
+_COMPUTED = {"predict": "unexplained_mm", "compensate": "position_error_mm"}  # columns of theirs
+
+
+def record(given: Mapping) -> None:
+    """Take what the options give, or nothing."""
+    one = given["position_mm"] is not None
+    if one == (given["file"] is not None):
+        what = "is given twice" if one else "is not given"
+        raise InputError(Problem("the reading", what, "--position-mm, or a FILE"))
+    with folder.writing(given["folder"]) as opened:
+        before = opened.state()
+        say_doubts(opened)
+        made = _Made([_single(given, before)]) if one else _of_file(given, before)
+        if made.taken:
+            opened.write(folder.readings_entry(made.taken, *made.source))
+        after = folder.open_(given["folder"]).state()
+    _say_taken(given, made, before, after)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """Readings that are taken, and what is wrong with rows that are not.
+
+    Numbers of readings whose rows are ``known``, and of those ``gone`` from the file. ``source`` is
+    what the journal keeps of the file.
+    """
+
+    taken: list[Reading]
+    skipped: Sequence[Problem] = ()
+    known: tuple[int, ...] = ()
+    gone: tuple[int, ...] = ()
+    source: tuple = ()
+
+
+def leave_out(path: str, name: str, reason: str, as_json: bool) -> None:
+    """Leave a point without readings out of the campaign."""
+    with folder.writing(path) as opened:
+        before = opened.state()
+        point = _point_named(opened, name)
+        have = [each for each in (*before.told, *before.in_hand) if each.reading.point == point]
+        problems = []
+        if have:
+            what = f"has {len(have)} readings: leaving it out now could hide a large error"
+            problems.append(Problem(f"point {name}", what))
+        if point in before.left_out:
+            problems.append(Problem(f"point {name}", "was left out before"))
+        if not reason.strip():
+            problems.append(Problem("--reason", "is empty", "why it cannot be measured"))
+        if len(opened.plan.points) - len(before.left_out) <= 2:
+            problems.append(Problem(f"point {name}", "only 2 candidates are left"))
+        if problems:
+            raise InputError(problems, "Nothing was left out")
+        opened.write(folder.leave_out_entry(point, reason.strip()))
+        after = folder.open_(path).state()
+    _say_standing(after, as_json)
+
+
+def strike(path: str, number: int, reason: str, as_json: bool) -> None:
+    """Declare a reading void."""
+    with folder.writing(path) as opened:
+        before = opened.state()
+        there = {each.number for each in (*before.told, *before.in_hand)}
+        problems = []
+        if number in {each.number for each, _ in before.struck}:
+            problems.append(Problem(f"reading {number}", "was struck before"))
+        elif number not in there:
+            allowed = f"1 to {before.numbered}" if before.numbered else "none was taken yet"
+            problems.append(Problem(f"reading {number}", "is not there", allowed))
+        if not reason.strip():
+            problems.append(Problem("--reason", "is empty", "what went wrong"))
+        if problems:
+            raise InputError(problems, "Nothing was struck")
+        opened.write(folder.strike_entry(number, reason.strip()))
+        after = folder.open_(path).state()
+    _say_standing(after, as_json)
+
+
+def _say_standing(after: State, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps(as_facts(after, after.plan.limits.tolerance_mm), indent=1))
+        return
+    click.echo("\n".join(words.standing(after)))
+
+
+def _single(given: Mapping, before: State) -> Reading:
+    plan = before.plan
+    problems: list[Problem] = []
+    position = _three(given["position_mm"], problems)
+    joints = None
+    for option, unit in (("joints_deg", "deg"), ("joints_rad", "rad")):
+        if given[option] is not None:
+            joints = _joints(given[option], unit, plan.slides, f"--{option[:6]}-{unit}", problems)
+    instrument = given["instrument"] or plan.instruments[0].name
+    if instrument not in {each.name for each in plan.instruments}:
+        known = ", ".join(each.name for each in plan.instruments)
+        problems.append(Problem("--instrument", f"{instrument!r}", known))
+    point = before.asked
+    if given["point"] is not None:
+        point = (
+            plan.points.label.index(given["point"]) if given["point"] in plan.points.label else None
+        )
+        if point is None:
+            problems.append(Problem("--point", f"{given['point']!r} is no candidate"))
+    elif point is None:
+        problems.append(Problem("the reading", words.standing(before)[-1], fix="give --point"))
+    if problems:
+        raise InputError(problems, "Nothing was recorded")
+    found = Reading(point, position, instrument, joints, given["std_mm"])
+    left_out = frozenset(before.left_out)
+    problems = reading.problems_of(
+        plan, found, "the reading", left_out, given["accept_implausible"]
+    )
+    if not given["again"]:
+        problems += _repeated(found, "the reading", _recorded(before))
+    if problems:
+        raise InputError(problems, "Nothing was recorded")
+    return found
+
+
+def _recorded(before: State) -> dict[tuple, str]:
+    """What readings there are, by their digits."""
+    there = (*before.told, *before.in_hand)
+    return {imports.digits(each.reading): f"reading {each.number}" for each in there}
+
+
+def _repeated(found: Reading, where: str, earlier: Mapping[tuple, str]) -> list[Problem]:
+    """The problem with a reading that is an earlier one to the last digit: it tells nothing new."""
+    same = earlier.get(imports.digits(found))
+    if same is None:
+        return []
+    fix = "give --again if it is a reading of its own"
+    return [Problem(where, f"is {same}, to the last digit", fix=fix)]
+
+
+def _of_file(given: Mapping, before: State) -> _Made:
+    """What is taken of a file, and what is not. InputError where nothing may be."""
+    path = given["file"]
+    for option in ("point", "joints_deg", "joints_rad", "std_mm"):
+        if given[option] is not None:
+            option = option.replace("_", "-")
+            raise InputError(Problem(f"--{option}", "is given with a file", "a column of the file"))
+    table = open_table(path)
+    mark = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
+    place = Path(os.path.relpath(Path(path).resolve(), Path(given["folder"]).resolve())).as_posix()
+    rows, problems = _rows(table, given["instrument"], before)
+    read = {number: row for number, row in enumerate(rows) if isinstance(row, Reading)}
+    compared = imports.compare(read, before, place, given["again"])
+    readings = _numbered(before)
+    left_out = frozenset(before.left_out)
+    earlier = _recorded(before)
+    good = []
+    for number, row in enumerate(rows):
+        where = f"{table.path}, line {table.line[number]}"
+        if isinstance(row, Problem):
+            wrong = [row]
+        elif number in compared.known:
+            one = compared.known[number]
+            wrong = _altered(row, where, one, readings[one], before)
+        elif number in compared.changed:
+            one = compared.changed[number]
+            wrong = [_in_place(where, one, readings[one], given["folder"], before)]
+        else:
+            wrong = reading.problems_of(
+                before.plan, row, where, left_out, given["accept_implausible"]
+            )
+            if not given["again"]:
+                wrong += _repeated(row, where, earlier)
+            good += [] if wrong else [row]
+        if isinstance(row, Reading):
+            earlier.setdefault(imports.digits(row), f"line {table.line[number]}")
+        problems += wrong
+    if not good and not problems:
+        what = f"was recorded before: {_listed(compared.known.values())}, no row is new"
+        fix = "a reading that is equal to another to the last digit is a further row of the file"
+        raise InputError(Problem(path, what, fix=fix), "Nothing was recorded")
+    if problems and not given["skip_bad"]:
+        raise InputError(problems, "Nothing was recorded")
+    known = tuple(sorted(compared.known.values()))
+    source = mark, place, compared.grown, compared.adopted
+    return _Made(good, problems, known, compared.gone, source)
+
+
+def _numbered(before: State) -> dict[int, Reading]:
+    struck = (each for each, _ in before.struck)
+    return {each.number: each.reading for each in (*before.told, *before.in_hand, *struck)}
+
+
+def _altered(row: Reading, where: str, number: int, known: Reading, before: State) -> list[Problem]:
+    """The problem with a row that is a reading by its position, and says else of it."""
+    differs = imports.unlike(row, known, before.plan.slides)
+    if not differs:
+        return []
+    what = f"is reading {number} by its position, and was recorded with another {differs}"
+    fix = f"bring the row back, or strike reading {number} and record the file again"
+    return [Problem(where, what, fix=fix)]
+
+
+def _in_place(where: str, number: int, known: Reading, path: str, before: State) -> Problem:
+    """The problem with a row that stands where another was when the file was recorded."""
+    seen = ", ".join(f"{each:g}" for each in known.position_mm)
+    what = (
+        f"stands where reading {number} was, which the file does not hold any more: point "
+        f"{before.plan.points.label[known.point]}, ({seen}) mm"
+    )
+    strike = shlex.join(["kinacc", "campaign", "strike", path, str(number), "--reason", ".."])
+    fix = (
+        "bring the row back if it was changed by mistake; if it was wrong before, run "
+        f"`{strike}` and record the file again; give --again if this is a reading of its own"
+    )
+    return Problem(where, what, fix=fix)
+
+
+def _listed(numbers: Iterable[int]) -> str:
+    """Numbers of readings in words: readings 1 to 4, 7."""
+    spans: list[list[int]] = []
+    for number in sorted(numbers):
+        if spans and number == spans[-1][1] + 1:
+            spans[-1][1] = number
+        else:
+            spans.append([number, number])
+    shown = ", ".join(f"{low} to {high}" if high > low else f"{low}" for low, high in spans)
+    return f"reading{'' if shown.isdigit() else 's'} {shown}"
+
+
+def _rows(table: RawTable, instrument: str | None, before: State):
+    """A Reading, or the Problem with it, of every row; and problems of the file as a whole."""
+    plan = before.plan
+    # A cell that is no number spoils its row, not the file: it is found again row by row.
+    reader = Reader(table, cells=[])
+    problems = reader.problems
+    position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
+    kinds = [LENGTH if slides else ANGLE for slides in plan.slides]
+    names = [f"q{joint + 1}" for joint in range(len(plan.slides))]
+    for command, own in _COMPUTED.items():
+        if own in table.columns:
+            what = f"was written by kinacc {command}: its positions are computed, not measured"
+            problems.append(Problem(table.path, what, "positions as the instrument read them"))
+    joints = reader.group(names, kinds, False)
+    std = reader.group(["std_x", "std_y", "std_z"], [LENGTH] * 3, False)
+    if "pose" not in table.columns and joints is None and not problems:
+        what = "does not say which point a row was measured at"
+        problems.append(Problem(table.path, what, f"a column pose, or {names[0]}_deg .."))
+    known = {each.name for each in plan.instruments}
+    if instrument is not None and instrument not in known:
+        problems.append(Problem("--instrument", f"{instrument!r}", ", ".join(known)))
+    if problems:
+        raise InputError(problems, "Nothing was recorded")
+    place = {name.strip(): number for number, name in enumerate(plan.points.label)}
+    rows: list[Reading | Problem] = []
+    for i in range(len(table)):
+        where = f"{table.path}, line {table.line[i]}"
+        at = None if joints is None or not np.isfinite(joints[i]).all() else joints[i]
+        if "pose" in table.columns:
+            name = str(table.columns["pose"][i]).strip()
+            point = place.get(name)
+            wrong = f"{name!r} is no candidate"
+        else:
+            point = None if at is None else reading.point_at(plan, at)
+            wrong = "its joints are those of no candidate"
+        own = instrument or plan.instruments[0].name
+        if "instrument" in table.columns and not table.is_gap(table.columns["instrument"][i]):
+            own = str(table.columns["instrument"][i]).strip()
+        if point is None or own not in known:
+            what = wrong if point is None else f"instrument {own!r} is not there"
+            rows.append(Problem(where, what))
+            continue
+        noise = None if std is None else ",".join(repr(float(each)) for each in std[i])
+        rows.append(Reading(point, position[i], own, at, noise))
+    return rows, problems
+
+
+def _point_named(opened: Opened, name: str) -> int:
+    label = opened.plan.points.label
+    if name not in label:
+        raise InputError(
+            Problem("point", f"{name!r} is no candidate", f"{label[0]} .. {label[-1]}")
+        )
+    return label.index(name)
+
+
+def _three(text: str, problems: list[Problem]) -> np.ndarray:
+    values = numbers_of(text)
+    if values.shape != (3,):
+        problems.append(Problem("--position-mm", repr(text), "three numbers x,y,z"))
+        return np.zeros(3)
+    return values
+
+
+def _joints(
+    text: str, unit: str, slides, option: str, problems: list[Problem]
+) -> np.ndarray | None:
+    values = numbers_of(text)
+    if values.shape != (len(slides),):
+        problems.append(Problem(option, repr(text), f"{len(slides)} numbers, one per joint"))
+        return None
+    return values * np.where(slides, 1.0, ANGLE[unit])
+
+
+def _say_taken(given: Mapping, made: _Made, before: State, after: State) -> None:
+    label = after.plan.points.label
+    if given["as_json"]:
+        content = {
+            "taken": len(made.taken),
+            "skipped": [str(each) for each in made.skipped],
+            "known": list(made.known),
+            "gone": list(made.gone),
+            "next": None if after.asked is None else label[after.asked],
+            "readings": after.taken,
+            "last_reading": after.numbered,
+        }
+        click.echo(json.dumps(content, indent=1))
+        return
+    for each in made.skipped:
+        click.echo(f"not taken: {each}", err=True)
+    if given["file"] is None:
+        found = made.taken[0]
+        size = float(np.linalg.norm(reading.error_mm(after.plan, found)))
+        click.echo(
+            f"recorded: reading {after.numbered}, point {label[found.point]}, {size:.3f} mm from "
+            "the model"
+        )
+        if before.asked is not None and found.point != before.asked:
+            click.echo(f"point {label[before.asked]} was asked for: this reading is kept in hand")
+    else:
+        if made.known:
+            rows = f"{len(made.known)} row{'s' if len(made.known) > 1 else ''}"
+            click.echo(f"known: {rows} recorded before, as {_listed(made.known)}")
+        if made.gone:
+            said = f"not in the file any more, and still in the campaign: {_listed(made.gone)}"
+            click.echo(f"{said}; strike what is void", err=True)
+        click.echo(f"recorded: {len(made.taken)} readings of {given['file']}")
+    click.echo("\n".join(words.standing(after)))

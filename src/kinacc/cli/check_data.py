@@ -1,0 +1,133 @@
+"""``kinacc check-data``: what a file of measurements holds, and what looks wrong in it."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from kinacc.cli.choice import CONFIG
+
+
+@click.command("check-data")
+@click.argument("files", nargs=-1, type=click.Path())
+@click.option("--dataset", multiple=True, help="Data set of the configuration. [all that are read]")
+@click.option("--figure", type=click.Path(), help="Draw one data set to a .svg, .png or .pdf file.")
+@click.option("--force", is_flag=True, help="Replace a figure that is there.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+def check_data(
+    files: tuple[str, ...], dataset: tuple[str, ...], figure: str | None, force: bool, as_json: bool
+) -> None:
+    """Check measured files before anything is fitted: what is there, and what looks wrong.
+
+    FILES are configuration files with data sets, config.yaml if none is given. Every suspicion
+    names the lines of the measured file it concerns. Exit code 0: nothing suspicious; 1: there are
+    suspicions; 2: the file or its description cannot be used.
+
+    \b
+    Example:
+      kinacc check-data examples/ur10_published.yaml --figure checked.svg
+      kinacc check-data config.yaml examples/ur10.yaml --dataset ur10_b --json
+    """
+    from kinacc.checks.report import UNUSABLE, to_json
+    from kinacc.errors import InputError
+
+    try:
+        sections = _sections(files or (CONFIG,), dataset)
+        _check_figure(figure, force, list(sections))
+    except InputError as error:
+        if not as_json:
+            raise
+        click.echo(to_json([_unusable(", ".join(files or (CONFIG,)), "", error)]))
+        sys.exit(UNUSABLE)
+    sys.exit(report_on(sections, as_json, figure))
+
+
+def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = None) -> int:
+    """Check every data set (complete configurations by name), print, and say the exit code."""
+    from kinacc.checks.report import UNUSABLE, to_json
+    from kinacc.errors import InputError
+    from kinacc.progress import reporting
+    from kinacc.workflow.stages.data_check import examined
+
+    worst, told = 0, []
+    for name, config in sections.items():
+        file = config["measurements"]["file"]
+        try:
+            with reporting(f"check-data {name}", bar=True) as progress:
+                report = examined(config, name, progress)
+        except InputError as error:
+            worst = UNUSABLE
+            told.append(_unusable(name, file["path"], error))
+            if not as_json:
+                click.echo(f"{error}\n", err=True)
+            continue
+        worst = max(worst, report.code)
+        if figure is not None:
+            _draw(report, figure)
+        told.append(report.as_dict())
+        if not as_json:
+            click.echo(report.as_text() + "\n")
+    if as_json:
+        click.echo(to_json(told))
+    return worst
+
+
+def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict]:
+    """The data sets to check: those asked for, or all that are read from a file."""
+    from kinacc.config.load import load
+    from kinacc.errors import InputError, Problem
+
+    full = load(files)
+    measured = [n for n, c in full.items() if c["measurements"]["source"] == "file"]
+    allowed = ", ".join(measured) or "none of these files' data sets is read from a file"
+    problems = [
+        Problem(
+            "--dataset",
+            f"{name!r} is {'synthetic' if name in full else 'not in the configuration'}",
+            allowed,
+        )
+        for name in wanted
+        if name not in measured
+    ]
+    if not measured and not wanted:
+        what = "no data set is read from a file: there is nothing to check"
+        problems.append(Problem(", ".join(files), what, "measurements.source: file"))
+    if problems:
+        raise InputError(problems)
+    return {name: full[name] for name in wanted or measured}
+
+
+def _check_figure(figure: str | None, force: bool, datasets: list[str]) -> None:
+    from kinacc.cli.compare import PICTURES
+    from kinacc.cli.sheet import check_output
+    from kinacc.errors import InputError, Problem
+
+    if figure is not None and len(datasets) > 1:
+        what = "draws one data set, and there are several"
+        raise InputError(Problem("--figure", what, ", ".join(datasets), "choose with --dataset"))
+    check_output(figure, force, PICTURES)
+
+
+def _draw(report, figure: str) -> None:
+    from pathlib import Path
+
+    from kinacc.figures.checked_data import draw
+    from kinacc.figures.save import write
+
+    suspects = {each.kind: each.lines for each in report.suspicions}
+    limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
+    drawn = draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
+    write(drawn, {Path(figure).suffix[1:]: Path(figure)})
+
+
+def _unusable(dataset: str, path: str, error) -> dict:
+    return {
+        "dataset": dataset,
+        "path": path,
+        "verdict": "unusable",
+        "problems": [
+            {"where": each.where, "what": each.what, "allowed": each.allowed, "fix": each.fix}
+            for each in error.problems
+        ],
+    }

@@ -1,0 +1,58 @@
+"""``kinacc compensate``: wanted poses to the joints that reach them."""
+
+from __future__ import annotations
+
+import click
+
+from kinacc.cli import choice
+
+
+@click.command("compensate")
+@choice.calibration_options
+@click.argument("poses", type=click.Path(), required=False)
+@click.option("--pose", multiple=True, help='A pose in mm: "x,y,z,qw,qx,qy,qz".')
+@click.option("--near-deg", help="Joints the posture should be near to, for rows without joints.")
+@click.option(
+    "--program",
+    type=click.Path(),
+    help="Instead of poses: joints written for the nominal arm, to be corrected.",
+)
+@choice.point_options
+@choice.output_options
+def compensate(
+    folder, model, config, robot, poses, pose, near_deg, program, frame, point, session, output,
+    as_json, force,
+) -> None:  # fmt: skip
+    """Find the joints at which the calibrated arm puts its tool where it is wanted.
+
+    FOLDER is the results folder of a data set. POSES is a CSV, Parquet or JSON file with x_mm,
+    y_mm, z_mm and qw, qx, qy, qz (or rvx_deg .. a rotation vector, or rx_deg .. intrinsic XYZ
+    angles). Columns q1_deg and so on, where the file has them, say near which joints the posture is
+    wanted; without them the posture nearest to zero is taken.
+
+    Joints are given only where the forward model was seen to come back to the pose within 1e-6 mm;
+    every other row says in words why it has none. Exit code 1 if a row has none. An arm of four or
+    five axes comes back to the position, and is turned as near as it can be.
+
+    \b
+    Example:
+      kinacc compensate results/mh180 --pose "1500,200,900,0,1,0,0"
+      kinacc compensate results/ur10_b wanted.csv -o joints.csv
+      kinacc compensate results/mh180 --program program.csv -o corrected.csv
+    """
+    from kinacc.cli import rows, sheet, wanted
+    from kinacc.deployment.compensate import compensate as joints_for
+    from kinacc.progress import reporting
+
+    sheet.check_output(output, force)
+    arm = choice.calibration_of(folder, model, robot, config, session)
+    given = wanted.poses(arm, poses, pose, near_deg, program, frame, point)
+    with reporting("compensate", bar=True):
+        found = joints_for(arm, given.pose, given.joints, given.directions, frame, point)
+    answer = wanted.compensated(arm, given, found, frame, point, program is not None)
+    choice.deliver(answer, output, as_json, force)
+    rows.say_unused(given)
+    missed = int((found.q_rad != found.q_rad).any(axis=1).sum())
+    if missed:
+        click.echo(f"{missed} of {len(given.label)} poses have no joints: see status", err=True)
+        raise SystemExit(1)

@@ -1,0 +1,80 @@
+"""``kinacc export``: a calibrated arm in the forms others read."""
+
+from __future__ import annotations
+
+import click
+
+from kinacc.cli import choice
+
+FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
+
+
+@click.command("export")
+@click.argument("folder", type=click.Path())
+@click.option("--to", "target", type=click.Path(), default=".", show_default=True, help="Folder.")
+@click.option(
+    "--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]"
+)
+@click.option("--name", help="Name of the files. [the data set's]")
+@click.option("--urdf", type=click.Path(), help="A URDF whose origins are corrected.")
+@click.option("--base-link", help="Link of that file the arm starts at. [its root]")
+@click.option("--tip-link", help="Link of that file the arm ends at. [the only one it can]")
+@click.option("--dh-joints", is_flag=True, help="URDF in the joints of the DH table.")
+@click.option("--robot", help="Robot of the results. [as the results say]")
+@click.option("--config", multiple=True, help="Configuration naming the robot.")
+@click.option("--json", "as_json", is_flag=True, help="List the files as JSON.")
+@click.option("--force", is_flag=True, help="Replace files that are there.")
+def export(
+    folder, target, formats, name, urdf, base_link, tip_link, dh_joints, robot, config, as_json,
+    force,
+) -> None:  # fmt: skip
+    """Write the calibrated DH model of FOLDER, a results folder, for other programs.
+
+    \b
+    yaml      a robot file kinacc reads again
+    json      parameters, deviations, frames, residuals, what the poses cannot tell
+    csv       one row per joint, degrees and millimetres
+    urdf      joint origins of the calibrated arm; with --urdf a file of yours, corrected in place
+    markdown  Tables I to III
+    latex     the same for a paper (booktabs)
+
+    Either all files appear or none; files that are there are kept without --force.
+
+    \b
+    Example:
+      kinacc export results/mh180 --to exported
+      kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --to exported
+    """
+    from kinacc.deployment.export.files import contents, note, write
+    from kinacc.errors import InputError, Problem
+
+    wanted = formats or FORMATS
+    about_urdf = {"--base-link": base_link, "--tip-link": tip_link}
+    problems = [
+        Problem(option, "is given without a file of yours", fix="give --urdf as well")
+        for option, value in about_urdf.items()
+        if value is not None and urdf is None
+    ]
+    if urdf is not None and "urdf" not in wanted:
+        problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
+    if problems:
+        raise InputError(problems, "Nothing was written")
+    made = contents(
+        folder,
+        choice.robot_of(folder, robot, config),
+        wanted,
+        name,
+        urdf,
+        (base_link, tip_link),
+        dh_joints,
+    )
+    paths = write(made, target, force)
+    if as_json:
+        import json
+
+        click.echo(json.dumps({"files": paths}, indent=1))
+    else:
+        click.echo("\n".join(paths))
+    said = note(folder)
+    if said:
+        click.echo(said, err=True)

@@ -1,0 +1,383 @@
+"""``kinacc init``: from a measured file to the two files a calibration starts from."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from kinacc.checks.report import Report
+    from kinacc.measurements.intake.guess import Guess
+
+_CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
+
+
+@click.command("init")
+@click.argument("measurement_file", type=click.Path())
+@click.option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
+@click.option("--out", default=".", show_default=True, help="Folder to write to.")
+@click.option("--name", help="Name of the data set. [as the file]")
+@click.option("--joint-unit", type=click.Choice(["deg", "rad"]), help="Unit of the joints.")
+@click.option("--length-unit", type=click.Choice(["mm", "m"]), help="Unit of the positions.")
+@click.option("--angle-unit", type=click.Choice(["deg", "rad"]), help="Unit of orientations.")
+@click.option(
+    "--orientation",
+    help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "
+    "convention such as XYZ.",
+)
+@click.option(
+    "--take",
+    multiple=True,
+    metavar="COLUMN",
+    help="Read this column, and those that go with it, where the names leave several readings "
+    "open. May be given again.",
+)
+@click.option(
+    "--yes",
+    is_flag=True,
+    help="Ask nothing; take the guesses, which are stated. Stops where there is no guess.",
+)
+@click.option("--force", is_flag=True, help="Replace files that are there.")
+@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON; asks nothing.")
+def init(measurement_file: str, **options) -> None:
+    """Describe MEASUREMENT_FILE: write its data set and, where needed, its robot.
+
+    Looks at the names and numbers of the file, asks what they do not say, and tries the answer on
+    the readings themselves. What was measured is read, and not what was wanted or how far off it
+    was; joints read back are read, and not commanded ones. Writes NAME.yaml and NAME.robot.yaml,
+    which name every column that is read, and overwrites nothing.
+
+    \b
+    Example:
+      kinacc init ../shared/data/ur10_tmac/series_D.csv --robot ur10 --name ur10_d
+      kinacc init tracker.csv --robot arm.urdf --orientation ZYX --out cell3 --yes
+      kinacc init log.csv --take actual_q_0 --take X
+    """
+    from kinacc.cli.init_questions import looked
+    from kinacc.kinematics import robot as robots
+    from kinacc.measurements.intake.write import plain_name
+
+    ask = not (options["yes"] or options["as_json"])
+    guess = _stated(looked(measurement_file, options, ask), options)
+    name = options["name"] or plain_name(measurement_file)
+    folder = Path(options["out"])
+    paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
+    _refuse(paths, name, options["force"])
+    if ask:
+        guess = _asked(guess)
+    robot, chosen = _robot(guess, options["robot"], ask)
+    own, text = _robot_file(robot, guess.joints, name, paths[1])
+    texts = {} if text is None else {paths[1]: text}
+    report = None
+    if robot is not None:
+        guess, report = _tried(guess, robots.load(robot), name)
+    texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, text in texts.items():
+        path.write_text(text, encoding="utf-8")
+    _tell(options["as_json"], guess, robot or own, chosen, report, list(texts), paths[0])
+
+
+_FOLDS_UNKNOWN = 60
+
+
+def _robot_file(robot: str | None, joints: int, name: str, path: Path) -> tuple[str, str | None]:
+    """What the data set calls its robot, and the text of the robot file to write, if any."""
+    from kinacc.kinematics import robot as robots
+    from kinacc.measurements.intake import write
+
+    if robot is None:
+        return str(path), write.template_text(f"{name}_robot", joints)
+    if robot in robots.shipped():
+        return str(path), write.shipped_text(robot)
+    if Path(robot).suffix.lower() in (".urdf", ".xml", ".xacro"):
+        return str(path), write.urdf_text(robots.load(robot).name, Path(robot), path.parent)
+    return robot, None
+
+
+def _stated(guess: Guess, options: dict) -> Guess:
+    """The guess with what the options say, which is no assumption then."""
+    from kinacc.errors import InputError, Problem
+
+    problems = []
+    for option in ("joint_unit", "length_unit", "angle_unit"):
+        unit, listed = guess.stated.get(option, ("", ""))
+        if options[option] and unit not in ("", options[option]):
+            where = f"--{option.replace('_', '-')} {options[option]}"
+            what = f"columns {listed} of {guess.section['path']} say {unit}"
+            fix = (
+                "leave the option out, or correct the names where they are the ones that are wrong"
+            )
+            problems.append(Problem(where, what, "the same in both places", fix))
+    if problems:
+        raise InputError(problems)
+    settings: dict = {}
+    turn: dict = {}
+    for option, setting in (("joint_unit", "joint_unit"), ("length_unit", "length_unit")):
+        if options[option]:
+            settings[setting] = options[option]
+    if options["angle_unit"]:
+        turn["unit"] = options["angle_unit"]
+    if options["orientation"]:
+        turn |= _orientation(options["orientation"])
+    if turn:
+        settings["orientation"] = turn
+    known = {name for name in ("joint_unit", "length_unit", "angle_unit") if options[name]}
+    known |= {"orientation", "order"} if options["orientation"] else set()
+    kept = {k: v for k, v in guess.assumed.items() if k not in known}
+    return replace(guess.but(settings), assumed=kept)
+
+
+def _orientation(word: str) -> dict:
+    from kinacc.checks.turns import CONVENTIONS
+    from kinacc.errors import InputError, Problem
+
+    if word in ("none", "quaternion", "rotation_vector"):
+        return {"kind": word}
+    if word == "quaternion_xyzw":
+        return {"kind": "quaternion", "order": "xyzw"}
+    if word in CONVENTIONS:
+        return {"kind": "euler", "convention": word}
+    allowed = f"none, quaternion, quaternion_xyzw, rotation_vector, {', '.join(CONVENTIONS)}"
+    raise InputError(Problem("--orientation", repr(word), allowed))
+
+
+def _refuse(paths, name: str, force: bool) -> None:
+    """Raise where the name is no name, or a file is there that must not be replaced."""
+    from kinacc.errors import InputError, Problem
+    from kinacc.measurements.intake.write import plain_name
+
+    problems = []
+    if name != plain_name(f"{name}.csv"):
+        problems.append(Problem("--name", repr(name), "letters, digits, _ and -"))
+    if not force:
+        problems += [
+            Problem(str(path), "is there already", fix="give --force to replace it, or --name")
+            for path in paths
+            if path.exists()
+        ]
+    if problems:
+        raise InputError(problems)
+
+
+def _asked(guess: Guess) -> Guess:
+    """The guess after a person was asked about what it assumes."""
+    for setting, words in guess.assumed.items():
+        click.echo(f"Not stated in the file: {words}.")
+        if setting == "orientation":
+            answer = _prompt(
+                "Orientation (Euler capitals: about moving axes, small: about fixed axes)",
+                type=click.Choice(_CONVENTIONS),
+                default=guess.section["orientation"]["convention"],
+            )
+            guess = guess.but({"orientation": _orientation(answer)})
+        elif setting == "order":
+            order = _prompt("Order", type=click.Choice(["wxyz", "xyzw"]), default="wxyz")
+            guess = guess.but({"orientation": {"order": order}})
+        else:
+            units = ["mm", "m"] if setting == "length_unit" else ["deg", "rad"]
+            now = guess.section["orientation"]["unit"]
+            now = now if setting == "angle_unit" else guess.section[setting]
+            unit = _prompt("Unit", type=click.Choice(units), default=now)
+            changed = (
+                {"orientation": {"unit": unit}} if setting == "angle_unit" else {setting: unit}
+            )
+            guess = guess.but(changed)
+    return guess
+
+
+def _prompt(question: str, **how: object) -> str:
+    """The answer to a question. InputError where nobody is there to answer."""
+    from kinacc.errors import InputError, Problem
+
+    try:
+        return click.prompt(question, **how)
+    except click.Abort:
+        fix = "run it in a terminal, give the option, or --yes to take the guesses"
+        raise InputError(Problem(f"question: {question}", "was not answered", fix=fix)) from None
+
+
+def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]:
+    """The robot as given, found by fitting, or as answered; None for a template. And why."""
+    from kinacc.checks.which_robot import fitting
+    from kinacc.kinematics import robot as robots
+    from kinacc.progress import reporting
+
+    if given is not None:
+        return given, "as given"
+    with reporting("init", bar=True) as progress:
+        found = fitting(guess, progress)
+    if ask:
+        names = [n for n in robots.shipped() if robots.load(n).dh.joints == guess.joints]
+        click.echo(f"Shipped robots of {guess.joints} axes: {', '.join(names)}.")
+        answer = _prompt(
+            "Robot (shipped name, robot file, URDF file, or 'new' for a template)",
+            default=found or "new",
+        )
+        return (None, "a template to fill in") if answer == "new" else (answer, "as answered")
+    if found is None:
+        return None, "none of the shipped robots fits; a template to fill in"
+    return found, "the only shipped robot that fits the readings"
+
+
+def _tried(guess: Guess, arm, name: str) -> tuple[Guess, Report]:
+    """The guess held against the readings: what was assumed and contradicts them is set right."""
+    from kinacc.checks import check
+    from kinacc.errors import InputError, Problem
+    from kinacc.measurements.layout import Layout
+    from kinacc.measurements.reader import read
+    from kinacc.progress import reporting
+
+    if arm.dh.joints != guess.joints:
+        what = f"{arm.name} has {arm.dh.joints} joints, the file {guess.joints}"
+        raise InputError(Problem("--robot", what))
+    with reporting(f"init {name}", bar=True) as progress:
+        for _ in range(3):
+            reading = read(guess.section, arm, strict=False)
+            layout = Layout.of(guess.section)
+            report = check.check(reading, layout, arm, name, guess.section["path"], progress)
+            settings = _contradicted(guess, report)
+            if not settings:
+                break
+            guess = _set_right(guess, settings)
+    return guess, report
+
+
+def _contradicted(guess: Guess, report: Report) -> dict:
+    """Settings that were assumed and that the readings contradict, as they should be."""
+    settings: dict = {}
+    for each in report.suspicions:
+        wanted = dict(each.values.get("setting", {}))
+        turn = dict(wanted.pop("orientation", {}))
+        about = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
+        if turn and about in guess.assumed:
+            settings |= {"orientation": turn}
+            settings |= {"e": wanted["e"]} if "e" in wanted else {}
+        settings |= {k: v for k, v in wanted.items() if k in guess.assumed}
+    return settings
+
+
+def _set_right(guess: Guess, settings: dict) -> Guess:
+    settings = dict(settings)
+    in_order = settings.pop("e", None)
+    if in_order:
+        columns = dict(guess.section["columns"])
+        unit = guess.section["orientation"]["unit"]
+        angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
+        columns |= {f"e{number}": column for number, column in enumerate(angles, 1)}
+        settings["columns"] = columns
+    told = {key: "found by trying it on the readings" for key in settings if key in guess.assumed}
+    if "orientation" in settings:
+        turn = settings["orientation"]
+        key = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
+        told[key] = "found by trying it on the readings"
+    kept = {k: v for k, v in guess.assumed.items() if k not in told}
+    return replace(guess.but(settings), assumed=kept)
+
+
+_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
+
+
+def _remarks(report: Report | None) -> list[str]:
+    """What has to be said of the points though nothing contradicts them."""
+    left = report.facts.get("quick_fit", {}).get("left_per_axis_mm") if report else None
+    if left is None or left > _CALCULATED_MM:
+        return []
+    return [
+        f"the points follow the joints to {left:.1g} mm, closer than an instrument measures: if a "
+        "controller or a simulation calculated them, they say nothing of the arm"
+    ]
+
+
+def _how(report: Report | None) -> str:
+    """How far what the file does not state was held against its readings."""
+    return "assumed" if report is None or report.stopping else "assumed, and the readings agree"
+
+
+def _dataset(
+    path: Path, name: str, robot: str, guess: Guess, report: Report | None, chosen: str
+) -> str:
+    """Text of the data set, which names files from the folder the command was called in."""
+    from kinacc.measurements.intake.write import dataset_text
+
+    note = [f"Written by kinacc init. Robot: {chosen}."]
+    how = _how(report).capitalize()
+    note += [f"{how}: {words}." for words in guess.assumed.values()]
+    note += [f"Not read: {', '.join(names)} ({why})." for names, why in guess.unused() if why]
+    check = f"kinacc check-data {shlex.quote(str(path))}"
+    note.append(f"Everything not given here is as in config.yaml.\n    {check}")
+    configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
+    return dataset_text(name, robot, guess, configurations, "\n".join(note))
+
+
+def _listed(names) -> str:
+    columns = [name.column for name in names]
+    return f"{columns[0]} .. {columns[-1]}" if len(columns) > 4 else ", ".join(columns)
+
+
+def _point(target: dict) -> str:
+    return _listed([target[axis] for axis in "xyz"])
+
+
+def _turned(guess: Guess) -> str:
+    """The columns of the orientation of the first target that has one."""
+    for target in guess.found.targets.values():
+        names = [n for q, n in target.items() if q[0] in "rq"]
+        if names and guess.section["orientation"]["kind"] != "none":
+            return f": {_listed(names)}"
+    return ""
+
+
+def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None:
+    file = shlex.quote(str(dataset))
+    commands = [f"kinacc check-data {file}", f"snakemake -c2 --configfile config.yaml {file}"]
+    if as_json:
+        answer = {
+            "written": [str(path) for path in written],
+            "robot": robot,
+            "robot_because": chosen,
+            "joints": guess.joints,
+            "targets": list(guess.targets),
+            "file": guess.section,
+            "assumed": guess.assumed,
+            "unused_columns": [name for names, _ in guess.unused() for name in names],
+            "left_aside": [
+                {"columns": list(names), "because": why} for names, why in guess.unused() if why
+            ],
+            "suspicions": [] if report is None else [s.kind for s in report.suspicions],
+            "remarks": _remarks(report),
+            "next": commands,
+        }
+        click.echo(json.dumps(answer, indent=1))
+        return
+    section, turn = guess.section, guess.section["orientation"]
+    click.echo(f"robot: {robot} ({chosen})")
+    click.echo(f"joints: {guess.joints}, in {section['joint_unit']}: {_listed(guess.found.joints)}")
+    if guess.found.commanded:
+        click.echo(f"joints as commanded: {_listed(guess.found.commanded)}")
+    targets = [f"{name} ({_point(each)})" for name, each in guess.found.targets.items()]
+    click.echo(f"targets, in {section['length_unit']}: {', '.join(targets)}")
+    kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
+    unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
+    click.echo(f"orientation: {kind}{unit}{_turned(guess)}")
+    for words in guess.assumed.values():
+        click.echo(f"{_how(report)}: {words}")
+    for names, why in guess.unused():
+        click.echo(f"columns not used: {', '.join(names)}" + (f" ({why})" if why else ""))
+    if report is not None and report.suspicions:
+        kinds = ", ".join(dict.fromkeys(each.kind for each in report.suspicions))
+        click.echo(f"suspicions: {kinds} (check-data says more)")
+    for words in _remarks(report):
+        click.echo(f"note: {words}")
+    for path in written:
+        click.echo(f"written: {path}")
+    if report is None:
+        click.echo("fill in the robot file first")
+    click.echo("next:")
+    for command in commands:
+        click.echo(f"  {command}")

@@ -1,0 +1,65 @@
+"""What ``kinacc init`` asks where the names of a file leave open what was measured."""
+
+from __future__ import annotations
+
+import shlex
+
+import click
+
+from kinacc.errors import InputError, Problem
+from kinacc.measurements.intake import guess as guesses
+from kinacc.measurements.intake.columns import Question
+from kinacc.measurements.intake.guess import Guess
+
+
+def looked(path: str, options: dict, ask: bool) -> Guess:
+    """The guess at a file without open questions: answered by ``--take``, or by a person."""
+    take, turned = list(options["take"]), options["orientation"] != "none"
+    while True:
+        guess = guesses.look(path, take, turned)
+        questions = guess.found.questions
+        if not questions:
+            return guess
+        if not ask:
+            raise InputError(
+                [_open(path, each) for each in questions], f"{path} leaves open what is to be read"
+            )
+        answer = _which(path, questions[0])
+        take += answer
+        turned = turned and bool(answer)
+
+
+def _which(path: str, question: Question) -> list[str]:
+    """Columns to take, as answered; none only where that is an answer too."""
+    click.echo(f"The names do not tell {question.about}: {question.why}.")
+    for number, reading in enumerate(question.readings, 1):
+        click.echo(f"  {number}: {reading.in_words()}")
+    several = question.about == "the measured point" and len(question.readings) > 1
+    hint = ", as 1,2 if several were measured" if several else ""
+    count = len(question.readings)
+    while True:
+        try:
+            answer = click.prompt(f"Number (0 for none of them{hint})", type=str)
+        except click.Abort:
+            raise InputError(_open(path, question)) from None
+        numbers = [int(word) for word in answer.replace(",", " ").split() if word.isdecimal()]
+        if numbers == [0] and question.without:
+            return []
+        if numbers == [0]:
+            what = f"does not hold {question.about}, by the answer given"
+            raise InputError(Problem(path, what, fix="add the columns to the file"))
+        if numbers and all(1 <= n <= count for n in numbers) and (several or len(numbers) == 1):
+            return [question.readings[number - 1].names[0] for number in numbers]
+        click.echo(f"a number from 0 to {count}")
+
+
+def _open(path: str, question: Question) -> Problem:
+    """What the file leaves open, with the options that decide it."""
+    readings = "; or ".join(each.in_words() for each in question.readings)
+    options = [f"--take {shlex.quote(each.names[0])}" for each in question.readings]
+    options += ["--orientation none"] if question.without else []
+    return Problem(
+        path,
+        f"the names do not tell {question.about}: {question.why}: {readings}",
+        fix=f"give {' or '.join(options)}",
+    )

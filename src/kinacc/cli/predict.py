@@ -1,0 +1,51 @@
+"""``kinacc predict``: joints to calibrated poses with standard deviations."""
+
+from __future__ import annotations
+
+import click
+
+from kinacc.cli import choice
+
+
+@click.command("predict")
+@choice.calibration_options
+@click.argument("joints", type=click.Path(), required=False)
+@click.option("--joints-deg", multiple=True, help='One configuration, e.g. "0,-20,30,0,45,0".')
+@click.option("--joints-rad", multiple=True, help="The same in radians.")
+@choice.point_options
+@choice.output_options
+def predict(
+    folder, model, config, robot, joints, joints_deg, joints_rad, frame, point, session, output,
+    as_json, force,
+) -> None:  # fmt: skip
+    """Predict the pose of the tool at given joints, with how sure that is.
+
+    FOLDER is the results folder of a data set, JOINTS a CSV, Parquet or JSON file with columns
+    q1_deg or q1_rad and so on (q1_mm where a joint slides).
+
+    \b
+    std_*           standard deviation by the covariance of the fitted parameters
+    unexplained_*   rms of what the model left of held-out measurements: add it in mind
+    undetermined_*  movement per mm or mrad along what the calibration could not see
+
+    Where the base was estimated with the arm, the base frame is that of the DH model, for a VEC
+    model as well. Where joints can take its place, it is a convention (undetermined_*):
+    --frame instrument leaves that out.
+
+    \b
+    Example:
+      kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
+      kinacc predict results/ur10_b plan.csv --frame instrument -o predicted.csv
+    """
+    from kinacc.cli import rows, sheet, tables
+    from kinacc.deployment.predict import predict as poses_at
+    from kinacc.progress import reporting
+
+    sheet.check_output(output, force)
+    arm = choice.calibration_of(folder, model, robot, config, session)
+    given = tables.given_joints(arm.robot, joints, joints_deg, joints_rad)
+    with reporting("predict", bar=True) as progress:
+        found = poses_at(arm, given.joints, given.directions, frame, point, progress)
+    choice.deliver(tables.predicted(arm, given, found, frame, point), output, as_json, force)
+    rows.say_unused(given)
+    rows.say_missing(found.pose.position_mm)

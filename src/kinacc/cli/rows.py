@@ -1,0 +1,308 @@
+"""Joint and pose files a command is given: units by column name, all faults listed."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.config.names import of_csv
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
+from kinacc.kinematics.robot import Robot
+from kinacc.measurements.layout import ROUNDED_MM, ROUNDED_RAD
+from kinacc.measurements.table import RawTable, load, numbers
+from kinacc.measurements.written_numbers import numbers_of
+
+ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
+LENGTH = {"mm": 1.0, "m": 1e3}
+_DIGITS = 15  # a whole number of more is no count
+_UNIT_QUATERNION = 1e-3
+_HEAD = 1_000_000  # characters of a line looked at
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What a file holds: ``joints`` (n, k) reported joints (rad, mm), ``directions`` (n, k) of
+    travel, wanted ``pose`` (n, ...) in mm; each None where the file has no such columns.
+
+    ``label`` (n,) is the file's ``pose`` column, or the line a row stands on.
+    """
+
+    count: int
+    label: np.ndarray
+    joints: np.ndarray | None
+    directions: np.ndarray | None
+    pose: Pose | None
+    unused: tuple[str, ...]
+
+
+def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False) -> Rows:
+    """Rows of a file, as ``open_table`` reads it; it must have ``joints`` or ``pose`` if asked for.
+
+    Poses are not looked for where they are not asked for.
+
+    Joints: ``q1_deg``, ``q1_rad`` (``q1_mm``, ``q1_m`` where a joint slides). Poses: ``x_mm`` or
+    ``x_m`` .., and ``qw`` .. ``qz``, or a rotation vector ``rvx_deg`` .. , or intrinsic XYZ angles
+    ``rx_deg`` .. (or rad). A quantity may stand in both units where they say the same. Raises
+    InputError listing every problem.
+    """
+    slides = robot.dh.prismatic
+    names = [f"q{i + 1}" for i in range(len(slides))]
+    table = open_table(path)
+    table = _answered(table, names, "joints") if joints else table
+    table = _answered(table, ["x", "y", "z"], "a pose") if pose else table
+    reader = Reader(table)
+    q_rad = reader.group(names, [LENGTH if each else ANGLE for each in slides], joints)
+    if any(f"q{len(slides) + 1}_{unit}" in table.columns for unit in (*ANGLE, *LENGTH)):
+        what = f"has a joint q{len(slides) + 1}, {robot.name} has {len(slides)} joints"
+        reader.problems.append(Problem(table.path, what))
+    directions = reader.directions(len(slides))
+    wanted = reader.pose() if pose else None
+    label = table.line
+    if "pose" in table.columns:
+        reader.used.add("pose")
+        label = np.array([str(cell) for cell in table.columns["pose"]], dtype=object)
+    if reader.problems:
+        raise InputError(reader.problems, f"{table.path} cannot be used")
+    unused = tuple(name for name in table.columns if name not in reader.used)
+    return Rows(len(table), label, q_rad, directions, wanted, unused)
+
+
+def _answered(table: RawTable, names: list[str], what: str) -> RawTable:
+    """The rows that hold an answer, of a file that says in a column ``status`` why others do not.
+
+    They are told on the error stream; an empty cell without a status stays, to be refused.
+    """
+    units = (*ANGLE, *LENGTH)
+    columns = [f"{name}_{unit}" for name in names for unit in units]
+    columns = [each for each in columns if each in table.columns]
+    if "status" not in table.columns or not columns:
+        return table
+    none = np.all([table.gaps(each) for each in columns], axis=0) & ~table.gaps("status")
+    if none.all() or not none.any():
+        return table
+    import sys
+
+    rows = table.rows_in_words(np.flatnonzero(none))
+    print(f"left out, without {what} by their status: {rows}", file=sys.stderr)
+    kept = np.flatnonzero(~none)
+    cells = {name: [own[row] for row in kept] for name, own in table.columns.items()}
+    return replace(table, columns=cells, line=table.line[kept])
+
+
+def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -> np.ndarray:
+    """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in ``unit``; InputError if unfit."""
+    slides, rows, problems = robot.dh.prismatic, [], []
+    for text in texts:
+        row = numbers_of(text)
+        if len(row) != len(slides):
+            allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
+            problems.append(Problem(option, repr(text), allowed))
+        rows.append(row)
+    if problems:
+        raise InputError(problems)
+    return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
+
+
+def limit_problems(
+    robot: Robot, joints: np.ndarray, label: np.ndarray, where: str
+) -> list[Problem]:
+    """A problem for every joint of which a row lies outside the robot's limits."""
+    problems = []
+    for joint in range(joints.shape[1]):
+        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
+        bad = np.flatnonzero((joints[:, joint] < low - 1e-9) | (joints[:, joint] > high + 1e-9))
+        if bad.size:
+            slides = robot.dh.prismatic[joint]
+            factor, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
+            shown = ", ".join(str(each) for each in label[bad[:5]])
+            more = f" and {bad.size - 5} more" if bad.size > 5 else ""
+            value = joints[bad[0], joint] * factor
+            hint = ""
+            if not slides and np.abs(joints[:, joint]).max() > 4.0 * np.pi:
+                hint = f"the column looks like degrees: name it q{joint + 1}_deg"
+            allowed = f"{low * factor:g} to {high * factor:g} {unit} ({robot.name})"
+            place = f"{where}, q{joint + 1}, rows {shown}{more}"
+            problems.append(Problem(place, f"{value:g} {unit}", allowed, hint))
+    return problems
+
+
+class Reader:
+    """Quantities of a table by name and unit; ``problems`` and the columns ``used`` grow.
+
+    ``cells``: where what is wrong with single cells is noted; they are NaN then.
+    """
+
+    def __init__(self, table: RawTable, cells: list[Problem] | None = None) -> None:
+        self.table = table
+        self.problems: list[Problem] = []
+        self.used: set[str] = set()
+        self.cells = self.problems if cells is None else cells
+
+    def group(self, names: list[str], units: list[dict], needed: bool) -> np.ndarray | None:
+        """Columns (n, m) of quantities that come together, or None where none is there."""
+        found = [self._columns(name, own) for name, own in zip(names, units, strict=True)]
+        present = [bool(each) for each in found]
+        if not any(present) and not needed:
+            return None
+        for name, own, there in zip(names, units, present, strict=True):
+            if not there:
+                where = f"{self.table.path}: column {_names(name, own)}"
+                listed = "the file has " + ", ".join(self.table.columns)
+                self.problems.append(Problem(where, "is missing", fix=listed))
+        if not all(present):
+            return None
+        rounded = [ROUNDED_MM if own is LENGTH else ROUNDED_RAD for own in units]
+        return np.stack([self._one(*each) for each in zip(names, found, rounded, strict=True)], 1)
+
+    def _columns(self, name: str, units: dict) -> dict[str, float]:
+        """Columns that hold a quantity, each with the factor of its unit."""
+        return {
+            each: factor
+            for unit, factor in units.items()
+            if (each := f"{name}_{unit}" if unit else name) in self.table.columns
+        }
+
+    def _one(self, name: str, columns: dict[str, float], rounded: float) -> np.ndarray:
+        """Values (n,) of a quantity; all columns it is given in have to say the same."""
+        self.used.update(columns)
+        values = {
+            column: numbers(self.table, column, self.cells) * factor
+            for column, factor in columns.items()
+        }
+        first, *others = columns
+        value = values[first]
+        for other in others:
+            apart = np.flatnonzero(np.abs(value - values[other]) > rounded)
+            if apart.size:
+                cells = (self.table.columns[each][apart[0]] for each in (first, other))
+                lines = self.table.rows_in_words(apart)
+                where = f"{self.table.path}: columns {first} and {other}, {lines}"
+                what = f"{name} is given twice and differs: {' and '.join(map(str, cells))}"
+                fix = "leave out the column that is wrong"
+                self.problems.append(Problem(where, what, "the same in both units", fix))
+            value = np.where(np.isnan(value), values[other], value)
+        return value
+
+    def directions(self, joints: int) -> np.ndarray | None:
+        names = [f"s{i + 1}" for i in range(joints)]
+        s = self.group(names, [{"": 1.0}] * joints, False)
+        if s is not None and not np.isin(s, (-1, 0, 1)).all():
+            where = f"{self.table.path}: columns s1 .. s{joints}"
+            self.problems.append(Problem(where, "a value is no direction", "-1, 0 or 1"))
+        return None if s is None else s.astype(np.int8)
+
+    def pose(self) -> Pose | None:
+        position = self.group(["x", "y", "z"], [LENGTH] * 3, True)
+        quaternion = self.group(["qw", "qx", "qy", "qz"], [{"": 1.0}] * 4, False)
+        vector = self.group(["rvx", "rvy", "rvz"], [ANGLE] * 3, False)
+        euler = self.group(["rx", "ry", "rz"], [ANGLE] * 3, False)
+        given = [each is not None for each in (quaternion, vector, euler)]
+        where = f"{self.table.path}: orientation"
+        if sum(given) > 1:
+            self.problems.append(Problem(where, "is given in more than one form", "one form"))
+        elif position is not None and not any(given):
+            allowed = "qw .. qz, or rvx_deg .. rvz_deg, or rx_deg .. rz_deg (or rad)"
+            self.problems.append(Problem(where, "is missing", allowed))
+        if position is None or sum(given) != 1:
+            return None
+        if quaternion is not None:
+            length = np.linalg.norm(quaternion, axis=1)
+            bad = np.flatnonzero(~(np.abs(length - 1.0) <= _UNIT_QUATERNION))
+            if bad.size:
+                place = f"{where}, {self.table.rows_in_words(bad)}"
+                what = f"quaternion of length {length[bad[0]]:.6g}"
+                self.problems.append(Problem(place, what, "length 1 within 0.001"))
+            rotation = rotation_from_quaternion(quaternion / length[:, None])
+        elif vector is not None:
+            rotation = exp_so3(vector)
+        else:
+            from scipy.spatial.transform import Rotation
+
+            rotation = Rotation.from_euler("XYZ", euler).as_matrix()
+        return Pose(rotation, position)
+
+
+def open_table(path: str | Path) -> RawTable:
+    """The file with the delimiter its first line shows: , or ; (decimal comma) or tab.
+
+    What commands write is read as well: JSON, units that stand in the description of a Parquet
+    column, and text of a CSV with the apostrophe that keeps it from being a formula.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(Problem(str(path), "no such file", "a CSV, Parquet or JSON file"))
+    kind = path.suffix.lower()
+    if kind == ".json":
+        return _of_json(path)
+    if kind in (".parquet", ".pq"):
+        return _with_units(load(path, ",", "."))
+    delimiter, decimal = ",", "."
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        head, first = file.readline(_HEAD), file.readline(_HEAD)
+    if ";" in head:
+        delimiter = ";"
+        decimal = "," if "," in first and "." not in first else "."
+    elif "\t" in head:
+        delimiter = "\t"
+    table = load(path, delimiter, decimal)
+    columns = {name: [of_csv(cell) for cell in cells] for name, cells in table.columns.items()}
+    return replace(table, columns=columns)
+
+
+def _of_json(path: Path) -> RawTable:
+    """The rows of an answer that a command gave as JSON."""
+    try:
+        rows = json.loads(path.read_bytes(), parse_int=_whole)["rows"]
+        names = list(rows[0])
+        columns = {name: [row.get(name) for row in rows] for name in names}
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
+        what, allowed = "holds no rows", "a table of rows, as commands write with -o NAME.json"
+        raise InputError(Problem(str(path), what, allowed)) from None
+    return RawTable(str(path), columns, np.arange(1, len(rows) + 1))
+
+
+def _whole(digits: str) -> int | float:
+    return int(digits) if len(digits) <= _DIGITS else float(digits)
+
+
+def _with_units(table: RawTable) -> RawTable:
+    """A Parquet table whose joints carry the unit in their names: in tables of results and of
+    campaigns it stands in the columns' descriptions."""
+    import pyarrow.parquet as pq
+
+    schema = pq.read_schema(table.path)
+
+    def called(name: str) -> str:
+        unit = ((schema.field(name).metadata or {}).get(b"unit") or b"").decode()
+        whole = f"{name}_{unit}"
+        is_joint = re.fullmatch(r"q\d+", name) and unit in (*ANGLE, *LENGTH)
+        return whole if is_joint and whole not in table.columns else name
+
+    return replace(table, columns={called(name): each for name, each in table.columns.items()})
+
+
+def _names(name: str, units: dict) -> str:
+    return " or ".join(f"{name}_{unit}" if unit else name for unit in units)
+
+
+def say_unused(given: Rows) -> None:
+    """Name the columns of a file that were not used, on the error stream."""
+    if given.unused:
+        import sys
+
+        print(f"not used: {', '.join(given.unused)}", file=sys.stderr)
+
+
+def say_missing(position_mm: np.ndarray) -> None:
+    """Count the rows without an answer, positions (n, 3), on the error stream."""
+    missing = int(np.isnan(position_mm).any(axis=1).sum())
+    if missing:
+        import sys
+
+        all_of = len(position_mm)
+        print(f"{missing} of {all_of} rows without a pose: status says why", file=sys.stderr)

@@ -1,0 +1,174 @@
+"""Rows a command hands out: as text for people, CSV, JSON or Parquet with units for machines."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.config.names import in_csv
+from kinacc.errors import InputError, Problem
+
+KINDS = (".csv", ".json", ".parquet")
+_SHOWN_ROWS = 24
+_NOTHING = 5e-5  # less is no digit of the four shown after the point
+
+
+@dataclass(frozen=True)
+class Field:
+    """One column: values (n,), NaN or None for none; its unit and what it means.
+
+    ``on_screen``: shown to a person too, not only in files.
+    """
+
+    name: str
+    values: np.ndarray
+    unit: str = ""
+    meaning: str = ""
+    on_screen: bool = True
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Named columns of equal length and a few facts about all of them."""
+
+    title: str
+    facts: Mapping[str, object]
+    fields: Sequence[Field]
+    shown_rows: int = _SHOWN_ROWS
+
+    def __len__(self) -> int:
+        return len(self.fields[0].values) if self.fields else 0
+
+    def as_json(self) -> str:
+        """The facts, units and rows as one JSON object."""
+        columns = [(field.name, [_plain(value) for value in field.values]) for field in self.fields]
+        rows = [{name: values[i] for name, values in columns} for i in range(len(self))]
+        units = {field.name: field.unit for field in self.fields if field.unit}
+        return json.dumps({**_plain_facts(self.facts), "units": units, "rows": rows}, indent=1)
+
+    def as_csv(self) -> str:
+        """Column names, then one line per row; empty cells for none."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow([field.name for field in self.fields])
+        for i in range(len(self)):
+            writer.writerow([_cell(field.values[i]) for field in self.fields])
+        return out.getvalue()
+
+    def as_text(self) -> str:
+        """Aligned columns of the first rows for a screen."""
+        count = min(len(self), self.shown_rows)
+        columns = [
+            [field.name, *(_short(field.values[i]) for i in range(count))]
+            for field in self.fields
+            if field.on_screen
+        ]
+        widths = [max(map(len, column)) for column in columns]
+        lines = [self.title] if self.title else []
+        for i in range(count + 1):
+            cells = (column[i].rjust(width) for column, width in zip(columns, widths, strict=True))
+            lines.append("  ".join(cells).rstrip())
+        if count < len(self):
+            lines.append(f".. {len(self) - count} rows more; give --output to have them all")
+        return "\n".join(lines)
+
+    def write(self, path: Path | str, force: bool = False) -> None:
+        """Write a .csv, .json or .parquet file, whole or not at all; see ``check_output``."""
+        path = Path(path)
+        check_output(path, force)
+        if path.suffix == ".parquet":
+            content = self._parquet()
+        else:
+            text = self.as_csv() if path.suffix == ".csv" else self.as_json() + "\n"
+            content = text.encode()
+        write_whole(path, content)
+
+    def _parquet(self) -> bytes:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        arrays, described = [], []
+        for field in self.fields:
+            array = pa.array([_plain(value) for value in field.values])
+            arrays.append(array)
+            about = {"unit": field.unit, "meaning": field.meaning}
+            described.append(pa.field(field.name, array.type, metadata=about))
+        facts = {key: json.dumps(value) for key, value in _plain_facts(self.facts).items()}
+        sink = pa.BufferOutputStream()
+        table = pa.Table.from_arrays(arrays, schema=pa.schema(described, metadata=facts))
+        pq.write_table(table, sink, compression="zstd", version="2.6")
+        return sink.getvalue().to_pybytes()
+
+
+def check_output(path: Path | str | None, force: bool, kinds: Sequence[str] = KINDS) -> None:
+    """Raise InputError where an output file could not or should not be written."""
+    if path is None:
+        return
+    path = Path(path)
+    problems = []
+    if kinds and path.suffix not in kinds:
+        problems.append(Problem(str(path), f"ends in {path.suffix!r}", ", ".join(kinds)))
+    if path.exists() and not force:
+        problems.append(Problem(str(path), "is there already", fix="give --force to replace it"))
+    if path.is_dir():
+        problems = [Problem(str(path), "is a folder", "a file")]
+    if problems:
+        raise InputError(problems, "Nothing was written")
+
+
+def write_whole(path: Path | str, content: bytes) -> None:
+    """Write a file so that it appears whole or not at all."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        part.write_bytes(content)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def number(value: float) -> str:
+    """Three digits for a sentence, whole thousands in full; 0 for what no digit is shown of."""
+    if abs(value) < _NOTHING:
+        return "0"
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+
+
+def _plain(value: object) -> object:
+    """A value JSON and Arrow know; None for NaN."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def _plain_facts(facts: Mapping[str, object]) -> dict[str, object]:
+    return {key: _plain(value) for key, value in facts.items()}
+
+
+def _cell(value: object) -> str:
+    value = _plain(value)
+    if value is None:
+        return ""
+    # Twelve digits: a nanometre in ten metres, and a text that ends where the digits end.
+    return f"{value:.12g}" if isinstance(value, float) else in_csv(str(value))
+
+
+def _short(value: object) -> str:
+    value = _plain(value)
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        if abs(value) < _NOTHING:
+            return f"{0.0:.4f}"
+        return f"{value:.4f}" if abs(value) >= 0.01 else f"{value:.3g}"
+    return str(value)

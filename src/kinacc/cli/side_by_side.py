@@ -1,0 +1,151 @@
+"""What ``compare`` is given, and its answer as a sheet and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.cli import choice, rows
+from kinacc.cli.sheet import Field, Sheet, number
+from kinacc.deployment.compare import Comparison, Shift, require_alike
+from kinacc.deployment.record import Calibration, nominal
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.region import points
+from kinacc.study.operating_points import spread_rows
+
+_UNLIKELY = 0.001
+
+
+def source(place: str, model: str, robot: str | None, config: tuple[str, ...]) -> Calibration:
+    """A calibration from a results folder or a robot file."""
+    path = Path(place)
+    if path.is_dir():
+        return replace(choice.calibration_of(path, model, robot, config), name=place)
+    if path.is_file() or place in robots.shipped():
+        return replace(nominal(robots.load(place), place), choice="dh")
+    raise InputError(Problem(place, "is not there", "a results folder, a robot file"))
+
+
+def joints(
+    arms: Sequence[Calibration], places: Sequence[str], path: str | None, count: int
+) -> np.ndarray:
+    """Reported joints (n, k) to compare at: of a file, as measured, or all over the limits.
+
+    Raises InputError where the joints of the two do not mean the same.
+    """
+    require_alike(*arms)
+    robot = arms[0].robot
+    if path is not None:
+        return rows.read(path, robot).joints
+    found = [_measured(Path(place), robot) for place in places]
+    found = [each for each in found if each is not None]
+    if found:
+        share = max(1, count // len(found))
+        return np.concatenate([each[np.sort(spread_rows(len(each), share))] for each in found])
+    low = np.maximum(arms[0].robot.q_min_rad, arms[1].robot.q_min_rad)
+    high = np.minimum(arms[0].robot.q_max_rad, arms[1].robot.q_max_rad)
+    return low + points("sobol", count, len(low)) * (high - low)
+
+
+def _measured(folder: Path, robot: robots.Robot) -> np.ndarray | None:
+    from kinacc.artifacts import store
+
+    path = folder / "measurements.parquet"
+    if not path.is_file():
+        return None
+    table = store.read(path)
+    return np.stack([table[f"q{i + 1}"] for i in range(robot.dh.joints)], axis=1).astype(float)
+
+
+def answer(found: Comparison, arms: Sequence[Calibration], poses: int) -> Sheet:
+    """The sheet of ``kinacc compare``: one row per parameter, and what poses did as facts."""
+    facts = {
+        "first": arms[0].name,
+        "second": arms[1].name,
+        "model": arms[0].choice,
+        "same_robot": found.same_robot,
+        "poses": poses,
+        "statistic": found.statistic,
+        "directions": found.directions,
+        "probability": found.probability,
+    }
+    for name, shift in (("", found.as_they_stand), ("_apart_from_frames", found.apart_from_frames)):
+        facts |= {
+            f"moved_rms{name}_mm": shift.rms_mm,
+            f"moved_max{name}_mm": float(shift.position_mm.max()),
+            f"by_chance{name}_mm": shift.chance_mm,
+            f"turned_rms{name}_mrad": 1e3 * shift.rms_rad,
+            f"by_chance{name}_mrad": 1e3 * shift.chance_rad,
+        }
+    each = found.parameters
+    fields = []
+    if each is not None:
+        angle = np.array([name.endswith("_rad") for name in each.names])
+        scale = np.where(angle, 1e3, 1.0)
+        names = [name.rpartition("_")[0] for name in each.names]
+        unit = np.where(angle, "mrad", "mm").astype(object)
+        fields = [
+            Field("parameter", np.array(names, dtype=object), "", "joint and DH parameter"),
+            Field("unit", unit, "", "unit of the row: lengths in mm, angles in mrad"),
+            Field("first", each.first * scale, "see unit", arms[0].name),
+            Field("second", each.second * scale, "see unit", arms[1].name),
+            Field("difference", each.difference * scale, "see unit", "second minus first"),
+            Field("std", each.std * scale, "see unit", "of the difference"),
+            Field("sigmas", each.sigmas, "1", "difference in standard deviations"),
+            Field("remark", _remarks(each), "", "where the poses do not determine it"),
+        ]
+    first, second = short_names(arms)
+    return Sheet(f"{second} against {first}", facts, fields, shown_rows=100)
+
+
+def short_names(arms: Sequence[Calibration]) -> tuple[str, str]:
+    """Last parts of the places the calibrations come from, where these differ."""
+    first, second = (Path(arm.name).name for arm in arms)
+    return (first, second) if first != second else (arms[0].name, arms[1].name)
+
+
+def in_words(found: Comparison, arms: Sequence[Calibration]) -> str:
+    """What moved, in sentences."""
+    lines = []
+    if not found.same_robot:
+        first, second = (arm.robot.name for arm in arms)
+        lines.append(
+            f"these are different robots ({first} and {second}): before any calibration they are "
+            f"{number(found.robots_apart_mm)} mm rms apart, after the best base and tool; what "
+            "follows is no change of one arm"
+        )
+    elif np.isfinite(found.probability):
+        verdict = "the arm has changed" if found.probability < _UNLIKELY else "no change is proven"
+        lines.append(
+            f"{found.directions} directions both determine: squared distance "
+            f"{found.statistic:.1f}, probability of more by chance {found.probability:.2g}: "
+            f"{verdict}, if the residuals are independent noise"
+        )
+    lines.append(_moved("flange poses moved", found.as_they_stand))
+    lines.append(_moved("after the best base and tool", found.apart_from_frames))
+    return "\n".join(lines)
+
+
+def _moved(words: str, shift: Shift) -> str:
+    by_chance = ""
+    if np.isfinite(shift.chance_mm):
+        chance = number(shift.chance_mm), number(1e3 * shift.chance_rad)
+        by_chance = f" (by chance {chance[0]} mm, {chance[1]} mrad)"
+    return (
+        f"{words}: {number(shift.rms_mm)} mm rms, at most {number(shift.position_mm.max())} mm, "
+        f"{number(1e3 * shift.rms_rad)} mrad rms{by_chance}"
+    )
+
+
+def _remarks(each) -> np.ndarray:
+    words = {
+        "": "",
+        "first": "undetermined in the first",
+        "second": "undetermined in the second",
+        "both": "undetermined in both",
+    }
+    return np.array([words[where] for where in each.undetermined_in], dtype=object)

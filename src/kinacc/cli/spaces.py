@@ -1,0 +1,96 @@
+"""Where poses may be drawn: ranges and boxes of options, and a data set's own space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.cli.choice import CONFIG
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics import region
+from kinacc.kinematics import robot as robots
+
+Ends = tuple[np.ndarray, np.ndarray]
+Inside = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is fitted of a robot and where; the defaults are those of no data set.
+
+    ``box``: ends (k,), (k,) of the reported joints; ``inside`` tests positions (n, 3) of the tool.
+    """
+
+    robot: str | None = None
+    frames_estimated: bool = True
+    rotation_weight_mm_per_rad: float = 500.0
+    hayati_joints: tuple[int, ...] = ()
+    box: Ends | None = None
+    inside: Inside | None = None
+
+
+def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:
+    """The settings of a configured data set. Raises InputError."""
+    from kinacc.workflow.calibration_settings import hayati_joints
+    from kinacc.workflow.plan import planned
+
+    datasets = planned(config or (CONFIG,)).datasets
+    if dataset not in datasets:
+        what = f"{dataset!r} is not in the configuration"
+        raise InputError(Problem("--dataset", what, ", ".join(datasets)))
+    settings = datasets[dataset]
+    robot, calibration = robots.load(settings["robot"]), settings["calibration"]
+    box, inside = _configured(settings["evaluation"], robot)
+    return Settings(
+        settings["robot"],
+        calibration["base_and_tool"] == "estimated",
+        float(calibration["rotation_weight_mm_per_rad"]),
+        tuple(hayati_joints(calibration["dh"], robot)),
+        box,
+        inside,
+    )
+
+
+def _configured(evaluation: Mapping, robot: robots.Robot) -> tuple[Ends | None, Inside | None]:
+    """Joint box and test of positions of a data set's evaluation space."""
+    from kinacc.workflow.evaluation import cylinder, joint_box
+
+    if evaluation["space"] == "joint_box":
+        return joint_box(evaluation, robot), None
+    if evaluation["space"] == "cylinder":
+        space = cylinder(evaluation)
+        return None, lambda position_mm: region.contains(space, position_mm)
+    return None, None
+
+
+def inside_box(space: Ends) -> Inside:
+    """Test of positions (n, 3) for lying in a box (3,), (3,)."""
+    low, high = space
+    return lambda position_mm: ((position_mm >= low) & (position_mm <= high)).all(axis=1)
+
+
+def ranges(option: str, text: str | None, count: int, problems: list[Problem]) -> Ends | None:
+    """Ends (count,), (count,) of a text such as "-90:90,-60:60"; None where there is none."""
+    if text is None:
+        return None
+    allowed = f"{count} ranges low:high, apart by commas"
+    try:
+        pairs = [[float(end) for end in pair.split(":")] for pair in text.split(",")]
+    except ValueError:
+        pairs = []
+    if len(pairs) != count or any(len(pair) != 2 or not pair[0] < pair[1] for pair in pairs):
+        problems.append(Problem(option, repr(text), allowed))
+        return None
+    low, high = np.array(pairs).T
+    return low, high
+
+
+def joint_ranges(text: str | None, robot: robots.Robot, problems: list[Problem]) -> Ends | None:
+    """Ends (k,), (k,) of ``--joints-deg`` in rad, mm where a joint slides; None where not given."""
+    ends = ranges("--joints-deg", text, robot.dh.joints, problems)
+    if ends is None:
+        return None
+    low, high = robots.in_own_units(robot, np.stack(ends))
+    return low, high

@@ -1,0 +1,116 @@
+"""Answers of ``predict`` and ``compensate`` as sheets, and the joints they were asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinacc.cli import rows
+from kinacc.cli.rows import Rows
+from kinacc.cli.sheet import Field, Sheet
+from kinacc.deployment.predict import Prediction
+from kinacc.deployment.record import Calibration
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose, quaternion_from_rotation
+from kinacc.kinematics.robot import Robot
+
+_MRAD = 1e3
+
+
+def given_joints(
+    robot: Robot, path: str | None, in_deg: tuple[str, ...], in_rad: tuple[str, ...]
+) -> Rows:
+    """Joints of a file or of arguments. InputError where there are none, or outside the limits."""
+    sources = [path is not None, bool(in_deg), bool(in_rad)]
+    if sum(sources) != 1:
+        what = "no joints are given" if not any(sources) else "joints are given more than once"
+        raise InputError(Problem("joints", what, "a file, --joints-deg or --joints-rad"))
+    if path is not None:
+        given = rows.read(path, robot)
+    else:
+        unit = "deg" if in_deg else "rad"
+        joints = rows.of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")
+        label = np.arange(1, len(joints) + 1)
+        given = Rows(len(joints), label, joints, None, None, ())
+    problems = rows.limit_problems(robot, given.joints, given.label, path or "joints")
+    if problems:
+        raise InputError(problems, "Joints outside the robot's limits")
+    return given
+
+
+def predicted(
+    arm: Calibration, given: Rows, found: Prediction, frame: str, point: str | None
+) -> Sheet:
+    """The sheet of ``kinacc predict``."""
+    std = found.std * np.array([1.0, 1.0, 1.0, _MRAD, _MRAD, _MRAD])
+    by = "standard deviation by the covariance of the fitted parameters"
+    seen = "movement per mm or mrad of displacement along directions the calibration cannot see"
+    left = f"rms of what the model left of {arm.residual.subset if arm.residual else 'no'} poses"
+    fields = [
+        Field("row", given.label, "", "the file's pose, or its line"),
+        *joint_fields(arm.robot.dh.prismatic, given.joints),
+        *pose_fields(found.pose, frame),
+        *(Field(f"std_{axis}_mm", std[:, i], "mm", by, False) for i, axis in enumerate("xyz")),
+        *(
+            Field(f"std_r{axis}_mrad", std[:, 3 + i], "mrad", by, False)
+            for i, axis in enumerate("xyz")
+        ),
+        Field("std_position_mm", found.std_position_mm, "mm", f"{by}, three axes together"),
+        Field("std_orientation_mrad", _MRAD * found.std_orientation_rad, "mrad", f"{by}, together"),
+        Field("unexplained_mm", found.residual_mm, "mm", left),
+        Field("unexplained_mrad", _MRAD * found.residual_rad, "mrad", left, False),
+        Field("undetermined_mm", found.blind_mm, "mm per mm or mrad", seen),
+        Field("undetermined_mrad", _MRAD * found.blind_rad, "mrad per mm or mrad", seen, False),
+        Field("status", _where(arm, found.outside), "", "whether the data cover these joints"),
+    ]
+    point = point or arm.default_point
+    title = f"{arm.name}: {point} in the {frame} frame by the {arm.choice} model"
+    return Sheet(title, facts(arm, frame, point), fields)
+
+
+def facts(arm: Calibration, frame: str, point: str) -> dict[str, object]:
+    """What all rows of an answer have in common."""
+    return {
+        "calibration": arm.name,
+        "robot": arm.robot.name,
+        "model": arm.choice,
+        "frame": frame,
+        "point": point,
+    }
+
+
+def joint_fields(prismatic: np.ndarray, joints: np.ndarray) -> list[Field]:
+    """Reported joints (n, k) in degrees, or mm where a joint slides (k,)."""
+    return [
+        Field(f"q{i + 1}_mm", joints[:, i], "mm", f"joint {i + 1}")
+        if slides
+        else Field(f"q{i + 1}_deg", np.rad2deg(joints[:, i]), "deg", f"joint {i + 1}")
+        for i, slides in enumerate(prismatic)
+    ]
+
+
+def pose_fields(pose: Pose, frame: str) -> list[Field]:
+    """Position and unit quaternion of poses (n, ...), NaN where there is none."""
+    known = np.isfinite(pose.position_mm[:, 0])
+    quaternion = np.full((len(known), 4), np.nan)
+    quaternion[known] = quaternion_from_rotation(pose.rotation[known])
+    about = f"in the {frame} frame"
+    position = [
+        Field(f"{axis}_mm", pose.position_mm[:, i], "mm", about) for i, axis in enumerate("xyz")
+    ]
+    turn = [Field(f"q{part}", quaternion[:, i], "1", about) for i, part in enumerate("wxyz")]
+    return position + turn
+
+
+def joints_in_words(outside: np.ndarray) -> str:
+    """The joints a mask (k,) marks: joint 2, or joints 2, 4."""
+    numbers = [str(joint + 1) for joint in np.flatnonzero(outside)]
+    return f"joint{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"
+
+
+def _where(arm: Calibration, outside: np.ndarray) -> np.ndarray:
+    said = "no prediction" if arm.choice == "vec" else "extrapolated"
+    words = [
+        f"{said}: {joints_in_words(row)} outside the range the data cover" if row.any() else "ok"
+        for row in outside
+    ]
+    return np.array(words, dtype=object)

@@ -1,0 +1,150 @@
+"""``kinacc tournament``: every assessor on every error field, judged against the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from kinacc.workflow.runner import Job
+
+
+@click.command("tournament")
+@click.option("--config", multiple=True, help="Configuration; may be repeated. [config.yaml]")
+@click.option("--results", default="results", show_default=True, help="Results folder.")
+@click.option(
+    "--size",
+    type=click.Choice(["default", "coverage", "budgets", "full"]),
+    help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
+)
+@click.option("--parts", type=click.IntRange(1, 10_000), help="Number of parts. [configuration]")
+@click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
+@click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
+@click.option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")
+@click.option(
+    "--cores", type=click.IntRange(1, 1000), default=1, show_default=True, help="Parts at a time."
+)
+@click.option("--times", is_flag=True, help="Also measure the time of a campaign of each.")
+@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
+def tournament(
+    config, results, size, parts, part, assessor, noise_mm, cores, times, as_json
+) -> None:
+    """Let every assessor assess errors that are known, and hold what it says to the truth.
+
+    The error fields are those of the configuration's data sets, whose tables have to be there
+    already, and families of synthetic arms. Leaves tournament_cells, tournament_verdicts and
+    tournament_fields in RESULTS/tournament. Parts that are there, made from the same inputs and
+    code, are kept: Ctrl-C stops it at once, and started again, it goes on from them. The number of
+    parts changes nothing in the results.
+
+    \b
+    Example:
+      kinacc tournament --config config.yaml --config examples/ur10.yaml --cores 2
+      kinacc tournament --size full --parts 200 --part 7-of-200
+    """
+    from kinacc.errors import InputError, Problem
+    from kinacc.workflow.plan import planned
+    from kinacc.workflow.runner import execute
+    from kinacc.workflow.tournament_plan import is_done, tournament_plan
+
+    chosen = planned(config or ("config.yaml",), results=results)
+    contest = tournament_plan(chosen, size, parts, assessor, noise_mm)
+    contest.check()
+    names = contest.part_names
+    if part is not None and part not in names:
+        raise InputError(Problem("--part", repr(part), f"{names[0]} to {names[-1]}"))
+    waiting = [contest.chunk_job(name) for name in ([part] if part else names)]
+    left = [job for job in waiting if not is_done(job)]
+    if len(left) < len(waiting):
+        click.echo(f"{len(waiting) - len(left)} of {len(waiting)} parts are there", err=True)
+    finished = len(waiting) - len(left)
+    try:
+        for job in _carried_out(left, cores):
+            finished += 1
+            if len(left) > 1 and cores > 1:
+                click.echo(f"{job.label}: done, {finished} of {len(waiting)}", err=True)
+        if part is not None:
+            return
+        execute(contest.tables_job(), bar=True)
+    except KeyboardInterrupt:
+        click.echo(
+            f"tournament: {finished} of {len(waiting)} parts are done and kept; the same command "
+            "goes on from there",
+            err=True,
+        )
+        raise
+    _tell(contest.outputs, _times(contest) if times else {}, as_json)
+
+
+def _carried_out(jobs: Sequence[Job], cores: int) -> Iterator[Job]:
+    """Run the jobs and yield each when it is done."""
+    if cores == 1 or len(jobs) < 2:
+        from kinacc.workflow.runner import execute
+
+        for job in jobs:
+            execute(job, bar=True)
+            yield job
+        return
+    from kinacc.workflow.local_executor import execute_all
+
+    yield from execute_all(jobs, cores)
+
+
+def _times(contest) -> dict[str, float]:
+    """Milliseconds of a campaign by assessor; no table holds them, for they differ by the hour."""
+    from kinacc.study.tournament.contest import CONTESTANTS, SIZES, jobs, times_ms
+    from kinacc.study.tournament.fields import of_tables
+    from kinacc.workflow.runner import read_inputs
+
+    fields = of_tables(read_inputs(contest.inputs), contest.settings["robots"], ())
+    work = jobs(fields, SIZES[contest.size])
+    job = next((each for each in work if each.budget == 200), work[-1])
+    return times_ms(job, contest.seed, contest.assessors or CONTESTANTS)
+
+
+def _tell(outputs: Mapping[str, str], times: dict[str, float], as_json: bool) -> None:
+    """Print the verdicts, and how statements fared whose assumption is not true of the field."""
+    import json
+
+    from kinacc.artifacts.store import read
+
+    path = outputs["tournament_verdicts"]
+    table = read(path)
+    rows = [dict(zip(table, each, strict=True)) for each in zip(*_plain(table), strict=True)]
+    if as_json:
+        click.echo(json.dumps({"verdicts": rows, "time_ms": times, "table": path}, indent=2))
+        return
+    cells = read(outputs["tournament_cells"])
+    click.echo(
+        "assessor                 about       statements   held  worst cell  rejected  below  cells"
+        "  no statement  untrue  then held"
+    )
+    for row in rows:
+        untrue, held = _untrue(cells, row["assessor"], row["target"])
+        click.echo(
+            f"{row['assessor']:23s}  {row['target']:10s}  {row['statements']:10d}  "
+            f"{row['mean_holds']:5.3f}  {row['worst_holds']:10.3f}  {row['rejected']:8d}  "
+            f"{row['below']:5d}  {row['cells']:5d}  {row['withheld']:12.1%}  {untrue:6d}  "
+            + (f"{held / untrue:9.3f}" if untrue else f"{'-':>9s}")
+        )
+    click.echo(
+        "held: share of upper bounds not below the truth; rejected: cells significantly below the "
+        "confidence;\nbelow: cells more than 3 points below it; untrue: statements left out of all "
+        "this because what they\nassume is not true of the field, which the readings did not show"
+    )
+    for name, taken in times.items():
+        click.echo(f"{name:24s}  {taken:8.1f} ms a campaign of 200 measurements")
+    click.echo(f"all of it: {path.rpartition('/')[0]}")
+
+
+def _untrue(cells: Mapping, assessor: str, target: str) -> tuple[int, int]:
+    """Number of statements whose assumption is not true of the field, and how many of them held."""
+    mine = (cells["assessor"] == assessor) & (cells["target"] == target) & (cells["broken"] > 0)
+    broken = cells["broken"][mine]
+    return int(broken.sum()), round(float((cells["broken_holds"][mine] * broken).sum()))
+
+
+def _plain(table) -> list[list]:
+    return [column.tolist() for column in table.values()]

@@ -1,0 +1,148 @@
+"""What ``compensate`` is asked for, and its answer as a sheet."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kinacc.cli import rows
+from kinacc.cli.rows import Rows
+from kinacc.cli.sheet import Field, Sheet
+from kinacc.cli.tables import facts, joint_fields, joints_in_words, pose_fields
+from kinacc.deployment.compensate import Compensation, programmed
+from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, Status
+from kinacc.deployment.record import Calibration
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose, rotation_from_quaternion
+from kinacc.measurements.written_numbers import numbers_of
+
+_FAR_FROM_PROGRAM_RAD = np.deg2rad(20.0)  # a calibration moves joints by less
+_NUMBERS = "7 numbers: x, y, z in mm, then a unit quaternion w, x, y, z"
+
+
+def poses(
+    arm: Calibration,
+    path: str | None,
+    texts: tuple[str, ...],
+    near_deg: str | None,
+    program: str | None,
+    frame: str,
+    point: str | None,
+) -> Rows:
+    """Wanted poses and, where given, joints the posture should be near to.
+
+    Raises InputError listing all problems.
+    """
+    sources = [path is not None, bool(texts), program is not None]
+    if sum(sources) != 1:
+        what = "is not given" if not any(sources) else "is given more than once"
+        raise InputError(Problem("what is wanted", what, "a file of poses, --pose, or --program"))
+    near = None
+    if near_deg is not None:
+        near = rows.of_arguments((near_deg,), "deg", arm.robot, "--near-deg")
+    if program is not None:
+        if frame != "base":
+            what = "a program speaks of the robot's own base"
+            raise InputError(Problem("--frame", what, "base"))
+        given = rows.read(program, arm.robot)
+        given = replace(given, pose=programmed(arm, given.joints, point))
+    elif path is not None:
+        given = rows.read(path, arm.robot, joints=False, pose=True)
+    else:
+        pose = _of_arguments(texts)
+        given = Rows(len(texts), np.arange(1, len(texts) + 1), None, None, pose, ())
+    if given.joints is None and near is not None:
+        given = replace(given, joints=np.broadcast_to(near, (given.count, near.shape[1])))
+    if given.joints is not None:
+        place = program or path or "--near-deg"
+        problems = rows.limit_problems(arm.robot, given.joints, given.label, place)
+        if problems:
+            raise InputError(problems, "Joints outside the robot's limits")
+    return given
+
+
+def compensated(
+    arm: Calibration,
+    given: Rows,
+    found: Compensation,
+    frame: str,
+    point: str | None,
+    is_program: bool = False,
+) -> Sheet:
+    """The sheet of ``kinacc compensate``; ``is_program``: the near joints are a program's."""
+    angular = np.where(arm.robot.dh.prismatic, np.nan, np.rad2deg(np.abs(found.change)))
+    largest = np.max(np.nan_to_num(angular, nan=-1.0), axis=1)
+    point = point or arm.default_point
+    fields = [
+        Field("row", given.label, "", "the file's pose, or its line"),
+        *joint_fields(arm.robot.dh.prismatic, found.q_rad),
+        Field("status", _words(arm, found, is_program), "", "why there are joints, or none"),
+        Field("position_error_mm", found.position_error_mm, "mm", "left by the forward model"),
+        Field(
+            "orientation_error_mrad",
+            1e3 * found.rotation_error_rad,
+            "mrad",
+            "left by the forward model",
+        ),
+        Field(
+            "largest_change_deg",
+            np.where(largest < 0.0, np.nan, largest),
+            "deg",
+            "largest movement of a joint from the joints it should be near to",
+        ),
+        *(replace(each, on_screen=False) for each in pose_fields(given.pose, frame)),
+    ]
+    title = f"{arm.name}: joints for the {point} in the {frame} frame by the {arm.choice} model"
+    return Sheet(title, facts(arm, frame, point), fields)
+
+
+def _words(arm: Calibration, found: Compensation, is_program: bool) -> np.ndarray:
+    words = []
+    for row, status in enumerate(found.status):
+        joints = joints_in_words(found.offending[row]) if found.offending[row].any() else ""
+        off_mm, off_rad = found.position_error_mm[row], found.rotation_error_rad[row]
+        left = f", {off_mm:.3g} mm left" if np.isfinite(off_mm) else ""
+        if np.isfinite(off_mm) and off_rad > FEW_AXES_TURN_RAD:
+            left += f" and {np.rad2deg(off_rad):.3g} deg"
+        beyond = f" ({joints} outside the range the data cover)" if joints else ""
+        said = {
+            Status.CONVERGED: "converged",
+            Status.EXTRAPOLATED: f"converged, extrapolated: {joints} outside the data's range",
+            Status.OTHER_POSTURE: f"converged in another posture than the nearest{beyond}",
+            Status.OUTSIDE_LIMITS: f"no joints: {joints} would be outside the limits",
+            Status.OUTSIDE_RANGE: f"no joints: {joints} would be outside the data's range",
+            Status.NOT_REACHED: f"no joints: not reached{left}",
+        }[Status(status)]
+        if status <= Status.OTHER_POSTURE:
+            said += _remarks(arm, found, row, is_program)
+        words.append(said)
+    return np.array(words, dtype=object)
+
+
+def _remarks(arm: Calibration, found: Compensation, row: int, is_program: bool) -> str:
+    """What a person should know before the joints are used."""
+    said, off_rad = "", found.rotation_error_rad[row]
+    if off_rad > ROTATION_TOLERANCE_RAD:
+        said += (
+            f", turned {1e3 * off_rad:.3g} mrad away: {arm.robot.dh.joints} axes reach no nearer"
+        )
+    far = (np.abs(found.change[row]) > _FAR_FROM_PROGRAM_RAD) & ~arm.robot.dh.prismatic
+    if is_program and far.any():
+        said += f", {joints_in_words(far)} far from the program: a singular or another posture"
+    return said
+
+
+def _of_arguments(texts: tuple[str, ...]) -> Pose:
+    values, problems = [], []
+    for text in texts:
+        row = numbers_of(text)
+        length = np.linalg.norm(row[3:]) if len(row) == 7 else 0.0
+        if abs(length - 1.0) > 1e-3:
+            problems.append(Problem("--pose", repr(text), _NUMBERS))
+            continue
+        values.append([*row[:3], *(row[3:] / length)])
+    if problems:
+        raise InputError(problems)
+    table = np.array(values)
+    return Pose(rotation_from_quaternion(table[:, 3:]), table[:, :3])

@@ -1,1 +1,0 @@
-"""Commands that use a calibration; one module each, loaded only when called."""

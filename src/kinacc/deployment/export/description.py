@@ -1,0 +1,145 @@
+"""A calibrated arm as a robot file of kinacc, as JSON and as a CSV table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinacc.deployment.record import TOOL, Calibration
+from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
+from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.robot import as_yaml
+
+CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
+SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a joint slides"
+
+
+def robot_name(arm: Calibration) -> str:
+    """Name of the calibrated arm."""
+    own = arm.name if arm.name.startswith(arm.robot.name) else f"{arm.robot.name}_{arm.name}"
+    return f"{own}_calibrated"
+
+
+def robot_yaml(arm: Calibration) -> str:
+    """A robot file that ``kinacc.kinematics.robot.load`` reads back to the same arm, bit by bit."""
+    robot = arm.robot
+    tool = robot.tool
+    if TOOL in arm.targets:
+        tool = compose(invert(robot.flange), arm.targets[TOOL])
+    calibrated = replace(
+        robot,
+        name=robot_name(arm),
+        source=f"calibrated from {robot.name} with data set {arm.name}",
+        date="",
+        dh=_dh_of(arm),
+        tool=tool,
+    )
+    heading = (
+        f"{robot.name} as calibrated by data set {arm.name} ({arm.choice} model).",
+        f"{CONVENTION}; angles in rad, lengths in mm.",
+    )
+    return as_yaml(calibrated, heading)
+
+
+def robot_json(
+    arm: Calibration,
+    std: np.ndarray,
+    nominal: DHModel,
+    undetermined: Sequence[str] | None,
+    provenance: Mapping[str, str],
+) -> str:
+    """Everything the calibration says of the arm: parameters, deviations, frames, residuals.
+
+    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined; ``undetermined`` says in sentences
+    what the poses leave open, None where nobody asked.
+    """
+    dh = _dh_of(arm)
+    joints = []
+    for joint in range(dh.joints):
+        row: dict[str, object] = {
+            "joint": joint + 1,
+            "type": _kind(dh, joint),
+        }
+        for column, name in enumerate(PARAMETERS):
+            value = float(getattr(dh, name)[joint])
+            row[name] = value
+            row[f"nominal_{name}"] = float(getattr(nominal, name)[joint])
+            row[f"std_{name}"] = _number(std[joint, column])
+        joints.append(row)
+    left = arm.residual
+    content = {
+        "name": robot_name(arm),
+        "robot": arm.robot.name,
+        "calibration": arm.name,
+        "convention": CONVENTION + (f"; {SLIDING}" if dh.prismatic.any() else ""),
+        "units": {"length": "mm", "angle": "rad", "quaternion": "w, x, y, z"},
+        "joints": joints,
+        "joint_map": arm.robot.joint_map.tolist(),
+        "first_dh_frame_in_base": _frame_record(arm.robot.base),
+        "flange_in_last_dh_frame": _frame_record(arm.robot.flange),
+        "base_in_instrument": _frame_record(arm.base),
+        "targets_in_last_dh_frame": {
+            name: _frame_record(pose) for name, pose in arm.targets.items()
+        },
+        "residual": left
+        and {
+            "subset": left.subset,
+            "position_rms_mm": _number(left.position_mm),
+            "orientation_rms_mrad": _number(1e3 * left.orientation_rad),
+        },
+        "undetermined": None if undetermined is None else list(undetermined),
+        "provenance": dict(provenance),
+    }
+    return json.dumps(content, indent=1) + "\n"
+
+
+def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
+    """One row per joint: fitted values, their standard deviations and the nominal values."""
+    dh, out = _dh_of(arm), io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    names = [name.replace("_rad", "_deg") for name in PARAMETERS]
+    writer.writerow(
+        [
+            "joint",
+            "type",
+            *names,
+            *(f"std_{name}" for name in names),
+            *(f"nominal_{n}" for n in names),
+        ]
+    )
+    factor = np.array([180.0 / np.pi if name.endswith("_rad") else 1.0 for name in PARAMETERS])
+    fitted, given = (
+        np.stack([getattr(model, name) for name in PARAMETERS], axis=1) * factor
+        for model in (dh, nominal)
+    )
+    for joint in range(dh.joints):
+        cells = np.concatenate([fitted[joint], std[joint] * factor, given[joint]])
+        kind = _kind(dh, joint)
+        writer.writerow([joint + 1, kind, *("" if np.isnan(x) else f"{x:.12g}" for x in cells)])
+    return out.getvalue()
+
+
+def _dh_of(arm: Calibration) -> DHModel:
+    if not isinstance(arm.model, DHModel):
+        raise TypeError("a VEC model has no DH table: choose dh")
+    return arm.model
+
+
+def _kind(dh: DHModel, joint: int) -> str:
+    return "prismatic" if dh.prismatic[joint] else "revolute"
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _frame_record(pose: Pose) -> dict[str, list[float]]:
+    return {
+        "position_mm": [float(value) for value in pose.position_mm],
+        "quaternion_wxyz": [float(value) for value in quaternion_from_rotation(pose.rotation)],
+    }

@@ -1,0 +1,116 @@
+"""The files of ``kinacc export``, made in memory first and written all or none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.artifacts import store
+from kinacc.calibration import identified
+from kinacc.config import names
+from kinacc.deployment import folder as results
+from kinacc.deployment.export import description, tables, urdf
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics.dh import PARAMETERS
+from kinacc.kinematics.robot import Robot
+
+_ENDINGS = {
+    "yaml": ".yaml",
+    "json": ".json",
+    "csv": ".csv",
+    "urdf": ".urdf",
+    "markdown": "_tables.md",
+    "latex": "_tables.tex",
+}
+
+
+def contents(
+    folder: Path | str,
+    robot: Robot,
+    formats: Sequence[str],
+    name: str | None = None,
+    urdf_file: Path | str | None = None,
+    links: tuple[str | None, str | None] = (None, None),
+    dh_joints: bool = False,
+) -> dict[str, str]:
+    """File names and their text for the calibrated DH model of a results folder.
+
+    Raises InputError for what cannot be exported.
+    """
+    dataset = Path(folder).resolve().name
+    if name is None:
+        problems = names.not_in_a_line("the results folder", dataset)
+    else:
+        problems = names.not_of_a_file("--name", name)
+    if problems:
+        raise InputError(problems, "Nothing was written")
+    found = results.read_tables(folder)
+    arm = results.calibration(found, robot, "dh", dataset)
+    std = _deviations(found["dh_model"])
+    told = found.get("dh_identified")
+    unseen = None if told is None else identified.recorded(told)
+    made = {}
+    for each in dict.fromkeys(formats):
+        if each == "yaml":
+            text = description.robot_yaml(arm)
+        elif each == "json":
+            marks = store.read_metadata(Path(folder) / "dh_model.parquet")
+            text = description.robot_json(arm, std, robot.dh, unseen, marks)
+        elif each == "csv":
+            text = description.robot_csv(arm, std, robot.dh)
+        elif each == "urdf" and urdf_file is not None:
+            text = urdf.corrected(arm, urdf_file, *links)
+        elif each == "urdf":
+            text = urdf.generated(arm, dh_joints)
+        else:
+            text = _tables(found, robot, dataset, unseen or (), each)
+        made[f"{dataset if name is None else name}{_ENDINGS[each]}"] = text
+    return made
+
+
+def note(folder: Path | str) -> str:
+    """What a DH model leaves out where another model was selected; empty where it was not."""
+    found = results.read_tables(folder)
+    selected = results.selected_model(found)
+    dh, other = (results.residual(found, each) for each in ("dh", selected))
+    if selected == "dh" or dh is None or other is None:
+        return ""
+    return (
+        f"note: the {selected} model was selected ({other.position_mm:.3f} mm rms of "
+        f"{other.subset} poses); a DH table cannot hold it and leaves {dh.position_mm:.3f} mm"
+    )
+
+
+def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> list[str]:
+    """Write files into a folder, all or none; InputError for those already there."""
+    paths = [Path(target) / name for name in made]
+    there = [
+        Problem(str(path), "is there already", fix="give --force to replace it")
+        for path in paths
+        if path.exists() and not force
+    ]
+    if there:
+        raise InputError(there, "Nothing was written")
+    with store.replacing(paths) as temporary:
+        for part, text in zip(temporary, made.values(), strict=True):
+            part.write_text(text, encoding="utf-8")
+    return [str(path) for path in paths]
+
+
+def _tables(found: Mapping, robot: Robot, dataset: str, unseen: Sequence[str], form: str) -> str:
+    if "residuals" not in found:
+        raise InputError(Problem(f"{dataset}: residuals.parquet", "no such file", "a finished run"))
+    nominal = {"joint": np.arange(1, robot.dh.joints + 1)}
+    nominal |= {name: getattr(robot.dh, name) for name in PARAMETERS}
+    made = tables.paper_tables(found["residuals"], found["dh_model"], nominal, dataset, unseen)
+    return (tables.markdown if form == "markdown" else tables.latex)(made)
+
+
+def _deviations(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Standard deviations (k, 5), by joint, as ``dh.PARAMETERS``."""
+    order = np.argsort(columns["joint"], kind="stable")
+    return np.stack(
+        [np.asarray(columns[f"std_{name}"], dtype=float)[order] for name in PARAMETERS], axis=1
+    )

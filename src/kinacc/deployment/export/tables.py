@@ -1,0 +1,176 @@
+"""Tables I to III as a paper would print them, in Markdown and LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.config.names import in_markdown
+from kinacc.kinematics.dh import PARAMETERS
+
+Columns = Mapping[str, np.ndarray]
+
+_SUBSETS = {"train": "training poses", "validation": "held-out poses"}
+_FIGURES = (("mean", "mean"), ("max", "max"), ("rms", "rms"), ("gamma99", "99 %"))
+_DIGITS_OF_STD = 2
+_MOST_DECIMALS = 6
+
+
+@dataclass(frozen=True)
+class Table:
+    """A caption, headers with their units, rows of text, and notes under the table."""
+
+    name: str
+    caption: str
+    headers: Sequence[tuple[str, str]]
+    rows: Sequence[Sequence[str]]
+    notes: Sequence[str] = ()
+
+
+def paper_tables(
+    residuals: Columns, fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str] = ()
+) -> list[Table]:
+    """Tables of a data set from its ``residuals`` and ``dh_model``; ``nominal`` as ``dh_model``.
+
+    ``unseen``: what the poses leave open, in sentences, as a note to the DH parameters.
+    """
+    return [
+        _residual_table(
+            residuals, "vec_vs_measured", "vec", f"VEC model against measurements, {name}"
+        ),
+        _dh_table(fitted, nominal, name, unseen),
+        _residual_table(residuals, "dh_vs_vec", "dh_vec", f"DH model against VEC model, {name}"),
+        _residual_table(
+            residuals, "dh_vs_measured", "dh", f"DH model against measurements, {name}"
+        ),
+    ]
+
+
+def markdown(tables: Sequence[Table]) -> str:
+    """The tables as Markdown."""
+    parts = []
+    for table in tables:
+        heads = [f"{text} [{unit}]" if unit else text for text, unit in table.headers]
+        lines = [f"**{in_markdown(table.caption)}**", "", _markdown_row(heads)]
+        lines.append(_markdown_row(["---", *["---:"] * (len(heads) - 1)]))
+        lines += [_markdown_row(row) for row in table.rows]
+        lines += ["", *map(in_markdown, table.notes)] if table.notes else []
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def latex(tables: Sequence[Table]) -> str:
+    """The tables as LaTeX (packages booktabs and amsmath), one ``table`` environment each."""
+    parts = []
+    for table in tables:
+        heads = [
+            rf"\multicolumn{{1}}{{c}}{{{_tex(text)}{f' [{_tex(unit)}]' if unit else ''}}}"
+            for text, unit in table.headers
+        ]
+        lines = [
+            r"\begin{table}",
+            r"  \centering",
+            rf"  \caption{{{_tex(table.caption)}}}",
+            rf"  \label{{tab:{table.name}}}",
+            rf"  \begin{{tabular}}{{l{'r' * (len(heads) - 1)}}}",
+            r"    \toprule",
+            f"    {' & '.join(heads)} " + r"\\",
+            r"    \midrule",
+            *(f"    {' & '.join(_tex_cell(cell) for cell in row)} " + r"\\" for row in table.rows),
+            r"    \bottomrule",
+            r"  \end{tabular}",
+        ]
+        lines += [rf"  \par\smallskip\footnotesize {_tex(note)}" for note in table.notes]
+        parts.append("\n".join([*lines, r"\end{table}"]))
+    return "\n\n".join(parts) + "\n"
+
+
+def with_deviation(value: float, std: float) -> str:
+    """``value ± std`` with two digits of the deviation; the value alone where there is none."""
+    if not np.isfinite(std):
+        return f"{round(value, 4) + 0.0:.4f}†"
+    if std <= 0.0:
+        return f"{value:g}"
+    decimals = _DIGITS_OF_STD - 1 - int(np.floor(np.log10(std)))
+    decimals = min(max(decimals, 0), _MOST_DECIMALS)
+    return f"{value:.{decimals}f} ± {std:.{decimals}f}"
+
+
+def _residual_table(columns: Columns, comparison: str, name: str, caption: str) -> Table:
+    pooled = np.isnan(np.asarray(columns["fold"], dtype=float))
+    ours = pooled & (np.asarray(columns["comparison"]) == comparison)
+    rows = []
+    for subset, words in _SUBSETS.items():
+        for row in np.flatnonzero(ours & (np.asarray(columns["subset"]) == subset)):
+            figures = [_figure(columns[key][row]) for key, _ in _FIGURES]
+            quantity = f"{columns['quantity'][row]} [{columns['unit'][row]}]"
+            rows.append([f"{quantity}, {words}", str(int(columns["n"][row])), *figures])
+    heads = [("", ""), ("points", ""), *((head, "") for _, head in _FIGURES)]
+    note = "99 %: quantile of a gamma distribution fitted to the magnitudes."
+    return Table(name, caption, heads, rows, [note])
+
+
+def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str]) -> Table:
+    order = np.argsort(fitted["joint"], kind="stable")
+    shown = [each for each in PARAMETERS if each != "beta_rad" or np.any(fitted[each] != 0.0)]
+    heads = {
+        "theta_offset_rad": ("theta - q", "rad"),
+        "d_mm": ("d", "mm"),
+        "a_mm": ("a", "mm"),
+        "alpha_rad": ("alpha", "rad"),
+        "beta_rad": ("beta", "rad"),
+    }
+    rows, blind = [], False
+    for row in order:
+        cells = [str(int(fitted["joint"][row]))]
+        for each in shown:
+            value, std = float(fitted[each][row]), float(fitted[f"std_{each}"][row])
+            fixed = not np.isfinite(std) and value == float(nominal[each][row])
+            if each == "beta_rad" and fixed:
+                cells.append("-")
+                continue
+            blind |= not np.isfinite(std)
+            cells.append(with_deviation(value, std))
+        rows.append(cells)
+    notes = ["One standard deviation behind ±."]
+    if blind:
+        notes.append(
+            "† shares a direction the poses do not determine; along it the value is nominal."
+        )
+    notes += [f"Left open by the poses: {'; '.join(unseen)}."] if unseen else []
+    return Table(
+        "dh_parameters",
+        f"DH parameters, {name}",
+        [("joint", ""), *(heads[each] for each in shown)],
+        rows,
+        notes,
+    )
+
+
+def _figure(value: float) -> str:
+    return "-" if not np.isfinite(value) else f"{value:.3f}"
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _tex_cell(text: str) -> str:
+    number = text.replace("†", "").replace(" ± ", "")
+    if number.lstrip("-").replace(".", "").replace("e-", "").isdigit():
+        mark = r"^\dagger" if text.endswith("†") else ""
+        return "$" + text.rstrip("†").replace("±", r"\pm") + mark + "$"
+    return _tex(text)
+
+
+def _tex(text: str) -> str:
+    for plain, tex in (
+        ("\\", r"\textbackslash "), ("&", r"\&"), ("%", r"\%"), ("_", r"\_"), ("#", r"\#"),
+        ("$", r"\$"), ("{", r"\{"), ("}", r"\}"), ("^", r"\^{}"), ("~", r"\~{}"),
+        ("±", r"$\pm$"), ("†", r"$^\dagger$"), ("theta", r"$\theta$"), ("alpha", r"$\alpha$"),
+        ("beta", r"$\beta$"),
+    ):  # fmt: skip
+        text = text.replace(plain, tex)
+    return text

@@ -1,0 +1,249 @@
+"""A calibrated arm as URDF: written from its DH chain, or an existing file with origins corrected.
+
+URDF has metres and radians; ``rpy`` turns about the fixed x, y and z axes in that order.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.calibration.observations import full_poses
+from kinacc.calibration.start import closed_form_start
+from kinacc.deployment.export import links
+from kinacc.deployment.export.description import robot_name
+from kinacc.deployment.record import TOOL, Calibration
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, invert, rotation_y, rotation_z
+from kinacc.kinematics import dh as _dh
+from kinacc.kinematics.robot import Robot
+from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between
+
+_M_PER_MM = 1e-3
+_SAME_ARM_MM = 1e-3  # how far a file's nominal arm may be from the robot's
+_PROBES = 24
+
+
+def generated(arm: Calibration, dh_joints: bool = False) -> str:
+    """A URDF of the calibrated DH chain: base_link, link_1 .. link_k, flange and tool.
+
+    Joints are those the controller reports, or with ``dh_joints`` those of the DH table. Raises
+    InputError where the robot's reported joints are coupled.
+    """
+    from lxml import etree
+
+    robot, dh = arm.robot, arm.model
+    names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
+    senses = np.ones(dh.joints) if dh_joints else links.signs(robot)
+    frames, end = links.origins(dh)
+    frames[0] = compose(robot.base, frames[0])
+    root = etree.Element("robot", name=_name(robot_name(arm)))
+    about = f"calibrated from {robot.name} with data set {arm.name}"
+    about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
+    root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
+    etree.SubElement(root, "link", name="base_link")
+    low, high = _limits(robot, senses, dh_joints)
+    for i, origin in enumerate(frames):
+        etree.SubElement(root, "link", name=f"link_{i + 1}")
+        kind = "prismatic" if dh.prismatic[i] else "revolute"
+        parent = "base_link" if i == 0 else f"link_{i}"
+        joint = _joint(root, _name(names[i]), kind, parent, f"link_{i + 1}", origin)
+        etree.SubElement(joint, "axis", xyz=f"0 0 {int(senses[i])}")
+        scale = _M_PER_MM if dh.prismatic[i] else 1.0
+        etree.SubElement(
+            joint,
+            "limit",
+            lower=_digits(low[i] * scale),
+            upper=_digits(high[i] * scale),
+            effort="1",
+            velocity="1",
+        )
+    last = f"link_{dh.joints}"
+    etree.SubElement(root, "link", name="flange")
+    flange = compose(end, robot.flange)
+    _joint(root, "flange_fixed", "fixed", last, "flange", flange)
+    if TOOL in arm.targets:
+        etree.SubElement(root, "link", name="tool")
+        tool = compose(invert(robot.flange), arm.targets[TOOL])
+        _joint(root, "tool_fixed", "fixed", "flange", "tool", tool)
+    return _written(root)
+
+
+def corrected(
+    arm: Calibration,
+    path: str | Path,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+) -> str:
+    """The URDF at ``path`` with origins changed so that its tip goes where the calibration says.
+
+    Axes, meshes, limits, comments and everything that hangs on a link stay: origins of the moving
+    joints change, and of the first fixed joint behind the last of them (one is added where there is
+    none). The file's nominal arm must be the robot of the calibration, up to where its base and tip
+    links sit. Raises InputError where it is not, saying how far apart the two are.
+    """
+    from lxml import etree
+
+    path = Path(path)
+    chain = joints_between(path, base_link, tip_link)
+    moving = [joint for joint in chain if joint.kind in MOVING]
+    base, tip = _ends_in_file(arm, chain, path)
+    fixed, tail = _fixed_parts(chain)
+    at_zero = _link_frames(chain)
+    plain, _ = links.origins(arm.robot.dh)
+    better, end = links.origins(arm.model)
+    frame, anchors = base, []
+    for origin, there in zip(plain, at_zero, strict=True):
+        frame = compose(frame, origin)
+        # How the file's link sits on the axis; it sits there still after the correction.
+        anchors.append(compose(invert(frame), there))
+    tree = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
+    elements = {each.get("name"): each for each in tree.getroot().findall("joint")}
+    before = invert(base)
+    for joint, gap, origin, anchor in zip(moving, fixed, better, anchors, strict=True):
+        new = compose(compose(invert(before), origin), anchor)
+        _set_origin(elements[joint.name], compose(invert(gap), new))
+        before = anchor
+    last = compose(compose(invert(before), end), tip)
+    if tail:
+        rest = IDENTITY
+        for joint in tail[1:]:
+            rest = compose(rest, joint.origin)
+        _set_origin(elements[tail[0].name], compose(last, invert(rest)))
+    else:
+        _add_tip(tree.getroot(), moving[-1].child, last)
+    return etree.tostring(tree, encoding="unicode") + "\n"
+
+
+def _ends_in_file(arm: Calibration, chain: list[Joint], path: Path) -> tuple[Pose, Pose]:
+    """First DH frame in the file's base link, and its tip link in the last DH frame."""
+    robot = arm.robot
+    count = sum(joint.kind in MOVING for joint in chain)
+    if count != robot.dh.joints:
+        what = f"its chain has {count} moving joints, {robot.name} has {robot.dh.joints}"
+        raise InputError(Problem(str(path), what))
+    links.signs(robot)  # coupled joints have no URDF
+    rng = np.random.default_rng(0)
+    low, high = np.maximum(robot.q_min_rad, -3.0e3), np.minimum(robot.q_max_rad, 3.0e3)
+    q_rad = low + rng.uniform(0.0, 1.0, (_PROBES, len(low))) * (high - low)
+    wanted = _forward(chain, q_rad)
+    ends = _dh.forward(robot.dh, q_rad @ robot.joint_map.T)
+    options = [(robot.base, robot.flange)]
+    start = closed_form_start(full_poses(q_rad, wanted), ends)
+    options.append((start.base, start.tool))
+    misfits = []
+    for base, tip in options:
+        seen = compose(base, compose(ends, tip))
+        misfits.append(float(np.abs(seen.position_mm - wanted.position_mm).max()))
+    if min(misfits) > _SAME_ARM_MM:
+        what = f"its arm differs from {robot.name} by up to {min(misfits):.3g} mm"
+        allowed = f"the arm that was calibrated, within {_SAME_ARM_MM:g} mm, joints alike"
+        raise InputError(Problem(str(path), what, allowed))
+    return options[0] if misfits[0] <= 1e-8 else options[int(np.argmin(misfits))]
+
+
+def _forward(chain: list[Joint], q: np.ndarray) -> Pose:
+    """Tip frames (n, ...) of a file's chain at joints (n, k), rad and mm."""
+    count, number = len(q), 0
+    here = Pose(np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3)))
+    for joint in chain:
+        here = compose(here, joint.origin)
+        if joint.kind not in MOVING:
+            continue
+        axis = joint.axis / np.linalg.norm(joint.axis)
+        step = q[:, number, None] * axis
+        number += 1
+        if joint.kind == "prismatic":
+            here = compose(here, Pose(np.broadcast_to(np.eye(3), (count, 3, 3)), step))
+        else:
+            here = compose(here, Pose(exp_so3(step), np.zeros((count, 3))))
+    return here
+
+
+def _fixed_parts(chain: list[Joint]) -> tuple[list[Pose], list[Joint]]:
+    """What fixed joints put in front of every moving joint, and the fixed joints after the last."""
+    gaps, gap, tail = [], IDENTITY, []
+    for joint in chain:
+        if joint.kind in MOVING:
+            gaps.append(gap)
+            gap, tail = IDENTITY, []
+        else:
+            gap = compose(gap, joint.origin)
+            tail.append(joint)
+    return gaps, tail
+
+
+def _link_frames(chain: list[Joint]) -> list[Pose]:
+    """Frames of the links behind the moving joints in the base link, at zero joints."""
+    here, found = IDENTITY, []
+    for joint in chain:
+        here = compose(here, joint.origin)
+        if joint.kind in MOVING:
+            found.append(here)
+    return found
+
+
+def _limits(robot: Robot, senses: np.ndarray, dh_joints: bool) -> tuple[np.ndarray, np.ndarray]:
+    low, high = robot.q_min_rad, robot.q_max_rad
+    if not dh_joints:
+        return low, high
+    ends = np.stack([low, high])
+    centre, half = robot.joint_map @ ends.mean(axis=0), 0.5 * (high - low)
+    reach = np.abs(robot.joint_map) @ half
+    return centre - reach, centre + reach
+
+
+def _joint(root, name: str, kind: str, parent: str, child: str, origin: Pose):
+    from lxml import etree
+
+    joint = etree.SubElement(root, "joint", name=name, type=kind)
+    _set_origin(joint, origin)
+    etree.SubElement(joint, "parent", link=parent)
+    etree.SubElement(joint, "child", link=child)
+    return joint
+
+
+def _set_origin(joint, origin: Pose) -> None:
+    from lxml import etree
+
+    element = joint.find("origin")
+    if element is None:
+        element = etree.Element("origin")
+        joint.insert(0, element)
+    element.set("xyz", " ".join(_digits(value * _M_PER_MM) for value in origin.position_mm))
+    element.set("rpy", " ".join(_digits(value) for value in rpy(origin.rotation)))
+
+
+def _add_tip(root, parent: str, origin: Pose) -> None:
+    from lxml import etree
+
+    name = f"{parent}_calibrated"
+    etree.SubElement(root, "link", name=name)
+    _joint(root, f"{name}_fixed", "fixed", parent, name, origin)
+
+
+def rpy(rotation: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw (3,) of a rotation (3, 3): ``Rz(yaw) Ry(pitch) Rx(roll)``, also upright."""
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
+    # What yaw and pitch leave is a turn about x, however ill they are defined.
+    rest = (rotation_z(yaw) @ rotation_y(pitch)).T @ rotation
+    return np.array([np.arctan2(rest[2, 1], rest[1, 1]), pitch, yaw])
+
+
+def _digits(value: float) -> str:
+    return repr(float(value) + 0.0)
+
+
+def _name(text: str) -> str:
+    return text.replace(" ", "_")
+
+
+def _written(root) -> str:
+    from lxml import etree
+
+    etree.indent(root)
+    head = '<?xml version="1.0"?>\n'
+    return head + etree.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,226 @@
+"""A calibration from the tables of a results folder and the robot they were made with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.calibration.uncertainty import Uncertainty
+from kinacc.deployment.record import MODELS, Anchor, Calibration, Residual
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose
+from kinacc.kinematics import tables as model_tables
+from kinacc.kinematics.dh import PARAMETERS
+from kinacc.kinematics.robot import Robot
+
+Tables = Mapping[str, Mapping[str, np.ndarray]]
+
+_NEEDED = ("vec_model", "dh_model", "frames")
+# Used where they are there.
+_WANTED = ("dh_fit", "dh_identified", "residuals", "model_selection")
+_COVARIANCE = {"dh": "dh_covariance", "vec": "vec_covariance"}
+_SAME = 1e-9
+
+
+def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
+    """The tables of a data set's results folder. Raises InputError naming all that are missing."""
+    from kinacc.artifacts import store
+
+    folder = Path(folder)
+    missing = [
+        Problem(str(folder / f"{name}.parquet"), "no such file", fix="run the workflow first")
+        for name in _NEEDED
+        if not (folder / f"{name}.parquet").is_file()
+    ]
+    if missing:
+        raise InputError(missing, f"{folder} holds no calibration")
+    names = [*_NEEDED, *_WANTED, *_COVARIANCE.values()]
+    present = [name for name in names if (folder / f"{name}.parquet").is_file()]
+    return {name: store.read(folder / f"{name}.parquet") for name in present}
+
+
+def recorded_robot(folder: Path | str) -> Robot | None:
+    """The robot a results folder was made with; None where it does not say.
+
+    Raises InputError where what it says cannot be read.
+    """
+    from kinacc.artifacts import store
+    from kinacc.kinematics import robot
+
+    path = Path(folder) / "robot.parquet"
+    if not path.is_file():
+        return None
+    return robot.of_text(str(store.read(path)["description"][0]), str(path))
+
+
+def calibration(
+    tables: Tables,
+    robot: Robot,
+    model: str | None = None,
+    name: str = "",
+    session: str | None = None,
+) -> Calibration:
+    """The calibration in ``tables`` (``read_tables``): ``model``, or the one selected.
+
+    ``session`` chooses the base where several were measured; the first where not given.
+    Raises InputError where the robot is not the one the tables were made with.
+    """
+    choice = selected_model(tables) if model is None else model
+    if choice not in MODELS:
+        raise InputError(Problem("model", f"{choice!r}", ", ".join(MODELS)))
+    slides = robot.dh.prismatic  # which joints slide is the robot's to say
+    volumetric = model_tables.vec_model(tables["vec_model"])
+    _require_same_arm(volumetric.dh, robot, name)
+    made = {
+        "vec": replace(volumetric, dh=replace(volumetric.dh, prismatic=slides)),
+        "dh": replace(model_tables.dh_model(tables["dh_model"]), prismatic=slides),
+        "nominal": robot.dh,
+    }
+    frames = tables["frames"]
+    of_model = np.asarray(frames["model"]) == choice
+    names = [str(each) for each in np.asarray(frames["frame"])[of_model]]
+    targets = [each for each in names if each != "base"]
+    number = _session_number(frames, of_model, session)
+    return Calibration(
+        name=name,
+        robot=robot,
+        choice=choice,
+        model=made[choice],
+        base=model_tables.frame(frames, choice, "base", session),
+        base_name="base" if number == 0 else f"base{number + 1}",
+        anchor=_anchor(frames, targets, session) if choice == "vec" else None,
+        targets={each: model_tables.frame(frames, choice, each) for each in targets},
+        known=uncertainty(tables, choice),
+        residual=residual(tables, choice),
+        fitted_range_rad=(volumetric.q_min_rad, volumetric.q_max_rad),
+    )
+
+
+def _anchor(frames: Mapping, targets: Sequence[str], session: str | None) -> Anchor | None:
+    """Base and targets of the DH model; None where the VEC model has the very same base."""
+    bases = [model_tables.frame(frames, each, "base", session) for each in ("dh", "vec")]
+    if all(np.array_equal(one, other) for one, other in zip(*bases, strict=True)):
+        return None
+    tools = {each: model_tables.frame(frames, "dh", each) for each in targets}
+    return Anchor(bases[0], tools)
+
+
+def _session_number(frames: Mapping, of_model: np.ndarray, session: str | None) -> int:
+    """Place of a session among the bases of a model; InputError for one that is not there."""
+    if session is None or "session" not in frames:
+        return 0
+    bases = of_model & (np.asarray(frames["frame"]) == "base")
+    known = [str(each) for each in np.asarray(frames["session"])[bases] if each is not None]
+    if session not in known:
+        allowed = ", ".join(known) or "none: the data name no sessions"
+        raise InputError(Problem("session", f"{session!r} is not there", allowed))
+    return known.index(session)
+
+
+def selected_model(tables: Tables) -> str:
+    """The model the fits selected; where none was recorded, the better one on held-out poses.
+
+    Raises InputError where the tables cannot tell.
+    """
+    recorded = _recorded(tables)
+    if recorded:
+        return recorded
+    rms = {each: residual(tables, each, "validation") for each in ("dh", "vec")}
+    if any(each is None for each in rms.values()):
+        what = "was not selected, and there are no held-out residuals to choose by"
+        raise InputError(Problem("model", what, ", ".join(MODELS), "give --model"))
+    return min(rms, key=lambda each: rms[each].position_mm)
+
+
+def _recorded(tables: Tables) -> str:
+    columns = tables.get("model_selection", {})
+    chosen = np.flatnonzero(np.asarray(columns.get("selected", [])) == 1)
+    return str(columns["model"][chosen[0]]) if len(chosen) else ""
+
+
+def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual | None:
+    """Rms of ``<choice>_vs_measured``: of held-out rows, or of training rows where there are none.
+
+    None where the table does not say.
+    """
+    columns = tables.get("residuals")
+    if columns is None:
+        return None
+    ours = np.asarray(columns["comparison"]) == f"{choice}_vs_measured"
+    ours &= np.isnan(np.asarray(columns["fold"], dtype=float))
+    for each in ("validation", "train") if subset is None else (subset,):
+        rows = ours & (np.asarray(columns["subset"]) == each)
+        of = {str(columns["quantity"][i]): float(columns["rms"][i]) for i in np.flatnonzero(rows)}
+        if "position" in of:
+            return Residual(of["position"], 1e-3 * of.get("orientation", np.nan), each)
+    return None
+
+
+def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
+    """Covariance and undetermined directions of a fit; None where the tables lack them."""
+    columns = tables.get(_COVARIANCE.get(choice, ""))
+    if columns is None:
+        return None
+    names = list(dict.fromkeys(str(each) for each in columns["parameter"]))
+    place = {name: number for number, name in enumerate(names)}
+    row = np.array([place[each] for each in columns["parameter"]])
+    column = np.array([place[each] for each in columns["other"]])
+    covariance = np.zeros((len(names), len(names)))
+    covariance[row, column] = covariance[column, row] = columns["covariance"]
+    return Uncertainty(tuple(names), covariance, _undetermined(tables, choice, place))
+
+
+def _undetermined(tables: Tables, choice: str, place: Mapping[str, int]) -> np.ndarray:
+    fit = tables.get("dh_fit") if choice == "dh" else None
+    if fit is None:
+        return np.zeros((0, len(place)))
+    rows = np.flatnonzero(np.asarray(fit["quantity"]) == "undetermined_direction")
+    directions = np.zeros((int(max(fit["number"][rows], default=0)), len(place)))
+    for row in rows:
+        directions[int(fit["number"][row]) - 1, place[fit["parameter"][row]]] = fit["value"][row]
+    return directions
+
+
+def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
+    """InputError where a robot given is not the one results were made with.
+
+    Limits and tool may differ: they are no part of what was fitted.
+    """
+    _require_same_arm(recorded.dh, given, place)
+    differs = {
+        "which joints slide": recorded.dh.prismatic != given.dh.prismatic,
+        "joint_map or signs": np.abs(recorded.joint_map - given.joint_map) > _SAME,
+        "base": ~_close(recorded.base, given.base),
+        "flange": ~_close(recorded.flange, given.flange),
+    }
+    problems = [
+        Problem(place, f"{given.name} differs from the recorded {recorded.name} in {what}")
+        for what, there in differs.items()
+        if np.any(there)
+    ]
+    if problems:
+        raise InputError(problems, f"The results were made with another robot than {given.name}")
+
+
+def _close(one: Pose, other: Pose) -> np.ndarray:
+    pairs = zip(one, other, strict=True)
+    return np.array([np.allclose(a, b, rtol=_SAME, atol=_SAME) for a, b in pairs])
+
+
+def _require_same_arm(nominal, robot: Robot, name: str) -> None:
+    place = f"results {name}".strip()
+    if nominal.joints != robot.dh.joints:
+        what = f"speak of {nominal.joints} joints, {robot.name} has {robot.dh.joints}"
+        raise InputError(Problem(place, what, fix="give the robot they were made with (--robot)"))
+    problems = []
+    for each in PARAMETERS:
+        made, given = getattr(nominal, each), getattr(robot.dh, each)
+        for joint in np.flatnonzero(np.abs(made - given) > _SAME * (1.0 + np.abs(given))):
+            what = f"joint {joint + 1} was fitted from {each} {made[joint]:.9g}"
+            allowed = f"{given[joint]:.9g}, as {robot.name} has it"
+            problems.append(Problem(place, what, allowed))
+    if problems:
+        raise InputError(problems, f"The results were made with another robot than {robot.name}")

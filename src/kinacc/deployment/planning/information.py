@@ -1,0 +1,114 @@
+"""What one measured pose tells of the parameters of a calibration, and what no pose tells.
+
+The arm is linearised at its nominal parameters. Displacements count in mm and mrad, a rotation of
+one radian weighs as much as ``rotation_weight_mm_per_rad`` in position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinacc.calibration import blind_groups, blind_words, frames
+from kinacc.calibration.dh_fit import joints_anywhere
+from kinacc.calibration.frames import BASE, MOTIONS
+from kinacc.calibration.identified import STRUCTURAL
+from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
+from kinacc.deployment.predict import sensitivity
+from kinacc.deployment.record import TOOL, Calibration, nominal
+from kinacc.geometry import Pose
+from kinacc.kinematics.robot import Robot
+
+_BLOCK = 512
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What will be measured and fitted.
+
+    ``tool`` is the measured point or frame in the last DH frame; ``orientation``: a full pose is
+    measured, not a position alone; ``frames_estimated``: base and tool are unknown as well;
+    ``hayati_joints`` (1-based) have a beta. ``threshold``: a direction seen with less than this
+    share of the best-seen one counts as undetermined.
+    """
+
+    tool: Pose
+    orientation: bool = True
+    frames_estimated: bool = True
+    hayati_joints: tuple[int, ...] = ()
+    rotation_weight_mm_per_rad: float = 500.0
+    threshold: float = 1e-2
+
+
+@dataclass(frozen=True)
+class Information:
+    """Rows (n, m, r) that n candidate poses add to the normal equations of r directions.
+
+    The r directions are those at least one candidate shows; ``excluded`` says in sentences what
+    that leaves open. ``values`` are the singular values of all candidates together, falling, of
+    ``names`` parameters (P,), and ``rank`` how many of them count.
+    """
+
+    rows: np.ndarray
+    names: tuple[str, ...]
+    values: np.ndarray
+    rank: int
+    excluded: tuple[str, ...]
+
+
+def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Information:
+    """Information of poses at reported joints (n, k), rad and mm."""
+    names = parameter_names(robot, experiment)
+    count = len(names)
+    blank = Uncertainty(names, np.eye(count), np.zeros((0, count)))
+    arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
+    slopes = _slopes(arm, np.atleast_2d(q_rad) @ robot.joint_map.T, experiment)
+    _, values, right = np.linalg.svd(slopes.reshape(-1, count), full_matrices=False)
+    rank = int(np.sum(values > experiment.threshold * values[0]))
+    lost = right[rank:] if len(right) == count else _complement(right[:rank])
+    excluded = _said(arm, experiment, lost) if len(lost) else ()
+    return Information(slopes @ right[:rank].T, names, values, rank, excluded)
+
+
+def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:
+    """Movement (n, m, P) of what is measured at DH joints (n, k), per mm or mrad."""
+    weight = np.ones(6)
+    weight[3:] = experiment.rotation_weight_mm_per_rad
+    seen = 6 if experiment.orientation else 3
+    slopes = np.empty((len(q_dh), seen, len(arm.known.names)))
+    for begin in range(0, len(q_dh), _BLOCK):
+        block = slice(begin, begin + _BLOCK)
+        part = sensitivity(arm, q_dh[block], None, "instrument", TOOL)
+        slopes[block] = (part * weight[:, None])[:, :seen] * arm.units
+    return slopes
+
+
+def _said(arm: Calibration, experiment: Experiment, lost: np.ndarray) -> tuple[str, ...]:
+    """What the directions ``lost`` (u, P) leave open, in the sentences of a fit."""
+    names = arm.known.names
+    anywhere = _slopes(arm, joints_anywhere(arm.robot.dh), experiment).reshape(-1, len(names))
+    _, values, right = np.linalg.svd(anywhere)
+    hidden = right[int(np.sum(values > STRUCTURAL * values[0])) :]
+    groups = blind_groups.groups(hidden, lost, blind_words.of_arm(names))
+    fitted = frames.known(arm.base, experiment.tool)
+    return tuple(text for text, _ in blind_words.statements(groups, names, fitted))
+
+
+def parameter_names(robot: Robot, experiment: Experiment) -> tuple[str, ...]:
+    """Names (P,) of what is fitted, base and tool first."""
+    free = [
+        name
+        for name in dh_parameter_names(robot.dh.joints)
+        if not name.endswith("beta_rad") or int(name[1]) in experiment.hayati_joints
+    ]
+    if not experiment.frames_estimated:
+        return tuple(free)
+    motions = MOTIONS if experiment.orientation else MOTIONS[:3]
+    base = [f"{BASE}.{motion}" for motion in MOTIONS]
+    return (*base, *(f"{TOOL}.{motion}" for motion in motions), *free)
+
+
+def _complement(kept: np.ndarray) -> np.ndarray:
+    """Orthonormal rows that complete ``kept`` (r, P)."""
+    return np.linalg.svd(kept)[2][len(kept) :]

@@ -1,0 +1,156 @@
+"""Poses a calibrated arm is predicted to take, each with how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from kinacc.calibration.frames import MOTIONS
+from kinacc.calibration.uncertainty import dh_parameter_names, vec_parameter_names
+from kinacc.deployment.record import FLANGE, Calibration
+from kinacc.geometry import Pose, compose, skew
+from kinacc.kinematics import dh, vec
+from kinacc.kinematics.vec import VECModel
+
+BLOCK = 512  # poses per pass: bounds the memory of the sensitivities
+
+
+class Prediction(NamedTuple):
+    """Predicted poses (n, ...) and what is known of them.
+
+    ``std`` (n, 6): standard deviations by the parameter covariance of x, y, z (mm) and of small
+    turns about x, y, z (rad), in the frame of the pose; NaN where the model has no covariance.
+    ``std_position_mm`` and ``std_orientation_rad`` (n,): roots of the summed variances.
+    ``blind_mm`` and ``blind_rad`` (n,): how far the pose moves when the parameters move by one unit
+    (1 mm or 1 mrad) along the directions the calibration could not see, root of the summed squares.
+    ``residual_mm`` and ``residual_rad`` (n,): rms of what the model left unexplained.
+    ``outside`` (n, k): joints outside the range the data cover; there a VEC model says nothing, and
+    all else is NaN.
+    """
+
+    pose: Pose
+    std: np.ndarray
+    std_position_mm: np.ndarray
+    std_orientation_rad: np.ndarray
+    blind_mm: np.ndarray
+    blind_rad: np.ndarray
+    residual_mm: np.ndarray
+    residual_rad: np.ndarray
+    outside: np.ndarray
+
+
+def predict(
+    calibration: Calibration,
+    q_rad: np.ndarray,
+    s: np.ndarray | None = None,
+    frame: str = "base",
+    point: str | None = None,
+    progress: Callable[[Iterable[int], str], Iterable[int]] | None = None,
+) -> Prediction:
+    """Poses of ``point`` in ``frame`` (base, instrument) at reported joints (n, k), rad and mm.
+
+    ``s`` (n, k): travel directions, unknown where not given. ``point``: a target by name or
+    ``flange``; the tool where not given. Raises InputError for an unknown frame or point.
+    """
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float)) @ calibration.robot.joint_map.T
+    count, outside = len(q_rad), calibration.outside_range(q_rad)
+    silent = outside.any(axis=1) & isinstance(calibration.model, VECModel)
+    said = np.flatnonzero(~silent)
+    pose = Pose(np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan))
+    std, blind = np.full((count, 6), np.nan), np.full((count, 2), np.nan)
+    undetermined = None
+    if calibration.known is not None:
+        undetermined = (calibration.known.undetermined * calibration.units).T
+    starts = range(0, len(said), BLOCK)
+    for begin in progress(starts, f"blocks of {BLOCK} poses") if progress else starts:
+        rows = said[begin : begin + BLOCK]
+        part = None if s is None else np.asarray(s)[rows]
+        found = calibration.pose(q_rad[rows], part, frame, point)
+        pose.rotation[rows], pose.position_mm[rows] = found
+        if undetermined is None:
+            continue
+        slopes = sensitivity(calibration, q_rad[rows], part, frame, point)
+        std[rows] = np.sqrt(np.sum((slopes @ calibration.root) ** 2, axis=2))
+        unseen = (slopes @ undetermined) ** 2
+        blind[rows, 0] = np.sqrt(unseen[:, :3].sum(axis=(1, 2)))
+        blind[rows, 1] = np.sqrt(unseen[:, 3:].sum(axis=(1, 2)))
+    left = calibration.residual
+    return Prediction(
+        pose,
+        std,
+        np.sqrt(np.sum(std[:, :3] ** 2, axis=1)),
+        np.sqrt(np.sum(std[:, 3:] ** 2, axis=1)),
+        blind[:, 0],
+        blind[:, 1],
+        np.where(silent, np.nan, left.position_mm if left else np.nan),
+        np.where(silent, np.nan, left.orientation_rad if left else np.nan),
+        outside,
+    )
+
+
+def sensitivity(
+    calibration: Calibration,
+    q_rad: np.ndarray,
+    s: np.ndarray | None = None,
+    frame: str = "base",
+    point: str | None = None,
+) -> np.ndarray:
+    """Jacobian (n, 6, P) of the pose in the parameters of ``calibration.known``.
+
+    Rows: position (mm) and small turn (rad) in ``frame``; ``q_rad`` (n, k) are DH joints.
+    """
+    name = point or calibration.default_point
+    carried, origin = calibration.point(name), calibration.origin(frame)
+    end = calibration.forward(q_rad, s)
+    slopes = np.zeros((len(q_rad), 6, len(calibration.known.names)))
+    place = {each: number for number, each in enumerate(calibration.known.names)}
+    jacobian, names = _model_jacobian(calibration, q_rad, s)
+    chosen = [(place[each], number) for number, each in enumerate(names) if each in place]
+    columns, numbers = np.array(chosen, dtype=int).reshape(-1, 2).T
+    slopes[:, :, columns] = jacobian[:, :, numbers]
+    # A turn of the last frame swings the point: w x arm = -[arm] w.
+    arm = (end.rotation @ carried.position_mm[:, None])[..., 0]
+    slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
+    if name != FLANGE:
+        _fill(slopes, place, name, end.rotation, np.zeros_like(arm))
+    slopes[:, :3] = origin.rotation @ slopes[:, :3]
+    slopes[:, 3:] = origin.rotation @ slopes[:, 3:]
+    if frame == "instrument" or calibration.anchor is not None:
+        # Motions of the base are about the instrument's axes, seen here in ``frame``.
+        turn = origin.rotation @ calibration.base.rotation.T
+        seen = compose(origin, compose(end, carried)).position_mm - origin.position_mm
+        _fill(slopes, place, calibration.base_name, np.broadcast_to(turn, end.rotation.shape), seen)
+    return slopes
+
+
+def _model_jacobian(
+    calibration: Calibration, q_rad: np.ndarray, s: np.ndarray | None
+) -> tuple[np.ndarray, list[str]]:
+    """Jacobian (n, 6, P) of the last frame in the model's parameters, and their names (P,)."""
+    model = calibration.model
+    if isinstance(model, VECModel):
+        return vec.parameter_jacobian(model, q_rad, s), vec_parameter_names(model)
+    jacobian = dh.parameter_jacobian(model, q_rad)
+    return jacobian.reshape(len(q_rad), 6, -1), dh_parameter_names(model.joints)
+
+
+def _fill(
+    slopes: np.ndarray,
+    place: dict[str, int],
+    name: str,
+    turned: np.ndarray,
+    arm: np.ndarray,
+) -> None:
+    """Columns of the motions of a frame: shifts (n, 3) ``turned``, turns swinging ``arm``."""
+    for axis, motion in enumerate(MOTIONS):
+        column = place.get(f"{name}.{motion}")
+        if column is None:
+            continue
+        along = turned[:, :, axis % 3]
+        if axis < 3:
+            slopes[:, :3, column] = along
+        else:
+            slopes[:, :3, column] = np.cross(along, arm)
+            slopes[:, 3:, column] = along

@@ -1,0 +1,163 @@
+"""A calibrated arm as one record: robot, chosen model, frames, and how sure the fit was of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
+from kinacc.calibration.uncertainty import Uncertainty, is_angle
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
+from kinacc.kinematics import dh, vec
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.robot import Robot
+from kinacc.kinematics.vec import VECModel
+
+MODELS = ("dh", "vec", "nominal")
+FRAMES = ("base", "instrument")
+FLANGE, TOOL = "flange", "tool"
+_LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Rms magnitudes of what a model leaves unexplained, and of which rows ("validation")."""
+
+    position_mm: float
+    orientation_rad: float
+    subset: str
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """``base`` and ``targets`` of the DH model, as those of ``Calibration``."""
+
+    base: Pose
+    targets: Mapping[str, Pose]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One model of one calibrated arm.
+
+    ``choice`` is nominal, dh or vec. ``base`` is the first DH frame in the instrument's frame,
+    ``targets`` are tool and other targets in the last DH frame. ``known`` is the uncertainty of the
+    fit (None for the nominal model), ``residual`` what the model does not explain.
+    ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides).
+    ``base_name`` is what ``known`` calls the base, which differs by session. ``anchor`` is the DH
+    model of the same data where this is a VEC model fitted with its base: errors of a VEC model can
+    turn or shift base and tool against each other by centimetres and no measured pose shows it, so
+    the robot's own base, and the tool programs mean, are those of the DH model.
+    """
+
+    name: str
+    robot: Robot
+    choice: str
+    model: DHModel | VECModel
+    base: Pose
+    targets: Mapping[str, Pose]
+    known: Uncertainty | None = None
+    residual: Residual | None = None
+    fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None
+    base_name: str = "base"
+    anchor: Anchor | None = None
+
+    @property
+    def default_point(self) -> str:
+        """The tool where there is one, else the first target."""
+        return TOOL if TOOL in self.targets else next(iter(self.targets), FLANGE)
+
+    def point(self, name: str | None) -> Pose:
+        """A target by name, or the flange, in the last DH frame. InputError for another name."""
+        return self._among(self.targets, name)
+
+    def programmed_point(self, name: str | None) -> Pose:
+        """A target as programs of the nominal arm mean it, in the last DH frame."""
+        return self._among(self.anchor.targets if self.anchor else self.targets, name)
+
+    def _among(self, targets: Mapping[str, Pose], name: str | None) -> Pose:
+        name = name or self.default_point
+        if name in targets:
+            return targets[name]
+        if name == FLANGE:
+            return self.robot.flange
+        known = ", ".join([*self.targets, FLANGE])
+        raise InputError(Problem("point", f"{name!r} is none of this calibration", known))
+
+    def origin(self, frame: str) -> Pose:
+        """First DH frame in ``frame``: the robot's own base, or the instrument."""
+        if frame not in FRAMES:
+            raise InputError(Problem("frame", f"{frame!r}", ", ".join(FRAMES)))
+        if frame == "instrument":
+            return self.base
+        if self.anchor is None:
+            return self.robot.base
+        return compose(self.robot.base, compose(invert(self.anchor.base), self.base))
+
+    def forward(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+        """Last DH frame in the first one, (n, ...), at DH joints (n, k)."""
+        if isinstance(self.model, VECModel):
+            return vec.pose(self.model, q_rad, s)
+        return dh.forward(self.model, q_rad)
+
+    def pose(
+        self,
+        q_rad: np.ndarray,
+        s: np.ndarray | None = None,
+        frame: str = "base",
+        point: str | None = None,
+    ) -> Pose:
+        """Poses (n, ...) of a point in ``frame`` at DH joints (n, k); travel s (n, k)."""
+        return compose(self.origin(frame), compose(self.forward(q_rad, s), self.point(point)))
+
+    def joint_jacobian(
+        self,
+        q_rad: np.ndarray,
+        s: np.ndarray | None = None,
+        frame: str = "base",
+        point: str | None = None,
+    ) -> np.ndarray:
+        """Jacobian (n, 6, k) of ``pose`` in the DH joints; rows as in ``dh.joint_jacobian``."""
+        if isinstance(self.model, VECModel):
+            slopes = vec.joint_jacobian(self.model, q_rad, s)
+        else:
+            slopes = dh.joint_jacobian(self.model, q_rad)
+        # A turn of the last frame swings the point: w x arm = -[arm] w.
+        arm = self.forward(q_rad, s).rotation @ self.point(point).position_mm
+        slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
+        turn = self.origin(frame).rotation
+        return np.concatenate([turn @ slopes[:, :3], turn @ slopes[:, 3:]], axis=1)
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """Matrix (P, r) whose product with its transpose is the covariance of ``known``."""
+        if self.known is None:
+            return np.zeros((0, 0))
+        units = self.units
+        values, vectors = np.linalg.eigh(self.known.covariance / np.outer(units, units))
+        kept = values > _LEAST_SHARE * max(float(values[-1]), 0.0)
+        return units[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+
+    @property
+    def units(self) -> np.ndarray:
+        """Unit (P,) in which displacements of the parameters are measured: mm, and one mrad."""
+        names = self.known.names if self.known else ()
+        return np.where([is_angle(name) for name in names], ANGLE_UNIT_RAD, 1.0)
+
+    def outside_range(self, q_rad: np.ndarray, slack: np.ndarray | float = 1e-9) -> np.ndarray:
+        """True (n, k) where a DH joint lies outside what the data cover by more than ``slack``."""
+        q_rad = np.atleast_2d(q_rad)
+        if self.fitted_range_rad is None:
+            return np.zeros(q_rad.shape, dtype=bool)
+        low, high = self.fitted_range_rad
+        return (q_rad < low - slack) | (q_rad > high + slack)
+
+
+def nominal(robot: Robot, name: str = "") -> Calibration:
+    """A robot as its maker describes it, as a calibration that nothing was learned for."""
+    tool = compose(robot.flange, robot.tool)
+    return Calibration(name or robot.name, robot, "nominal", robot.dh, IDENTITY, {TOOL: tool})

@@ -1,0 +1,21 @@
+"""Nominal description of an arm: joints, limits, how reported joints turn the axes.
+
+A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
+"""
+
+from kinacc.kinematics.robot.description import files, load, of_text, shipped
+from kinacc.kinematics.robot.record import Robot, carried, dh_angles, forward, in_own_units
+from kinacc.kinematics.robot.written import as_yaml
+
+__all__ = [
+    "Robot",
+    "as_yaml",
+    "carried",
+    "dh_angles",
+    "files",
+    "forward",
+    "in_own_units",
+    "load",
+    "of_text",
+    "shipped",
+]

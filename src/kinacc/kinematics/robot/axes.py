@@ -1,0 +1,130 @@
+"""DH chain of an arm whose axes are known as lines in space.
+
+Crossing and skew axes are joined by their common normal, which is unique. For (nearly) parallel
+axes it is not, or lies kilometres away: there the next frame sits where the next axis crosses the
+plane of the last one (d = 0) and a Hayati angle beta takes up what alpha cannot, so every parameter
+stays of the arm's own size and no digits are lost.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kinacc.geometry import Pose, compose, invert, rotation_x, rotation_y, rotation_z
+from kinacc.kinematics.dh import DHModel
+
+NEARLY_PARALLEL = 0.02  # sine of the angle between two axes below which a Hayati angle is used
+_ON_AXIS_MM = 1e-10
+_TIE = 1e-9
+_ROUND_OFF_RAD = 1e-15
+
+
+class Axes(NamedTuple):
+    """k joint axes at zero joints in the base frame: points (k, 3) and unit directions (k, 3)."""
+
+    point_mm: np.ndarray
+    direction: np.ndarray
+
+
+def chain_of(axes: Axes, flange: Pose, prismatic: np.ndarray) -> tuple[Pose, DHModel, Pose]:
+    """Base, DH chain and flange with ``base chain(q) flange`` the arm's forward kinematics.
+
+    ``flange`` is the arm's flange at zero joints in the base frame. The base is the identity where
+    axis 1 is the base z axis, the returned flange where the last row can reach it by itself.
+    """
+    frame = base = _first_frame(axes.point_mm[0], axes.direction[0])
+    rows = []
+    for joint in range(1, len(axes.direction)):
+        rows.append(_row(frame, axes.point_mm[joint], axes.direction[joint]))
+        frame = compose(frame, _across(rows[-1]))
+    rows.append(_last_row(frame, flange))
+    frame = compose(frame, _across(rows[-1]))
+    rest = compose(invert(frame), flange)
+    columns = np.array(rows).T + 0.0  # no negative zeros
+    return base, DHModel(*columns, prismatic), _without_round_off(rest)
+
+
+def _first_frame(point: np.ndarray, direction: np.ndarray) -> Pose:
+    """Frame with z along axis 1, as close to the base frame as that allows."""
+    if np.abs(direction - [0.0, 0.0, 1.0]).max() < 1e-15:
+        rotation = np.eye(3)
+    else:
+        aside = np.eye(3)[0 if abs(direction[0]) < 0.9 else 1]
+        y = np.cross(direction, aside)
+        y /= np.linalg.norm(y)
+        rotation = np.stack([np.cross(y, direction), y, direction], axis=1)
+    return Pose(rotation, point - (point @ direction) * direction)
+
+
+def _row(frame: Pose, point: np.ndarray, direction: np.ndarray) -> tuple[float, ...]:
+    """theta, d, a, alpha, beta from a frame on one axis to a frame on the next."""
+    w = frame.rotation.T @ direction
+    p = frame.rotation.T @ (point - frame.position_mm)
+    sine = np.hypot(w[0], w[1])
+    if sine < NEARLY_PARALLEL:
+        at = p - p[2] / w[2] * w
+        theta, a = _theta_and_length(at[0], at[1])
+        return (theta, 0.0, a, *_tilt(theta, w))
+    x, y, alpha = _normal(w, sine)
+    along = (p @ y) / -np.sin(alpha)
+    d = p[2] - along * w[2]
+    return np.arctan2(x[1], x[0]), d, p @ x, alpha, 0.0
+
+
+def _last_row(frame: Pose, flange: Pose) -> tuple[float, ...]:
+    """The row from the last axis to the flange: all of it where their z axes are parallel."""
+    w = frame.rotation.T @ flange.rotation[:, 2]
+    p = frame.rotation.T @ (flange.position_mm - frame.position_mm)
+    if np.hypot(w[0], w[1]) >= NEARLY_PARALLEL:
+        return _row(frame, flange.position_mm, flange.rotation[:, 2])
+    theta, a = _theta_and_length(p[0], p[1])
+    if a == 0.0:
+        x = frame.rotation.T @ flange.rotation[:, 0]
+        theta = np.arctan2(x[1], x[0])
+    return (theta, p[2], a, *_tilt(theta, w))
+
+
+def _normal(w: np.ndarray, sine: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Direction x of the common normal of z and ``w``, y = z cross x, and alpha about x.
+
+    Of the two senses the one that keeps theta within a quarter turn, so that an arm drawn in its
+    zero pose has the table people draw up for it.
+    """
+    x = np.array([-w[1], w[0], 0.0]) / sine
+    if x[0] < -_TIE or (abs(x[0]) <= _TIE and x[1] < 0.0):
+        x = -x
+    y = np.array([-x[1], x[0], 0.0])
+    return x, y, float(np.arctan2(-(w @ y), w[2]))
+
+
+def _theta_and_length(x: float, y: float) -> tuple[float, float]:
+    length = float(np.hypot(x, y))
+    if length < _ON_AXIS_MM:
+        return 0.0, 0.0
+    if x < -_TIE * length or (abs(x) <= _TIE * length and y < 0.0):
+        return float(np.arctan2(-y, -x)), -length
+    return float(np.arctan2(y, x)), length
+
+
+def _tilt(theta: float, w: np.ndarray) -> tuple[float, float]:
+    """alpha and beta that turn z into the direction ``w``, after theta."""
+    u = rotation_z(theta).T @ w
+    beta = float(np.arctan2(u[0], np.hypot(u[1], u[2])))
+    return float(np.arctan2(-u[1], u[2])), beta if abs(beta) > _ROUND_OFF_RAD else 0.0
+
+
+def _across(row: tuple[float, ...]) -> Pose:
+    theta, d, a, alpha, beta = row
+    turn = rotation_z(theta)
+    return Pose(
+        turn @ rotation_x(alpha) @ rotation_y(beta), turn @ np.array([a, 0.0, 0.0]) + [0, 0, d]
+    )
+
+
+def _without_round_off(pose: Pose) -> Pose:
+    """Identity where nothing but rounding is left."""
+    turned = np.abs(pose.rotation - np.eye(3)).max() > 1e-14
+    moved = np.abs(pose.position_mm).max() > 1e-11
+    return Pose(pose.rotation if turned else np.eye(3), pose.position_mm if moved else np.zeros(3))

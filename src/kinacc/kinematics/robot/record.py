@@ -1,0 +1,59 @@
+"""The nominal arm as a record, and what follows from it alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.geometry import IDENTITY, Pose, compose
+from kinacc.kinematics import dh as _dh
+from kinacc.kinematics.dh import DHModel
+
+FEWEST_JOINTS, MOST_JOINTS = 4, 7
+
+
+@dataclass(frozen=True)
+class Robot:
+    """An arm as its maker describes it.
+
+    ``dh`` is the nominal model; ``q_min_rad`` and ``q_max_rad`` (k,) limit the reported joints (mm
+    where a joint slides); ``joint_map`` (k, k) turns reported joints into DH joints (signs and
+    couplings); ``source`` and ``date`` say where the figures come from. ``base`` is the first DH
+    frame in the arm's own base frame, ``flange`` the mechanical flange in the last DH frame and
+    ``tool`` the tool centre point in the flange frame; the first two differ from identity only
+    where the description was converted from another form.
+    """
+
+    name: str
+    dh: DHModel
+    q_min_rad: np.ndarray
+    q_max_rad: np.ndarray
+    joint_map: np.ndarray
+    source: str
+    date: str = ""
+    base: Pose = IDENTITY
+    flange: Pose = IDENTITY
+    tool: Pose = IDENTITY
+    joint_names: tuple[str, ...] = ()
+
+
+def dh_angles(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
+    """DH joint values (n, k) of reported joints (n, k)."""
+    return np.asarray(q_rad, dtype=float) @ robot.joint_map.T
+
+
+def forward(robot: Robot, q_rad: np.ndarray) -> Pose:
+    """Flange poses (n, ...) in the arm's base frame at reported joints (n, k), nominal model."""
+    end = _dh.forward(robot.dh, dh_angles(robot, np.atleast_2d(q_rad)))
+    return compose(compose(robot.base, end), robot.flange)
+
+
+def in_own_units(robot: Robot, joints: np.ndarray) -> np.ndarray:
+    """Reported joints (..., k) given in degrees, mm where a joint slides, in rad and mm."""
+    return np.where(robot.dh.prismatic, joints, np.deg2rad(joints))
+
+
+def carried(robot: Robot) -> Pose:
+    """Tool centre point of the description in the last DH frame: flange, then tool."""
+    return compose(robot.flange, robot.tool)

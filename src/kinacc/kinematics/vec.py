@@ -1,0 +1,278 @@
+"""Volumetric error compensation (VEC) model: joint-dependent Chebyshev errors (eqs. 5-6).
+
+In front of every DH joint stands a first-order error matrix whose six elements (``ERRORS``) are
+Chebyshev polynomials of that joint's angle (in mm of its travel, for a prismatic one), mapped from
+``[q_min, q_max]`` to [-1, 1]. ``eps_z`` also takes an offset by travel direction s: none at 0, the
+first at -1, the second at +1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from kinacc.geometry import Pose, project_so3, skew, vee
+from kinacc.kinematics import chain as _chain
+from kinacc.kinematics import dh as _dh
+from kinacc.kinematics.dh import DHModel
+
+ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
+
+
+@dataclass(frozen=True)
+class VECModel:
+    """Errors of k joints acting on ``dh``.
+
+    ``coefficients`` (k, 6, order + 1) in mm (delta) and rad (eps); ``direction_offsets_rad`` (k, 2)
+    of eps_z for s = -1 and s = +1; joint range ``q_min_rad``, ``q_max_rad`` (k,).
+    """
+
+    dh: DHModel
+    q_min_rad: np.ndarray
+    q_max_rad: np.ndarray
+    coefficients: np.ndarray
+    direction_offsets_rad: np.ndarray
+
+    def __post_init__(self) -> None:
+        for field in fields(self)[1:]:
+            value = np.array(getattr(self, field.name), dtype=float)
+            value.setflags(write=False)
+            object.__setattr__(self, field.name, value)
+
+    @property
+    def order(self) -> int:
+        """Order of the Chebyshev polynomials."""
+        return self.coefficients.shape[-1] - 1
+
+    @property
+    def joints(self) -> int:
+        """Number of joints k."""
+        return self.dh.joints
+
+
+def without_errors(
+    dh: DHModel, q_min_rad: np.ndarray, q_max_rad: np.ndarray, order: int
+) -> VECModel:
+    """The model whose errors are all zero: it equals ``dh``."""
+    shape = (dh.joints, len(ERRORS), order + 1)
+    return VECModel(dh, q_min_rad, q_max_rad, np.zeros(shape), np.zeros((dh.joints, 2)))
+
+
+def to_vector(model: VECModel) -> np.ndarray:
+    """Coefficients (P,): joint, error, order; then the direction offsets: joint, direction."""
+    return np.concatenate([model.coefficients.ravel(), model.direction_offsets_rad.ravel()])
+
+
+def with_vector(model: VECModel, vector: np.ndarray) -> VECModel:
+    """The model with the coefficients of ``vector`` (P,), ordered as ``to_vector``."""
+    split = model.coefficients.size
+    return replace(
+        model,
+        coefficients=np.reshape(vector[:split], model.coefficients.shape),
+        direction_offsets_rad=np.reshape(vector[split:], model.direction_offsets_rad.shape),
+    )
+
+
+def mapped_joints(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
+    """Joints (n, k) mapped from the fitted range to [-1, 1]; beyond it the model extrapolates."""
+    span = model.q_max_rad - model.q_min_rad
+    return (2.0 * np.asarray(q_rad, dtype=float) - model.q_min_rad - model.q_max_rad) / span
+
+
+def chebyshev_basis(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
+    """Chebyshev polynomials of the first kind (n, k, order + 1) at joints (n, k)."""
+    return _basis(mapped_joints(model, q_rad), model.order)
+
+
+def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    """Joint errors (n, k, 6) in mm and rad at joints (n, k) and travel directions s (n, k)."""
+    return _errors(model, chebyshev_basis(model, np.atleast_2d(q_rad)), s)
+
+
+def forward(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+    """Flange poses (n, ...) as eqs. 5-6 print them: the rotation is not quite orthonormal."""
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    joint_errors = errors(model, q_rad, s)
+    frames = _chain.start(len(q_rad))
+    for joint in range(model.joints):
+        frames = _chain.disturb(frames, joint_errors[:, joint].T)
+        frames = _dh.across_joint(model.dh, joint, frames, q_rad[:, joint])
+    return _chain.to_pose(frames)
+
+
+def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+    """Flange poses (n, ...) with the rotation projected to SO(3)."""
+    raw = forward(model, q_rad, s)
+    return Pose(project_so3(raw.rotation), raw.position_mm)
+
+
+def joint_jacobian(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    """Jacobian (n, 6, k) of ``pose`` in the joints; rows as in ``dh.joint_jacobian``. Exact."""
+    split = _split(model, q_rad, s)
+    slopes = _slopes(model, q_rad)
+    jacobian = np.empty((len(split.rotation), 6, model.joints))
+    turn_z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    for joint in range(model.joints):
+        before, after = split.before[joint], split.after[joint]
+        linear, angular = slopes[:, joint, :3], slopes[:, joint, 3:]
+        tilted = np.eye(3) + skew(split.errors[:, joint, 3:])
+        spin = skew(angular)
+        if model.dh.prismatic[joint]:
+            linear = linear + tilted[..., 2]
+        else:
+            spin = spin + tilted @ turn_z
+        moved = (spin @ after.position_mm[..., None])[..., 0] + linear
+        jacobian[:, :3, joint] = (before @ moved[..., None])[..., 0]
+        twisted = split.rotation_t @ before @ spin @ after.rotation
+        jacobian[:, 3:, joint] = _angular_rate(split, 2.0 * vee(twisted))
+    return jacobian
+
+
+def elementary_jacobian(
+    model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
+) -> np.ndarray:
+    """Jacobian (n, 6, k, 6) of ``pose`` in the six errors of every joint, as ``ERRORS``. Exact."""
+    return _elementary_jacobian(_split(model, q_rad, s))
+
+
+def parameter_jacobian(
+    model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
+) -> np.ndarray:
+    """Jacobian (n, 6, P) of ``pose`` in the coefficients, ordered as ``to_vector``. Exact."""
+    split = _split(model, q_rad, s)
+    elementary = _elementary_jacobian(split)
+    count, cut = len(elementary), model.coefficients.size
+    jacobian = np.empty((count, 6, cut + model.direction_offsets_rad.size))
+    expanded = jacobian[:, :, :cut].reshape(count, 6, *model.coefficients.shape)
+    np.multiply(elementary[..., None], split.basis[:, None, :, None, :], out=expanded)
+    offsets = jacobian[:, :, cut:].reshape(count, 6, model.joints, 2)
+    if s is None:
+        offsets[:] = 0.0
+    else:
+        chosen = direction_basis(s)[:, None]
+        np.multiply(elementary[..., ERRORS.index("eps_z"), None], chosen, out=offsets)
+    return jacobian
+
+
+def direction_basis(s: np.ndarray) -> np.ndarray:
+    """Indicators (n, k, 2) of the travel directions -1 and +1 in ``s`` (n, k)."""
+    return (np.asarray(s)[..., None] == np.array([-1, 1])).astype(float)
+
+
+@dataclass(frozen=True)
+class _Split:
+    """The chain cut at every error matrix: what stands before it and what follows it."""
+
+    basis: np.ndarray  # (n, k, order + 1)
+    errors: np.ndarray  # (n, k, 6)
+    before: list[np.ndarray]  # k of (n, 3, 3): rotation from the base up to the error matrix
+    after: list[Pose]  # k of n poses: flange seen from behind the error matrix
+    rotation: np.ndarray  # (n, 3, 3): projected flange rotation Q, raw rotation = Q S
+    rotation_t: np.ndarray
+    rate_matrix: np.ndarray  # (n, 3, 3): inverse of tr(S) I - S
+
+
+def _split(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None) -> _Split:
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    basis = chebyshev_basis(model, q_rad)
+    joint_errors = _errors(model, basis, s)
+    frames = _chain.start(len(q_rad))
+    before, links = [], []
+    for joint in range(model.joints):
+        before.append(_chain.to_pose(frames).rotation)
+        link = _dh.across_joint(model.dh, joint, _chain.start(len(q_rad)), q_rad[:, joint])
+        links.append(_chain.to_pose(link))
+        frames = _chain.disturb(frames, joint_errors[:, joint].T)
+        frames = _dh.across_joint(model.dh, joint, frames, q_rad[:, joint])
+    after: list[Pose] = [links[-1]]
+    for joint in range(model.joints - 2, -1, -1):
+        following = after[0]
+        error = joint_errors[:, joint + 1]
+        tilt = np.eye(3) + skew(error[:, 3:])
+        tilted = tilt @ following.rotation
+        moved = (tilt @ following.position_mm[..., None])[..., 0] + error[:, :3]
+        link = links[joint]
+        after.insert(
+            0,
+            Pose(
+                link.rotation @ tilted,
+                (link.rotation @ moved[..., None])[..., 0] + link.position_mm,
+            ),
+        )
+    raw = _chain.to_pose(frames).rotation
+    rotation = project_so3(raw)
+    rotation_t = np.swapaxes(rotation, 1, 2)
+    stretch = rotation_t @ raw
+    trace = np.trace(stretch, axis1=1, axis2=2)
+    rate_matrix = np.linalg.inv(trace[:, None, None] * np.eye(3) - stretch)
+    return _Split(basis, joint_errors, before, after, rotation, rotation_t, rate_matrix)
+
+
+def _elementary_jacobian(split: _Split) -> np.ndarray:
+    """Jacobian (n, 6, k, 6) of the projected pose in the elements of every error matrix."""
+    # Arrays of one number per pose, poses last: small batched cross products would cost 5 times.
+    before = np.stack(split.before).transpose(2, 3, 0, 1)  # row, column, joint, pose
+    after = np.stack([pose.rotation for pose in split.after]).transpose(2, 3, 0, 1)
+    reach = np.stack([pose.position_mm for pose in split.after]).transpose(2, 0, 1)
+    turned = np.einsum("nji,gnjk->ikgn", split.rotation, np.stack(split.before))
+    rate = (split.rotation @ split.rate_matrix).transpose(1, 2, 0)[:, :, None]
+    jacobian = np.zeros((6, len(ERRORS), *reach.shape[1:]))
+    jacobian[:3, :3] = before
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        # e_axis x r has two entries: -r_v along u and r_u along v.
+        jacobian[:3, 3 + axis] = before[:, v] * reach[u] - before[:, u] * reach[v]
+        # The skew part of turned [e_axis] after, written with columns and rows.
+        twist = _cross(after[u], turned[:, v]) - _cross(after[v], turned[:, u])
+        for row in range(3):
+            jacobian[3 + row, 3 + axis] = (
+                rate[row, 0] * twist[0] + rate[row, 1] * twist[1] + rate[row, 2] * twist[2]
+            )
+    return np.ascontiguousarray(jacobian.transpose(3, 0, 2, 1))
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of vectors along the first axis."""
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def _angular_rate(split: _Split, twist: np.ndarray) -> np.ndarray:
+    """Rate of the polar factor Q in the base, from vee(X - X') with X = Q' dM, M = Q S."""
+    body = (split.rate_matrix @ twist[..., None])[..., 0]
+    return (split.rotation @ body[..., None])[..., 0]
+
+
+def _basis(x: np.ndarray, order: int) -> np.ndarray:
+    basis = np.empty((*x.shape, order + 1))
+    basis[..., 0] = 1.0
+    if order >= 1:
+        basis[..., 1] = x
+    for n in range(2, order + 1):
+        basis[..., n] = 2.0 * x * basis[..., n - 1] - basis[..., n - 2]
+    return basis
+
+
+def _errors(model: VECModel, basis: np.ndarray, s: np.ndarray | None) -> np.ndarray:
+    values = np.einsum("nkt,ket->nke", basis, model.coefficients)
+    if s is not None:
+        s = np.asarray(s)
+        values[..., 5] += np.where(s == -1, model.direction_offsets_rad[:, 0], 0.0)
+        values[..., 5] += np.where(s == 1, model.direction_offsets_rad[:, 1], 0.0)
+    return values
+
+
+def _slopes(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
+    """Derivatives (n, k, 6) of the joint errors in their own joint, per rad."""
+    x = mapped_joints(model, np.atleast_2d(q_rad))
+    slope = np.zeros((*x.shape, model.order + 1))
+    # T_n' = n U_{n-1}, with U by the same recurrence.
+    second = np.ones_like(x)
+    previous = np.zeros_like(x)
+    for n in range(1, model.order + 1):
+        slope[..., n] = n * second
+        second, previous = 2.0 * x * second - previous, second
+    values = np.einsum("nkt,ket->nke", slope, model.coefficients)
+    return values * (2.0 / (model.q_max_rad - model.q_min_rad))[:, None]

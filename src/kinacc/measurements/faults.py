@@ -1,0 +1,124 @@
+"""Values of a measurement file that cannot be meant, each named with its lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from kinacc.errors import Problem
+from kinacc.kinematics.robot import Robot, forward
+from kinacc.measurements.layout import Place
+from kinacc.measurements.table import RawTable
+
+_UNIT_QUATERNION = 1e-3  # how far from 1 a measured quaternion's length may be
+_CORRELATION = 1.0 + 1e-6  # a correlation may exceed 1 by rounding only
+
+
+def quaternion_problems(
+    table: RawTable, quaternion: np.ndarray, places: Sequence[Place]
+) -> list[Problem]:
+    """Quaternions (n, 4) whose length is not 1."""
+    length = np.linalg.norm(quaternion, axis=1)
+    bad = np.flatnonzero(np.isfinite(length) & (np.abs(length - 1.0) > _UNIT_QUATERNION))
+    if not bad.size:
+        return []
+    names = ", ".join(place.column for place in places)
+    return [
+        Problem(
+            f"{table.path}: columns {names}, {table.rows_in_words(bad)}",
+            f"quaternion of length {length[bad[0]]:.6g}",
+            f"length 1 within {_UNIT_QUATERNION:g}",
+            "check which columns hold it and the decimals written",
+        )
+    ]
+
+
+def negative(table: RawTable, values: np.ndarray, places: Sequence[Place]) -> list[Problem]:
+    """Standard deviations (n, len(places)) below zero."""
+    found = []
+    for place, column in zip(places, values.T, strict=True):
+        bad = np.flatnonzero(column < 0.0)
+        if bad.size:
+            where = f"{table.path}: column {place.column}, {table.rows_in_words(bad)}"
+            value = column[bad[0]] / place.factor
+            found.append(Problem(where, f"standard deviation {value:g}", "0 or above"))
+    return found
+
+
+def covariance_problems(
+    table: RawTable, elements: Sequence[np.ndarray], places: Sequence[Place]
+) -> list[Problem]:
+    """Covariances (xx, xy, xz, yy, yz, zz, each (n,)) that are none."""
+    xx, xy, xz, yy, yz, zz = elements
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlations = np.abs([xy / np.sqrt(xx * yy), xz / np.sqrt(xx * zz), yz / np.sqrt(yy * zz)])
+        determinant = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+        wrong = (np.min([xx, yy, zz], axis=0) <= 0.0) | (correlations.max(axis=0) > _CORRELATION)
+        wrong |= determinant < -1e-9 * xx * yy * zz
+    bad = np.flatnonzero(wrong)
+    if not bad.size:
+        return []
+    names = ", ".join(place.column for place in places)
+    where = f"{table.path}: columns {names}, {table.rows_in_words(bad)}"
+    return [Problem(where, "is no covariance", "a matrix without negative variances")]
+
+
+def limit_problems(
+    table: RawTable, q_rad: np.ndarray, robot: Robot, places: Sequence[Place]
+) -> list[Problem]:
+    """Joint positions (n, k) beyond the robot's limits."""
+    problems = []
+    slides = robot.dh.prismatic
+    for joint, place in enumerate(places):
+        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
+        values = q_rad[:, joint]
+        bad = beyond(values, low, high)
+        if bad.size:
+            unit = 1.0 if slides[joint] else np.pi / 180.0
+            limits = f"{low / unit:g} to {high / unit:g} {'mm' if slides[joint] else 'deg'}"
+            hint = ""
+            if place.factor == 1.0 and np.max(np.abs(values)) > 4.0 * np.pi and not slides[joint]:
+                hint = "the column looks like degrees"
+            value = f"{values[bad[0]] / place.factor:g}"
+            where = f"{table.path}: column {place.column}, {table.rows_in_words(bad)}"
+            what = f"{value} is outside the joint limits"
+            problems.append(Problem(where, what, f"{limits} ({robot.name})", hint))
+    return problems
+
+
+def beyond(values: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Indices of the joint positions beyond the limits; their last written digit may be."""
+    slack = 1e-6
+    return np.flatnonzero((values < low - slack) | (values > high + slack))
+
+
+def scale_problems(table: RawTable, columns: Mapping, robot: Robot) -> list[Problem]:
+    """Units that cannot be meant: measured points spread unlike the points the arm reaches."""
+    joints = robot.dh.joints
+    q_rad = np.stack([columns[f"q{i + 1}"] for i in range(joints)], axis=1)
+    position_mm = np.stack([columns[f"{axis}_mm"] for axis in "xyz"], axis=1)
+    expected = _spread(forward(robot, q_rad).position_mm)
+    measured = _spread(position_mm)
+    if len(q_rad) < 4 or expected < 1.0:
+        return []
+    ratio = measured / expected
+    where = f"{table.path}: columns x, y, z and q1 .. q{joints}"
+    told = (
+        f"the points spread over {measured:.4g} mm rms, the joints move {robot.name} by "
+        f"{expected:.4g} mm rms"
+    )
+    if ratio < 0.02:
+        return [Problem(where, told, "about the same", "the positions look like metres")]
+    if ratio > 50.0:
+        hint = "the positions look like micrometres, or the joints like radians"
+        return [Problem(where, told, "about the same", hint)]
+    turning = q_rad[:, ~robot.dh.prismatic]
+    if ratio > 3.0 and np.max(np.abs(turning)) < np.deg2rad(2.0 * np.pi) + 1e-9:
+        return [Problem(where, told, "about the same", "the joints look like radians")]
+    return []
+
+
+def _spread(points_mm: np.ndarray) -> float:
+    centred = points_mm - points_mm.mean(axis=0)
+    return float(np.sqrt(np.mean(np.sum(centred**2, axis=1))))

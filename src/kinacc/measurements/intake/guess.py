@@ -1,0 +1,240 @@
+"""A file nobody has described as a ``measurements.file`` section, with all that was assumed."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinacc.errors import InputError, Problem
+from kinacc.measurements.intake import columns, text
+from kinacc.measurements.intake.columns import Columns
+from kinacc.measurements.layout import TOOL, Layout, find
+from kinacc.measurements.names import Name, name_of
+from kinacc.measurements.roles import NOMINAL
+from kinacc.measurements.table import RawTable, numbers
+
+_FULL_TURN_RAD = 2.0 * np.pi * 1.05
+_LARGEST_M = 50.0  # no instrument stands further away
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What ``measurements.file`` would say, and what of it the file does not.
+
+    ``assumed`` are words on settings taken by default or by the size of numbers, by setting:
+    joint_unit, length_unit, angle_unit, orientation, order. ``stated``: columns that state a unit,
+    by setting. ``found`` is what the columns were recognised as; its questions are open.
+    """
+
+    section: dict[str, Any]
+    table: RawTable
+    found: Columns
+    assumed: dict[str, str] = field(default_factory=dict)
+    stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.found.joints)
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Names of the targets."""
+        return tuple(self.found.targets)
+
+    def but(self, settings: Mapping[str, Any]) -> Guess:
+        """The guess with other settings; ``orientation`` is taken key by key."""
+        section = self.section | {k: v for k, v in settings.items() if k != "orientation"}
+        turn = section["orientation"] | settings.get("orientation", {})
+        return replace(self, section=section | {"orientation": turn})
+
+    def unused(self) -> tuple[tuple[tuple[str, ...], str], ...]:
+        """Columns the section does not have read, as the reader itself sees it, and why (or "").
+
+        Raises InputError where the reader cannot follow the section.
+        """
+        problems: list[Problem] = []
+        slides = np.array([name.unit in ("mm", "m") for name in self.found.joints])
+        read = find(self.table, Layout.of(self.section), slides, problems)
+        if read is None:
+            raise InputError(problems, f"{self.table.path} cannot be described")
+        left = list(read.unused(self.table))
+        told = []
+        for group, why in self.found.aside:
+            if set(group.names) <= set(left):
+                told.append((group.names, why))
+                left = [name for name in left if name not in group.names]
+        return (*told, (tuple(left), "")) if left else tuple(told)
+
+
+def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Guess:
+    """The best guess at a file; what it leaves open stands in ``found.questions``.
+
+    ``take``: columns that are read whatever their names say, each for all that go with it;
+    ``turned``: orientations are wanted. Raises InputError where joints or positions cannot be
+    found, where units contradict each other, and where ``take`` names what cannot be read.
+    """
+    written = text.look(path)
+    table = written.load(path)
+    units = written.units or ("",) * len(table.columns)
+    if len(units) != len(table.columns):
+        what = f"{len(units)} units under {len(table.columns)} column names"
+        where = f"{path}: line {written.skip_lines + 2}"
+        raise InputError(Problem(where, what, "a unit, or nothing, for each"))
+    names = [name_of(c, u) for c, u in zip(table.columns, units, strict=True)]
+    cells: dict[str, np.ndarray] = {}
+
+    def values(name: Name) -> np.ndarray:
+        if name.column not in cells:
+            cells[name.column] = numbers(table, name.column, [], gaps=True)
+        return cells[name.column]
+
+    found = columns.recognise(names, values, take, turned)
+    _refuse(str(path), table, found, take)
+    problems: list[Problem] = []
+    sizes = _Units(str(path), values, problems)
+    first = next(iter(found.targets.values()))
+    turn = [n for q, n in first.items() if q in ("rx", "ry", "rz")]
+    joint_unit = sizes.of(
+        [n for n in found.joints if n.unit not in ("mm", "m")],
+        "joint_unit",
+        ("deg", "rad"),
+        _FULL_TURN_RAD,
+    )
+    points = [each[axis] for each in found.targets.values() for axis in "xyz"]
+    length_unit = sizes.of(points, "length_unit", ("mm", "m"), _LARGEST_M)
+    angle_unit = sizes.of(turn, "angle_unit", ("deg", "rad"), _FULL_TURN_RAD)
+    kind, convention = found.turn
+    if kind == "euler":
+        sizes.assumed["orientation"] = (
+            f"the orientations are Euler angles of convention {convention}"
+        )
+    turned_as = {"kind": kind, "convention": convention, "unit": angle_unit}
+    if "quat1" in first:
+        turned_as["order"] = "wxyz"
+        listed = ", ".join(first[f"quat{number}"].column for number in range(1, 5))
+        sizes.assumed["order"] = f"{listed} are w, x, y, z of the quaternion"
+    units = {"joint_unit": joint_unit, "length_unit": length_unit}
+    mapping = _mapping(str(path), found, joint_unit, length_unit, angle_unit, problems)
+    if problems:
+        raise InputError(problems, f"{path} cannot be described")
+    section: dict[str, Any] = {
+        "path": str(path),
+        "delimiter": written.delimiter,
+        "decimal": written.decimal,
+        "skip_lines": written.skip_lines,
+        "skip_under_names": written.skip_under_names,
+        **units,
+        "orientation": turned_as,
+        "targets": list(found.targets),
+        "columns": mapping,
+    }
+    return Guess(section, table, found, sizes.assumed, sizes.stated)
+
+
+def _refuse(path: str, table: RawTable, found: Columns, take: Sequence[str]) -> None:
+    problems = []
+    by_hand = "or write the data set by hand (docs/configuration.md)"
+    for column in take:
+        if column not in table.columns:
+            what = f"{path} has no such column"
+            problems.append(Problem(f"--take {column}", what, ", ".join(table.columns)))
+        elif column not in found.read():
+            whys = [why for group, why in found.aside if column in group.names]
+            what = f"cannot be read{f': {whys[0]}' if whys else ''}"
+            allowed = "one column of joints, of a point or of an orientation"
+            problems.append(Problem(f"--take {column}", what, allowed))
+    for there, kinds, what, allowed, fix in (
+        (found.joints, ("joints",), "no columns of 4 to 7 joints", "q1 ..", "q1_deg, q2_deg .."),
+        (
+            found.targets,
+            ("point", "pose"),
+            "no columns of a measured point",
+            "x, y, z",
+            "x_mm, y_mm, z_mm",
+        ),
+    ):
+        if there:
+            continue
+        left = [(group, why) for group, why in found.aside if group.kind in kinds]
+        told = "; ".join(f"{group.in_words()}: {why}" for group, why in left)
+        takeable = [g.names[0] for g, _ in left if g.kind == "point" and g.role == NOMINAL]
+        fix = f"name them {fix}, {by_hand}"
+        if takeable:
+            fix += f"; --take {shlex.quote(takeable[0])} reads them all the same"
+        what = f"{what} were found" + (f" ({told})" if told else "")
+        problems.append(Problem(path, what, allowed, fix))
+    if problems:
+        raise InputError(problems, f"{path} cannot be described")
+
+
+@dataclass
+class _Units:
+    """Units of columns: those they state, or those the size of their numbers speaks for."""
+
+    path: str
+    values: Callable[[Name], np.ndarray]
+    problems: list[Problem]
+    assumed: dict[str, str] = field(default_factory=dict)
+    stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    def of(
+        self, names: Sequence[Name], setting: str, units: tuple[str, str], largest: float
+    ) -> str:
+        usual, small = units
+        if not names:
+            return usual
+        ends = [names[0].column, names[-1].column]
+        listed = " .. ".join(ends) if len(names) > 3 else ", ".join(n.column for n in names)
+        sizes = [np.nanmax(np.abs(self.values(n)), initial=0.0) for n in names]
+        most = float(max(sizes))
+        stated = list(dict.fromkeys(each.unit for each in names if each.unit))
+        if not stated:
+            unit = small if most <= largest else usual
+            self.assumed[setting] = f"{listed} are in {unit}: the largest number is {most:.4g}"
+            return unit
+        unit = stated[0]
+        self.stated[setting] = (unit, listed)
+        where = f"{self.path}: columns {', '.join(n.column for n in names)}"
+        if unit not in units:
+            self.problems.append(Problem(where, f"are in {unit}", f"{usual} or {small}"))
+        elif unit == "m" and most > largest:
+            what = f"are in m, and the largest number is {most:.4g}"
+            self.problems.append(
+                Problem(where, what, f"at most {largest:g} m", "correct the names")
+            )
+        return unit if unit in units else usual
+
+
+def _mapping(
+    path: str, found: Columns, joint_unit: str, length_unit: str, angle_unit: str, problems
+) -> dict[str, str]:
+    """Our names and the file's, of every column that is read."""
+    mapping: dict[str, str] = {}
+
+    def put(ours: str, name: Name, unit: str) -> None:
+        if name.unit in ("", unit) or not unit:
+            mapping[ours] = name.column
+        elif name.column != f"{ours}_{name.unit}":  # our own name says its unit
+            what = f"is in {name.unit}, others of its kind are in {unit}"
+            fix = "export all of them in one unit"
+            problems.append(Problem(f"{path}: column {name.column}", what, unit, fix))
+
+    for suffix, names in (("", found.joints), ("_cmd", found.commanded)):
+        for number, name in enumerate(names, 1):
+            slides = name.unit in ("mm", "m")
+            put(f"q{number}{suffix}", name, length_unit if slides else joint_unit)
+    for target, parts in found.targets.items():
+        prefix = "" if target == TOOL else f"{target}_"
+        for quantity, name in parts.items():
+            turned = quantity.removeprefix("std_").startswith("r")
+            unit = "" if quantity[0] == "q" else angle_unit if turned else length_unit
+            put(f"{prefix}{quantity}", name, unit)
+    for quantity, name in found.single.items():
+        put(quantity, name, "")
+    return mapping

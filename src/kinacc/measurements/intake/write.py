@@ -1,0 +1,119 @@
+"""The two files ``kinacc init`` writes: a data set and, where it needs one, a robot."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from kinacc.kinematics import robot as robots
+from kinacc.measurements.intake.guess import Guess
+
+_DEFAULTS = {"delimiter": ",", "decimal": ".", "skip_lines": 0, "skip_under_names": 0}
+_FEW_POSES = 60  # below, every configuration is held out once
+_PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./ -]*")
+_WORDS_OF_YAML = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
+
+
+def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note: str) -> str:
+    """The data set as a configuration file."""
+    section = guess.section
+    turn = section["orientation"]
+    lines = [
+        *(f"# {line}" for line in note.splitlines()),
+        "",
+        "datasets:",
+        f"  {name}:",
+        f"    robot: {scalar(robot)}",
+        "    measurements:",
+        "      source: file",
+        "      file:",
+        f"        path: {scalar(section['path'])}",
+    ]
+    for key, default in _DEFAULTS.items():
+        if section[key] != default:
+            lines.append(f"        {key}: {scalar(section[key])}")
+    lines.append(f"        joint_unit: {section['joint_unit']}")
+    lines.append(f"        length_unit: {section['length_unit']}")
+    words = {"kind": turn["kind"]}
+    if turn["kind"] == "euler":
+        words["convention"] = turn["convention"]
+    if turn["kind"] in ("euler", "rotation_vector"):
+        words["unit"] = turn["unit"]
+    if turn["kind"] == "quaternion" and any(k.endswith("quat1") for k in section["columns"]):
+        words["order"] = turn["order"]
+    listed = ", ".join(f"{key}: {scalar(value)}" for key, value in words.items())
+    lines.append(f"        orientation: {{{listed}}}")
+    lines.append(f"        targets: [{', '.join(scalar(name) for name in section['targets'])}]")
+    if section["columns"]:
+        lines.append("        columns: # our name: the file's name")
+        for ours, own in section["columns"].items():
+            key = ours if _PLAIN.fullmatch(ours) else scalar(ours)
+            lines.append(f"          {key}: {scalar(own)}")
+    folds = configurations if configurations < _FEW_POSES else 5
+    held = " # one configuration held out at a time" if configurations < _FEW_POSES else ""
+    lines += [
+        f"      folds: {folds}{held}",
+        "    calibration:",
+        "      base_and_tool: estimated",
+        "      vec: {order: auto, prior: chosen} # by cross-validation",
+        "      dh: {fit_to: measurements, hayati_joints: auto}",
+        "    evaluation:",
+        "      space: measured # the region the measured poses fill",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def shipped_text(name: str) -> str:
+    """The description of a shipped robot, to be kept beside the data and changed at will."""
+    text = (Path(robots.__file__).parents[1] / "robots" / f"{name}.yaml").read_text("utf-8")
+    head = f"# Copy of the shipped robot {name}; change what differs on yours (docs/robots.md)."
+    return f"{head}\n{text}"
+
+
+def urdf_text(name: str, urdf: Path, folder: Path) -> str:
+    """A robot file that reads a URDF file, named from where the robot file stands."""
+    path = os.path.relpath(urdf, folder)
+    return (
+        f"# The arm of {urdf.name}; docs/robots.md says what else may stand here.\n"
+        f"name: {scalar(name)}\n"
+        f"urdf: {scalar(path)}\n"
+        "# base_link: base       # where the chain starts, if not at the root\n"
+        "# tip_link: tool0       # where it ends, if there is a choice\n"
+    )
+
+
+def template_text(name: str, joints: int) -> str:
+    """A robot file to be filled in: an arm of ``joints`` rows that is no arm yet."""
+    row = (
+        "  - {theta_offset_deg: 0, d_mm: 0, a_mm: 100, alpha_deg: 90, sign: 1, "
+        "limits_deg: [-360, 360]} # joint "
+    )
+    return "\n".join(
+        [
+            "# FILL IN: lengths and angles of the arm's data sheet, row by row (docs/robots.md).",
+            "# sign: -1 where the controller counts against the row's axis. Until then check-data",
+            "# says that the robot does not fit.",
+            f"name: {scalar(name)}",
+            "source: FILL IN where the figures come from",
+            "convention: standard # or modified (Craig)",
+            "dh:",
+            *(f"{row}{number}" for number in range(1, joints + 1)),
+            "",
+        ]
+    )
+
+
+def scalar(value: Any) -> str:
+    """A value as YAML on one line."""
+    if isinstance(value, str) and _PLAIN.fullmatch(value) and value.strip() == value:
+        return value if value.lower() not in _WORDS_OF_YAML else json.dumps(value)
+    return json.dumps(value, ensure_ascii=False)
+
+
+def plain_name(path: str | Path) -> str:
+    """Name of a data set after a file: letters, digits, _ and -."""
+    stem = re.sub(r"[^A-Za-z0-9_-]+", "_", Path(path).stem).strip("_-")
+    return stem or "measured"

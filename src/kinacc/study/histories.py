@@ -1,0 +1,201 @@
+"""Single runs of model invalidation in full: Figs. 5 and 6, and the remark about a larger bound.
+
+Simulations are the study's own worlds, looked through from repetition 0; the first that satisfies
+the rule of an example is shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinacc.assess.model_invalidation import ModelInvalidation, Step
+from kinacc.assess.world import World
+from kinacc.errors import InputError, Problem
+from kinacc.study.monte_carlo import Columns, StudySettings, checked_errors, world_of
+
+REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
+
+RULES = {
+    REJECTED: (
+        "first simulation that rejects at eta, does not reject at the slightly larger eta, and "
+        "ends measuring the point of the largest true error again"
+    ),
+    LARGER: "the simulation of 'rejected', at the slightly larger eta",
+    KEPT: "first simulation that does not reject although a point was measured again",
+}
+FALLBACKS = {
+    REJECTED: (
+        "first simulation that rejects at eta",
+        "first simulation; none searched rejects at eta",
+    ),
+    KEPT: (
+        "first simulation that does not reject",
+        "first simulation; all searched reject at eta",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class HistorySettings:
+    """The ``histories`` section of the configuration.
+
+    noise_mm: standard deviation per axis; eta_ratio_*: bound over true accuracy of the run that
+    rejects, of the larger bound on its world, and of the run that does not reject;
+    simulations_searched: how many repetitions are looked through.
+    """
+
+    noise_mm: float = 0.3
+    eta_ratio_rejected: float = 0.834 / 0.906
+    eta_ratio_larger: float = 0.844 / 0.906
+    eta_ratio_kept: float = 1.023 / 0.906
+    simulations_searched: int = 1000
+
+    def __post_init__(self) -> None:
+        found = [
+            Problem(f"histories.{name}", f"{getattr(self, name)}", "above 0")
+            for name in (field.name for field in fields(self))
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0)
+        ]
+        if found:
+            raise InputError(found, "the histories cannot be made with these settings")
+
+    @classmethod
+    def of(cls, section: Mapping[str, object]) -> HistorySettings:
+        """Settings from a configuration section; keys that are not known here are left out."""
+        names = {field.name for field in fields(cls)}
+        return cls(**{name: value for name, value in section.items() if name in names})
+
+
+@dataclass(frozen=True)
+class Example:
+    """One run to show: its simulation, its bound, and the rule it was chosen by."""
+
+    name: str
+    simulation: int
+    eta_mm: float
+    rule: str
+    rule_met: bool
+
+
+def histories(
+    error_mm: ArrayLike,
+    settings: HistorySettings,
+    study: StudySettings,
+    seed: int,
+    point: ArrayLike | None = None,
+    progress=None,
+) -> Columns:
+    """Columns of ``histories``: each example measurement by measurement.
+
+    error_mm: (m, 3) true errors at the operating points, robot base frame, mm; point: (m,) their
+    numbers, default 0 .. m-1. alpha, distance, covariance, budget and visiting order are the
+    study's. Raises InputError for errors that cannot be used.
+    """
+    errors = checked_errors(error_mm)
+    numbers = np.arange(errors.shape[0]) if point is None else np.asarray(point, np.int64)
+    sizes = np.sqrt(np.sum(errors**2, axis=1))
+    assessor = ModelInvalidation(study.measurements, study.alpha, study.distance, study.covariance)
+    tables = []
+    for example in examples(errors, settings, study, seed, progress):
+        world = world_of(errors, settings.noise_mm, example.simulation, study, seed)
+        steps = assessor.history(world, example.eta_mm)
+        rows = world.index[[step.row for step in steps]]
+        tables.append(_table(example, steps, numbers[rows], sizes[rows], settings, study))
+    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+
+
+def examples(
+    error_mm: np.ndarray,
+    settings: HistorySettings,
+    study: StudySettings,
+    seed: int,
+    progress=None,
+) -> list[Example]:
+    """The runs to show, each the first simulation that satisfies its rule (see RULES).
+
+    Where none of the simulations searched does, the closest thing that exists is shown and said to
+    be that (FALLBACKS), with ``rule_met`` false.
+    """
+    assessor = ModelInvalidation(study.measurements, study.alpha, study.distance, study.covariance)
+    sizes = np.sqrt(np.sum(error_mm**2, axis=1))
+    truth, worst = float(sizes.max()), int(sizes.argmax())
+    eta, larger, kept = (
+        truth * ratio
+        for ratio in (
+            settings.eta_ratio_rejected,
+            settings.eta_ratio_larger,
+            settings.eta_ratio_kept,
+        )
+    )
+
+    def rejects(world: World) -> bool:
+        return assessor.run(world, eta).rejected
+
+    def shows_fig5(world: World) -> bool:
+        if not rejects(world) or assessor.run(world, larger).rejected:
+            return False
+        last = assessor.history(world, eta)[-1]
+        return last.repeat > 1 and world.index[last.row] == worst
+
+    def keeps(world: World) -> bool:
+        return not assessor.run(world, kept).rejected
+
+    def shows_fig6(world: World) -> bool:
+        found = assessor.run(world, kept)
+        return not found.rejected and found.measurements > found.points_visited
+
+    def search(name: str, bound: float, wanted: Callable, less: Callable) -> Example:
+        second = None
+        simulations = range(settings.simulations_searched)
+        memory = None
+        for simulation in progress(simulations, "simulations") if progress else simulations:
+            world = world_of(error_mm, settings.noise_mm, simulation, study, seed, memory)
+            memory = world.readings_mm
+            if wanted(world):
+                return Example(name, simulation, bound, RULES[name], True)
+            if second is None and less(world):
+                second = simulation
+        if second is None:
+            return Example(name, 0, bound, FALLBACKS[name][1], False)
+        return Example(name, second, bound, FALLBACKS[name][0], False)
+
+    fig5 = search(REJECTED, eta, shows_fig5, rejects)
+    fig6 = search(KEPT, kept, shows_fig6, keeps)
+    return [fig5, Example(LARGER, fig5.simulation, larger, RULES[LARGER], fig5.rule_met), fig6]
+
+
+def _table(
+    example: Example,
+    steps: list[Step],
+    point: np.ndarray,
+    true_mm: np.ndarray,
+    settings: HistorySettings,
+    study: StudySettings,
+) -> Columns:
+    count = len(steps)
+
+    def constant(value: object, kind: type = float) -> np.ndarray:
+        return np.array([value] * count, kind)
+
+    return {
+        "example": constant(example.name, object),
+        "simulation": constant(example.simulation, np.int64),
+        "rule": constant(example.rule, object),
+        "rule_met": constant(int(example.rule_met), np.int64),
+        "noise_mm": constant(settings.noise_mm),
+        "alpha": constant(study.alpha),
+        "distance": constant(study.distance, object),
+        "covariance": constant(study.covariance, object),
+        "iteration": np.arange(1, count + 1),
+        "point": point,
+        "repeat": np.array([step.repeat for step in steps], np.int64),
+        "eta_mm": constant(example.eta_mm),
+        "measured_mm": np.array([step.measured_mm for step in steps], float),
+        "averaged_mm": np.array([step.averaged_mm for step in steps], float),
+        "true_mm": true_mm,
+        "rejection_probability": np.array([step.rejection_probability for step in steps], float),
+    }

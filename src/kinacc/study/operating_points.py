@@ -1,0 +1,175 @@
+"""The operating points an assessor may visit: joint configurations and their true errors."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import compose
+from kinacc.kinematics import dh as _dh
+from kinacc.kinematics import inverse, region
+from kinacc.kinematics.inverse import Status, limits
+from kinacc.kinematics.region import Cylinder, Orientations
+from kinacc.kinematics.robot import Robot, dh_angles
+from kinacc.study.accuracy_map import ModelPair, errors_at, joints_of
+
+_DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
+
+
+class OperatingPoints(NamedTuple):
+    """Points in visiting order: DH joint angles (n, k), travel directions (n, k), errors (n, 3)."""
+
+    q_rad: np.ndarray
+    travel: np.ndarray
+    error_mm: np.ndarray
+
+
+class PosesWanted(NamedTuple):
+    """Which tool poses points are drawn from, and which joints are taken for them.
+
+    ``branches`` are those of ``inverse.machining_branches`` where None.
+    """
+
+    cylinder: Cylinder
+    reference: np.ndarray
+    orientations: Orientations
+    branches: tuple[str, ...] | None = None
+    invert_with: str = "dh"
+
+
+def with_errors(pair: ModelPair, q_rad: np.ndarray) -> OperatingPoints:
+    """The points at joints (n, k), their error VEC minus DH of the tool in the robot base."""
+    travel = np.zeros(q_rad.shape[1]) if pair.travel is None else pair.travel
+    directions = np.broadcast_to(np.asarray(travel, dtype=np.int8), q_rad.shape)
+    return OperatingPoints(q_rad, directions, errors_at(pair, q_rad)[:, :3])
+
+
+def in_space(
+    robot: Robot, pair: ModelPair, wanted: PosesWanted, sequence: str, count: int
+) -> np.ndarray:
+    """Joints (count, k) of tool poses drawn from a quasi-random sequence, in drawing order.
+
+    Five coordinates per draw: radius, angle and height (even over the volume), orientation,
+    branch. Draws without a solution within the limits and the fitted range are passed over.
+    Raises InputError, with the reasons counted, where the space holds too few.
+    """
+    found, counts, first = [], np.zeros(len(Status), dtype=int), 1
+    while sum(map(len, found)) < count:
+        if first > _DRAWS_PER_POINT * count:
+            raise _too_few(sum(map(len, found)), count, counts)
+        unit = region.points(sequence, count, 5, first)
+        q_rad, status = _solve_draws(robot, pair, wanted, unit)
+        counts += np.bincount(status, minlength=len(Status))
+        found.append(q_rad[status == Status.FOUND])
+        first += count
+    return np.concatenate(found)[:count]
+
+
+def _solve_draws(
+    robot: Robot, pair: ModelPair, wanted: PosesWanted, unit: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    cells = region.fill(wanted.cylinder, unit[:, :3])
+    turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
+    branches = inverse.machining_branches(robot) if wanted.branches is None else wanted.branches
+    branch = (unit[:, 4] * len(branches)).astype(int)
+    tool = region.tool_poses(cells, wanted.reference, wanted.orientations.rotation[turn])
+    solved = joints_of(robot, pair, tool, branches, wanted.invert_with)
+    rows = np.arange(len(unit))
+    return solved.q_rad[rows, branch], solved.status[rows, branch]
+
+
+def in_joints(
+    robot: Robot,
+    pair: ModelPair,
+    box_rad: tuple[np.ndarray, np.ndarray],
+    sequence: str,
+    count: int,
+    cylinder: Cylinder | None = None,
+) -> np.ndarray:
+    """DH joint angles (count, k) drawn evenly in a box of reported joints (k,), (k,).
+
+    Only configurations within the joint limits and within the range the VEC model was fitted over
+    are kept, and with ``cylinder`` only those whose tool (DH model) lies in it. Raises InputError
+    naming the joints of which nothing is left, or saying how few configurations qualify.
+    """
+    lower, upper = _assessable_box(robot, pair, *box_rad)
+    found, first, block = [], 1, max(count, 1024)
+    while sum(map(len, found)) < count:
+        if first > _DRAWS_PER_POINT * block:
+            problem = Problem(
+                "evaluation space",
+                f"only {sum(map(len, found))} of {first - 1} joint configurations lie in it",
+                f"{count} points",
+                "enlarge the space, or draw with points_in: space",
+            )
+            raise InputError(problem)
+        unit = region.points(sequence, block, len(lower), first)
+        q_rad = dh_angles(robot, lower + unit * (upper - lower))
+        good = limits.within(q_rad, pair.vec.q_min_rad, pair.vec.q_max_rad)
+        if cylinder is not None:
+            tool = compose(robot.base, compose(_dh.forward(pair.dh, q_rad), pair.dh_tool))
+            good &= region.contains(cylinder, tool.position_mm)
+        found.append(q_rad[good])
+        first += block
+    return np.concatenate(found)[:count]
+
+
+def _assessable_box(
+    robot: Robot, pair: ModelPair, lower_rad: np.ndarray, upper_rad: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A box of reported joints cut to the joint limits and, where uncoupled, the fitted range."""
+    lower = np.maximum(lower_rad, robot.q_min_rad)
+    upper = np.minimum(upper_rad, robot.q_max_rad)
+    for joint in np.flatnonzero(limits.uncoupled(robot)):
+        sign = robot.joint_map[joint, joint]
+        ends = pair.vec.q_min_rad[joint] / sign, pair.vec.q_max_rad[joint] / sign
+        lower[joint] = max(lower[joint], min(ends))
+        upper[joint] = min(upper[joint], max(ends))
+    problems = [
+        Problem(
+            f"joint {joint + 1}",
+            f"{np.rad2deg(lower_rad[joint]):.6g} to {np.rad2deg(upper_rad[joint]):.6g} deg is "
+            "outside the joint limits or the range the VEC model was fitted over",
+        )
+        for joint in np.flatnonzero(lower > upper)
+    ]
+    if problems:
+        raise InputError(problems, "The joint box cannot be assessed")
+    return lower, upper
+
+
+def spread_rows(total: int, count: int) -> np.ndarray:
+    """``count`` of ``total`` row numbers spread evenly, each once, coarse to fine (van der Corput).
+
+    All of them where ``count`` is not smaller than ``total``.
+    """
+    count = min(count, total)
+    draws = region.points("halton", 4 * max(total, 1), 1, 0)[:, 0]
+    rows = list(dict.fromkeys((draws * total).astype(int).tolist()))
+    return np.array(rows[:count], dtype=int)
+
+
+def _too_few(found: int, count: int, counts: np.ndarray) -> InputError:
+    reasons = ", ".join(
+        f"{counts[status]} {status.name.lower().replace('_', ' ')}"
+        for status in Status
+        if status != Status.FOUND and counts[status]
+    )
+    return InputError(
+        Problem(
+            "evaluation.cylinder",
+            f"only {found} of {counts.sum()} poses drawn can be assessed ({reasons})",
+            f"{count} points",
+            "move the cylinder closer to the arm, or fit the VEC model over a wider joint range",
+        )
+    )
+
+
+def readings_of(pose: np.ndarray, target: np.ndarray) -> list[np.ndarray]:
+    """Row numbers of every (configuration, target) pair of ``pose`` (n,), ``target`` (n,)."""
+    groups: dict[tuple, list[int]] = {}
+    for row, key in enumerate(zip(pose.tolist(), target.tolist(), strict=True)):
+        groups.setdefault(key, []).append(row)
+    return [np.array(rows) for rows in groups.values()]

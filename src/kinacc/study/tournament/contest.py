@@ -1,0 +1,259 @@
+"""Campaigns of every assessor in every cell: field, candidates, noise, budget, repetition.
+
+One repetition of a field, candidate count and noise is one world: the candidates drawn, their order
+and every reading are fixed by (seed, field, candidates, noise, repetition). All assessors and
+budgets see that world, whatever part of the work it is simulated in.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinacc.assess import ASSESSORS
+from kinacc.assess.adaptive import conduct
+from kinacc.assess.registry import ADAPTIVE
+from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.streams import key_of
+from kinacc.assess.world import World, drawn_world
+from kinacc.errors import InputError, Problem
+from kinacc.study.tournament import summary
+from kinacc.study.tournament.fields import Field
+
+Columns = dict[str, np.ndarray]
+NM_PER_MM = 1_000_000
+CONTESTANTS = (*ASSESSORS, *ADAPTIVE)
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a tournament is.
+
+    ``budgets`` by number of candidates; ``repetitions`` of every cell, and ``repetitions_slow`` for
+    assessors that take more than 50 ms; ``draws``: accepted draws of which every synthetic family
+    is made.
+    """
+
+    noise_mm: tuple[float, ...]
+    budgets: dict[int, tuple[int, ...]]
+    repetitions: int
+    repetitions_slow: int
+    draws: tuple[int, ...]
+
+    def only(self, noise_mm: Sequence[float]) -> Size:
+        """The same with this noise alone, of its own; with all of it where none is given."""
+        unknown = [each for each in noise_mm if each not in self.noise_mm]
+        if unknown:
+            allowed = ", ".join(f"{each:g}" for each in self.noise_mm)
+            raise InputError([Problem("noise_mm", f"{each:g}", allowed) for each in unknown])
+        return replace(self, noise_mm=tuple(noise_mm) or self.noise_mm)
+
+
+SIZES = {
+    "default": Size((0.05, 0.1, 0.2, 0.3), {200: (50, 200), 1000: (200,)}, 20, 6, (0,)),
+    "coverage": Size((0.05, 0.1, 0.2, 0.3), {200: (200,)}, 1000, 200, (0,)),
+    "budgets": Size((0.1,), {200: (50, 100, 500), 1000: (200,)}, 200, 200, (0,)),
+    "full": Size(
+        (0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
+        {200: (50, 100, 200, 500, 1000), 1000: (50, 200, 500, 1000)},
+        1000,
+        200,
+        (0, 1),
+    ),
+}
+SLOW = tuple(name for name, each in ADAPTIVE.items() if getattr(each, "is_slow", False))
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One field at one candidate count and noise: what a world belongs to."""
+
+    field: Field
+    candidates: int
+    noise_mm: float
+
+    def known(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
+        """What an assessor may know of the candidates beside the noise: joints and effects."""
+        return {"q_rad": self.field.q_rad[chosen], "effects": self.field.effects[chosen]}
+
+
+def cells(fields: Sequence[Field], size: Size) -> Iterator[Cell]:
+    """Every cell that the fields are large enough for; a small field counts as it is."""
+    for field in fields:
+        for count in sorted({min(each, field.points) for each in size.budgets}):
+            if count in size.budgets or count < min(size.budgets):
+                yield from (Cell(field, count, noise) for noise in size.noise_mm)
+
+
+def _listed(size: Size, candidates: int) -> int:
+    """The candidate count whose budgets are used: the smallest listed for a small field."""
+    return candidates if candidates in size.budgets else min(size.budgets)
+
+
+@dataclass(frozen=True)
+class Job:
+    """All campaigns of one cell with one budget: what a part of the work consists of."""
+
+    cell: Cell
+    budget: int
+
+
+def jobs(fields: Sequence[Field], size: Size) -> list[Job]:
+    """Every job of a tournament, in a fixed order."""
+    return [
+        Job(cell, budget)
+        for cell in cells(fields, size)
+        for budget in size.budgets[_listed(size, cell.candidates)]
+    ]
+
+
+def part_of(work: Sequence[Job], number: int, of: int) -> Sequence[Job]:
+    """Jobs of part ``number`` (1-based) of ``of``."""
+    if not 1 <= number <= of:
+        raise InputError(Problem("part", f"{number} of {of}", "1 up to the number of parts"))
+    return work[number - 1 :: of]
+
+
+def summed(
+    work: Sequence[Job], size: Size, seed: int, assessors: Sequence[str], progress=None
+) -> Columns:
+    """Summary of every job: rows as in :func:`kinacc.study.tournament.summary.summed`.
+
+    ``progress(iterable, what, total)`` reports. The campaigns themselves are not kept.
+    """
+    parts = []
+    for job in progress(work, "cells", len(work)) if progress else work:
+        for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
+            own = [name for name in assessors if (name in SLOW) == is_slow]
+            if own:
+                parts.append(summary.summed(campaigns(job, range(count), seed, own)[0]))
+    if not parts:
+        return {name: np.empty(0, kind) for name, kind in summary.KINDS.items()}
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def times_ms(job: Job, seed: int, assessors: Sequence[str] = CONTESTANTS) -> dict[str, float]:
+    """Processor time of one campaign of every assessor, median of three, after one to warm up."""
+    found = {}
+    for name in assessors:
+        _, times = campaigns(job, range(4), seed, [name])
+        found[name] = float(np.median(times["time_ms"][1:]))
+    return found
+
+
+def campaigns(
+    job: Job, repetitions: Iterable[int], seed: int, assessors: Sequence[str] = CONTESTANTS
+) -> tuple[Columns, Columns]:
+    """Statements and times of the campaigns of one job.
+
+    Statements: one row per campaign and statement, with the truth it is graded against. Times are
+    kept apart, for they differ from run to run.
+    """
+    rows: list[dict] = []
+    times: list[dict] = []
+    cell = job.cell
+    for repetition in repetitions:
+        place = {
+            "field": cell.field.name,
+            "candidates": cell.candidates,
+            "noise_mm": cell.noise_mm,
+            "budget": job.budget,
+            "repetition": repetition,
+        }
+        world, chosen = world_of(cell, repetition, job.budget, seed)
+        for name in assessors:
+            own = {**place, "assessor": name}
+            begun = time.process_time()
+            stated = _campaign(name, world, job, chosen)
+            times.append({**own, "time_ms": 1e3 * (time.process_time() - begun)})
+            rows += [{**own, **graded} for graded in stated]
+    return _columns(rows, ROW_KINDS), _columns(times, TIME_KINDS)
+
+
+def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World, np.ndarray]:
+    """The world of one repetition, ``visits`` readings of each point, and its rows of the field.
+
+    A campaign may spend its whole budget on one point; so the budget is what ``visits`` should be.
+    """
+    noise_nm = round(cell.noise_mm * NM_PER_MM)
+    entropy = (seed, zlib.crc32(cell.field.name.encode()), cell.candidates, noise_nm, repetition)
+    chosen = cell.field.candidates(cell.candidates, entropy)
+    error_mm = cell.field.error_mm[chosen]
+    return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits), chosen
+
+
+def _campaign(name: str, world: World, job: Job, chosen: np.ndarray) -> list[dict]:
+    """The statements of one campaign, each with its truth."""
+    size = np.linalg.norm(world.error_mm, axis=1)
+    truths = {CANDIDATES: float(size.max()), MEASURED: math.nan}
+    if name in ASSESSORS:
+        found = ASSESSORS[name](measurements=job.budget).assess(world)
+        taken, visited = found.measurements, found.points_visited
+        stated = (Statement(CANDIDATES, found.assessed_mm),)
+    else:
+        campaign = conduct(ADAPTIVE[name](measurements=job.budget), world, **job.cell.known(chosen))
+        taken, rows = campaign.taken()
+        visited, stated = len(rows), campaign.statements()
+        truths[MEASURED] = float(size[rows].max())
+    return [
+        {
+            "target": each.target,
+            "true_mm": _truth(each, truths, job.cell.field),
+            "value_mm": each.value_mm,
+            "lower_mm": each.lower_mm,
+            "upper_mm": each.upper_mm,
+            "confidence": each.confidence,
+            "withheld": each.withheld or None,
+            "assumption": _assumption(each, size),
+            "measurements": taken,
+            "points_visited": visited,
+        }
+        for each in stated
+    ]
+
+
+def _truth(said: Statement, truths: dict[str, float], field: Field) -> float:
+    """What a statement is graded against; of the region: what its share does not exceed."""
+    if said.target in truths:
+        return truths[said.target]
+    return float(np.quantile(field.size_mm, said.share, method="inverted_cdf"))
+
+
+def _assumption(said: Statement, size: np.ndarray) -> str:
+    """Whether what a statement rests on is true of the field: none, holds, broken or unknown."""
+    if not said.assumption:
+        return "none"
+    if not said.crowd:
+        return "unknown"
+    company = int(np.sum(size >= size.max() / said.isolation))
+    return "holds" if company >= said.crowd else "broken"
+
+
+ROW_KINDS = {
+    "field": object,
+    "candidates": np.int64,
+    "noise_mm": float,
+    "budget": np.int64,
+    "repetition": np.int64,
+    "assessor": object,
+    "target": object,
+    "true_mm": float,
+    "value_mm": float,
+    "lower_mm": float,
+    "upper_mm": float,
+    "confidence": float,
+    "withheld": object,
+    "assumption": object,
+    "measurements": np.int64,
+    "points_visited": np.int64,
+}
+TIME_KINDS = {name: ROW_KINDS[name] for name in [*ROW_KINDS][:6]} | {"time_ms": float}
+
+
+def _columns(rows: list[dict], kinds: dict[str, type]) -> Columns:
+    return {name: np.array([row[name] for row in rows], kind) for name, kind in kinds.items()}

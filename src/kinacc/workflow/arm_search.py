@@ -1,0 +1,154 @@
+"""The search for arms like the paper's: seeds in order, one rule, every try counted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.config.schema import defaults
+from kinacc.kinematics import robot, tables, vec
+from kinacc.kinematics.robot import Robot
+from kinacc.progress import reporting
+from kinacc.study.claims.numbers import number_claims
+from kinacc.synthetic import acceptance, columns
+from kinacc.synthetic.accepted import GEOMETRY, AcceptedDraw, geometry_columns
+from kinacc.synthetic.draw import TABLE_II, Scales
+from kinacc.synthetic.response import Response, linearise
+from kinacc.synthetic.tuning import Targets, targets_of, tuned
+from kinacc.workflow import calibration_settings, in_memory
+from kinacc.workflow.stages.measurements import split
+
+_UNTUNED = AcceptedDraw(0, Scales(1.0, 1.0, 1.0, 1.0), TABLE_II)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One seed tried: its arm, the numbers it gave by claim id, and whether it was accepted."""
+
+    draw: AcceptedDraw
+    numbers: Mapping[str, float]
+    accepted: bool
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What every draw of a search shares: the arm, the configuration, both fits' response."""
+
+    robot: Robot
+    config: Mapping
+    response: Response
+    targets: Targets
+
+    @property
+    def poses(self) -> int:
+        """Number of calibration poses."""
+        return int(self.config["measurements"]["synthetic"]["poses"])
+
+    @property
+    def tracker_noise_mm(self) -> float:
+        """Standard deviation of the tracker per axis."""
+        return float(self.config["measurements"]["synthetic"]["tracker_noise_mm"])
+
+
+def bench_of(config: Mapping) -> Bench:
+    """The bench for the complete configuration of a data set of the synthetic arm."""
+    targets = targets_of({claim.id: claim.paper for claim in number_claims()})
+    bench = Bench(robot.load(config["robot"]), config, None, targets)
+    # Poses, folds, joint range and points are those of any arm on the geometry of Table II.
+    start = {"measurements": measured(bench, _UNTUNED)}
+    made = in_memory.run(("vec", "dh", "residuals", "assessment_points"), config, start)
+    fitted = tables.vec_model(made["vec_model"])
+    empty = vec.without_errors(TABLE_II, fitted.q_min_rad, fitted.q_max_rad, fitted.order)
+    seen = made["measurements"]
+    options = calibration_settings.options(config["calibration"], bench.robot)
+    weight = options.rotation_weight_mm_per_rad
+    response = linearise(
+        empty,
+        options.prior.std(empty),
+        targets.noise_mm(weight),
+        weight,
+        _stacked(seen, "q"),
+        _stacked(seen, "s") * options.travel_direction,
+        np.asarray(seen["subset"]) == "train",
+        _stacked(made["assessment_points"], "q"),
+    )
+    return Bench(bench.robot, config, response, targets)
+
+
+def trial(bench: Bench, seed: int) -> Trial:
+    """Draw, tune, measure and fit the arm of ``seed``, and judge it."""
+    draw = tuned(
+        bench.robot, seed, bench.response, bench.targets, bench.poses, bench.tracker_noise_mm
+    )
+    return judged(bench, draw)
+
+
+def judged(bench: Bench, draw: AcceptedDraw) -> Trial:
+    """Measure and fit an arm as the workflow does, and judge it."""
+    found = acceptance.numbers(bench.config, measured(bench, draw))
+    return Trial(draw, found, acceptance.accepted(found))
+
+
+def measured(bench: Bench, draw: AcceptedDraw) -> dict[str, np.ndarray]:
+    """Columns of ``measurements`` of an arm, split as the workflow splits them."""
+    seen = columns(bench.robot, draw, bench.poses, bench.tracker_noise_mm)
+    return split(seen, bench.config)
+
+
+def trials(bench: Bench, first: int = 0) -> Iterator[Trial]:
+    """Trials of the seeds from ``first`` on, without end."""
+    seed = first
+    while True:
+        yield trial(bench, seed)
+        seed += 1
+
+
+def search(bench: Bench, wanted: int, progress=None) -> list[Trial]:
+    """The first ``wanted`` accepted trials of the seeds 0, 1, 2, ..., in order.
+
+    ``progress(iterable, what)`` reports on the seeds tried.
+    """
+    found: list[Trial] = []
+    for each in progress(trials(bench), "seeds") if progress else trials(bench):
+        found += [each] if each.accepted else []
+        if len(found) >= wanted:
+            break
+    return found
+
+
+def write(path: str, wanted: int) -> int:
+    """Search under the default configuration and write the table; returns the seeds tried."""
+    with reporting("draw-robots", bar=True) as progress:
+        found = search(bench_of({"robot": "mh180", **defaults()}), wanted, progress)
+    Path(path).write_text(as_csv(found), encoding="utf-8")
+    return found[-1].draw.seed + 1
+
+
+def as_csv(found: Sequence[Trial]) -> str:
+    """The table of accepted draws as shipped: remarks, then one row per draw."""
+    tried = found[-1].draw.seed + 1
+    names = ["seed", *Scales._fields, *geometry_columns(), *found[0].numbers]
+    remarks = (
+        "Accepted draws of the synthetic arm; made by `kinacc draw-robots`, not by hand.",
+        "Seeds 0, 1, 2, ... were tried in order under the default configuration. Accepted: every",
+        "number of Tables I to III and the true accuracy within its tolerance, nothing else looked",
+        f"at. {tried} seeds were tried for {len(found)} draws, {found[0].draw.seed + 1} for the "
+        "first.",
+    )
+    lines = [*(f"# {remark}" for remark in remarks), ",".join(names)]
+    lines += [",".join(map(str, _row(each))) for each in found]
+    return "\n".join(lines) + "\n"
+
+
+def _row(found: Trial) -> list:
+    draw = found.draw
+    geometry = np.stack([getattr(draw.geometry, name) for name in GEOMETRY], axis=1)
+    numbers = (f"{value:.6g}" for value in found.numbers.values())
+    return [draw.seed, *draw.scales, *(geometry.ravel() + 0.0).tolist(), *numbers]
+
+
+def _stacked(columns_: Mapping, letter: str) -> np.ndarray:
+    return np.stack([columns_[f"{letter}{joint}"] for joint in range(1, 7)], axis=1).astype(float)

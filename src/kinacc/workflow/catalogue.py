@@ -1,0 +1,279 @@
+"""Every stage of the study: what it reads, what it leaves and what it depends on.
+
+The one list the workflow, the command line and the check of a results folder share. Importing it
+costs nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+FIGURE_FOLDER = "figures"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of the study.
+
+    ``message`` says in words what it does. ``inputs`` and ``outputs`` are artefact names of the
+    data set. ``settings`` are dotted key paths of the data set's configuration, ``files`` those
+    whose values name files it reads; nothing else of the configuration reaches the stage.
+    ``optional`` inputs are used by data sets that have them. ``after`` are artefacts that have to
+    be there, where the data set has them, and are not read. ``scattered`` stages run once per
+    part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
+    part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file;
+    ``shared`` ones take long enough to be kept for other folders (Snakemake's cache).
+    """
+
+    name: str
+    message: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    settings: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+    scattered: bool = False
+    on_request: bool = False
+    measured: bool = False
+    shared: bool = False
+
+    @property
+    def module(self) -> str:
+        """Name of the module whose ``run`` does the work."""
+        return f"kinacc.workflow.stages.{self.name}"
+
+    @property
+    def is_figure(self) -> bool:
+        """Whether the stage draws a figure instead of making tables."""
+        return self.name.startswith("fig")
+
+
+_MODELS = ("vec_model", "dh_model", "frames")
+
+STAGES: dict[str, Stage] = {
+    stage.name: stage
+    for stage in (
+        Stage(
+            "measurements",
+            "reading or synthesising the measured poses",
+            (),
+            ("measurements", "robot"),
+            ("seed", "robot", "measurements"),
+            files=("robot", "measurements.file.path"),
+        ),
+        Stage(
+            "data_check",
+            "checking the measured file before anything is fitted to it",
+            (),
+            ("data_check",),
+            ("robot", "measurements", "calibration", "data_check"),
+            files=("robot", "measurements.file.path"),
+            measured=True,
+        ),
+        Stage(
+            "vec",
+            "fitting the volumetric error compensation (VEC) model to the training poses",
+            ("measurements",),
+            ("vec_model", "vec_frames", "vec_fit", "vec_covariance", "vec_orders"),
+            (
+                "robot",
+                "calibration.rotation_weight_mm_per_rad",
+                "calibration.base_and_tool",
+                "calibration.frames",
+                "calibration.vec",
+            ),
+            files=("robot",),
+            after=("data_check",),
+            shared=True,
+        ),
+        Stage(
+            "dh",
+            "fitting the DH model by least squares (Table II)",
+            ("measurements", "vec_model", "vec_frames"),
+            ("dh_model", "frames", "dh_fit", "dh_covariance", "dh_identified"),
+            (
+                "robot",
+                "calibration.rotation_weight_mm_per_rad",
+                "calibration.base_and_tool",
+                "calibration.frames",
+                "calibration.dh",
+            ),
+            files=("robot",),
+            shared=True,
+        ),
+        Stage(
+            "residuals",
+            "comparing models and measurements, cross-validated (Tables I and III)",
+            ("measurements", *_MODELS, "vec_orders"),
+            ("residuals", "pose_errors", "model_selection", "joint_bias", "worst_rows"),
+            ("robot", "calibration"),
+            files=("robot",),
+        ),
+        Stage(
+            "excluded_rows",
+            "saying how far off the excluded rows are",
+            ("measurements", *_MODELS),
+            ("excluded_rows",),
+            ("robot", "measurements"),
+            files=("robot", "measurements.file.path"),
+            measured=True,
+        ),
+        Stage(
+            "accuracy_map",
+            "mapping the largest error over the slices of the evaluation space (Fig. 3)",
+            _MODELS,
+            ("accuracy_map",),
+            (
+                "robot",
+                "evaluation.cylinder",
+                "evaluation.reference_orientation_deg",
+                "evaluation.rotation_deg",
+                "evaluation.rotations",
+                "evaluation.tool_mm",
+                "evaluation.invert_with",
+                "evaluation.travel_direction",
+                "map",
+            ),
+            files=("robot",),
+        ),
+        Stage(
+            "assessment_points",
+            "choosing the operating points of the study and their true errors",
+            ("measurements", *_MODELS, "pose_errors"),
+            ("assessment_points",),
+            ("robot", "evaluation"),
+            files=("robot",),
+        ),
+        Stage(
+            "study_chunk",
+            "simulating the assessors under noise",
+            ("assessment_points",),
+            ("study_chunk",),
+            (
+                "seed",
+                "study.noise_mm",
+                "study.repetitions",
+                "study.measurements",
+                "study.alpha",
+                "study.visiting_order",
+            ),
+            scattered=True,
+            shared=True,
+        ),
+        Stage(
+            "study",
+            "gathering the simulations and summing them up (Fig. 4)",
+            ("study_chunk", "assessment_points"),
+            ("study", "study_summary", "readings"),
+            ("study.outlier_rule", "study.distance", "study.covariance", "study.search"),
+        ),
+        Stage(
+            "histories",
+            "following single model invalidations step by step (Figs. 5 and 6)",
+            ("assessment_points",),
+            ("histories",),
+            (
+                "seed",
+                "study.measurements",
+                "study.alpha",
+                "study.distance",
+                "study.covariance",
+                "study.visiting_order",
+                "histories",
+            ),
+        ),
+        Stage("fig1", "drawing Fig. 1, the one-dimensional example", (), ("fig1",)),
+        Stage(
+            "fig2",
+            "drawing Fig. 2, the arm over its evaluation space",
+            ("dh_model", "frames", "assessment_points"),
+            ("fig2",),
+            (
+                "dataset",
+                "robot",
+                "evaluation.space",
+                "evaluation.cylinder",
+                "evaluation.tool_mm",
+            ),
+            files=("robot",),
+        ),
+        Stage(
+            "fig3",
+            "drawing Fig. 3, the accuracy maps",
+            ("accuracy_map",),
+            ("fig3",),
+            ("dataset",),
+        ),
+        Stage(
+            "fig4",
+            "drawing Fig. 4, assessed accuracy against noise",
+            ("study_summary", "assessment_points"),
+            ("fig4",),
+            ("dataset", "evaluation.space"),
+        ),
+        Stage(
+            "fig5",
+            "drawing Fig. 5, a model that is invalidated",
+            ("histories", "assessment_points"),
+            ("fig5",),
+            ("dataset", "evaluation.space"),
+        ),
+        Stage(
+            "fig6",
+            "drawing Fig. 6, a model that cannot be invalidated",
+            ("histories", "assessment_points"),
+            ("fig6",),
+            ("dataset", "evaluation.space"),
+        ),
+        Stage(
+            "claims",
+            "holding the paper's numbers and sentences to the results",
+            (
+                "residuals",
+                "dh_model",
+                "assessment_points",
+                "study",
+                "study_summary",
+                "readings",
+                "histories",
+            ),
+            ("claims",),
+            ("robot",),
+            optional=("accuracy_map", "robustness"),
+        ),
+        Stage(
+            "robustness_chunk",
+            "going through fits, study and claims with further draws of the arm",
+            (),
+            ("robustness_chunk",),
+            (
+                "seed",
+                "robot",
+                "measurements",
+                "calibration",
+                "evaluation",
+                "map",
+                "study",
+                "histories",
+                "robustness",
+            ),
+            files=("robot",),
+            scattered=True,
+            on_request=True,
+            shared=True,
+        ),
+        Stage(
+            "robustness_table",
+            "gathering the claims on further draws of the arm",
+            ("robustness_chunk",),
+            ("robustness",),
+            on_request=True,
+        ),
+    )
+}
+
+
+def maker_of(artefact: str) -> Stage:
+    """The stage that leaves an artefact."""
+    return next(stage for stage in STAGES.values() if artefact in stage.outputs)

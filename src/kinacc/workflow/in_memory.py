@@ -1,0 +1,57 @@
+"""Stages one after another on tables in memory: the same functions the workflow's rules call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from kinacc.workflow.stages import (
+    accuracy_map,
+    assessment_points,
+    dh,
+    histories,
+    measurements,
+    residuals,
+    study,
+    study_chunk,
+    vec,
+)
+
+# Named one by one, so that whatever runs stages in memory depends on their code.
+RUNS = {
+    "measurements": measurements.run,
+    "vec": vec.run,
+    "dh": dh.run,
+    "residuals": residuals.run,
+    "accuracy_map": accuracy_map.run,
+    "assessment_points": assessment_points.run,
+    "study_chunk": study_chunk.run,
+    "study": study.run,
+    "histories": histories.run,
+}
+
+
+def run(
+    names: Sequence[str],
+    config: Mapping,
+    tables: Mapping,
+    extra: Mapping[str, Mapping] | None = None,
+) -> dict[str, Mapping]:
+    """``tables`` and all that the stages ``names``, in this order, make of them.
+
+    ``config`` is the complete configuration of one data set; ``extra`` are settings by stage that
+    no configuration has.
+    """
+    found = dict(tables)
+    for name in names:
+        found |= RUNS[name](found, {**config, **(extra or {}).get(name, {})})
+    return found
+
+
+def without_folds(measurements: Mapping) -> dict[str, np.ndarray]:
+    """Columns of ``measurements`` with no fold named, so that nothing is cross-validated.
+
+    Rows that train stay those that train: the delivered fits and their tables are the same.
+    """
+    return {**measurements, "fold": np.full(len(measurements["pose"]), np.nan)}

@@ -1,0 +1,298 @@
+"""Which stages a data set goes through, with which files and settings.
+
+What the workflow's rules and the command line share: both ask here for a stage's paths, values and
+hashes, so that either leaves the same bytes. Importing it costs nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
+from kinacc.errors import InputError, Problem
+from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, Stage, maker_of
+
+RESULTS = "results"
+
+
+def planned(
+    paths: Sequence[str | os.PathLike],
+    overrides: Mapping[str, object] | None = None,
+    results: str = RESULTS,
+) -> Plan:
+    """The plan for configuration files and values given on the command line.
+
+    Raises InputError listing every problem in them.
+    """
+    from kinacc.config.load import load
+    from kinacc.config.schema import without_execution_keys
+
+    full = load(paths, _read_words(overrides or {}))
+    formats = {name: tuple(config["figures"]["formats"]) for name, config in full.items()}
+    first = next(iter(formats.values()))
+    tournament = next(iter(full.values()))["tournament"]
+    problems = [
+        Problem(
+            f"datasets.{name}.figures.formats",
+            f"{', '.join(own)} here, {', '.join(first)} elsewhere",
+            "the same formats for every data set",
+        )
+        for name, own in formats.items()
+        if own != first
+    ] + [
+        Problem(f"datasets.{name}.tournament", "differs from data set to data set", "one for all")
+        for name, config in full.items()
+        if config["tournament"] != tournament
+    ]
+    if problems:
+        raise InputError(problems)
+    return Plan(
+        {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
+        {name: config["study"]["chunks"] for name, config in full.items()},
+        first,
+        results,
+        tournament,
+    )
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The validated configuration of every data set, and where results go.
+
+    ``datasets`` maps a data set's name to its complete configuration (defaults filled in, without
+    values that only say how a run is carried out); ``parts`` to the number of parts its scattered
+    stages are computed in; ``formats`` are the picture formats; ``tournament`` is the
+    configuration's section of that name, which is one for all data sets.
+    """
+
+    datasets: Mapping[str, Mapping[str, object]]
+    parts: Mapping[str, int]
+    formats: tuple[str, ...]
+    results: str = RESULTS
+    tournament: Mapping[str, object] = field(default_factory=dict)
+
+    def stages(self, dataset: str) -> dict[str, Stage]:
+        """The stages a data set goes through, in order."""
+        missing = self.left_out(dataset)
+        return {name: stage for name, stage in STAGES.items() if name not in missing}
+
+    def left_out(self, dataset: str) -> dict[str, str]:
+        """Stages a data set cannot go through, each with the reason."""
+        config = self.datasets[dataset]
+        space = config["evaluation"]["space"]
+        reasons = {}
+        if space != "cylinder":
+            for name in ("accuracy_map", "fig3"):
+                reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
+        if config["measurements"]["source"] != "synthetic":
+            for name in ("robustness_chunk", "robustness_table"):
+                reasons[name] = "no further draws of a measured arm"
+            if "exclude" not in config["measurements"]["file"]:
+                reasons["excluded_rows"] = "no row is excluded"
+        else:
+            made_here = (name for name, stage in STAGES.items() if stage.measured)
+            reasons |= dict.fromkeys(made_here, "the measurements are synthetic")
+        return {name: reason for name, reason in reasons.items() if name in STAGES}
+
+    def targets(self, dataset: str, on_request: bool = False) -> list[str]:
+        """Every file the data set leaves in a plain run, or those made only on request."""
+        return [
+            path
+            for name, stage in self.stages(dataset).items()
+            if stage.on_request == on_request and not stage.scattered
+            for path in self.outputs(name, dataset).values()
+        ]
+
+    def inputs(self, name: str, dataset: str) -> dict[str, str | list[str]]:
+        """Files a stage reads: artefact -> path, or paths of its parts; role -> other file.
+
+        An optional artefact counts if the data set has it; one made on request, once it is there.
+        """
+        stage = STAGES[name]
+        available = {
+            made
+            for each in self.stages(dataset).values()
+            for made in each.outputs
+            if not each.on_request or os.path.exists(self._table(made, dataset))
+        }
+        wanted = (*stage.inputs, *(extra for extra in stage.optional if extra in available))
+        found: dict[str, str | list[str]] = {}
+        for artefact in wanted:
+            maker = maker_of(artefact)
+            paths = [
+                self._table(artefact, dataset, part)
+                for part in self.part_names(maker.name, dataset)
+            ]
+            found[artefact] = paths if maker.scattered else paths[0]
+        return found | self._files(stage, self.datasets[dataset])
+
+    def gates(self, name: str, dataset: str) -> list[str]:
+        """Tables that have to be there before a stage runs, and that it does not read."""
+        made = {each for stage in self.stages(dataset).values() for each in stage.outputs}
+        return [self._table(each, dataset) for each in STAGES[name].after if each in made]
+
+    def contents(self, name: str, dataset: str) -> dict[str, str]:
+        """Content hashes of the files from outside that a stage reads."""
+        return {
+            role: file_hash(path)
+            for role, path in self._files(STAGES[name], self.datasets[dataset]).items()
+        }
+
+    def check_files(self) -> None:
+        """Read every measured file that is newer than its table, or read by other settings.
+
+        Raises InputError listing all problems. Done before anything runs, because Snakemake
+        removes a table before it is made anew.
+        """
+        problems: list[Problem] = []
+        for dataset, config in self.datasets.items():
+            path = self._files(STAGES["measurements"], config).get("measurements_file")
+            table = self._table("measurements", dataset)
+            settings = self.settings("measurements", dataset)
+            if path is None or _is_current(table, path, settings):
+                continue
+            from kinacc.kinematics import robot
+            from kinacc.workflow import calibration_settings
+            from kinacc.workflow.stages import measurements
+
+            try:
+                made = measurements.run({}, settings)
+                calibration_settings.require_enough_rows(
+                    made, robot.load(config["robot"]), config["calibration"]
+                )
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(problems)
+
+    def remarks(self) -> list[str]:
+        """What whoever started a run should know of its data at the end, a line each."""
+        told = []
+        for dataset in self.datasets:
+            path = self._table("data_check", dataset)
+            if "data_check" in self.left_out(dataset) or not os.path.exists(path):
+                continue
+            from kinacc.artifacts.store import read
+            from kinacc.workflow.stages.data_check import in_words
+
+            found = in_words(read(path))
+            told += [f"{dataset}: the check of the data found:"] if found else []
+            told += [f"  - {words}" for words in found]
+        return told
+
+    def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
+        """Files a stage leaves: artefact -> path, or picture format -> path."""
+        stage = STAGES[name]
+        if stage.is_figure:
+            folder = f"{self.results}/{dataset}/{FIGURE_FOLDER}"
+            return {kind: f"{folder}/{name}.{kind}" for kind in self.formats}
+        return {artefact: self._table(artefact, dataset, part) for artefact in stage.outputs}
+
+    def part_names(self, name: str, dataset: str) -> list[str | None]:
+        """Names of the parts a stage is computed in: 1-of-2, 2-of-2; None where it is whole."""
+        if not STAGES[name].scattered:
+            return [None]
+        config = self.datasets[dataset]
+        items = (
+            config["robustness"]["draws"]
+            if "robustness" in name
+            else config["study"]["repetitions"]
+        )
+        count = min(self.parts[dataset], items)
+        return [f"{number}-of-{count}" for number in range(1, count + 1)]
+
+    def message(self, name: str) -> str:
+        """What the stage is doing, for a Snakemake rule or with the wildcards put in."""
+        part = ", part {wildcards.part}" if STAGES[name].scattered else ""
+        return f"{{wildcards.dataset}}: {STAGES[name].message}{part}"
+
+    def log(self, name: str, dataset: str, part: str | None = None) -> str:
+        """Log file of a stage."""
+        return f"{self.results}/{dataset}/logs/{name}{f'.{part}' if part else ''}.log"
+
+    def settings(self, name: str, dataset: str) -> dict[str, object]:
+        """The configuration values a stage depends on, nested as in the configuration."""
+        config, chosen = self.datasets[dataset], {}
+        for path in STAGES[name].settings:
+            _copy({**config, "dataset": dataset}, chosen, path.split("."))
+        return chosen
+
+    def code(self, name: str) -> str:
+        """Hash of all code a stage's results depend on."""
+        return stage_code_hash(STAGES[name].module)
+
+    def seed(self, dataset: str) -> int:
+        """Seed of the data set."""
+        return self.datasets[dataset]["seed"]
+
+    def _table(self, artefact: str, dataset: str, part: str | None = None) -> str:
+        folder = f"{self.results}/{dataset}"
+        return f"{folder}/{artefact}/{part}.parquet" if part else f"{folder}/{artefact}.parquet"
+
+    @staticmethod
+    def _files(stage: Stage, config: Mapping[str, object]) -> dict[str, str]:
+        found = {}
+        for path in stage.files:
+            value: object = config
+            for key in path.split("."):
+                value = value.get(key) if isinstance(value, Mapping) else None
+            if path == "robot":
+                if isinstance(value, str) and os.path.isfile(value):
+                    from kinacc.kinematics.robot import files
+
+                    roles = ("robot_file", "robot_urdf_file")
+                    read = zip(roles, files(value), strict=False)
+                    found |= {role: str(file) for role, file in read}
+            elif value is not None and config["measurements"]["source"] == "file":
+                found["measurements_file"] = value
+        return found
+
+
+def _is_current(table: str, path: str, settings: Mapping[str, object]) -> bool:
+    """Whether a table was made after the file ``path`` changed, and by these settings."""
+    if not os.path.exists(table) or os.path.getmtime(path) >= os.path.getmtime(table):
+        return False
+    from kinacc.artifacts.store import read_metadata
+
+    try:
+        return read_metadata(table).get("config_hash") == config_hash(settings)
+    except InputError:
+        return False
+
+
+def _read_words(values: object) -> object:
+    """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
+    import yaml
+
+    if isinstance(values, Mapping):
+        return {key: _read_words(value) for key, value in values.items()}
+    if isinstance(values, (list, tuple)):
+        return [_read_words(value) for value in values]
+    if not isinstance(values, str):
+        return values
+    from kinacc.config.load import COMMAND_LINE
+    from kinacc.config.reading import unreadable
+
+    problem = unreadable(values, COMMAND_LINE)
+    if problem:
+        raise InputError(problem)
+    return yaml.safe_load(values)
+
+
+def _in_use(config: dict) -> dict:
+    """The configuration without the source of measurements that is not used, or an empty list."""
+    unused = {"synthetic", "file"} - {config["measurements"]["source"]}
+    measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
+    if "file" in measurements and not measurements["file"]["exclude"]:
+        file = {k: v for k, v in measurements["file"].items() if k != "exclude"}
+        measurements = {**measurements, "file": file}
+    return {**config, "measurements": measurements}
+
+
+def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:
+    """Copy one value into a nested dictionary, with the sections around it."""
+    for key in keys[:-1]:
+        source, target = source[key], target.setdefault(key, {})
+    target[keys[-1]] = source[keys[-1]]

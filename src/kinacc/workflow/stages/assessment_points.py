@@ -1,0 +1,86 @@
+"""Choose the operating points of the study and state their true errors."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.kinematics import robot
+from kinacc.kinematics.inverse import limits
+from kinacc.kinematics.robot import Robot
+from kinacc.study import operating_points
+from kinacc.study.operating_points import OperatingPoints, PosesWanted
+from kinacc.workflow import evaluation as shared
+
+Columns = dict[str, np.ndarray]
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+    """``assessment_points`` of a modelled space, or chosen from what was measured."""
+    evaluation = settings["evaluation"]
+    arm = robot.load(settings["robot"])
+    if evaluation["space"] == "measured":
+        return {"assessment_points": _measured(inputs, int(evaluation["points"]))}
+    return {"assessment_points": _columns(arm, _drawn(arm, inputs, evaluation))}
+
+
+def _drawn(arm: Robot, inputs: Mapping, evaluation: Mapping) -> OperatingPoints:
+    pair = shared.models(inputs, evaluation, arm)
+    sequence, count = evaluation["sequence"], int(evaluation["points"])
+    limited = arm.q_min_rad, arm.q_max_rad
+    if evaluation["space"] == "joint_box":
+        box = shared.joint_box(evaluation, arm) or limited
+        q_rad = operating_points.in_joints(arm, pair, box, sequence, count)
+    elif evaluation["points_in"] == "joints":
+        space = shared.cylinder(evaluation)
+        q_rad = operating_points.in_joints(arm, pair, limited, sequence, count, space)
+    else:
+        wanted = PosesWanted(
+            shared.cylinder(evaluation),
+            shared.reference(evaluation),
+            shared.orientations(evaluation),
+            invert_with=evaluation["invert_with"],
+        )
+        q_rad = operating_points.in_space(arm, pair, wanted, sequence, count)
+    return operating_points.with_errors(pair, q_rad)
+
+
+def _columns(arm: Robot, points: OperatingPoints) -> Columns:
+    reported = limits.reported_joints(arm, points.q_rad)
+    columns: Columns = {"point": np.arange(len(reported))}
+    for joint in range(reported.shape[1]):
+        columns[f"q{joint + 1}"] = reported[:, joint]
+    for joint in range(reported.shape[1]):
+        columns[f"s{joint + 1}"] = points.travel[:, joint]
+    return {**columns, **_error_columns(points.error_mm)}
+
+
+def _error_columns(error_mm: np.ndarray) -> Columns:
+    components = {f"e{axis}_mm": error_mm[:, i] for i, axis in enumerate("xyz")}
+    return {**components, "true_error_mm": np.linalg.norm(error_mm, axis=1)}
+
+
+def _measured(inputs: Mapping, count: int) -> Columns:
+    """Configurations spread over the measured ones, errors averaged over repeated readings."""
+    errors, measurements = inputs["pose_errors"], inputs["measurements"]
+    wanted = np.asarray(errors["comparison"]) == "dh_vs_measured"
+    held_out = wanted & (np.asarray(errors["estimate"]) == "cross_validated")
+    if not held_out.any():
+        warnings.warn("no cross-validated errors: the points use those of the fit", stacklevel=2)
+        held_out = wanted
+    rows = np.flatnonzero(held_out)
+    groups = operating_points.readings_of(
+        np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows]
+    )
+    chosen = [rows[groups[i]] for i in operating_points.spread_rows(len(groups), count)]
+    vectors = np.stack([np.asarray(errors[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
+    first = np.array([np.asarray(errors["row"])[group[0]] for group in chosen]).astype(int)
+    names = [name for name in measurements if name[:1] in "qs" and name[1:].isdigit()]
+    columns: Columns = {"point": np.arange(len(chosen))}
+    columns |= {name: np.asarray(measurements[name])[first] for name in names}
+    return {
+        **columns,
+        **_error_columns(np.array([vectors[group].mean(axis=0) for group in chosen])),
+    }

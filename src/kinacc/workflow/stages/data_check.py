@@ -1,0 +1,119 @@
+"""Check the measured file before anything is fitted to it; what makes a fit wrong stops here."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from kinacc.calibration.observations import from_columns
+from kinacc.checks import check
+from kinacc.checks.report import Report
+from kinacc.checks.suspicion import NOTE, STOPS, Suspicion, suspicion
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics import robot
+from kinacc.kinematics.robot import Robot
+from kinacc.measurements.layout import Layout
+from kinacc.measurements.reader import Reading, read
+from kinacc.workflow import calibration_settings as shared
+from kinacc.workflow.stages.measurements import configurations
+
+Columns = dict[str, np.ndarray]
+Progress = Callable[[Iterable, str], Iterable]
+_PER_POSE = 6  # a rigid body has no more, however many targets it carries
+
+
+def run(inputs: Mapping, settings: Mapping, progress: Progress) -> dict[str, Columns]:
+    """``data_check``: every finding with its level and, where it was accepted, the reason.
+
+    Raises InputError where findings stop the workflow, one problem each.
+    """
+    report = examined(settings, "", progress)
+    if report.stopping:
+        title = f"{report.path} is not ready to be fitted"
+        raise InputError([_problem(report.path, each) for each in report.stopping], title)
+    for each in report.suspicions:
+        warnings.warn(f"{each.kind}: {each.what}", stacklevel=1)
+    return {"data_check": _columns(report)}
+
+
+def examined(settings: Mapping, dataset: str, progress: Progress) -> Report:
+    """What the check finds in a data set's file, and what its configuration says of that.
+
+    ``settings``: robot and the sections ``measurements``, ``calibration`` and ``data_check``.
+    Raises InputError where the file cannot be read or holds too little to say anything.
+    """
+    arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
+    reading = read(section, arm, strict=False)
+    report = check.check(reading, Layout.of(section), arm, dataset, section["path"], progress)
+    few = _few_poses(reading, arm, settings["calibration"])
+    accepted = settings["data_check"]["accept"]
+    return replace(report, suspicions=(*report.suspicions, *few), accepted=dict(accepted))
+
+
+def in_words(table: Mapping) -> list[str]:
+    """Findings of a ``data_check`` table, a line each, the gravest first."""
+    order = sorted(range(len(table["finding"])), key=lambda i: table["level"][i] == NOTE)
+    return [
+        f"{table['finding'][i]}: {table['what'][i]}"
+        + (f" ({table['lines'][i]})" if table["lines"][i] else "")
+        + (f"; accepted: {table['accepted'][i]}" if table["accepted"][i] else "")
+        for i in order
+    ]
+
+
+def _few_poses(reading: Reading, arm: Robot, calibration: Mapping) -> list[Suspicion]:
+    """Whether the VEC model has more coefficients than the poses give independent readings."""
+    count = len(reading.columns["pose"])
+    seen = from_columns({**reading.columns, "fold": np.full(count, np.nan)}, arm.joint_map)
+    options = shared.options(calibration, arm)
+    same = configurations(reading.columns)
+    # A target adds three components to a pose, an orientation three; repeats add none.
+    pairs, first = np.unique(np.stack([same, seen.target]), axis=1, return_index=True)
+    turned = np.zeros(same.max() + 1)
+    np.maximum.at(turned, pairs[0], 3.0 * seen.has_rotation[first])
+    components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
+    coefficients = 6 * arm.dh.joints * (options.order + 1)
+    frames = int(options.frames(seen).free.sum()) if options.frames_estimated else 0
+    if components.sum() >= coefficients + frames:
+        return []
+    of_frames = f" and {frames} of base and targets" if frames else ""
+    return [
+        suspicion(
+            "few_poses",
+            f"{len(components)} different poses give {components.sum():.0f} independent numbers "
+            f"for the {coefficients} coefficients of the VEC model of order {options.order}"
+            f"{of_frames}: its prior decides most of them, not the measurements",
+            (),
+            "measure more poses, lower calibration.vec.order, or let it be chosen (order: auto)",
+            poses=len(components),
+            coefficients=coefficients,
+        ).held_to(())
+    ]
+
+
+def _problem(path: str, each: Suspicion) -> Problem:
+    where = f"{path}, {each.where}" if each.lines else path
+    go_on = f"to go on all the same, give data_check: {{accept: {{{each.kind}: the reason}}}}"
+    rows = " or exclude the rows (measurements.file.exclude)" if _in_some_rows(each) else ""
+    return Problem(where, f"{each.kind}: {each.what}", fix=f"{each.fix}{rows}; {go_on}")
+
+
+def _in_some_rows(each: Suspicion) -> bool:
+    return each.level == STOPS and each.kind in ("outliers", "repeated_reading", "duplicate_rows")
+
+
+def _columns(report: Report) -> Columns:
+    found = report.findings
+    texts = {
+        "finding": [each.kind for each in found],
+        "level": [each.level for each in found],
+        "what": [each.what for each in found],
+        "lines": [each.where if each.lines else None for each in found],
+        "fix": [each.fix or None for each in found],
+        "accepted": [report.accepted.get(each.kind) for each in found],
+    }
+    columns = {name: np.array([*cells, None], dtype=object)[:-1] for name, cells in texts.items()}
+    return columns | {"rows": np.array([len(each.lines) for each in found], dtype=np.int64)}

@@ -1,0 +1,83 @@
+"""How far off the rows are that the configuration excludes: no fit has seen them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.calibration.observations import from_columns
+from kinacc.calibration.residuals import COMPARISONS, Errors, errors
+from kinacc.kinematics import robot
+from kinacc.measurements.reader import UNCERTAINTY, excluded_lines, read_excluded
+from kinacc.workflow.stages.residuals import delivered_models
+
+Columns = dict[str, np.ndarray]
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+    """``excluded_rows``: errors of the delivered models at the rows left out, with the reasons.
+
+    Null errors where a row cannot be read, or where its target or session stands nowhere else.
+    """
+    arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
+    reasons = excluded_lines(section)
+    used = inputs["measurements"]
+    every = from_columns(used, arm.joint_map)
+    models = delivered_models(inputs, arm.dh, every)
+    reading, _ = read_excluded(section, arm)
+    rows: list[tuple] = []
+    if reading is not None:
+        left_out = _known(reading.columns, used)
+        count = len(left_out["pose"])
+        joined = {
+            name: np.concatenate([np.asarray(used[name]), left_out[name]]) for name in left_out
+        }
+        joined["fold"] = np.full(len(joined["pose"]), np.nan)
+        seen = errors(models, from_columns(joined, arm.joint_map).select(slice(len(every), None)))
+        lines = left_out["row"].astype(int).tolist()
+        for name in COMPARISONS:
+            rows += _rows(name, left_out, lines, reasons, seen[name], count)
+    told = {row[1] for row in rows}
+    for name in COMPARISONS:
+        rows += [
+            (name, line, None, None, reasons[line], *[np.nan] * 6)
+            for line in sorted(set(reasons) - told)
+        ]
+    texts = ("comparison", "line", "target", "session", "reason")
+    numbers = ("ex_mm", "ey_mm", "ez_mm", "rx_mrad", "ry_mrad", "rz_mrad")
+    columns = {
+        name: np.array([*(row[i] for row in rows), None], dtype=object)[:-1]
+        for i, name in enumerate(texts)
+    }
+    columns["line"] = columns["line"].astype(np.int64)
+    return {
+        "excluded_rows": columns
+        | {name: np.array([row[5 + i] for row in rows], float) for i, name in enumerate(numbers)}
+    }
+
+
+def _known(columns: Mapping, used: Mapping) -> Columns:
+    """The rows whose target and session other rows show as well: only these have frames."""
+    there = np.isin(columns["target"].astype(str), np.asarray(used["target"]).astype(str))
+    there &= np.isin(columns["session"].astype(str), np.asarray(used["session"]).astype(str))
+    return {
+        name: np.asarray(values)[there]
+        for name, values in columns.items()
+        if name not in UNCERTAINTY
+    }
+
+
+def _rows(name: str, columns: Mapping, lines: list, reasons: Mapping, seen: Errors, count: int):
+    return [
+        (
+            name,
+            lines[i],
+            columns["target"][i],
+            columns["session"][i],
+            reasons[lines[i]],
+            *seen.position_mm[i],
+            *(1e3 * seen.rotation_rad[i]),
+        )
+        for i in range(count)
+    ]

@@ -1,0 +1,87 @@
+"""Read or synthesise the measured poses, deal them into folds, and write down the robot."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.kinematics import robot
+from kinacc.measurements import folds
+from kinacc.measurements.reader import UNCERTAINTY
+
+Columns = dict[str, np.ndarray]
+TIME_BLOCK = "time_block"
+SAME_CONFIGURATION_DEG = 0.1  # joints this close are one configuration visited again
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+    """``measurements`` of the configured source, with fold and subset, and ``robot``."""
+    arm, section = robot.load(settings["robot"]), settings["measurements"]
+    if section["source"] == "synthetic":
+        from kinacc import synthetic
+
+        seen = synthetic.measure(arm, section["synthetic"])
+    else:
+        from kinacc.measurements.reader import read
+
+        reading = read(section["file"], arm)
+        for words in reading.left_out():
+            warnings.warn(words, stacklevel=1)
+        seen = reading.columns
+    return {"measurements": split(seen, settings), "robot": _robot(arm)}
+
+
+def split(columns: Mapping, settings: Mapping) -> Columns:
+    """The columns with ``fold`` and ``subset``: whole configurations held out together.
+
+    ``settings``: seed and the ``measurements`` section. Fold null without folds, and for the
+    configurations of a session or target that could not be placed without them (with a warning
+    that names these); the rows of the validation fold are the validation subset.
+    """
+    section = settings["measurements"]
+    count = len(columns["pose"])
+    fold = np.full(count, np.nan)
+    if section["folds"] is not None:
+        same = configurations(columns)
+        if section["fold_by"] == TIME_BLOCK:
+            fold = folds.blocks(same, int(section["folds"])).astype(float)
+        else:
+            fold = folds.assign(same, int(section["folds"]), int(settings["seed"])).astype(float)
+        labels = {kind: columns[kind] for kind in ("session", "target") if kind in columns}
+        for kind, value, rows in folds.always_trained(fold, labels, same):
+            fold[rows] = np.nan
+            warnings.warn(
+                f"{kind} {value} has fewer than {folds.LEAST_ROWS} rows outside one of its folds: "
+                f"its {int(rows.sum())} rows always train and are not cross-validated",
+                stacklevel=2,
+            )
+    held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])
+    subset = np.where(held_out, "validation", "train").astype(object)
+    return {**_not_stated(count), **columns, "subset": subset, "fold": fold}
+
+
+def configurations(columns: Mapping) -> np.ndarray:
+    """Number (n,) of every row's configuration: rows of one pose, or of the same joints."""
+    names = [name for name in columns if name[:1] == "q" and name[1:].isdigit()]
+    q_rad = np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
+    return folds.configurations(
+        np.asarray(columns["pose"]), q_rad, np.deg2rad(SAME_CONFIGURATION_DEG)
+    )
+
+
+def _not_stated(count: int) -> Columns:
+    """Null columns of all that a source of measurements need not state."""
+    null = {name: np.full(count, np.nan) for name in ("row", "temperature_c", *UNCERTAINTY)}
+    return null | {"session": np.full(count, None, dtype=object)}
+
+
+def _robot(arm: robot.Robot) -> Columns:
+    words = {
+        "name": arm.name,
+        "source": arm.source or None,
+        "date": arm.date or None,
+        "description": robot.as_yaml(arm),
+    }
+    return {name: np.array([value], dtype=object) for name, value in words.items()}

@@ -1,0 +1,139 @@
+"""Compare models and measurements: statistics and error vectors, in sample and cross-validated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from kinacc.calibration import tables, worth_columns
+from kinacc.calibration.observations import Observations
+from kinacc.calibration.residuals import (
+    COMPARISONS,
+    Errors,
+    FittedModels,
+    cross_validated,
+    errors,
+    fit_all,
+    statistics,
+)
+from kinacc.kinematics import robot
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.tables import dh_model, vec_model
+from kinacc.workflow import calibration_settings as shared
+
+Columns = dict[str, np.ndarray]
+_QUANTITIES = (("position", "mm", 1.0), ("orientation", "mrad", 1e3))
+
+
+def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]:
+    """``residuals``, ``pose_errors`` and what follows from them of every comparison.
+
+    Train rows are of the delivered models at the rows they were fitted to. Validation rows are of
+    rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
+    """
+    arm = robot.load(settings["robot"])
+    options = shared.options(settings["calibration"], arm)
+    every, train = shared.observed(inputs, arm)
+    delivered = delivered_models(inputs, arm.dh, every)
+    joint_range = delivered.vec.q_min_rad, delivered.vec.q_max_rad
+
+    def refit(observations: Observations, fold: int) -> FittedModels:
+        if np.array_equal(every.fold != fold, train):
+            return delivered
+        own = shared.chosen(options, inputs["vec_orders"], fold)
+        return fit_all(observations, arm.dh, joint_range, own, delivered.vec)
+
+    folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
+    counted = progress(folds, "folds") if progress else folds
+    held_out, trained = cross_validated(every, refit, counted)
+    seen = errors(delivered, every.select(train))
+    return {
+        "residuals": _residuals(every.fold, folds, seen, held_out, trained),
+        "pose_errors": _pose_errors(inputs["measurements"], train, seen, held_out, bool(folds)),
+        **worth_columns.columns(inputs["measurements"], every, train, seen, held_out),
+    }
+
+
+def delivered_models(inputs: Mapping, nominal: DHModel, every: Observations) -> FittedModels:
+    """The models of the tables ``inputs``, fitted to targets and sessions of ``every``."""
+    frames = {
+        model: tables.frames_of(inputs["frames"], model, every.target_names, every.session_names)
+        for model in ("vec", "dh", "nominal")
+    }
+    return FittedModels(
+        vec=vec_model(inputs["vec_model"], nominal.prismatic),
+        vec_frames=frames["vec"],
+        dh=dh_model(inputs["dh_model"], nominal.prismatic),
+        dh_frames=frames["dh"],
+        nominal=nominal,
+        nominal_frames=frames["nominal"],
+    )
+
+
+def _residuals(
+    fold: np.ndarray,
+    folds: list[int],
+    seen: dict[str, Errors],
+    held_out: dict[str, Errors],
+    trained: dict[int, dict[str, Errors]],
+) -> Columns:
+    rows: list[tuple] = []
+    for name in COMPARISONS:
+        rows += _statistics_rows(name, "train", np.nan, seen[name])
+        for number in folds:
+            rows += _statistics_rows(name, "train", number, trained[number][name])
+        rows += _statistics_rows(name, "validation", np.nan, held_out[name])
+        for number in folds:
+            part = held_out[name].select(fold == number)
+            rows += _statistics_rows(name, "validation", number, part)
+    names = ("comparison", "subset", "fold", "quantity", "unit")
+    figures = ("n", "mean", "max", "rms", "gamma99")
+    texts = {"comparison", "subset", "quantity", "unit"}
+    return {
+        name: np.array([row[i] for row in rows], dtype=object if name in texts else float)
+        for i, name in enumerate((*names, *figures))
+    }
+
+
+def _statistics_rows(name: str, subset: str, fold: float, found: Errors) -> Iterator[tuple]:
+    vectors = {"position": found.position_mm, "orientation": found.rotation_rad}
+    for quantity, unit, factor in _QUANTITIES:
+        figures = statistics(factor * vectors[quantity])
+        if figures is not None:
+            values = figures.n, figures.mean, figures.max, figures.rms, figures.gamma99
+            yield (name, subset, fold, quantity, unit, *values)
+
+
+def _pose_errors(
+    measurements: Mapping,
+    train: np.ndarray,
+    seen: dict[str, Errors],
+    held_out: dict[str, Errors],
+    any_folds: bool,
+) -> Columns:
+    parts = []
+    for name in COMPARISONS:
+        parts.append(_error_rows(measurements, name, "train", np.flatnonzero(train), seen[name]))
+        if any_folds:
+            rows = np.flatnonzero(np.isfinite(held_out[name].position_mm[:, 0]))
+            found = held_out[name].select(rows)
+            parts.append(_error_rows(measurements, name, "cross_validated", rows, found))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _error_rows(
+    measurements: Mapping, comparison: str, estimate: str, rows: np.ndarray, found: Errors
+) -> Columns:
+    copied = {
+        name: np.asarray(measurements[name])[rows]
+        for name in ("pose", "target", "repeat", "subset", "fold")
+    }
+    return {
+        "comparison": np.full(len(rows), comparison, dtype=object),
+        "estimate": np.full(len(rows), estimate, dtype=object),
+        "row": rows,
+        **copied,
+        **{f"e{axis}_mm": found.position_mm[:, i] for i, axis in enumerate("xyz")},
+        **{f"r{axis}_mrad": 1e3 * found.rotation_rad[:, i] for i, axis in enumerate("xyz")},
+    }

@@ -1,0 +1,58 @@
+"""Stage: every claim on further accepted draws of the synthetic arm, one part of the draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.study.claims.evaluate import evaluate
+from kinacc.synthetic.accepted import further_draws
+from kinacc.workflow import in_memory
+
+STAGES = (
+    "vec",
+    "dh",
+    "residuals",
+    "accuracy_map",
+    "assessment_points",
+    "study_chunk",
+    "study",
+    "histories",
+)
+
+_COLUMNS = {"draw": int, "claim": object, "reproduced": float, "verdict": object}
+
+
+def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+    """Return ``robustness_chunk`` for ``settings["part"]`` (default: all further draws).
+
+    Raises InputError where fewer draws were accepted than are wanted.
+    """
+    own = int(settings["measurements"]["synthetic"]["draw"])
+    draws = further_draws(own, int(settings["robustness"]["draws"]))
+    part = settings.get("part") or {"number": 1, "of": 1}
+    chosen = draws[part["number"] - 1 :: part["of"]]
+    config = {name: value for name, value in settings.items() if name != "part"}
+    counted = progress(chosen, "draws") if progress else chosen
+    parts = [claims_on(draw, config) for draw in counted]
+    return {
+        "robustness_chunk": {
+            name: np.concatenate([np.empty(0, dtype), *(part[name] for part in parts)])
+            for name, dtype in _COLUMNS.items()
+        }
+    }
+
+
+def claims_on(draw: int, config: Mapping) -> dict[str, np.ndarray]:
+    """Rows of ``robustness`` of one accepted draw under the configuration of a data set."""
+    measurements = config["measurements"]
+    synthetic = {**measurements["synthetic"], "draw": draw}
+    own = {**config, "measurements": {**measurements, "synthetic": synthetic}}
+    # No claim is about held-out poses or other readings: both are left out to save their time.
+    seen = in_memory.run(["measurements"], own, {})["measurements"]
+    start = {"measurements": in_memory.without_folds(seen)}
+    tables = in_memory.run(STAGES, own, start, {"study_chunk": {"all_readings": False}})
+    claims = evaluate(tables, paper_arm=True)
+    rows = {name: claims[name] for name in ("claim", "reproduced", "verdict")}
+    return {"draw": np.full(len(claims["claim"]), draw), **rows}

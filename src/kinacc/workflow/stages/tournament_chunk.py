@@ -1,0 +1,24 @@
+"""Stage: campaigns of every assessor in some of the tournament's cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kinacc.study.tournament import contest
+from kinacc.study.tournament.fields import of_tables
+
+
+def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+    """Return ``tournament_chunk`` for ``settings["part"]`` (default: everything).
+
+    inputs: tables of the data sets, ``<data set>/<artefact>``. settings: ``seed``, ``size`` (a
+    name of :data:`contest.SIZES`), ``assessors`` (all if empty),
+    ``noise_mm`` (all of the size if empty) and, by data set, ``robots``.
+    """
+    size = contest.SIZES[settings["size"]].only(settings["noise_mm"])
+    fields = of_tables(inputs, settings["robots"], size.draws)
+    part = settings.get("part") or {"number": 1, "of": 1}
+    work = contest.part_of(contest.jobs(fields, size), part["number"], part["of"])
+    assessors = settings["assessors"] or contest.CONTESTANTS
+    found = contest.summed(work, size, settings["seed"], assessors, progress)
+    return {"tournament_chunk": found}

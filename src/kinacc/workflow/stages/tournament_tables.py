@@ -1,0 +1,19 @@
+"""Stage: gather the cells of the tournament and judge every assessor by them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kinacc.study.tournament import contest, summary
+from kinacc.study.tournament.fields import described, of_tables
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, dict]:
+    """Return ``tournament_cells``, ``tournament_verdicts`` and ``tournament_fields``."""
+    cells = summary.in_order(inputs["tournament_chunk"])
+    fields = of_tables(inputs, settings["robots"], contest.SIZES[settings["size"]].draws)
+    return {
+        "tournament_cells": cells,
+        "tournament_verdicts": summary.judged(cells),
+        "tournament_fields": described(fields),
+    }

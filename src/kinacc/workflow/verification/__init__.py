@@ -1,0 +1,1 @@
+"""Is a results folder whole, as the contract says, and made from one another?"""

@@ -1,0 +1,277 @@
+"""Check a results folder: everything there, as the contract says, and made from one another."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.artifacts import campaign_tables, store, tournament_tables
+from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
+from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
+from kinacc.errors import InputError, Problem
+from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES
+from kinacc.workflow.plan import Plan
+from kinacc.workflow.verification.conformity import check_file
+from kinacc.workflow.verification.lineage import check_lineage, made_without, parts
+from kinacc.workflow.verification.pictures import check_picture
+from kinacc.workflow.verification.rules import contradictions
+
+FORMATS = ("svg", "png", "pdf")
+
+
+@dataclass(frozen=True)
+class DatasetReport:
+    """What was found in one data set's folder: files checked, problems, and notes beside them."""
+
+    name: str
+    checked: tuple[str, ...]
+    problems: tuple[Problem, ...]
+    notes: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict:
+        """Plain values for JSON."""
+        return {
+            "name": self.name,
+            "ok": not self.problems,
+            "checked": list(self.checked),
+            "problems": [_plain(problem) for problem in self.problems],
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found in a results folder; ``ok`` if there is no problem anywhere."""
+
+    folder: str
+    datasets: tuple[DatasetReport, ...]
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether all is well."""
+        return not self.problems and not any(each.problems for each in self.datasets)
+
+    @property
+    def exit_code(self) -> int:
+        """0 if all is well, else 1."""
+        return 0 if self.ok else 1
+
+    def to_dict(self) -> dict:
+        """Plain values for JSON."""
+        return {
+            "ok": self.ok,
+            "folder": self.folder,
+            "problems": [_plain(problem) for problem in self.problems],
+            "datasets": [each.to_dict() for each in self.datasets],
+        }
+
+    def __str__(self) -> str:
+        lines = [f"{self.folder}: {'all is well' if self.ok else 'not as it should be'}"]
+        lines += [f"  - {problem}" for problem in self.problems]
+        for each in self.datasets:
+            count = len(each.problems)
+            found = "no problem" if not count else f"{count} problem{'s' if count > 1 else ''}"
+            lines.append(f"{each.name}: {len(each.checked)} files checked, {found}")
+            lines += [f"  - {problem}" for problem in each.problems]
+            lines += [f"  note: {note}" for note in each.notes]
+        return "\n".join(lines)
+
+
+def check_results(results: Path | str, plan: Plan | None = None) -> Report:
+    """Check every data set's folder below ``results``.
+
+    Every artefact present, its schema, units and provenance keys as the contract says, values in
+    their limits, rows and tables consistent, inputs still those it was made from, claims readable,
+    pictures whole. With a ``plan`` (the configuration) also that its data sets are all there and
+    that the artefacts were made with these settings and files.
+    """
+    folder = Path(results)
+    if not folder.is_dir():
+        problem = Problem(str(folder), "no such folder", "a results folder", "run snakemake -c2")
+        return Report(str(folder), (), (problem,))
+    if (folder / f"{CAMPAIGN[0].name}.parquet").is_file():
+        return Report(str(folder), (check_campaign(folder),))
+    if folder.name == TOURNAMENT:
+        return Report(str(folder), (check_tournament(folder),))
+    if _is_dataset(folder):
+        return Report(str(folder), (check_dataset(folder, plan),))
+    names = sorted(
+        path.name
+        for path in folder.iterdir()
+        if path.is_dir() and not path.name.startswith(".") and path.name != TOURNAMENT
+    )
+    problems = []
+    if plan is not None:
+        missing = [name for name in plan.datasets if name not in names]
+        problems = [Problem(str(folder / name), "no such folder: not run") for name in missing]
+        names = [name for name in names if name in plan.datasets]
+    elif not names:
+        problems = [Problem(str(folder), "holds no data set", "one folder for each data set")]
+    reports = [check_dataset(folder / name, plan) for name in names]
+    if (folder / TOURNAMENT).is_dir():
+        reports.append(check_tournament(folder / TOURNAMENT))
+    return Report(str(folder), tuple(reports), tuple(problems))
+
+
+def _is_dataset(folder: Path) -> bool:
+    """Whether the folder is that of one data set, given in place of the folder of all of them."""
+    return any((folder / artefact.file_name).is_file() for artefact in ARTEFACTS.values())
+
+
+def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
+    """Check the folder of one data set; see :func:`check_results`."""
+    checked, problems, tables, marks = [], [], {}, {}
+    for name, path in _tables_there(folder):
+        checked.append(str(path))
+        columns, found = check_file(path, ARTEFACTS[name])
+        problems += found
+        if path.parent != folder:
+            continue  # parts of a table are held to its schema; the whole is held to the rules
+        if columns is not None:
+            tables[name] = columns
+        try:
+            marks[name] = store.read_metadata(path)
+        except InputError:
+            continue
+    left_out = _left_out(folder, marks, tables, plan)
+    notes = [
+        f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
+        f"{reason}"
+        for reason in dict.fromkeys(r for n, r in left_out.items() if not STAGES[n].measured)
+    ]
+    problems += _missing(folder, left_out)
+    for picture in _pictures(folder, plan, left_out):
+        checked += [str(picture)] if picture.exists() else []
+        problems += check_picture(picture)
+    problems += [_placed(folder, problem) for problem in contradictions(tables)]
+    found, said = check_lineage(folder, marks, plan)
+    leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
+    return DatasetReport(
+        folder.name, tuple(checked), tuple(problems + found), (*notes, *said, *leftovers)
+    )
+
+
+def check_tournament(folder: Path) -> DatasetReport:
+    """Check the folder of the tournament: every table whole and as the contract says."""
+    checked, problems, marks = [], [], {}
+    for name, path in _tables_there(folder):
+        checked.append(str(path))
+        problems += check_file(path, ARTEFACTS[name])[1]
+        if path.parent == folder:
+            with suppress(InputError):
+                marks[name] = store.read_metadata(path)
+    gathered = [each.name for each in tournament_tables.ALL[1:]]
+    problems += [
+        Problem(str(folder / f"{name}.parquet"), "missing", fix="run kinacc tournament again")
+        for name in gathered
+        if name not in marks and any(other in marks for other in gathered)
+    ]
+    leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
+    return DatasetReport(folder.name, tuple(checked), tuple(problems), tuple(leftovers))
+
+
+def check_campaign(folder: Path) -> DatasetReport:
+    """Check the report of a measuring campaign: its tables whole, made together, of one mind."""
+    checked, problems, tables, marks = [], [], {}, []
+    for artefact in CAMPAIGN:
+        path = folder / f"{artefact.name}.parquet"
+        if not path.is_file():
+            problems.append(Problem(str(path), "missing", fix="run kinacc campaign report again"))
+            continue
+        checked.append(str(path))
+        tables[artefact.name], found = check_file(path, artefact)
+        problems += found
+        with suppress(InputError):
+            marks.append(store.read_metadata(path))
+    if any(each != marks[0] for each in marks):
+        fix = "run kinacc campaign report again"
+        problems.append(Problem(str(folder), "tables of different states of a campaign", fix=fix))
+    if not problems:
+        problems += campaign_tables.contradictions(tables)
+    return DatasetReport(folder.name, tuple(checked), tuple(problems), ())
+
+
+def main(folder: str, as_json: bool = False, plan: Plan | None = None) -> int:
+    """Print what is found in a results folder; the exit code."""
+    report = check_results(folder, plan)
+    print(json.dumps(report.to_dict(), indent=2) if as_json else report)
+    return report.exit_code
+
+
+def _tables_there(folder: Path) -> Iterator[tuple[str, Path]]:
+    """Every table of the contract that is in the folder, parts included."""
+    for name in ARTEFACTS:
+        path = folder / f"{name}.parquet"
+        if path.exists():
+            yield name, path
+        for own in parts(folder, name):
+            yield from ((name, Path(part)) for part in own)
+
+
+def _left_out(folder: Path, marks: dict, tables: dict, plan: Plan | None) -> dict[str, str]:
+    """Stages the data set rightly does without, each with the reason."""
+    if plan is not None:
+        return dict(plan.left_out(folder.name))
+    return _without_file(folder, tables) | _without_map(folder, marks)
+
+
+def _without_file(folder: Path, tables: dict) -> dict[str, str]:
+    """Stages of a measured file that a synthetic arm, or one without exclusions, has not."""
+    if "measurements" in tables and np.isnan(tables["measurements"]["row"]).all():
+        return {
+            n: "the measurements are synthetic" for n, stage in STAGES.items() if stage.measured
+        }
+    if not (folder / "excluded_rows.parquet").exists():
+        return {"excluded_rows": "no row is excluded"}
+    return {}
+
+
+def _without_map(folder: Path, marks: dict) -> dict[str, str]:
+    drawn = any((folder / FIGURE_FOLDER / f"fig3.{kind}").exists() for kind in FORMATS)
+    if drawn or (folder / "accuracy_map.parquet").exists():
+        return {}
+    if not made_without(folder, "accuracy_map", marks):
+        return {}
+    return dict.fromkeys(("accuracy_map", "fig3"), "the claims were made without a map")
+
+
+def _missing(folder: Path, left_out: Collection[str]) -> list[Problem]:
+    return [
+        Problem(str(folder / f"{name}.parquet"), "missing", fix=f"made by {stage.message}")
+        for stage in STAGES.values()
+        if not (stage.on_request or stage.scattered or stage.is_figure or stage.name in left_out)
+        for name in stage.outputs
+        if not (folder / f"{name}.parquet").exists()
+    ]
+
+
+def _pictures(folder: Path, plan: Plan | None, left_out: Collection[str]) -> Iterator[Path]:
+    formats = FORMATS if plan is None else plan.formats
+    for name, stage in STAGES.items():
+        if stage.is_figure and name not in left_out:
+            yield from (folder / FIGURE_FOLDER / f"{name}.{kind}" for kind in formats)
+
+
+def _leftovers(folder: Path) -> list[Path]:
+    found = [path for mark in ("partial", "part") for path in folder.rglob(f".*.{mark}")]
+    return sorted(path for path in found if path.is_file())
+
+
+def _placed(folder: Path, problem: Problem) -> Problem:
+    return Problem(f"{folder}/{problem.where}", problem.what, problem.allowed, problem.fix)
+
+
+def _plain(problem: Problem) -> dict[str, str]:
+    return {
+        "where": problem.where,
+        "what": problem.what,
+        "allowed": problem.allowed,
+        "fix": problem.fix,
+    }

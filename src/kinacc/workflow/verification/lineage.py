@@ -1,0 +1,185 @@
+"""Hold the provenance of a data set's artefacts to each other: was each made from what is there?"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+
+from kinacc.errors import InputError, Problem
+from kinacc.workflow.catalogue import STAGES, Stage
+from kinacc.workflow.plan import Plan
+from kinacc.workflow.runner import Job, stage_provenance
+
+Marks = Mapping[str, Mapping[str, str]]
+Inputs = dict[str, "str | list[str]"]
+
+_AGAIN = "run the workflow again: it remakes what is out of date"
+
+
+def check_lineage(
+    folder: Path, marks: Marks, plan: Plan | None = None
+) -> tuple[list[Problem], list[str]]:
+    """Problems and notes on the provenance of the tables in a data set's folder.
+
+    ``marks`` holds the provenance of every readable table by artefact. Without a ``plan``, files
+    from outside the folder (measurements, a robot of one's own) and configuration are not known.
+    """
+    problems = list(_one_version(folder, marks))
+    older: list[str] = []
+    of_robot_file: dict[str, list[Problem]] = {}
+    for stage in STAGES.values():
+        made = [name for name in stage.outputs if name in marks]
+        problems += _one_run(folder, made, marks)
+        if stage.scattered and plan is not None:
+            problems += _parts_held_to_settings(folder, stage, plan)
+        if not made or stage.scattered or (plan is None and "measurements_file" in _roles(stage)):
+            continue
+        found, is_current = _held_to_inputs(folder, stage, marks[made[0]], plan)
+        if plan is None and stage.files:
+            of_robot_file[made[0]] = found
+        else:
+            problems += found
+        older += [] if is_current else made
+    notes = []
+    if len(of_robot_file) > 1 and all(of_robot_file.values()):
+        # One robot serves all stages: where every one that reads it differs, it has a file.
+        names = ", ".join(of_robot_file)
+        notes.append(f"{folder}: its robot file is not checked without --config: {names}")
+    else:
+        problems += [each for found in of_robot_file.values() for each in found]
+    if older:
+        names = ", ".join(older)
+        notes.append(f"{folder}: made with other code or library versions than installed: {names}")
+    return problems, notes
+
+
+def made_without(folder: Path, artefact: str, marks: Marks) -> bool:
+    """Whether every stage that may use an artefact was run without it."""
+    users = [stage for stage in STAGES.values() if artefact in stage.optional]
+    return bool(users) and all(
+        stage.outputs[0] in marks
+        and any(
+            _expected(stage, inputs, {}, 0)["inputs_hash"]
+            == marks[stage.outputs[0]].get("inputs_hash")
+            for inputs in _candidates(folder, stage)
+        )
+        for stage in users
+    )
+
+
+def parts(folder: Path, artefact: str) -> list[list[str]]:
+    """Complete sets of the parts of a scattered artefact, one list for every number of parts."""
+    found: dict[int, dict[int, str]] = {}
+    for path in sorted((folder / artefact).glob("*.parquet")):
+        numbers = re.fullmatch(r"(\d+)-of-(\d+)", path.stem)
+        if numbers:
+            number, count = map(int, numbers.groups())
+            found.setdefault(count, {})[number] = str(path)
+    return [
+        [own[number] for number in range(1, count + 1)]
+        for count, own in sorted(found.items())
+        if set(own) == set(range(1, count + 1))
+    ]
+
+
+def _roles(stage: Stage) -> set[str]:
+    return {"measurements_file"} if "measurements.file.path" in stage.files else set()
+
+
+def _one_version(folder: Path, marks: Marks) -> Iterator[Problem]:
+    for key in ("kinacc_version", "seed"):
+        groups: dict[str, list[str]] = {}
+        for name, own in marks.items():
+            if key in own:
+                groups.setdefault(own[key], []).append(name)
+        if len(groups) > 1:
+            said = "; ".join(f"{value} in {', '.join(names)}" for value, names in groups.items())
+            yield Problem(str(folder), f"{key} {said}", "the same in all artefacts", _AGAIN)
+
+
+def _one_run(folder: Path, made: Sequence[str], marks: Marks) -> Iterator[Problem]:
+    for name in made[1:]:
+        for key, value in marks[made[0]].items():
+            if marks[name].get(key, value) != value:
+                where = str(folder / f"{name}.parquet")
+                what = f"{key} {marks[name][key]} differs from {value} of {made[0]}.parquet"
+                yield Problem(where, what, "tables of one stage are made together", _AGAIN)
+
+
+def _held_to_inputs(
+    folder: Path, stage: Stage, own: Mapping[str, str], plan: Plan | None
+) -> tuple[list[Problem], bool]:
+    """Problems of one stage's provenance, and whether it was made with the code installed."""
+    where = str(folder / f"{stage.outputs[0]}.parquet")
+    settings, seed = {}, 0
+    candidates = _candidates(folder, stage)
+    if plan is not None:
+        settings, seed = plan.settings(stage.name, folder.name), plan.seed(folder.name)
+        known = plan.inputs(stage.name, folder.name)
+        files = {name: known[name] for name in known if name.endswith("_file")}
+        candidates = [
+            inputs | files
+            for inputs in candidates
+            if all(Path(each).is_file() for each in files.values())
+        ]
+    if not candidates:
+        return [], True
+    problems = []
+    try:
+        expected = [_expected(stage, inputs, settings, seed) for inputs in candidates]
+    except InputError as error:
+        return list(error.problems), True
+    if own.get("inputs_hash") not in [each["inputs_hash"] for each in expected]:
+        names = ", ".join(candidates[0]) or "nothing"
+        fix = _AGAIN
+        if plan is None and stage.files:
+            fix += "; if the robot is a file of your own, give the configuration too"
+        what = f"inputs_hash {own.get('inputs_hash')} is not that of the inputs now there ({names})"
+        problems.append(Problem(where, what, expected[0]["inputs_hash"], fix))
+    if plan is not None and own.get("config_hash") != expected[0]["config_hash"]:
+        what = f"config_hash {own.get('config_hash')}: made with another configuration"
+        problems.append(Problem(where, what, expected[0]["config_hash"], _AGAIN))
+    if plan is not None and own.get("seed") != str(seed):
+        problems.append(Problem(where, f"seed {own.get('seed')}", str(seed), _AGAIN))
+    return problems, own.get("code_hash") == expected[0]["code_hash"]
+
+
+def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[Problem]:
+    """Parts of a scattered table that were made with other settings than the plan's."""
+    from kinacc.artifacts.store import read_metadata
+
+    wanted = _expected(stage, {}, plan.settings(stage.name, folder.name), 0)["config_hash"]
+    for part in plan.part_names(stage.name, folder.name):
+        path = folder / stage.outputs[0] / f"{part}.parquet"
+        try:
+            own = read_metadata(path).get("config_hash") if path.is_file() else wanted
+        except InputError:
+            continue  # an unreadable part is reported where parts are held to the contract
+        if own != wanted:
+            what = f"config_hash {own}: made with another configuration"
+            yield Problem(str(path), what, wanted, _AGAIN)
+
+
+def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dict[str, object]:
+    return stage_provenance(Job(stage.module, inputs, {}, settings, seed))
+
+
+def _candidates(folder: Path, stage: Stage) -> list[Inputs]:
+    """Sets of artefacts a stage may have read, as they are now; none if a needed one is absent."""
+    found: list[Inputs] = [{}]
+    for name in stage.inputs:
+        maker = next(each for each in STAGES.values() if name in each.outputs)
+        path = folder / f"{name}.parquet"
+        if maker.scattered:
+            found = [old | {name: own} for old in found for own in parts(folder, name)]
+        else:
+            found = [old | {name: str(path)} for old in found] if path.is_file() else []
+    present = [name for name in stage.optional if (folder / f"{name}.parquet").is_file()]
+    chosen = [
+        {name: str(folder / f"{name}.parquet") for name in names}
+        for count in range(len(present), -1, -1)
+        for names in combinations(present, count)
+    ]
+    return [old | extra for old in found for extra in chosen]

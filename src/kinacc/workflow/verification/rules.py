@@ -1,0 +1,21 @@
+"""What rows and tables of one data set must say of each other, beyond single columns.
+
+A rule runs where all tables it needs are there and readable.
+"""
+
+from __future__ import annotations
+
+from kinacc.errors import Problem
+from kinacc.workflow.verification import assessment_rules, calibration_rules
+from kinacc.workflow.verification.rule import Tables
+
+RULES = (*calibration_rules.RULES, *assessment_rules.RULES)
+
+
+def contradictions(tables: Tables) -> list[Problem]:
+    """Everything the tables of one data set say that cannot be."""
+    problems: list[Problem] = []
+    for needed, rule in RULES:
+        if all(name in tables and len(next(iter(tables[name].values()))) for name in needed):
+            problems += rule(tables)
+    return problems

@@ -1,0 +1,33 @@
+"""Compile the sequential kernels once, so that no run has to wait for it.
+
+python -m kinacc.workflow.warm_up
+"""
+
+from __future__ import annotations
+
+
+def main() -> None:
+    """Run what uses compiled kernels on a tiny problem."""
+    import numpy as np
+
+    from kinacc.config.schema import defaults
+    from kinacc.kinematics import dh, inverse, robot
+    from kinacc.workflow.stages import histories, study_chunk
+
+    settings = defaults()
+    settings["study"] |= {"repetitions": 1, "measurements": 20, "noise_mm": [0.1]}
+    settings["histories"]["simulations_searched"] = 1
+    error_mm = np.linspace(0.1, 0.9, 30).reshape(10, 3)
+    points = {
+        "point": np.arange(10),
+        **{f"e{axis}_mm": error_mm[:, i] for i, axis in enumerate("xyz")},
+        "true_error_mm": np.linalg.norm(error_mm, axis=1),
+    }
+    study_chunk.run({"assessment_points": points}, settings)
+    histories.run({"assessment_points": points}, settings)
+    arm = robot.load("iiwa14")  # no closed form: its inverse searches
+    inverse.solve(arm, arm.dh, dh.forward(arm.dh, np.full((1, 7), 0.5)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""check-data as a person and a program call it: what is said, and the exit code."""
+
+import json
+
+import pytest
+from command_line import call
+
+ROBOT = "irb120"
+
+
+@pytest.fixture
+def configuration(tmp_path):
+    """Writes a measured file of a nominal arm, with a change of its text, and its data set."""
+    import numpy as np
+
+    from kinacc.kinematics import robot
+
+    arm = robot.load(ROBOT)
+    q_deg = np.round(np.random.default_rng(0).uniform(-60, 60, (20, 6)), 3)
+    point = robot.forward(arm, np.deg2rad(q_deg)).position_mm
+    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
+
+    def write(change=lambda rows: rows):
+        rows = change(np.round(np.column_stack([q_deg, point]), 4))
+        path = tmp_path / "poses.csv"
+        np.savetxt(path, rows, fmt="%.10g", delimiter=",", header=",".join(names), comments="")
+        config = tmp_path / "data.yaml"
+        config.write_text(
+            f"datasets: {{cell: {{robot: {ROBOT}, measurements: {{source: file, file: {{path: "
+            f"{path}, orientation: {{kind: none}}}}}}, calibration: {{base_and_tool: "
+            "estimated, vec: {order: 0}}, evaluation: {space: measured}}}\n"
+        )
+        return config
+
+    return write
+
+
+def test_a_good_file_is_described_and_passes(configuration):
+    done = call("check-data", configuration())
+    assert done.exit_code == 0, done.output
+    for words in ("poses: 20", "joint coverage", "limits -165 to 165", "nothing suspicious"):
+        assert words in done.output
+
+
+def test_suspicions_name_their_lines_and_end_with_1(configuration):
+    def shifted(rows):
+        rows[[4, 11], 6] += 30.0
+        return rows
+
+    config = configuration(shifted)
+    done = call("check-data", config)
+    assert done.exit_code == 1
+    assert "outliers" in done.output
+    assert "lines 6, 13" in done.output
+    told = json.loads(call("check-data", config, "--json").stdout)
+    assert told["verdict"] == "suspicions"
+    assert told["datasets"][0]["suspicions"][0]["lines"] == [6, 13]
+    assert told["datasets"][0]["facts"]["poses"] == 20
+
+
+def test_the_picture_is_drawn_once(configuration, tmp_path):
+    def shifted(rows):
+        rows[4, 6] += 30.0
+        return rows
+
+    config, picture = configuration(shifted), tmp_path / "checked.svg"
+    assert call("check-data", config, "--figure", picture).exit_code == 1
+    assert picture.read_bytes().startswith(b"<?xml")
+    assert call("check-data", config, "--figure", picture).exit_code == 2
+    assert call("check-data", config, "--figure", picture, "--force").exit_code == 1
+
+
+@pytest.mark.parametrize("flag", [[], ["--json"]])
+def test_what_cannot_be_used_ends_with_2(configuration, tmp_path, flag):
+    config = configuration(lambda rows: rows[:3])
+    done = call("check-data", config, *flag)
+    assert done.exit_code == 2
+    assert "at least 6" in done.output
+    (tmp_path / "poses.csv").unlink()
+    done = call("check-data", config, *flag)
+    assert done.exit_code == 2
+    assert "Parquet" in done.output
+    if flag:
+        assert json.loads(done.stdout)["verdict"] == "unusable"
+
+
+def test_only_measured_data_sets_can_be_checked(tmp_path):
+    config = tmp_path / "synthetic.yaml"
+    config.write_text("datasets: {mh180: {robot: mh180}}\n")
+    done = call("check-data", config)
+    assert done.exit_code == 2
+    assert "nothing to check" in done.output
+
+
+def test_help_has_an_example():
+    shown = call("check-data", "--help").output
+    assert "Example:" in shown
+    assert "kinacc check-data " in shown

@@ -1,0 +1,138 @@
+"""init as a person calls it: two files that check-data and the workflow take at once."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kinacc.cli.group import main
+from kinacc.config.load import load
+from kinacc.kinematics import robot
+
+SHARED = Path(__file__).parents[2] / ".." / "shared" / "data"
+
+
+def call(*words, **more):
+    return CliRunner().invoke(main, [str(word) for word in words], **more)
+
+
+def measured(name):
+    path = SHARED / name
+    if not path.is_file():
+        pytest.skip(f"{path.name} is not beside the project")
+    return path
+
+
+@pytest.fixture
+def foreign(tmp_path):
+    """A `;` file with decimal commas of an IRB 120: radians, ZYX angles, names of its own."""
+    arm = robot.load("irb120")
+    rng = np.random.default_rng(0)
+    q = np.round(rng.uniform(-1.0, 1.0, (40, 6)), 6)
+    pose = robot.forward(arm, q)
+    r = pose.rotation
+    turn = np.rad2deg(
+        np.stack(
+            [
+                np.arctan2(r[:, 2, 1], r[:, 2, 2]),
+                -np.arcsin(r[:, 2, 0]),
+                np.arctan2(r[:, 1, 0], r[:, 0, 0]),
+            ],
+            axis=1,
+        )
+    )
+    rows = np.column_stack([q, np.round(pose.position_mm, 4), np.round(turn, 5)])
+    head = ";".join([*(f"Achse {i}" for i in range(1, 7)), *"XYZ", "Rx", "Ry", "Rz"])
+    body = "\n".join(";".join(f"{value:.6f}".replace(".", ",") for value in row) for row in rows)
+    path = tmp_path / "Messung 3.csv"
+    path.write_text(f"{head.replace('Achse', 'axis')}\n{body}\n", encoding="utf-8")
+    return path
+
+
+def test_a_foreign_file_is_described_and_passes_the_check(foreign, tmp_path):
+    done = call("init", foreign, "--out", tmp_path / "cell", "--yes")
+    assert done.exit_code == 0, done.output
+    dataset = tmp_path / "cell" / "Messung_3.yaml"
+    assert f"kinacc check-data {dataset}" in done.output
+    assert f"#     kinacc check-data {dataset}\n" in dataset.read_text(encoding="utf-8")
+    settings = load((dataset,))["Messung_3"]
+    file = settings["measurements"]["file"]
+    assert (file["delimiter"], file["decimal"], file["joint_unit"]) == (";", ",", "rad")
+    # XYZ was assumed; trying finds the same rotations by either of their two names.
+    assert file["orientation"]["convention"] in ("ZYX", "xyz")
+    assert robot.load(settings["robot"]).name == "irb120"
+    checked = call("check-data", dataset)
+    assert checked.exit_code == 0, checked.output
+
+
+def test_nothing_is_overwritten_unless_forced(foreign, tmp_path):
+    words = ("init", foreign, "--out", tmp_path, "--robot", "irb120", "--name", "a")
+    assert call(*words, "--yes").exit_code == 0
+    dataset = tmp_path / "a.yaml"
+    dataset.write_text("mine\n")
+    refused = call(*words, "--yes")
+    assert refused.exit_code == 2
+    assert "is there already" in refused.output
+    assert dataset.read_text() == "mine\n"
+    assert call(*words, "--yes", "--force").exit_code == 0
+    assert "datasets:" in dataset.read_text()
+
+
+def test_what_it_cannot_know_is_asked(foreign, tmp_path):
+    # joint unit, length unit, angle unit, orientation, robot
+    done = call("init", foreign, "--out", tmp_path, input="rad\nmm\ndeg\nZYX\nirb120\n")
+    assert done.exit_code == 0, done.output
+    assert "Not stated in the file" in done.output
+    file = load((tmp_path / "Messung_3.yaml",))["Messung_3"]["measurements"]["file"]
+    assert file["orientation"]["convention"] == "ZYX"
+
+
+def test_an_unknown_robot_gets_a_template_to_fill_in(foreign, tmp_path):
+    lines = foreign.read_text(encoding="utf-8").splitlines()
+    without = [";".join(line.split(";")[1:]) for line in lines]
+    path = tmp_path / "five.csv"
+    path.write_text("\n".join(without).replace("axis 2", "axis 1").replace("axis 3", "axis 2")
+                    .replace("axis 4", "axis 3").replace("axis 5", "axis 4")
+                    .replace("axis 6", "axis 5"))  # fmt: skip
+    done = call("init", path, "--out", tmp_path, "--yes")
+    assert done.exit_code == 0, done.output
+    assert "fill in the robot file first" in done.output
+    template = tmp_path / "five.robot.yaml"
+    assert "FILL IN" in template.read_text()
+    assert robot.load(template).dh.joints == 5
+
+
+def test_the_answer_for_a_program(foreign, tmp_path):
+    done = call("init", foreign, "--out", tmp_path, "--robot", "irb120", "--json")
+    told = json.loads(done.stdout)
+    assert told["joints"] == 6
+    assert told["suspicions"] == []
+    assert told["next"][0].startswith("kinacc check-data")
+
+
+def test_wrong_options_are_named(foreign, tmp_path):
+    for words in (("--robot", "iiwa14"), ("--orientation", "ABC"), ("--name", "a b")):
+        done = call("init", foreign, "--out", tmp_path, "--yes", *words)
+        assert done.exit_code == 2
+        assert words[0] in done.output
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("ur10_tmac/published_series_D.csv", "ur10"),
+        ("fanuc_r2000ic/poses.csv", "fanuc_r2000ic_165f"),
+    ],
+)
+def test_measured_files_are_described_without_a_word(path, name, tmp_path):
+    done = call("init", measured(path), "--out", tmp_path, "--name", "cell", "--json")
+    told = json.loads(done.stdout)
+    assert told["robot"] == name
+    assert told["suspicions"] == []
+    assert load((tmp_path / "cell.yaml",))["cell"]["measurements"]["source"] == "file"
+
+
+def test_help_has_an_example():
+    assert "kinacc init " in call("init", "--help").output

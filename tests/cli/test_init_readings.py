@@ -1,0 +1,457 @@
+"""Files whose names hold more than one reading: the measured one is taken, or it is asked."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
+
+from kinacc.cli.group import main
+from kinacc.config.load import load
+from kinacc.errors import InputError
+from kinacc.kinematics import robot
+from kinacc.measurements.reader import read
+
+ROWS = 14
+ARM = robot.load("ur10")
+AXES = "xyz"
+
+
+def call(*words, **more):
+    return CliRunner().invoke(main, [str(word) for word in words], **more)
+
+
+def file_section(folder):
+    """What a run would read, from the data set that init has written."""
+    return load((folder / "readings.yaml",))["readings"]["measurements"]["file"]
+
+
+def numbered(pattern, count=6, first=1):
+    return [pattern.format(number) for number in range(first, first + count)]
+
+
+def by_axis(pattern):
+    """Names of x, y, z; capitals where the pattern asks for {A}."""
+    return [pattern.format(a=axis, A=axis.upper()) for axis in AXES]
+
+
+class Rows:
+    """What an arm that is a little off did, as a tracker and its controller have it."""
+
+    def __init__(self):
+        rng = np.random.default_rng(4)
+        self.q = np.round(rng.uniform(-100, 100, (ROWS, 6)), 4)
+        pose = robot.forward(ARM, np.deg2rad(self.q))
+        self.controller = pose.position_mm
+        turn = Rotation.from_euler("XYZ", [20, -30, 100], degrees=True)
+        self.measured = turn.apply(self.controller) + np.array([2000, -900, 300])
+        self.measured = np.round(self.measured + rng.normal(0, 0.05, (ROWS, 3)), 4)
+        self.nominal = np.round(self.measured + rng.normal(0, 0.7, (ROWS, 3)), 4)
+        self.deviation = self.measured - self.nominal
+        self.spread = rng.uniform(0.01, 0.05, (ROWS, 3))
+        self.turn = turn * Rotation.from_matrix(pose.rotation)
+        self.quaternion = self.turn.as_quat(scalar_first=True)
+        self.rounded = np.round(self.q)
+
+
+IT = Rows()
+Q = (numbered("q{}_deg"), IT.q)
+X = (by_axis("{a}_mm"), IT.measured)
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(*groups):
+        names = [name for group, _ in groups for name in group]
+        rows = np.hstack([np.reshape(values, (ROWS, -1)) for _, values in groups])
+        path = tmp_path / "readings.csv"
+        lines = [",".join(names), *(",".join(f"{v:.9g}" for v in row) for row in rows)]
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    return write
+
+
+def described(path, *options):
+    """What a run would read, where init finds it without a question."""
+    folder = path.parent / "cell"
+    done = call("init", path, "--robot", "ur10", "--out", folder, "--yes", *options)
+    assert done.exit_code == 0, done.output
+    return file_section(folder)
+
+
+def assert_measured(section, others=()):
+    """The run takes the measured points and the joints as they were; returns their columns.
+
+    ``others`` are the targets it takes beside that of the measured points, none unless named.
+    """
+    columns = read(section, ARM, strict=False).columns
+    assert set(columns["target"]) == {"tool", *others}
+    columns = {name: values[columns["target"] == "tool"] for name, values in columns.items()}
+    point = np.stack([columns[f"{axis}_mm"] for axis in AXES], axis=1)
+    q_deg = np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, 7)], axis=1))
+    np.testing.assert_allclose(point, IT.measured, atol=1e-3)
+    np.testing.assert_allclose(q_deg, IT.q, atol=1e-4)
+    return columns
+
+
+RIGHT = {
+    "nominal beside ours": [Q, X, (by_axis("nom_{a}_mm"), IT.nominal)],
+    "nominal before ours": [(by_axis("nom_{a}_mm"), IT.nominal), Q, X],
+    "commanded behind the axis": [Q, X, (by_axis("{a}_cmd_mm"), IT.nominal)],
+    "nominal, actual, d": [
+        Q,
+        (by_axis("Nominal {A} [mm]"), IT.nominal),
+        (by_axis("Actual {A} [mm]"), IT.measured),
+        (by_axis("d{A} [mm]"), IT.deviation),
+    ],
+    "d first": [
+        Q,
+        (by_axis("d{A} [mm]"), IT.deviation),
+        (by_axis("Actual {A} [mm]"), IT.measured),
+        (by_axis("Nominal {A} [mm]"), IT.nominal),
+    ],
+    "uncertainties": [Q, (by_axis("{A}"), IT.measured), (by_axis("U{a}"), IT.spread / 1000)],
+    "German": [
+        (numbered("A{} Istwinkel [°]"), IT.q),
+        (numbered("A{} Sollwinkel [°]"), IT.rounded),
+        (by_axis("{A} Soll [mm]"), IT.nominal),
+        (by_axis("{A} gemessen [mm]"), IT.measured),
+        (by_axis("Abweichung {A} [mm]"), IT.deviation),
+    ],
+    "French": [
+        (numbered("axe {} (degrés)"), IT.q),
+        (by_axis("{A} nominal (mm)"), IT.nominal),
+        (by_axis("{A} mesuré (mm)"), IT.measured),
+        (by_axis("écart {A} (mm)"), IT.deviation),
+    ],
+    "Spanish": [
+        (numbered("J{} (grados)"), IT.q),
+        (by_axis("{A} teórico (mm)"), IT.nominal),
+        (by_axis("desviación {A} (mm)"), IT.deviation),
+        (by_axis("{A} medido (mm)"), IT.measured),
+    ],
+    "Italian": [
+        (numbered("Giunto {} (gradi)"), IT.q),
+        (by_axis("scostamento {A} (mm)"), IT.deviation),
+        (by_axis("{A} nominale (mm)"), IT.nominal),
+        (by_axis("{A} misurato (mm)"), IT.measured),
+    ],
+    "Greek letters": [
+        Q,
+        (by_axis("Δ{a}"), IT.deviation),
+        (by_axis("{a}_meas"), IT.measured),
+        (by_axis("σ{a}"), IT.spread),
+        (by_axis("{a}_nom"), IT.nominal),
+    ],
+    "written together": [
+        (numbered("qcmd{}"), IT.rounded),
+        (numbered("qact{}"), IT.q),
+        (by_axis("{a}nom"), IT.nominal),
+        (by_axis("{a}meas"), IT.measured),
+        (by_axis("{a}err"), IT.deviation),
+    ],
+    "a controller's log beside a tracker": [
+        (numbered("target_q_{}", first=0), np.deg2rad(IT.rounded)),
+        (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
+        (numbered("actual_qd_{}", first=0), IT.q * 0.0),
+        (numbered("joint_temperatures_{}", first=0), IT.q * 0.0 + 30.0),
+        (numbered("actual_TCP_pose_{}", first=0), np.hstack([IT.controller / 1000.0] * 2)),
+        (by_axis("tracker_{a}_mm"), IT.measured),
+    ],
+    "a pose of the robot beside ours": [Q, X, (by_axis("robot_{a}_mm"), IT.controller)],
+    "the same point twice": [Q, (by_axis("{A}"), IT.measured), X],
+    "joints in both units": [(numbered("q{}_rad"), np.deg2rad(IT.q)), Q, X],
+    "velocities and forces": [
+        Q,
+        X,
+        (by_axis("v{a} [mm/s]"), IT.spread),
+        (by_axis("F{a} [N]"), IT.spread),
+        (numbered("J{} [deg/s]"), IT.q * 0.1),
+    ],
+    "three reflectors": [
+        Q,
+        (by_axis("B1 {A} nominal"), IT.nominal),
+        X,
+        (by_axis("B1_{a}_mm"), IT.measured + IT.turn.apply([90, 0, 0])),
+        (by_axis("B2_{a}_mm"), IT.measured + IT.turn.apply([0, 90, 0])),
+    ],
+    "axes by letters": [(list("SLURBT"), IT.q), X],
+}
+
+
+@pytest.mark.parametrize("case", RIGHT)
+def test_what_was_measured_is_read_whatever_stands_beside_it(case, file):
+    others = ("B_1", "B_2") if case == "three reflectors" else ()
+    assert_measured(described(file(*RIGHT[case])), others)
+
+
+def test_a_column_that_init_calls_not_used_is_not_used(file, tmp_path):
+    path = file(*RIGHT["nominal beside ours"])
+    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "cell", "--json")
+    told = json.loads(done.stdout)
+    assert told["unused_columns"] == by_axis("nom_{a}_mm")
+    assert told["left_aside"] == [{"columns": by_axis("nom_{a}_mm"), "because": "nominal"}]
+    settings = file_section(tmp_path / "cell")
+    assert settings["targets"] == ["tool"]
+    assert settings["columns"]["x"] == "x_mm"
+    columns = read(settings, ARM).columns
+    assert len(columns["x_mm"]) == ROWS
+    assert set(columns["target"]) == {"tool"}
+
+
+def test_what_was_reported_is_read_and_what_was_commanded_goes_beside_it(file):
+    joints = (numbered("actual_q_{}", first=0), np.deg2rad(IT.q))
+    wanted = (numbered("target_q_{}", first=0), np.deg2rad(IT.rounded))
+    section = described(file(wanted, joints, X))
+    assert_measured(section)
+    reading = read(section, ARM)
+    np.testing.assert_allclose(reading.commanded, np.deg2rad(IT.rounded), atol=1e-6)
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_q1_to_q4_beside_joints_are_a_quaternion(file, tmp_path, order):
+    four = IT.quaternion if order == "wxyz" else IT.quaternion[:, [1, 2, 3, 0]]
+    path = file((numbered("rax_{}"), IT.q), X, (numbered("q{}", 4), four))
+    section = described(path)
+    assert section["orientation"]["kind"] == "quaternion"
+    assert section["orientation"]["order"] == order
+    columns = assert_measured(section)
+    found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
+    both = np.abs(np.sum(found * IT.quaternion, axis=1))
+    np.testing.assert_allclose(both, 1.0, atol=1e-6)
+
+
+def test_a_drehung_is_an_orientation_and_no_target(file):
+    turn = (by_axis("Drehung {A} [°]"), IT.turn.as_euler("XYZ", degrees=True))
+    section = described(file(Q, (by_axis("{A} [mm]"), IT.measured), turn))
+    assert section["orientation"]["kind"] == "euler"
+    assert section["orientation"]["unit"] == "deg"
+    columns = assert_measured(section)
+    assert set(columns["target"]) == {"tool"}
+    assert np.isfinite(columns["qw"]).all()
+
+
+def test_standard_deviations_are_those_of_the_measured_point(file):
+    measured = (by_axis("Measured {A} [mm]"), IT.measured)
+    spread = (by_axis("Measured std {A} [mm]"), IT.spread)
+    wide = (by_axis("U95 {A} [mm]"), 2 * IT.spread)
+    deviation = (by_axis("Dev {A} [mm]"), IT.deviation)
+    columns = assert_measured(described(file(Q, wide, measured, spread, deviation)))
+    given = np.stack([columns[f"std_{axis}_mm"] for axis in AXES], axis=1)
+    np.testing.assert_allclose(given, IT.spread, rtol=1e-6)
+
+
+ASKED = {
+    "a tool centre point": [Q, (by_axis("tcp_{a}"), IT.controller)],
+    "a tool centre point beside another point": [Q, X, (by_axis("tcp_{a}_mm"), IT.controller)],
+    "actual beside actual joints": [
+        (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
+        (by_axis("actual_{a}"), IT.controller),
+    ],
+    "set point and actual point": [
+        Q,
+        (by_axis("{A} Soll"), IT.nominal),
+        (by_axis("{A} Ist"), IT.controller),
+    ],
+    "a point and the length of its deviation": [Q, X, (["3D error [mm]"], IT.spread[:, :1])],
+    "a target beside a point": [Q, X, (by_axis("target_{a}_mm"), IT.nominal)],
+    "a reference beside a point": [Q, X, (by_axis("ref_{a}_mm"), IT.nominal)],
+    "a point and how far it is off": [
+        Q,
+        (by_axis("{A}"), IT.nominal),
+        (by_axis("d{A}"), IT.deviation),
+    ],
+    "the published form of a robot's data": [
+        (numbered("joint_{}"), IT.q),
+        (by_axis("{a}_t"), IT.nominal),
+        (by_axis("{a}_dif"), IT.deviation),
+    ],
+    "words nobody knows": [
+        Q,
+        (by_axis("zadana_{a}"), IT.nominal),
+        (by_axis("zmierzona_{a}"), IT.measured),
+    ],
+    "two points in frames of their own": [
+        Q,
+        (by_axis("A_{a}"), IT.controller),
+        (by_axis("B_{a}"), IT.measured),
+    ],
+    "the same name with other numbers": [Q, X, (by_axis("{A}"), IT.nominal)],
+    "commanded joints alone": [(numbered("joint_{}_cmd"), IT.rounded), X],
+    "joints of two arms": [(numbered("left_j{}"), IT.q), (numbered("right_j{}"), IT.rounded), X],
+    "numbers without a word for joints": [(numbered("position[{}]", first=0), IT.q), X],
+    "the controller's orientation beside a tracker's point": [
+        (numbered("robax_{}"), IT.q),
+        (by_axis("trans_{a}"), IT.controller),
+        (numbered("rot_q{}", 4), IT.quaternion),
+        (by_axis("tracker_{a}"), IT.measured),
+    ],
+    "two orientations": [
+        Q,
+        X,
+        (by_axis("r{a}_deg"), IT.turn.as_euler("XYZ", degrees=True)),
+        (["qw", "qx", "qy", "qz"], IT.quaternion),
+    ],
+    "an orientation beside nominal and measured": [
+        Q,
+        (by_axis("Nominal {A}"), IT.nominal),
+        (by_axis("Measured {A}"), IT.measured),
+        (by_axis("R{a}"), IT.turn.as_euler("XYZ", degrees=True)),
+    ],
+}
+
+
+@pytest.mark.parametrize("case", ASKED)
+def test_two_readings_are_asked_about_and_never_taken_in_silence(case, file, tmp_path):
+    path, out = file(*ASKED[case]), tmp_path / "cell"
+    for flag in ("--yes", "--json"):
+        done = call("init", path, "--robot", "ur10", "--out", out, flag)
+        assert done.exit_code == 2, done.output
+        assert "--take" in done.output
+    unanswered = call("init", path, "--robot", "ur10", "--out", out)
+    assert unanswered.exit_code == 2
+    assert "--take" in unanswered.output
+    assert not out.exists()
+
+
+def test_an_answer_and_an_option_decide_alike(file, tmp_path):
+    path = file(*ASKED["a target beside a point"])
+    words = ("init", path, "--robot", "ur10", "--force")
+    asked = call(*words, "--out", tmp_path / "a", input="1\n")
+    given = call(*words, "--out", tmp_path / "b", "--yes", "--take", "x_mm")
+    for done, folder in ((asked, "a"), (given, "b")):
+        assert done.exit_code == 0, done.output
+        file_section = load((tmp_path / folder / "readings.yaml",))["readings"]["measurements"][
+            "file"
+        ]
+        assert file_section["columns"]["x"] == "x_mm"
+        assert file_section["targets"] == ["tool"]
+
+
+def test_none_of_the_readings_is_an_answer(file, tmp_path):
+    path = file(*ASKED["a tool centre point"])
+    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", input="0\n")
+    assert done.exit_code == 2
+    assert "the measured point" in done.output
+    path = file(*ASKED["two orientations"])
+    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", input="0\n")
+    assert done.exit_code == 0, done.output
+    assert "orientation: none" in done.output
+
+
+REFUSED = {
+    "only the controller's own kinematics": (
+        [
+            (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
+            (numbered("actual_TCP_pose_{}", first=0), np.hstack([IT.controller / 1000.0] * 2)),
+        ],
+        "never a measurement",
+    ),
+    "the controller's own kinematics by axes": (
+        [Q, (by_axis("actual_TCP_pose_{a}"), IT.controller / 1000.0)],
+        "never a measurement",
+    ),
+    "only nominal points": ([Q, (by_axis("soll_{a}"), IT.nominal)], "nominal"),
+    "only deviations": ([Q, (by_axis("d{A} [mm]"), IT.deviation)], "a deviation"),
+    "centimetres": ([Q, (by_axis("{A} [cm]"), IT.measured / 10)], "cm"),
+    "inches": ([Q, (by_axis("{a}_in"), IT.measured / 25.4)], "inch"),
+    "milliradians": ([(numbered("q{} [mrad]"), 1e3 * np.deg2rad(IT.q)), X], "mrad"),
+    "joints in millimetres": ([(numbered("J{} [mm]"), IT.q), X], "joints in mm"),
+    "thousands of metres": ([Q, (by_axis("{a}_m"), IT.measured)], "at most 50 m"),
+    "positions in two units": (
+        [Q, (["X [mm]", "Y [mm]", "Z [m]"], IT.measured * [1, 1, 1e-3])],
+        "one unit",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_read_is_refused_with_its_reason(case, file, tmp_path):
+    groups, reason = REFUSED[case]
+    done = call("init", file(*groups), "--robot", "ur10", "--out", tmp_path / "cell", "--yes")
+    assert done.exit_code == 2
+    assert reason in done.output
+    assert not (tmp_path / "cell").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "unit", "column"),
+    [("--length-unit", "m", "x_mm"), ("--joint-unit", "rad", "q1_deg")],
+)
+def test_an_option_against_the_names_is_refused(file, tmp_path, option, unit, column):
+    path = file(Q, X)
+    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", "--yes", option, unit)
+    assert done.exit_code == 2
+    assert f"{option} {unit}" in done.output
+    assert column in done.output
+    assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("mapped", [True, False])
+@pytest.mark.parametrize(
+    ("key", "unit", "ours", "column"),
+    [("joint_unit", "rad", "q1", "q1_deg"), ("length_unit", "m", "x", "x_mm")],
+)
+def test_a_key_against_the_names_is_refused(file, tmp_path, mapped, key, unit, ours, column):
+    path, config = file(Q, X), tmp_path / "cell.yaml"
+    section = {"path": str(path), "orientation": {"kind": "none"}, key: unit}
+    section |= {"columns": {ours: column}} if mapped else {}
+    dataset = {"robot": "ur10", "measurements": {"source": "file", "file": section}}
+    dataset |= {
+        "calibration": {"base_and_tool": "estimated"},
+        "evaluation": {"space": "measured"},
+    }
+    config.write_text(yaml.safe_dump({"datasets": {"cell": dataset}}))
+    done = call("check-data", config)
+    assert done.exit_code == 2
+    for words in (column, f"measurements.file.{key}", unit):
+        assert words in done.output
+    with pytest.raises(InputError, match=f"measurements.file.{key} says {unit}"):
+        read(load((config,))["cell"]["measurements"]["file"], ARM)
+
+
+def test_degrees_under_the_names_contradict_a_key_in_radians(tmp_path):
+    names = [*numbered("J{}"), *by_axis("{A}")]
+    rows = np.hstack([IT.q, IT.measured])
+    lines = [",".join(names), ",".join(["[deg]"] * 6 + ["[mm]"] * 3)]
+    path = tmp_path / "readings.csv"
+    path.write_text("\n".join([*lines, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    columns = dict(zip([*numbered("q{}"), *AXES], names, strict=True))
+    section = described(path)
+    assert_measured(section)
+    with pytest.raises(InputError, match=r"J1.*says deg.*joint_unit says rad"):
+        read(section | {"joint_unit": "rad", "columns": columns}, ARM)
+
+
+def test_the_reader_takes_no_nominal_point_for_a_target(file):
+    section = load_defaults() | {"path": str(file(*RIGHT["nominal beside ours"]))}
+    reading = read(section, ARM)
+    assert set(reading.columns["target"]) == {"tool"}
+    assert reading.unused == tuple(by_axis("nom_{a}_mm"))
+    both = read(section | {"targets": ["tool", "nom"]}, ARM)
+    assert set(both.columns["target"]) == {"tool", "nom"}
+
+
+@pytest.mark.parametrize("word", ["soll", "dev", "sigma", "robot", "target"])
+def test_the_reader_takes_no_point_alone_that_says_it_was_not_measured(file, word):
+    section = load_defaults() | {"path": str(file(Q, (by_axis(f"{word}_{{a}}_mm"), IT.measured)))}
+    with pytest.raises(InputError, match=r"measurements\.file\.targets"):
+        read(section, ARM)
+    assert len(read(section | {"targets": [word]}, ARM).columns["x_mm"]) == ROWS
+
+
+def load_defaults():
+    from kinacc.config.schema import defaults
+
+    section = defaults()["measurements"]["file"]
+    return section | {"orientation": section["orientation"] | {"kind": "none"}}
+
+
+def test_points_that_a_controller_calculated_are_remarked_on(file, tmp_path):
+    path = file(Q, (by_axis("{a}_mm"), IT.controller))
+    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "cell", "--yes")
+    assert done.exit_code == 0, done.output
+    assert "closer than an instrument measures" in done.output

@@ -1,0 +1,153 @@
+"""Names that people give: they lead nowhere, and are text in Markdown, CSV and LaTeX."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from command_line import call, small_study
+
+from kinacc.config.names import in_csv, of_csv
+from kinacc.kinematics import robot
+
+EVIL = "=1+1|**b** <i>x</i>"  # a formula, two cells, bold, HTML
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a small synthetic study, made by the workflow's own stages."""
+    return small_study(tmp_path_factory.mktemp("study"))
+
+
+def called(text, name):
+    """The text of a robot file with another name."""
+    return re.sub(r"name: .*", lambda _: f"name: {json.dumps(name)}", text, count=1)
+
+
+@pytest.mark.parametrize("name", ["../../evil", "/tmp/evil", "a/b", "..", "", "-x", "a\nb", "a "])
+def test_an_export_stays_in_its_folder_whatever_its_name(folder, tmp_path, name):
+    inside = tmp_path / "a" / "b"
+    inside.mkdir(parents=True)
+    done = call("export", folder, "--to", inside, "--name", name)
+    assert done.exit_code == 2, done.output
+    assert "--name" in done.output
+    assert "letters, digits, _ - . and spaces" in done.output
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_an_export_may_be_named_after_a_version(folder, tmp_path):
+    done = call("export", folder, "--to", tmp_path, "--name", "Prüfling v1.2-b", "--format", "yaml")
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "Prüfling v1.2-b.yaml").is_file()
+
+
+def test_the_name_of_a_results_folder_is_text_in_the_exported_tables(folder, tmp_path):
+    renamed = tmp_path / "cell|3_$x$ *new*"
+    shutil.copytree(folder, renamed)
+    done = call("export", renamed, "--to", tmp_path / "out", "--format", "markdown",
+                "--format", "latex", "--name", "arm")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    shown = (tmp_path / "out" / "arm_tables.md").read_text()
+    assert r"**DH parameters, cell\|3\_\$x\$ \*new\***" in shown
+    printed = (tmp_path / "out" / "arm_tables.tex").read_text()
+    assert r"cell|3\_\$x\$ *new*" in printed
+
+
+def test_a_name_with_two_dashes_is_exported_to_urdf(folder, tmp_path):
+    renamed = tmp_path / "cell---3"
+    shutil.copytree(folder, renamed)
+    done = call("export", renamed, "--to", tmp_path / "out", "--format", "urdf")
+    assert done.exit_code == 0, done.output
+    assert robot.load(tmp_path / "out" / "cell---3.urdf").dh.joints == 6
+
+
+def test_a_campaign_report_shows_names_and_reasons_as_they_were_given(folder, tmp_path):
+    own = tmp_path / "arm.yaml"
+    text = robot.as_yaml(robot.load("mh180"))
+    own.write_text(called(text, EVIL))
+    joints = np.random.default_rng(1).uniform(-30, 30, (4, 6))
+    candidates = tmp_path / "points|1.csv"
+    head = ",".join(["pose", *(f"q{i}_deg" for i in range(1, 7))])
+    rows = [",".join([f"{EVIL} {i}", *map(str, row)]) for i, row in enumerate(joints)]
+    candidates.write_text("\n".join([head, *rows]) + "\n")
+    campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
+    done = call("campaign", "start", campaign, "--calibration", folder, "--robot", own,
+                "--candidates", candidates, "--instrument", "a|b=0.05", "--frame", "base",
+                "--budget", 4, "--model", "dh")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
+    cells = list(csv.DictReader(visit.open()))
+    assert all(row["pose"].startswith("'=1+1|") for row in cells)
+    readings = tmp_path / "readings.csv"
+    with readings.open("w", newline="") as file:
+        out = csv.writer(file)
+        out.writerow(["pose", "x_mm", "y_mm", "z_mm"])
+        for row in cells[:3]:
+            out.writerow([row["pose"], *(float(row[f"expected_{a}_mm"]) + 0.1 for a in "xyz")])
+    assert call("campaign", "record", campaign, readings).exit_code == 0
+    last = f"{EVIL} {cells[3]['pose'][-1]}"
+    reason = "behind | the\n# column"
+    assert call("campaign", "leave-out", campaign, last, "--reason", reason).exit_code == 0
+    assert call("campaign", "report", campaign).exit_code == 0
+    shown = (campaign / "report" / "report.md").read_text()
+    safe = r"=1+1\|\*\*b\*\* \<i\>x\</i\>"
+    assert f"# Largest error of {safe}, dh model of mh180" in shown
+    assert re.search(rf"^\| {re.escape(safe)} \d \| 1 \|", shown, re.MULTILINE)
+    assert r"instrument a\|b: " in shown
+    assert r"(rows of points\|1.csv)" in shown
+    assert r"was left out: behind \| the # column" in shown
+    assert "<i>" not in shown
+
+
+def test_text_that_would_be_a_formula_is_read_back_as_it_was(folder, tmp_path):
+    names = ["=cmd|x", "+a", "-5", "-a", "@b", "'plain"]
+    joints, found = tmp_path / "joints.csv", tmp_path / "found.csv"
+    head = ",".join(["pose", *(f"q{i}_deg" for i in range(1, 7))])
+    joints.write_text("\n".join([head, *(f"{name},0,0,0,0,{60 + i},0"
+                                         for i, name in enumerate(names))]) + "\n")  # fmt: skip
+    assert call("predict", folder, joints, "-o", found).exit_code == 0
+    rows = list(csv.reader(found.open()))[1:]
+    assert [row[0] for row in rows] == ["'=cmd|x", "'+a", "-5", "'-a", "'@b", "'plain"]
+    assert not any(cell[:1] in "=+@\t\r" for row in rows for cell in row if cell)
+    text = found.read_text().replace("row,", "pose,", 1)
+    found.write_text(text)
+    again = tmp_path / "again.parquet"
+    assert call("predict", folder, found, "-o", again).exit_code == 0
+    assert pq.read_table(again).column("row").to_pylist() == names
+
+
+@pytest.mark.parametrize("text", ["=1", "'=1", "''=1", "'", "-1", "-1e-3", "-", "+a", "@", "\t",
+                                  "\r", "'-5", "plain", "-5,2"])  # fmt: skip
+def test_every_text_comes_back_from_a_cell(text):
+    cell = in_csv(text)
+    assert of_csv(cell) == text
+    assert cell[:1] not in tuple("=@\t\r")
+    assert (cell == text) == (text in ("'", "-1", "-1e-3", "plain"))
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "\x1b[31mred", "\u202eleft"])
+def test_a_name_that_does_not_stand_in_a_line_is_refused_where_it_is_given(folder, tmp_path, name):
+    def refused(*words):
+        done = call(*words)
+        assert done.exit_code == 2, done.output
+        assert "cannot be a name" in done.output
+        assert "on one line" in done.output
+
+    own = tmp_path / "arm.yaml"
+    text = robot.as_yaml(robot.load("mh180"))
+    own.write_text(called(text, name))
+    refused("plan-poses", own)
+    start = ("campaign", "start", tmp_path / "c", "--calibration", folder)
+    refused(*start, "--instrument", f"{name}=0.1")
+    candidates = tmp_path / "points.csv"
+    with candidates.open("w", newline="") as file:
+        out = csv.writer(file)
+        out.writerow(["pose", *(f"q{i}_deg" for i in range(1, 7))])
+        out.writerows([[name, 0, 0, 0, 0, 60, 0], ["b", 0, 0, 0, 0, 50, 0]])
+    refused(*start, "--noise-mm", 0.1, "--candidates", candidates)
+    assert not (tmp_path / "c").exists()

@@ -1,0 +1,244 @@
+"""The commands that use a calibration, as a person calls them: answers, files, mistakes."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from command_line import call, small_study
+
+from kinacc.kinematics import robot
+
+HELP = ("predict", "compensate", "export", "compare", "plan-poses", "fitted")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a small synthetic study, made by the workflow's own stages."""
+    return small_study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.mark.parametrize("name", HELP)
+def test_help_has_an_example(name):
+    shown = call(name, "--help")
+    assert shown.exit_code == 0
+    assert "Example:" in shown.output
+    assert f"kinacc {name} " in shown.output
+    assert "--json" in shown.output
+
+
+def test_fitted_says_what_the_fits_are_worth(folder, tmp_path):
+    shown = call("fitted", folder)
+    assert shown.exit_code == 0, shown.output
+    assert "is selected: with VEC the squared error" in shown.output
+    assert "d of joint 2 and d of joint 3 appear only as their difference" in shown.output
+    answer = json.loads(call("fitted", folder, "--json").output)
+    table = pq.read_table(folder / "residuals.parquet").to_pydict()
+    for model, of in answer["position_error_mm"].items():
+        rows = [
+            i
+            for i, name in enumerate(table["comparison"])
+            if name == f"{model}_vs_measured"
+            and table["quantity"][i] == "position"
+            and table["fold"][i] is None
+        ]
+        got = {table["subset"][i]: table["rms"][i] for i in rows}
+        assert {subset: figures["rms"] for subset, figures in of.items()} == got
+    assert answer["selected"] in ("dh", "vec")
+    assert answer["vec_order"] == 1
+    assert "j2.d_mm" in answer["parameters"]["undetermined"]
+    assert len(answer["worst_rows"]) == 5
+    missing = call("fitted", tmp_path)
+    assert missing.exit_code == 2
+    assert missing.output.count("no such file") == 5
+
+
+def test_predict_and_compensate_undo_each_other(folder, tmp_path):
+    joints, poses, back = (tmp_path / name for name in ("joints.csv", "poses.csv", "back.csv"))
+    q_deg = np.random.default_rng(0).uniform(-20, 20, (12, 6))
+    q_deg[:, 4] += 60.0
+    names = ",".join(f"q{i}_deg" for i in range(1, 7))
+    np.savetxt(joints, q_deg, delimiter=",", header=names, comments="")
+    made = call("predict", folder, joints, "--robot", "mh180", "--model", "dh", "-o", poses)
+    assert made.exit_code == 0, made.output
+    rows = list(csv.DictReader(poses.open()))
+    assert len(rows) == 12
+    for name in ("x_mm", "std_position_mm", "std_orientation_mrad", "unexplained_mm",
+                 "undetermined_mm", "status"):  # fmt: skip
+        assert rows[0][name]
+    done = call("compensate", folder, poses, "--robot", "mh180", "--model", "dh", "-o", back)
+    assert done.exit_code == 0, done.output
+    rows = list(csv.DictReader(back.open()))
+    assert all(row["status"].startswith("converged") for row in rows)
+    assert max(float(row["position_error_mm"]) for row in rows) <= 1e-6
+    found = np.array([[float(row[f"q{i}_deg"]) for i in range(1, 7)] for row in rows])
+    assert np.abs(found - q_deg).max() < 1e-6
+
+
+def test_rows_without_a_pose_are_counted(folder, tmp_path):
+    path = tmp_path / "far.csv"
+    path.write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,0,0,60,0\n0,0,0,0,60,359\n")
+    done = call("predict", folder, path, "--robot", "mh180", "--model", "vec")
+    assert "1 of 2 rows without a pose" in done.output
+
+
+def test_answers_for_machines_have_units_and_nulls(folder, tmp_path):
+    joints = '"0,0,0,0,60,0"'.strip('"')
+    shown = call("predict", folder, "--robot", "mh180", "--model", "nominal",
+                 "--joints-deg", joints, "--json")  # fmt: skip
+    content = json.loads(shown.output)
+    assert content["model"] == "nominal"
+    assert content["units"]["x_mm"] == "mm"
+    assert content["rows"][0]["std_position_mm"] is None
+    path = tmp_path / "own.parquet"
+    call("predict", folder, "--robot", "mh180", "--joints-deg", joints, "-o", path)
+    schema = pq.read_schema(path)
+    assert schema.field("std_position_mm").metadata[b"unit"] == b"mm"
+    assert schema.field("unexplained_mm").metadata[b"meaning"]
+
+
+def test_a_program_is_corrected_and_files_are_kept(folder, tmp_path):
+    program, out = tmp_path / "program.csv", tmp_path / "out.csv"
+    program.write_text("q1_rad;q2_rad;q3_rad;q4_rad;q5_rad;q6_rad\n0,1;0,2;-0,1;0,2;1,0;0,3\n")
+    words = ("compensate", folder, "--program", program, "--robot", "mh180", "-o", out)
+    assert call(*words).exit_code == 0
+    before = out.read_text()
+    again = call(*words)
+    assert again.exit_code == 2
+    assert "--force" in again.output
+    assert out.read_text() == before
+    assert call(*words, "--force").exit_code == 0
+
+
+def test_poses_without_joints_say_why_and_fail_the_command(folder):
+    done = call("compensate", folder, "--robot", "mh180", "--pose", "9000,0,0,1,0,0,0", "--json")
+    assert done.exit_code == 1
+    content = json.loads(done.stdout)
+    assert content["rows"][0]["q1_deg"] is None
+    assert "not reached" in content["rows"][0]["status"]
+
+
+def test_every_mistake_in_a_file_is_named(folder, tmp_path):
+    bad = tmp_path / "bad.csv"
+    bad.write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,x_mm\n1,2,3,x,5,6\n")
+    done = call("predict", folder, bad, "--robot", "mh180")
+    assert done.exit_code == 2
+    assert "q6_deg or q6_rad" in done.output
+    poses = tmp_path / "poses.csv"
+    poses.write_text("x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,2,3,0.5,0,0,0\n")
+    done = call("compensate", folder, poses, "--robot", "mh180")
+    assert done.exit_code == 2
+    assert "length 0.5" in done.output
+    radians = tmp_path / "radians.csv"
+    radians.write_text(",".join(f"q{i}_rad" for i in range(1, 7)) + "\n20,30,10,0,60,0\n")
+    done = call("predict", folder, radians, "--robot", "mh180")
+    assert done.exit_code == 2
+    assert "q1_deg" in done.output
+    assert "Traceback" not in done.output
+
+
+def test_another_robot_is_refused(folder):
+    done = call("predict", folder, "--robot", "ur10", "--joints-deg", "0,0,0,0,0,0")
+    assert done.exit_code == 2
+    assert "another robot than ur10" in done.output
+
+
+def test_export_writes_every_form(folder, tmp_path):
+    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--json")
+    assert done.exit_code == 0, done.output
+    files = [Path(name).name for name in json.loads(done.stdout)["files"]]
+    assert files == ["mh180.yaml", "mh180.json", "mh180.csv", "mh180.urdf", "mh180_tables.md",
+                     "mh180_tables.tex"]  # fmt: skip
+    left_open = json.loads((tmp_path / "mh180.json").read_text())["undetermined"]
+    assert left_open == json.loads(call("fitted", folder, "--json").output)["undetermined"]
+    assert f"Left open by the poses: {left_open[0]}" in (tmp_path / "mh180_tables.md").read_text()
+    compared = call("compare", tmp_path / "mh180.yaml", folder, "--robot", "mh180", "--json")
+    assert compared.exit_code == 0, compared.output
+    assert json.loads(compared.stdout)["moved_max_mm"] < 1e-9
+
+
+def test_a_urdf_that_is_not_there_is_said(folder, tmp_path):
+    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--format", "urdf",
+                "--urdf", tmp_path / "none.urdf")  # fmt: skip
+    assert done.exit_code == 2
+    assert "none.urdf: no such file or directory" in done.output
+    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--tip-link", "tool0")
+    assert done.exit_code == 2
+    assert "--tip-link" in done.output
+    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--format", "yaml",
+                "--urdf", tmp_path / "none.urdf")  # fmt: skip
+    assert done.exit_code == 2
+    assert "--urdf" in done.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_compare_draws_and_says_what_moved(folder, tmp_path):
+    picture = tmp_path / "moved.svg"
+    done = call("compare", "mh180", folder, "--robot", "mh180", "--picture", picture)
+    assert done.exit_code == 0, done.output
+    assert "after the best base and tool" in done.output
+    assert picture.stat().st_size > 5000
+
+
+def test_compare_says_that_robots_differ_and_refuses_what_cannot_be_compared():
+    other = call("compare", "irb120", "meca500")
+    assert other.exit_code == 0, other.output
+    assert "these are different robots (irb120 and meca500)" in other.output
+    assert "the arm has changed" not in other.output
+    assert not re.search(r"e-\d\d", other.output)
+    assert json.loads(call("compare", "irb120", "meca500", "--json").stdout)["same_robot"] is False
+    refused = call("compare", "mh180", "iiwa14")
+    assert refused.exit_code == 2
+    assert "iiwa14: has 7 joints; allowed: 6, as mh180 has" in refused.output
+
+
+def test_plan_poses_writes_joints_a_controller_can_read(tmp_path):
+    out, picture = tmp_path / "plan.csv", tmp_path / "index.svg"
+    done = call("plan-poses", "ur10", "--poses", "12", "--drawn", "120", "--hayati", "2,3",
+                "-o", out, "--picture", picture)  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "  - theta of joint 1 cannot be told from a turn of the base" in done.output
+    rows = list(csv.DictReader(out.open()))
+    assert [row["order"] for row in rows] == [str(i) for i in range(1, 13)]
+    assert len({row["candidate"] for row in rows}) == 12
+    assert picture.stat().st_size > 5000
+    again = call("plan-poses", "ur10", "--poses", "12", "--candidates", out, "--json")
+    assert again.exit_code == 0, again.output
+    content = json.loads(again.stdout)
+    assert content["poses"] == 12
+    assert content["undetermined"]
+
+
+def test_every_wrong_option_of_plan_poses_is_named():
+    done = call("plan-poses", "ur10", "--tool-mm", "1,2", "--joints-deg", "1:2", "--hayati", "9")
+    assert done.exit_code == 2
+    for name in ("--tool-mm", "--joints-deg", "--hayati"):
+        assert name in done.output
+    ranges = ",".join(["nan:1", *["0:1"] * 5])
+    done = call("plan-poses", "ur10", "--tool-mm", "1,nan,2", "--joints-deg", ranges,
+                "--hayati", "2.5")  # fmt: skip
+    assert done.exit_code == 2
+    for name in ("--tool-mm", "--joints-deg", "--hayati"):
+        assert name in done.output
+
+
+def test_results_say_which_robot_they_were_made_with(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # no configuration here
+    words = ("predict", folder.resolve(), "--joints-deg", "0,0,0,0,60,0")
+    told = call(*words)
+    assert told.exit_code == 0, told.output
+    assert told.output == call(*words, "--robot", "mh180").output
+    other = tmp_path / "signs.yaml"
+    text = robot.as_yaml(robot.load("mh180")).replace("limits_rad", "sign: -1, limits_rad", 1)
+    other.write_text(text)
+    refused = call(*words, "--robot", other)
+    assert refused.exit_code == 2
+    assert "joint_map or signs" in refused.output
+    (folder / "robot.parquet").rename(tmp_path / "robot.parquet")
+    try:
+        assert "--robot" in call(*words).output
+    finally:
+        (tmp_path / "robot.parquet").rename(folder / "robot.parquet")

@@ -1,0 +1,193 @@
+"""URDF of a calibrated arm: forward kinematics against pinocchio reading the same file."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from kinacc.deployment.export import urdf
+from kinacc.deployment.record import TOOL, nominal
+from kinacc.errors import InputError
+from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.kinematics import dh, robot
+
+TOOL_POSE = Pose(exp_so3(np.array([0.3, -0.2, 0.9])), np.array([12.0, -40.0, 180.0]))
+CLOSE_MM, CLOSE = 1e-6, 1e-9
+
+# A file whose links sit elsewhere on their axes than DH frames do, with fixed joints between.
+UR10_FILE = """<?xml version="1.0"?>
+<robot name="ur10">
+  <!-- kept as it is -->
+  <link name="world"/><link name="base"/><link name="shoulder"/><link name="upper"/>
+  <link name="bracket"/><link name="fore"/><link name="w1"/><link name="w2"/><link name="w3"/>
+  <link name="camera"/>
+  <joint name="stand" type="fixed"><origin xyz="0.1 0.2 0.3" rpy="0 0 3.141592653589793"/>
+    <parent link="world"/><child link="base"/></joint>
+  <joint name="pan" type="revolute"><origin xyz="0 0 0.1273" rpy="0 0 0"/>
+    <parent link="base"/><child link="shoulder"/><axis xyz="0 0 1"/>
+    <limit lower="-6" upper="6" effort="330" velocity="2.16"/></joint>
+  <joint name="lift" type="revolute"><origin xyz="0 0.220941 0" rpy="0 1.5707963267948966 0"/>
+    <parent link="shoulder"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-6" upper="6" effort="330" velocity="2.16"/></joint>
+  <joint name="mount" type="fixed"><origin xyz="0.05 0 0.2" rpy="0.4 0 0"/>
+    <parent link="upper"/><child link="bracket"/></joint>
+  <joint name="elbow" type="revolute"><origin xyz="-0.05 ELBOW" rpy="-0.4 0 0"/>
+    <parent link="bracket"/><child link="fore"/><axis xyz="0 1 0"/>
+    <limit lower="-6" upper="6" effort="150" velocity="3.15"/></joint>
+  <joint name="wrist1" type="revolute"><origin xyz="0 0 0.5723" rpy="0 1.5707963267948966 0"/>
+    <parent link="fore"/><child link="w1"/><axis xyz="0 1 0"/>
+    <limit lower="-6" upper="6" effort="56" velocity="3.2"/></joint>
+  <joint name="wrist2" type="revolute"><origin xyz="0 0.1149 0"/>
+    <parent link="w1"/><child link="w2"/><axis xyz="0 0 1"/>
+    <limit lower="-6" upper="6" effort="56" velocity="3.2"/></joint>
+  <joint name="wrist3" type="revolute"><origin xyz="0 0 0.1157"/>
+    <parent link="w2"/><child link="w3"/><axis xyz="0 1 0"/>
+    <limit lower="-6" upper="6" effort="56" velocity="3.2"/></joint>
+  TAIL
+  <joint name="eye" type="fixed"><origin xyz="0.1 0 0"/>
+    <parent link="w3"/><child link="camera"/></joint>
+</robot>
+"""
+TAIL = """<link name="ee"/><link name="probe"/>
+  <joint name="hand" type="fixed"><origin xyz="0 0.0922 0" rpy="0 0 1.5707963267948966"/>
+    <parent link="w3"/><child link="ee"/></joint>
+  <joint name="stick" type="fixed"><origin xyz="0 0 0.2" rpy="0.1 0.2 0.3"/>
+    <parent link="ee"/><child link="probe"/></joint>"""
+
+
+def bent(arm, seed=0, size=1.0):
+    """The arm with every DH parameter off, Hayati angles too, and a tool."""
+    rng = np.random.default_rng(seed)
+    vector = dh.to_vector(arm.dh)
+    off = rng.normal(0.0, size, vector.size) * np.tile([2e-3, 0.5, 0.5, 2e-3, 1e-3], arm.dh.joints)
+    return replace(
+        nominal(arm, "test"),
+        choice="dh",
+        model=dh.with_vector(arm.dh, vector + off),
+        targets={TOOL: compose(arm.flange, TOOL_POSE)},
+    )
+
+
+def seen_by_pinocchio(text, tip, q_rad, slides, names, base="base_link"):
+    """Tip frames (n, ...) in mm at joints (n, k), rad and mm."""
+    model = pin.buildModelFromXML(text)
+    data = model.createData()
+    order = [model.joints[model.getJointId(name)].idx_v for name in names]
+    steps = q_rad * np.where(slides, 1e-3, 1.0)
+    rotation, position = [], []
+    for row in steps:
+        step = np.zeros(model.nv)
+        step[order] = row
+        pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), step))
+        ends = [data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (base, tip)]
+        frame = ends[0].inverse() * ends[1]
+        rotation.append(frame.rotation)
+        position.append(1e3 * frame.translation)
+    return Pose(np.array(rotation), np.array(position))
+
+
+def some_joints(arm, count=15, seed=1):
+    share = np.random.default_rng(seed).uniform(0.1, 0.9, (count, arm.dh.joints))
+    return arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
+
+
+def assert_same(ours, theirs):
+    assert np.abs(ours.position_mm - theirs.position_mm).max() < CLOSE_MM
+    assert np.abs(ours.rotation - theirs.rotation).max() < CLOSE
+
+
+@pytest.mark.parametrize("name", robot.shipped())
+def test_a_generated_file_moves_as_the_calibrated_arm(name):
+    arm = bent(robot.load(name))
+    q_rad = some_joints(arm.robot)
+    names = [f"joint_{i}" for i in range(1, arm.robot.dh.joints + 1)]
+    names = [each.replace(" ", "_") for each in arm.robot.joint_names] or names
+    text = urdf.generated(arm)
+    for link, point in (("tool", "tool"), ("flange", "flange")):
+        theirs = seen_by_pinocchio(text, link, q_rad, arm.robot.dh.prismatic, names)
+        assert_same(arm.pose(q_rad @ arm.robot.joint_map.T, None, "base", point), theirs)
+
+
+def test_a_generated_file_is_read_back_as_the_same_arm(tmp_path):
+    arm = bent(robot.load("ur10"))
+    path = tmp_path / "own.urdf"
+    path.write_text(urdf.generated(arm))
+    back = robot.load(path)
+    q_rad = some_joints(arm.robot)
+    wanted = arm.pose(q_rad)
+    assert np.abs(robot.forward(back, q_rad).position_mm - wanted.position_mm).max() < CLOSE_MM
+    np.testing.assert_allclose(back.q_max_rad, arm.robot.q_max_rad)
+
+
+@pytest.mark.parametrize("robot_from", ["file", "shipped"])
+@pytest.mark.parametrize("tail", [TAIL, ""])
+def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
+    text = UR10_FILE.replace("ELBOW", ELBOW).replace("TAIL", tail)
+    path, tip = tmp_path / "ur10.urdf", "probe" if tail else "w3"
+    path.write_text(text)
+    base_robot = robot.urdf.load(path, "world", tip) if robot_from == "file" else robot.load("ur10")
+    arm = bent(base_robot)
+    done = urdf.corrected(arm, path, "world", tip)
+    joints = [joint.name for joint in robot.urdf.joints_between(path, "world", tip)]
+    names = [name for name in joints if name not in ("stand", "mount", "hand", "stick")]
+    q_rad = some_joints(base_robot)
+    slides = np.zeros(6, dtype=bool)
+    before = seen_by_pinocchio(text, tip, q_rad, slides, names, "world")
+    # What the calibration says of the tip, wherever the file puts base and tip on the arm.
+    ends = dh.forward(base_robot.dh, q_rad)
+    base, carried = urdf._ends_in_file(arm, robot.urdf.joints_between(path, "world", tip), path)
+    assert_same(compose(base, compose(ends, carried)), before)
+    wanted = compose(base, compose(arm.forward(q_rad), carried))
+    if robot_from == "file":
+        assert_same(arm.pose(q_rad, None, "base", "flange"), wanted)
+    end = tip if tail else f"{tip}_calibrated"
+    assert_same(wanted, seen_by_pinocchio(done, end, q_rad, slides, names, "world"))
+    assert "<!-- kept as it is -->" in done
+    assert 'effort="330"' in done
+    assert np.linalg.norm(wanted.position_mm - before.position_mm, axis=1).min() > 0.1
+
+
+def _elbow() -> str:
+    """The elbow in the bracket, so that the plain file is the nominal UR10."""
+    bracket = Pose(Rotation.from_euler("xyz", [0.4, 0, 0]).as_matrix(), np.array([50.0, 0, 200.0]))
+    inside = bracket.rotation.T @ (np.array([0.0, -171.9, 612.0]) - bracket.position_mm)
+    return " ".join(repr(float(value) / 1e3) for value in inside[1:])
+
+
+ELBOW = _elbow()
+
+
+def test_another_arm_is_refused_with_the_distance(tmp_path):
+    path = tmp_path / "ur10.urdf"
+    text = UR10_FILE.replace("ELBOW", ELBOW).replace("TAIL", "")
+    path.write_text(text.replace("0.5723", "0.5713"))
+    with pytest.raises(InputError, match=r"differs from ur10 by up to .* mm"):
+        urdf.corrected(bent(robot.load("ur10")), path, "world", "w3")
+
+
+def test_coupled_joints_are_refused_and_dh_joints_offered():
+    arm = bent(robot.load("fanuc_r2000ic_165f"))
+    coupled = arm.robot.joint_map.copy()
+    coupled[2, 1] = 1.0
+    arm = replace(arm, robot=replace(arm.robot, joint_map=coupled))
+    with pytest.raises(InputError, match="--dh-joints"):
+        urdf.generated(arm)
+    q_dh = np.random.default_rng(0).uniform(-1, 1, (5, 6))
+    names = [each.replace(" ", "_") for each in arm.robot.joint_names]
+    text = urdf.generated(arm, dh_joints=True)
+    theirs = seen_by_pinocchio(text, "flange", q_dh, arm.robot.dh.prismatic, names)
+    assert_same(arm.pose(q_dh, None, "base", "flange"), theirs)
+
+
+@settings(max_examples=200)
+@given(
+    st.tuples(*[st.sampled_from([0.0, 1e-9, -1e-7, 0.3, np.pi / 2, -np.pi / 2, np.pi, 3.0])] * 3)
+)
+def test_roll_pitch_yaw_come_back_upright_and_not(angles):
+    rotation = Rotation.from_euler("xyz", angles).as_matrix()
+    back = Rotation.from_euler("xyz", urdf.rpy(rotation)).as_matrix()
+    assert np.abs(back - rotation).max() < 1e-14

@@ -1,0 +1,105 @@
+"""Calibrations of simulated arms, made by the workflow's own fits, small enough for tests."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from kinacc.calibration import dh_fit, frames, tables, uncertainty, vec_fit
+from kinacc.calibration.frames import Frames
+from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.vec_fit import Prior
+from kinacc.deployment.folder import calibration
+from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.kinematics import dh, robot, vec
+
+BASE = Pose(exp_so3(np.array([0.3, -1.1, 2.0])), np.array([2500.0, -900.0, 400.0]))
+TOOL = Pose(exp_so3(np.array([-0.4, 0.2, 0.7])), np.array([30.0, -20.0, 150.0]))
+WEIGHT = 500.0
+HAYATI = {"ur10": (2, 3)}
+
+
+def truth(name: str, seed: int = 1) -> dh.DHModel:
+    """A real arm: the nominal one with errors of a tenth of a millimetre and of a milliradian."""
+    arm, rng = robot.load(name), np.random.default_rng(seed)
+    vector = dh.to_vector(arm.dh)
+    errors = rng.normal(0.0, 1.0, vector.size) * np.tile([1e-3, 0.3, 0.3, 1e-3, 0.0], arm.dh.joints)
+    return dh.with_vector(arm.dh, vector + errors)
+
+
+def joints(name: str, count: int, seed: int = 2, part: float = 0.36) -> np.ndarray:
+    """Reported joints (count, k) in the middle ``part`` of the limits."""
+    arm, half = robot.load(name), 0.5 * part
+    share = np.random.default_rng(seed).uniform(0.5 - half, 0.5 + half, (count, arm.dh.joints))
+    return arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
+
+
+def measured(name: str, count: int = 80, noise_mm: float = 0.03, seed: int = 3) -> Observations:
+    """Poses of the real arm seen by an instrument, joints of the robot's DH table."""
+    arm, rng = robot.load(name), np.random.default_rng(seed)
+    q_rad = joints(name, count, part=0.4) @ arm.joint_map.T
+    seen = compose(BASE, compose(dh.forward(truth(name), q_rad), TOOL))
+    turn = exp_so3(rng.normal(0.0, noise_mm / WEIGHT, (count, 3)))
+    noise = rng.normal(0.0, noise_mm, (count, 3))
+    return full_poses(q_rad, Pose(turn @ seen.rotation, seen.position_mm + noise))
+
+
+@cache
+def results(name: str, count: int = 80, seed: int = 3) -> dict:
+    """Tables of a results folder, as far as a calibration needs them."""
+    arm, seen = robot.load(name), measured(name, count, seed=seed)
+    nominal = dh_fit.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
+    dh_found = dh_fit.fit(
+        seen,
+        arm.dh,
+        free=dh_fit.free_parameters(arm.dh.joints, HAYATI.get(name, ())),
+        rotation_weight_mm_per_rad=WEIGHT,
+        threshold=1e-3,
+    )
+    low, high = seen.q_rad.min(axis=0) - 0.02, seen.q_rad.max(axis=0) + 0.02
+    vec_found = vec_fit.fit(
+        seen,
+        vec.without_errors(arm.dh, low, high, 2),
+        prior=Prior(1.0, 1e-3, 0.7, 1e-3),
+        rotation_weight_mm_per_rad=WEIGHT,
+        frames=nominal.frames,
+        frames_free=True,
+    )
+    of = {"vec": vec_found.frames, "dh": dh_found.frames, "nominal": nominal.frames}
+    known = uncertainty.of_dh(dh_found, ("tool",))
+    return {
+        "vec_model": tables.vec_model_columns(vec_found),
+        "dh_model": tables.dh_model_columns(dh_found),
+        "frames": tables.frames_columns(of, ("tool",)),
+        "dh_fit": tables.dh_fit_columns(dh_found, known),
+        "dh_covariance": tables.covariance_columns(known),
+        "vec_covariance": tables.covariance_columns(uncertainty.of_vec(vec_found, ("tool",))),
+        "residuals": _residuals(seen, of, dh_found.model, vec_found.model),
+    }
+
+
+def calibrated(name: str, model: str = "dh", count: int = 80, seed: int = 3):
+    """The calibration of a simulated arm by one model."""
+    return calibration(results(name, count, seed), robot.load(name), model, name)
+
+
+def _residuals(seen: Observations, of: dict[str, Frames], by_dh, by_vec) -> dict:
+    rows = []
+    for model, flange in (
+        ("dh", dh.forward(by_dh, seen.q_rad)),
+        ("vec", vec.pose(by_vec, seen.q_rad)),
+    ):
+        pose = compose(of[model].base, compose(flange, of[model].tool))
+        off = np.linalg.norm(pose.position_mm - seen.position_mm, axis=1)
+        rows.append((f"{model}_vs_measured", float(np.sqrt(np.mean(off**2)))))
+    return {
+        "comparison": np.array([row[0] for row in rows], dtype=object),
+        "subset": np.array(["validation"] * 2, dtype=object),
+        "fold": np.full(2, np.nan),
+        "quantity": np.array(["position"] * 2, dtype=object),
+        "rms": np.array([row[1] for row in rows]),
+    }
+
+
+__all__ = ["BASE", "TOOL", "calibrated", "frames", "joints", "measured", "results", "truth"]

@@ -1,0 +1,133 @@
+"""Two calibrations side by side: nothing where nothing changed, and a planted change by name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_arms import calibrated, joints
+
+from kinacc.deployment.compare import compare
+from kinacc.deployment.record import nominal
+from kinacc.errors import InputError
+from kinacc.figures.comparison import draw
+from kinacc.figures.save import render
+from kinacc.geometry import Pose, exp_so3
+from kinacc.kinematics import dh, robot
+
+
+def changed(arm, **by_name):
+    """The calibration with DH parameters changed: ``j2_a_mm=0.5``."""
+    from kinacc.calibration.uncertainty import dh_parameter_names
+
+    vector, names = dh.to_vector(arm.model).copy(), dh_parameter_names(arm.model.joints)
+    for name, value in by_name.items():
+        vector[names.index(name.replace("_", ".", 1))] += value
+    return replace(arm, model=dh.with_vector(arm.model, vector))
+
+
+@pytest.mark.parametrize("name", ["mh180", "ur10"])
+def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
+    q_rad = joints(name, 60)
+    found = [
+        compare(calibrated(name, "dh", 60, 200 + i), calibrated(name, "dh", 60, 300 + i), q_rad)
+        for i in range(20)
+    ]
+    chances = np.array([each.probability for each in found])
+    assert chances.min() > 1e-3
+    assert 0.25 < chances.mean() < 0.75
+    ratio = [each.statistic / each.directions for each in found]
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.25)
+    for kind in ("as_they_stand", "apart_from_frames"):
+        shifts = [getattr(each, kind) for each in found]
+        seen = np.mean([shift.rms_mm**2 for shift in shifts])
+        expected = np.mean([shift.chance_mm**2 for shift in shifts])
+        assert seen / expected == pytest.approx(1.0, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "size"), [("j2_a_mm", 1.0), ("j3_alpha_rad", 2e-3), ("j5_theta_offset_rad", 3e-3)]
+)
+def test_a_planted_change_is_found_under_its_name(parameter, size):
+    before = calibrated("mh180", "dh", 60, 3)
+    after = changed(calibrated("mh180", "dh", 60, 4), **{parameter: size})
+    found = compare(before, after, joints("mh180", 60))
+    assert found.probability < 1e-6
+    largest = found.parameters.names[int(np.nanargmax(np.abs(found.parameters.sigmas)))]
+    assert largest == parameter.replace("_", ".", 1)
+    assert np.nanmax(np.abs(found.parameters.sigmas)) > 5.0
+    assert found.apart_from_frames.rms_mm > 3.0 * found.apart_from_frames.chance_mm
+
+
+def test_what_no_pose_shows_is_marked_and_counts_for_nothing():
+    before = calibrated("mh180", "dh", 60, 3)
+    after = changed(before, j2_d_mm=5.0, j3_d_mm=5.0)  # axes 2 and 3 are antiparallel
+    found = compare(before, after, joints("mh180", 60))
+    place = found.parameters.names.index("j2.d_mm")
+    assert found.parameters.undetermined_in[place] == "both"
+    assert np.isnan(found.parameters.sigmas[place])
+    assert found.parameters.difference[place] == pytest.approx(5.0)
+    assert found.probability > 0.9
+    assert found.apart_from_frames.rms_mm < 0.05
+
+
+def test_another_base_and_tool_are_not_a_change_of_the_arm():
+    arm = nominal(robot.load("mh180"), "one")
+    turned = Pose(exp_so3(np.array([0.0, 0.0, 2e-3])), np.zeros(3))
+    other = changed(arm, j1_theta_offset_rad=2e-3, j1_d_mm=3.0, j6_d_mm=-2.0)
+    found = compare(arm, other, joints("mh180", 60))
+    assert found.as_they_stand.rms_mm > 2.0
+    assert found.apart_from_frames.rms_mm < 1e-6
+    assert found.apart_from_frames.rms_rad < 1e-9
+    assert np.isnan(found.probability)
+    assert np.isnan(found.as_they_stand.chance_mm)
+    assert turned.rotation[0, 0] < 1.0
+
+
+def test_vec_models_are_compared_by_their_poses():
+    q_rad = joints("mh180", 40)
+    before, after = calibrated("mh180", "vec", 80, 3), calibrated("mh180", "vec", 80, 4)
+    found = compare(before, after, q_rad)
+    assert found.parameters is None
+    assert 0.0 < found.apart_from_frames.rms_mm < 0.3
+    assert found.apart_from_frames.chance_mm > 0.0
+
+
+def test_arms_of_different_kinds_are_refused():
+    with pytest.raises(InputError, match="has 7 joints"):
+        compare(nominal(robot.load("mh180")), nominal(robot.load("iiwa14")), np.zeros((2, 6)))
+
+
+def test_another_geometry_is_another_robot_and_a_calibration_is_not():
+    q_rad = joints("irb120", 60)
+    arm, other = (nominal(robot.load(name)) for name in ("irb120", "meca500"))
+    found = compare(arm, other, q_rad)
+    assert not found.same_robot
+    assert found.robots_apart_mm == pytest.approx(found.apart_from_frames.rms_mm)
+    assert compare(arm, arm, q_rad).same_robot
+    before, after = (calibrated("mh180", "dh", 60, seed) for seed in (3, 4))
+    far = changed(after, j2_theta_offset_rad=0.2)  # the same robot, whatever happened to it
+    for each in (after, far):
+        found = compare(before, each, joints("mh180", 60))
+        assert found.same_robot
+        assert found.robots_apart_mm == 0.0
+
+
+def test_a_robot_file_of_the_calibrated_arm_is_the_same_robot():
+    arm = nominal(robot.load("mh180"))
+    bent = changed(arm, j2_a_mm=2.0, j3_theta_offset_rad=3e-3, j5_alpha_rad=2e-3)
+    own = replace(bent, robot=replace(bent.robot, dh=bent.model))
+    found = compare(arm, own, joints("mh180", 60))
+    assert found.same_robot
+    assert found.robots_apart_mm > 1.0
+
+
+def test_the_picture_marks_every_parameter():
+    before = calibrated("ur10", "dh", 60, 3)
+    after = changed(calibrated("ur10", "dh", 60, 4), j2_a_mm=1.0)
+    found = compare(before, after, joints("ur10", 60))
+    figure = draw(found, "before", "after")
+    labels = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
+    assert len(labels) == len(found.parameters.names)
+    assert "a$_{2}$" in labels
+    assert render(figure, ["svg"])["svg"].startswith(b"<?xml")
+    assert render(draw(found, "before", "after"), ["svg"]) == render(figure, ["svg"])

@@ -1,0 +1,141 @@
+"""Joints that reach wanted poses: round trips, postures, limits, and rows that have none."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from small_arms import calibrated, joints
+
+from kinacc.deployment.compensate import compensate, programmed
+from kinacc.deployment.postures import Status
+from kinacc.deployment.predict import predict
+from kinacc.deployment.record import nominal
+from kinacc.geometry import Pose, compose, invert, log_so3
+from kinacc.kinematics import robot
+
+
+def left(arm, q_rad, wanted, frame="base", point=None):
+    """What the forward model says is left of the wanted poses, mm and rad."""
+    seen = predict(arm, q_rad, None, frame, point).pose
+    off = np.linalg.norm(seen.position_mm - wanted.position_mm, axis=1)
+    turn = log_so3(seen.rotation @ np.swapaxes(wanted.rotation, 1, 2))
+    return off.max(), np.linalg.norm(turn, axis=1).max()
+
+
+@pytest.mark.parametrize("name", ["mh180", "ur10"])
+@pytest.mark.parametrize("model", ["dh", "vec", "nominal"])
+def test_joints_come_back_from_their_own_poses(name, model):
+    arm, q_rad = calibrated(name, model), joints(name, 30, seed=4)
+    wanted = predict(arm, q_rad, None, "instrument").pose
+    found = compensate(arm, wanted, q_rad + 0.03, None, "instrument")
+    assert (found.status <= Status.EXTRAPOLATED).all()
+    off, turn = left(arm, found.q_rad, wanted, "instrument")
+    assert off < 1e-6
+    assert turn < 1e-9
+    moved = np.abs(found.q_rad - q_rad).max(axis=1)
+    assert np.median(moved) < 1e-8
+    assert moved.max() < 1e-4  # the wrist of a nearly singular posture is known less well
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(["dh", "vec"]))
+def test_a_nominal_program_is_corrected_by_little(seed, model):
+    arm, q_rad = calibrated("mh180", model), joints("mh180", 5, seed)
+    wanted = programmed(arm, q_rad)
+    found = compensate(arm, wanted, q_rad)
+    good = found.status <= Status.OTHER_POSTURE
+    assert good.mean() >= 0.8  # a wrist near alignment may need a turn the range does not have
+    off, _ = left(arm, found.q_rad[good], Pose(*(part[good] for part in wanted)))
+    assert off < 1e-6
+    assert (found.change[good] == found.q_rad[good] - q_rad[good]).all()
+    nominal_off = np.linalg.norm(predict(arm, q_rad).pose.position_mm - wanted.position_mm, axis=1)
+    assert nominal_off.max() > 1e-3  # there was something to correct
+
+
+def test_without_joints_to_be_near_any_posture_the_data_cover_is_good():
+    arm, q_rad = calibrated("mh180", "dh"), joints("mh180", 20, seed=5)
+    wanted = predict(arm, q_rad).pose
+    found = compensate(arm, wanted)
+    assert (found.status == Status.CONVERGED).all()
+    assert left(arm, found.q_rad, wanted)[0] < 1e-6
+    assert not arm.outside_range(found.q_rad @ arm.robot.joint_map.T).any()
+    assert np.isnan(found.change).all()
+
+
+def test_every_kind_of_row_without_joints_says_why():
+    arm = calibrated("mh180", "dh")
+    far = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))
+    found = compensate(arm, far)
+    assert found.status.tolist() == [Status.NOT_REACHED]
+    assert np.isnan(found.q_rad).all()
+    q_rad = joints("mh180", 1)
+    q_rad[0, 4] = arm.robot.q_max_rad[4] + 0.05  # joint 5 cannot get there, nor its mirror
+    q_rad[0, 3] = arm.robot.q_max_rad[3] - 0.1
+    wanted = arm.pose(q_rad @ arm.robot.joint_map.T)
+    found = compensate(arm, wanted, q_rad)
+    assert found.status[0] in (Status.OUTSIDE_LIMITS, Status.OTHER_POSTURE)
+    if found.status[0] == Status.OUTSIDE_LIMITS:
+        assert np.isnan(found.q_rad).all()
+        assert found.offending[0, 4]
+
+
+def test_a_posture_outside_the_limits_is_left_for_another_and_that_is_said():
+    arm, q_rad = nominal(robot.load("mh180")), joints("mh180", 1)
+    q_rad[0] = [0.1, 0.2, 0.3, 0.2, 1.0, 0.4]
+    wanted = predict(arm, q_rad).pose
+    # The same pose with the wrist flipped: joint 5 mirrored.
+    flipped = compensate(arm, wanted, np.array([0.1, 0.2, 0.3, 0.2 + np.pi, -1.0, 0.4 - np.pi]))
+    assert flipped.status[0] == Status.CONVERGED
+    assert flipped.q_rad[0, 4] == pytest.approx(-1.0, abs=1e-6)
+    near = compensate(arm, wanted, q_rad)
+    assert near.q_rad[0] == pytest.approx(q_rad[0], abs=1e-9)
+    from dataclasses import replace
+
+    tight = replace(arm.robot, q_max_rad=np.where(np.arange(6) == 4, 0.9, arm.robot.q_max_rad))
+    found = compensate(replace(arm, robot=tight), wanted, q_rad)
+    assert found.status[0] == Status.OTHER_POSTURE
+    assert found.q_rad[0, 4] < 0.0
+    assert left(arm, found.q_rad, wanted)[0] < 1e-6
+
+
+def test_whole_turns_stay_near_the_joints_given():
+    arm, q_rad = nominal(robot.load("mh180")), joints("mh180", 1)
+    q_rad[0] = [0.1, 0.2, 0.3, np.deg2rad(350.0), 1.0, np.deg2rad(-350.0)]
+    wanted = predict(arm, q_rad).pose
+    found = compensate(arm, wanted, q_rad + 0.01)
+    assert found.q_rad[0] == pytest.approx(q_rad[0], abs=1e-8)
+
+
+def test_a_vec_model_gives_no_joints_outside_its_range():
+    arm = calibrated("mh180", "vec")
+    by_dh = calibrated("mh180", "dh")
+    q_rad = joints("mh180", 1)
+    q_rad[0, 0] = 2.9  # the arm turned away from all that was measured
+    wanted = predict(by_dh, q_rad).pose
+    found = compensate(arm, wanted, q_rad)
+    assert found.status[0] == Status.OUTSIDE_RANGE
+    assert found.offending[0, 0]
+    assert np.isnan(found.q_rad).all()
+
+
+def test_seven_axes_stay_where_they_are_asked_to():
+    arm, q_rad = nominal(robot.load("iiwa14")), joints("iiwa14", 10)
+    wanted = predict(arm, q_rad).pose
+    found = compensate(arm, wanted, q_rad + 0.05)
+    assert (found.status == Status.CONVERGED).all()
+    assert left(arm, found.q_rad, wanted)[0] < 1e-6
+    assert np.abs(found.q_rad - q_rad).max() < 0.5
+
+
+def test_a_program_and_the_base_mean_the_same_under_dh_and_vec():
+    """Base and tool of a VEC fit may drift against each other where no measured pose shows it."""
+    arms = [calibrated("mh180", model) for model in ("dh", "vec")]
+    q_rad = joints("mh180", 5)
+    one, other = (programmed(arm, q_rad) for arm in arms)
+    np.testing.assert_array_equal(other.position_mm, one.position_mm)
+    np.testing.assert_array_equal(other.rotation, one.rotation)
+    own = compose(invert(arms[0].base), arms[1].pose(q_rad, None, "instrument"))
+    seen = arms[1].pose(q_rad, None, "base")
+    np.testing.assert_allclose(seen.position_mm, own.position_mm, rtol=0, atol=1e-9)
+    std = [predict(arms[1], q_rad, None, frame).std_position_mm for frame in ("base", "instrument")]
+    np.testing.assert_allclose(std[0], std[1], rtol=1e-9)

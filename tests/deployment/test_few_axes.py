@@ -1,0 +1,93 @@
+"""Arms of four and five axes: their point is put where it is wanted, turned as near as can be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinacc.deployment.compensate import compensate, programmed
+from kinacc.deployment.postures import FEW_AXES_TURN_RAD, Status
+from kinacc.deployment.record import nominal
+from kinacc.geometry import Pose, log_so3, rotation_x, skew
+from kinacc.kinematics import dh, robot
+
+SCARA = """
+dh:
+  - {theta_offset_deg: 0, d_mm: 300, a_mm: 350, alpha_deg: 0, limits_deg: [-140, 140]}
+  - {theta_offset_deg: 0, d_mm: 0, a_mm: 250, alpha_deg: 180, limits_deg: [-145, 145]}
+  - {joint: prismatic, theta_offset_deg: 0, d_mm: 0, a_mm: 0, alpha_deg: 0, limits_mm: [0, 200]}
+  - {theta_offset_deg: 0, d_mm: 50, a_mm: 0, alpha_deg: 0, limits_deg: [-360, 360]}
+tool: {position_mm: [40, 30, 20]}
+"""
+FIVE = """
+dh:
+  - {theta_offset_deg: 0, d_mm: 300, a_mm: 50, alpha_deg: -90, limits_deg: [-160, 160]}
+  - {theta_offset_deg: -90, d_mm: 0, a_mm: 400, alpha_deg: 0, limits_deg: [-90, 120]}
+  - {theta_offset_deg: 0, d_mm: 0, a_mm: 350, alpha_deg: 0, limits_deg: [-140, 140]}
+  - {theta_offset_deg: 0, d_mm: 0, a_mm: 0, alpha_deg: 90, limits_deg: [-120, 120]}
+  - {theta_offset_deg: 0, d_mm: 120, a_mm: 0, alpha_deg: 0, limits_deg: [-180, 180]}
+tool: {position_mm: [10, 0, 60]}
+"""
+BENT = {"scara": [0.4, 1.0, 90.0, -0.6], "five": [0.3, -0.2, 0.9, 0.5, -0.7]}
+
+
+def real_arm(name):
+    """The arm as described, with axes askew by a milliradian and lengths off by tenths of a mm."""
+    plain = nominal(robot.of_text({"scara": SCARA, "five": FIVE}[name], name))
+    rng = np.random.default_rng(4)
+    vector = dh.to_vector(plain.robot.dh)
+    errors = np.tile([1e-3, 0.3, 0.3, 1e-3, 1e-3], plain.robot.dh.joints)
+    moved = dh.with_vector(plain.robot.dh, vector + errors * rng.normal(0.0, 1.0, vector.size))
+    return plain, replace(plain, model=moved, choice="dh")
+
+
+def program(name, count=12):
+    spread = np.where(np.array(BENT[name]) > 10.0, 60.0, 0.35)
+    return BENT[name] + spread * np.random.default_rng(1).uniform(-1, 1, (count, len(spread)))
+
+
+@pytest.mark.parametrize("name", ["scara", "five"])
+def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
+    plain, arm = real_arm(name)
+    q = program(name)
+    wanted = programmed(plain, q)
+    found = compensate(arm, wanted, q)
+    assert (found.status == Status.CONVERGED).all()
+    there = arm.pose(found.q_rad)
+    assert np.linalg.norm(there.position_mm - wanted.position_mm, axis=1).max() < 1e-6
+    turn = np.linalg.norm(log_so3(there.rotation @ np.swapaxes(wanted.rotation, 1, 2)), axis=1)
+    np.testing.assert_allclose(turn, found.rotation_error_rad, rtol=0, atol=1e-9)
+    assert turn.max() > 1e-4  # the plain arm's orientation is out of the real one's reach
+    # Near the solution, wherever the point stays to first order, the turn is no smaller.
+    rng = np.random.default_rng(2)
+    unit = np.where(arm.robot.dh.prismatic, 1e3, 1.0)
+    slopes = dh.joint_jacobian(arm.model, found.q_rad)
+    lever = (arm.forward(found.q_rad).rotation @ arm.point(None).position_mm[:, None])[..., 0]
+    moves = slopes[:, :3] - skew(lever) @ slopes[:, 3:]
+    for row in range(len(q)):
+        free = np.linalg.svd(moves[row] * unit)[2][3:]
+        for _ in range(10):
+            along = 1e-4 * rng.normal(0.0, 1.0, len(free)) @ free * unit
+            near = arm.pose(found.q_rad[row] + along)
+            left = log_so3(near.rotation[0] @ wanted.rotation[row].T)
+            assert np.linalg.norm(left) > turn[row] - 1e-7
+
+
+def test_without_joints_to_be_near_a_posture_is_found():
+    plain, arm = real_arm("scara")
+    wanted = programmed(plain, program("scara", 3))
+    found = compensate(arm, wanted)
+    assert (found.status == Status.CONVERGED).all()
+    there = arm.pose(found.q_rad)
+    assert np.linalg.norm(there.position_mm - wanted.position_mm, axis=1).max() < 1e-6
+
+
+def test_another_orientation_than_the_arm_takes_is_not_reached():
+    plain, arm = real_arm("scara")
+    q = program("scara", 2)
+    wanted = programmed(plain, q)
+    tipped = Pose(wanted.rotation @ rotation_x(0.3), wanted.position_mm)
+    found = compensate(arm, tipped, q)
+    assert (found.status == Status.NOT_REACHED).all()
+    assert np.isnan(found.q_rad).all()
+    assert (found.rotation_error_rad > FEW_AXES_TURN_RAD).all()

@@ -1,0 +1,234 @@
+"""Robot files: forms that say the same, and every fault named at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kinacc.errors import InputError
+from kinacc.geometry import Pose, compose, rotation_x, rotation_z
+from kinacc.kinematics import robot
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.robot import forms
+
+GOOD = """\
+name: small
+source: made up
+date: 2024-05-01
+dh:
+  - {theta_offset_deg: 0, d_mm: 290, a_mm: 0, alpha_deg: -90, limits_deg: [-165, 165]}
+  - {theta_offset_deg: -90, d_mm: 0, a_mm: 270, alpha_deg: 0, limits_deg: [-110, 110], sign: -1}
+  - {joint: prismatic, theta_offset_deg: 0, d_mm: 5, a_mm: 70, alpha_deg: -90, limits_mm: [0, 400]}
+  - {theta_offset_deg: 0, d_mm: 302, a_mm: 0, alpha_deg: 90, limits_rad: [-2.8, 2.8], name: roll}
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path):
+    """Loads a robot from the text of a YAML file."""
+
+    def load(text: str) -> robot.Robot:
+        path = tmp_path / "arm.yaml"
+        path.write_text(text)
+        return robot.load(path)
+
+    return load
+
+
+def test_units_kinds_signs_and_limits_are_read(arm):
+    small = arm(GOOD)
+    assert (small.name, small.source, small.date) == ("small", "made up", "2024-05-01")
+    assert small.dh.prismatic.tolist() == [False, False, True, False]
+    assert np.allclose(small.q_min_rad, [np.deg2rad(-165), np.deg2rad(-110), 0, -2.8])
+    assert np.allclose(small.q_max_rad, [np.deg2rad(165), np.deg2rad(110), 400, 2.8])
+    assert np.array_equal(small.joint_map, np.diag([1, -1, 1, 1]))
+    assert small.joint_names == ("joint 1", "joint 2", "joint 3", "roll")
+    in_other_units = arm(
+        GOOD.replace("d_mm: 290", "d_m: 0.29")
+        .replace("alpha_deg: -90, limits_deg: [-165, 165]", f"alpha_rad: {-np.pi / 2}, LIMITS")
+        .replace("LIMITS", f"limits_rad: [{-np.deg2rad(165)}, {np.deg2rad(165)}]")
+        .replace("limits_mm: [0, 400]", "limits_m: [0, 0.4]")
+    )
+    assert np.allclose(in_other_units.dh.d_mm, small.dh.d_mm)
+    assert np.allclose(in_other_units.dh.alpha_rad, small.dh.alpha_rad)
+    assert np.allclose(in_other_units.q_max_rad, small.q_max_rad)
+
+
+def test_a_coupled_joint_is_turned_by_both(arm):
+    text = GOOD.replace(", sign: -1", "")
+    text += "joint_map: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 1, 0, 1]]\n"
+    q = np.array([[0.1, 0.2, 30.0, 0.4]])
+    coupled, plain = arm(text), arm(GOOD.replace(", sign: -1", ""))
+    pose = robot.forward(coupled, q)
+    same = robot.forward(plain, np.array([[0.1, 0.2, 30.0, 0.6]]))
+    assert np.allclose(pose.position_mm, same.position_mm)
+    assert np.allclose(robot.dh_angles(coupled, q), [[0.1, 0.2, 30.0, 0.6]])
+
+
+def test_base_flange_and_tool_frames_are_read(arm):
+    framed = arm(
+        GOOD
+        + "base: {position_m: [0, 0, 0.5], rpy_deg: [0, 0, 90]}\n"
+        + "flange: {quaternion_wxyz: [0.7071067811865476, 0, 0, 0.7071067811865476]}\n"
+        + "tool: {position_mm: [0, 0, 100], rotation_vector_deg: [0, 0, 45]}\n"
+    )
+    q = np.array([[0.1, 0.2, 30.0, 0.4]])
+    base = Pose(rotation_z(np.pi / 2), np.array([0, 0, 500.0]))
+    wanted = compose(base, compose(robot.forward(arm(GOOD), q), Pose(base.rotation, np.zeros(3))))
+    pose = robot.forward(framed, q)
+    assert np.allclose(pose.position_mm, wanted.position_mm)
+    assert np.allclose(pose.rotation, wanted.rotation)
+    assert np.allclose(robot.carried(framed).rotation, rotation_z(np.pi * 0.75))
+
+
+# --- modified tables ------------------------------------------------------------------------------
+
+
+def craig(table: DHModel, q: np.ndarray) -> np.ndarray:
+    """Product of a modified table, from Craig's matrix for one joint."""
+    total = np.eye(4)
+    for i in range(table.joints):
+        slides = table.prismatic[i]
+        t = table.theta_offset_rad[i] + (0 if slides else q[i])
+        d = table.d_mm[i] + (q[i] if slides else 0)
+        a, al = table.a_mm[i], table.alpha_rad[i]
+        st_, ct, sa, ca = np.sin(t), np.cos(t), np.sin(al), np.cos(al)
+        total = total @ np.array(
+            [
+                [ct, -st_, 0, a],
+                [st_ * ca, ct * ca, -sa, -sa * d],
+                [st_ * sa, ct * sa, ca, ca * d],
+                [0, 0, 0, 1],
+            ]
+        )
+    return total
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(4, 7))
+def test_a_modified_table_is_the_same_arm(seed, count):
+    rng = np.random.default_rng(seed)
+    table = DHModel(
+        rng.uniform(-3, 3, count),
+        rng.uniform(-500, 500, count),
+        rng.uniform(-500, 500, count),
+        rng.uniform(-3, 3, count),
+        np.zeros(count),
+        rng.random(count) < 0.3,
+    )
+    chain, base = forms.from_modified(table)
+    arm = robot.Robot("any", chain, -np.ones(count), np.ones(count), np.eye(count), "", base=base)
+    q = rng.uniform(-3, 3, (5, count))
+    pose = robot.forward(arm, q)
+    for row in range(5):
+        wanted = craig(table, q[row])
+        assert np.abs(pose.position_mm[row] - wanted[:3, 3]).max() < 1e-9
+        assert np.abs(pose.rotation[row] - wanted[:3, :3]).max() < 1e-12
+
+
+def test_a_modified_file_with_a_hayati_term_is_converted(arm):
+    text = GOOD.replace("dh:", "convention: modified\ndh:").replace(
+        "a_mm: 270", "a_mm: 270, beta_deg: 2"
+    )
+    modified = arm(text)
+    assert np.allclose(modified.dh.a_mm, [270, 70, 0, 0])
+    assert np.allclose(modified.dh.beta_rad, [np.deg2rad(2), 0, 0, 0])
+    assert np.allclose(modified.base.rotation, rotation_x(-np.pi / 2))
+
+
+# --- faults ---------------------------------------------------------------------------------------
+
+
+def faults(arm, text: str) -> str:
+    with pytest.raises(InputError) as refusal:
+        arm(text)
+    return str(refusal.value)
+
+
+def test_all_faults_are_listed_with_place_value_and_remedy(arm):
+    text = (
+        GOOD.replace("d_mm: 290", "d: 290")
+        .replace("alpha_deg: 0,", "alpha_deg: 1.5708,")
+        .replace("limits_deg: [-110, 110]", "limits_deg: [110, -110]")
+        .replace("sign: -1", "sign: 2")
+        .replace("limits_mm", "limits_deg")
+        .replace("a_mm: 0, alpha_deg: 90", "a_mm: zero, alpah_deg: 90")
+        .replace("name: small", "nmae: small")
+    )
+    said = faults(arm, text)
+    for words in (
+        "arm.yaml:1, nmae: unknown key",
+        "did you mean name?",
+        "arm.yaml:5, dh, joint 1, d: unknown key",
+        "the unit is part of the name: d_mm or d_m",
+        "dh, joint 1: d is missing",
+        "joint 2, alpha_deg: 1.5708 is 1 quarter turns in rad",
+        "joint 2, limits_deg: [110, -110] is reversed",
+        "joint 2, sign: 2 is no sign; allowed: 1, -1",
+        "joint 3, limits_deg: the joint slides; allowed: limits in mm or m",
+        "joint 4, a_mm: 'zero' is not a number",
+        "joint 4, alpah_deg: unknown key",
+        "did you mean alpha_deg?",
+    ):
+        assert words in said, (words, said)
+    lines = [int(line.split("arm.yaml:")[1].split(",")[0]) for line in said.splitlines()[1:]]
+    assert lines == sorted(lines)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("d_mm: 290", "d_m: 290", ("290 is longer than any arm", "write d_mm")),
+        ("alpha_deg: -90,", "alpha_rad: -90,", ("-90 is more than a turn", "write alpha_deg")),
+        ("limits_deg: [-165, 165]", "limits_rad: [-165, 165]", ("looks like degrees",)),
+        ("d_mm: 290", "d_mm: 290, d_m: 0.29", ("d is given twice",)),
+        ("d_mm: 290", "d_mm: .nan", ("nan is not a number",)),
+        ("limits_deg: [-165, 165]", "beta_deg: 0", ("its limits are missing", "limits_rad")),
+        ("joint: prismatic", "joint: linear", ("'linear' unknown", "revolute, prismatic")),
+        ("joint: prismatic, ", "", ("joint 3, limits_mm: the joint turns",)),
+        ("source:", "convention: craig\nsource:", ("'craig' unknown", "standard, modified")),
+        ("source:", "joint_map: [[1, 0], [0, 1]]\nsource:", ("wrong shape", "4 x 4")),
+        ("source:", "tool: {x_mm: 3}\nsource:", ("tool, x_mm: unknown key",)),
+        ("source:", "tool: {position_mm: [1, 2]}\nsource:", ("3 numbers",)),
+        ("source:", "tool: {quaternion_wxyz: [1, 1, 0, 0]}\nsource:", ("has length 1.41",)),
+        ("source:", "tool: {rpy_deg: [0, 0, 1], rpy_rad: [0, 0, 1]}\nsource:", ("a second",)),
+        ("name: small", "name: small\nname: other", ("is given twice",)),
+        ("dh:", "dh: [", ("is not YAML",)),
+        ("dh:", "rows:", ("dh: missing",)),
+    ],
+)
+def test_each_fault_is_named(arm, old, new, words):
+    assert old in GOOD
+    said = faults(arm, GOOD.replace(old, new, 1))
+    for each in words:
+        assert each in said
+
+
+def test_lengths_in_metres_under_mm_are_noticed(arm):
+    text = GOOD.replace("290", "0.29").replace("270", "0.27").replace(" 70", " 0.07")
+    said = faults(arm, text.replace("302", "0.302").replace("d_mm: 5", "d_mm: 0.005"))
+    assert "all lengths together are 0.937 mm" in said
+    assert "write d_m and a_m" in said
+
+
+def test_limits_in_rad_under_deg_are_noticed(arm):
+    text = "\n".join(line for line in GOOD.splitlines() if "prismatic" not in line)
+    rad = text.replace("165", "2.88").replace("110", "1.92").replace("limits_rad", "limits_deg")
+    more = "\n  - {theta_offset_deg: 0, d_mm: 2, a_mm: 0, alpha_deg: 90, limits_deg: [-3, 3]}\n"
+    assert "write limits_rad" in faults(arm, rad + more)
+
+
+def test_too_few_and_too_many_joints_are_refused(arm):
+    last = GOOD.splitlines()[-1] + "\n"
+    assert "has 8 joints; allowed: 4 to 7" in faults(arm, GOOD + 4 * last)
+    assert "has 3 joints" in faults(arm, GOOD.removesuffix(last))
+
+
+def test_an_unknown_robot_names_those_there_are():
+    with pytest.raises(InputError) as refusal:
+        robot.load("mh999")
+    assert "irb120" in str(refusal.value)

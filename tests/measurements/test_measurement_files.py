@@ -1,0 +1,294 @@
+"""Measurement files: what is read as what, and every fault named with its place."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kinacc.errors import InputError
+from kinacc.geometry import rotation_from_quaternion
+from kinacc.kinematics import dh, robot
+from kinacc.measurements.reader import read
+
+ARM = robot.load("ur10")
+SECTION = {
+    "path": None,
+    "source": "the tracker of hall 3",
+    "delimiter": ",",
+    "decimal": ".",
+    "joint_unit": "deg",
+    "length_unit": "mm",
+    "orientation": {"kind": "euler", "convention": "XYZ", "unit": "deg"},
+    "columns": {},
+}
+
+
+@pytest.fixture
+def truth():
+    """Joints (rad), flange positions (mm) and rotations of twelve poses."""
+    q_rad = np.random.default_rng(5).uniform(-2.5, 2.5, (12, 6))
+    return q_rad, dh.forward(ARM.dh, q_rad)
+
+
+@pytest.fixture
+def good(truth):
+    """A good file's columns, in degrees, millimetres and intrinsic XYZ angles."""
+    q_rad, pose = truth
+    columns = {f"q{i + 1}_deg": np.rad2deg(q_rad[:, i]) for i in range(6)}
+    columns |= dict(zip(("x_mm", "y_mm", "z_mm"), pose.position_mm.T, strict=True))
+    euler = Rotation.from_matrix(pose.rotation).as_euler("XYZ", degrees=True)
+    return columns | dict(zip(("rx_deg", "ry_deg", "rz_deg"), euler.T, strict=True))
+
+
+def written(folder, columns, delimiter=",", decimal="."):
+    path = folder / "poses.csv"
+    rows = zip(*columns.values(), strict=True)
+    cells = [[str(v).replace(".", decimal) for v in row] for row in rows]
+    lines = [delimiter.join(columns), *(delimiter.join(row) for row in cells)]
+    path.write_text("\n".join(lines) + "\n")
+    return str(path)
+
+
+def problems_of(folder, table, **section) -> str:
+    with pytest.raises(InputError) as caught:
+        read(SECTION | {"path": written(folder, table)} | section, ARM)
+    return str(caught.value)
+
+
+def assert_is_truth(columns, truth):
+    q_rad, pose = truth
+    found = np.stack([columns[f"q{i}"] for i in range(1, 7)], axis=1)
+    np.testing.assert_allclose(found, q_rad, atol=1e-12)
+    position = np.stack([columns[f"{axis}_mm"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(position, pose.position_mm, atol=1e-9)
+    quaternion = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
+    np.testing.assert_allclose(rotation_from_quaternion(quaternion), pose.rotation, atol=1e-9)
+
+
+def test_euler_degrees_and_millimetres(tmp_path, good, truth):
+    reading = read(SECTION | {"path": written(tmp_path, good | {"stamp": np.ones(12)})}, ARM)
+    assert_is_truth(reading.columns, truth)
+    assert reading.unused == ("stamp",)
+    assert reading.left_out() == ["columns not used: stamp"]
+    np.testing.assert_array_equal(reading.columns["row"], np.arange(2, 14))
+
+
+def test_rotation_vectors_metres_and_radians(tmp_path, good, truth):
+    q_rad, pose = truth
+    columns = {f"q{i + 1}_rad": q_rad[:, i] for i in range(6)}
+    columns |= dict(zip(("x_m", "y_m", "z_m"), pose.position_mm.T / 1000.0, strict=True))
+    vectors = Rotation.from_matrix(pose.rotation).as_rotvec()
+    columns |= dict(zip(("rx_rad", "ry_rad", "rz_rad"), vectors.T, strict=True))
+    turn = {"kind": "rotation_vector", "convention": "XYZ", "unit": "rad"}
+    path = written(tmp_path, columns)
+    assert_is_truth(read(SECTION | {"path": path, "orientation": turn}, ARM).columns, truth)
+
+
+def test_quaternions_of_either_sign(tmp_path, good, truth):
+    quaternion = Rotation.from_matrix(truth[1].rotation).as_quat(scalar_first=True)
+    quaternion *= np.where(np.arange(12) % 2, 1.0, -1.0)[:, None]
+    columns = good | dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True))
+    turn = SECTION["orientation"] | {"kind": "quaternion"}
+    reading = read(SECTION | {"path": written(tmp_path, columns), "orientation": turn}, ARM)
+    assert_is_truth(reading.columns, truth)
+    assert (reading.columns["qw"] >= 0).all()
+
+
+def test_semicolons_decimal_commas_and_foreign_names(tmp_path, good, truth):
+    names = {"q1": "shoulder", "x": "measurement_x", "rx": "measurement_rx"}
+    foreign = {"q1_deg": "shoulder", "x_mm": "measurement_x", "rx_deg": "measurement_rx"}
+    columns = {foreign.get(name, name): values for name, values in good.items()}
+    path = written(tmp_path, columns, ";", ",")
+    section = SECTION | {"path": path, "delimiter": ";", "decimal": ",", "columns": names}
+    assert_is_truth(read(section, ARM).columns, truth)
+
+
+def test_parquet(tmp_path, good, truth):
+    path = tmp_path / "poses.parquet"
+    pq.write_table(pa.table(good), path)
+    assert_is_truth(read(SECTION | {"path": str(path)}, ARM).columns, truth)
+
+
+def test_position_only_has_no_quaternion(tmp_path, good):
+    turn = SECTION["orientation"] | {"kind": "none"}
+    reading = read(SECTION | {"path": written(tmp_path, good), "orientation": turn}, ARM)
+    assert np.isnan(reading.columns["qw"]).all()
+    assert "rx_deg" in reading.unused
+
+
+def test_rows_of_one_pose_are_counted_as_repeats(tmp_path, good):
+    columns = good | {"pose": np.repeat(np.arange(6), 2)[::-1]}
+    reading = read(SECTION | {"path": written(tmp_path, columns)}, ARM)
+    np.testing.assert_array_equal(reading.columns["repeat"], [0, 1] * 6)
+
+
+def test_a_missing_file_says_where_the_data_comes_from(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere\.csv.*the tracker of hall 3"):
+        read(SECTION | {"path": str(tmp_path / "nowhere.csv")}, ARM)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "the file is empty"),
+        ("q1_deg,x_mm\n", "no rows"),
+        ("q1_deg;x_mm\n1;2\n", "delimiter to ';'"),
+        ("a,b,a\n1,2,3\n", "column names given twice: a"),
+        ("a,b\n1,2\n\n1,2,3\n", "line 4: 3 cells under 2 column names"),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused(tmp_path, text, said):
+    path = tmp_path / "poses.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read(SECTION | {"path": str(path)}, ARM)
+    assert said in str(caught.value)
+
+
+def test_all_missing_columns_are_named_at_once(tmp_path, good):
+    for name in ("q3_deg", "x_mm", "rz_deg"):
+        del good[name]
+    text = problems_of(tmp_path, good)
+    for name in ("q3_deg or q3_rad", "x_mm or x_m", "rz_deg or rz_rad"):
+        assert f"column {name}: is missing" in text
+
+
+def test_a_quantity_in_two_units_has_to_say_the_same(tmp_path, good, truth):
+    alike = good | {"x_m": np.round(good["x_mm"] / 1000, 6)}
+    reading = read(SECTION | {"path": written(tmp_path, alike)}, ARM)
+    assert_is_truth(reading.columns, truth)
+    assert reading.unused == ("x_m",)
+    off = alike["x_m"].copy()
+    off[3] += 2e-6
+    said = "column x_mm or x_m: is given in two units that do not say the same"
+    assert said in problems_of(tmp_path, good | {"x_m": off})
+
+
+def test_a_mapped_column_that_is_not_there(tmp_path, good):
+    text = problems_of(tmp_path, good, columns={"q1": "base_joint"})
+    assert "column base_joint: is not there" in text
+
+
+def test_bad_cells_of_several_columns_are_all_named(tmp_path, good):
+    good = {name: values.astype(object) for name, values in good.items()}
+    good["q2_deg"][3] = "nan"
+    good["x_mm"][5] = "12,5"
+    good["z_mm"][[1, 7]] = "inf"
+    path = tmp_path / "poses.csv"
+    rows = [";".join(map(str, row)) for row in zip(*good.values(), strict=True)]
+    path.write_text("\n".join([";".join(good), *rows]))
+    with pytest.raises(InputError) as caught:
+        read(SECTION | {"path": str(path), "delimiter": ";"}, ARM)
+    text = str(caught.value)
+    assert "column q2_deg, line 5: not a finite number: 'nan'" in text
+    assert "column x_mm, line 7: not a finite number: '12,5'" in text
+    assert "column z_mm, lines 3, 9: not a finite number: 'inf', 'inf'" in text
+
+
+def test_a_quaternion_that_is_not_a_unit(tmp_path, good):
+    columns = good | {"qw": np.ones(12), "qx": np.zeros(12), "qy": np.zeros(12)}
+    columns["qz"] = np.where(np.arange(12) == 4, 0.1, 0.0)
+    turn = SECTION["orientation"] | {"kind": "quaternion"}
+    text = problems_of(tmp_path, columns, orientation=turn)
+    assert "line 6: quaternion of length 1.00499" in text
+
+
+def test_a_joint_outside_its_limits(tmp_path, good):
+    good["q5_deg"][2] = 361.0
+    text = problems_of(tmp_path, good)
+    assert "column q5_deg, line 4: 361 is outside the joint limits" in text
+    assert "-360 to 360 deg (ur10)" in text
+
+
+def test_metres_under_a_millimetre_name(tmp_path, good):
+    for axis in "xyz":
+        good[f"{axis}_mm"] = good[f"{axis}_mm"] / 1000.0
+    assert "the positions look like metres" in problems_of(tmp_path, good)
+
+
+def test_radians_under_a_degree_name(tmp_path, good):
+    for i in range(1, 7):
+        good[f"q{i}_deg"] = np.deg2rad(good[f"q{i}_deg"])
+    assert "the joints look like radians" in problems_of(tmp_path, good)
+
+
+def test_degrees_under_a_radian_name(tmp_path, good):
+    columns = {
+        name.replace("_deg", "_rad") if name[0] == "q" else name: v for name, v in good.items()
+    }
+    text = problems_of(tmp_path, columns)
+    assert "the column looks like degrees" in text
+
+
+def test_a_travel_direction_that_is_none(tmp_path, good):
+    text = problems_of(tmp_path, good | {"s4": np.full(12, 2)})
+    assert "column s4, lines 2, 3, 4, 5, 6 and 7 more: 2; allowed: -1, 0 or 1" in text
+
+
+def test_a_pose_and_repeat_given_twice(tmp_path, good):
+    columns = good | {"pose": np.zeros(12, int), "repeat": np.minimum(np.arange(12), 10)}
+    assert "line 13: pose 0, repeat 10 is given again" in problems_of(tmp_path, columns)
+
+
+def test_a_seventh_joint_the_robot_has_not(tmp_path, good):
+    text = problems_of(tmp_path, good | {"q7_deg": np.zeros(12)})
+    assert "q7 is there, the robot has 6 joints" in text
+
+
+def test_coupled_joints_reach_the_same_points(tmp_path, good, truth):
+    q_rad, pose = truth
+    matrix = np.eye(6)
+    matrix[2, 1] = 1.0
+    coupled = dataclasses.replace(ARM, joint_map=matrix)
+    reported = np.linalg.solve(matrix, q_rad.T).T
+    inside = (np.abs(reported) < np.deg2rad(359)).all(axis=1)
+    columns = {name: values[inside] for name, values in good.items()}
+    columns |= {f"q{i + 1}_deg": np.rad2deg(reported[inside, i]) for i in range(6)}
+    reading = read(SECTION | {"path": written(tmp_path, columns)}, coupled)
+    found = np.stack([reading.columns[f"q{i}"] for i in range(1, 7)], axis=1)
+    np.testing.assert_allclose(
+        dh.forward(ARM.dh, found @ matrix.T).position_mm, pose.position_mm[inside], atol=1e-9
+    )
+
+
+def test_a_column_mapped_to_two_quantities_is_refused(tmp_path, good):
+    text = problems_of(tmp_path, good, columns={"q1": "q2_deg"})
+    assert "column q2_deg: is taken for 2 quantities, q1 among them" in text
+
+
+def test_a_file_without_orientations_is_told_from_a_missing_column(tmp_path, good):
+    bare = {name: column for name, column in good.items() if name[0] != "r"}
+    text = problems_of(tmp_path, bare)
+    assert text.count("\n") == 1
+    assert "column rx, ry, rz" in text
+    assert "orientation.kind" in text
+    assert "rz_deg or rz_rad" in problems_of(tmp_path, {**bare, "rx_deg": good["rx_deg"],
+                                                        "ry_deg": good["ry_deg"]})  # fmt: skip
+
+
+@pytest.mark.parametrize("nothing", ["NaN", "nan", "NA", "#N/A", "null"])
+def test_what_programs_write_for_nothing_is_an_empty_cell(tmp_path, good, nothing):
+    columns = {name: [f"{value!r}" for value in column.tolist()] for name, column in good.items()}
+    for name in ("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"):
+        columns[name][3] = nothing
+    reading = read(SECTION | {"path": written(tmp_path, columns)}, ARM)
+    assert len(reading.columns["pose"]) == 11
+    assert "nothing was measured in line 5" in " ".join(reading.left_out())
+    columns["q2_deg"][4] = nothing
+    assert "not a finite number" in problems_of(tmp_path, columns)
+
+
+def test_a_list_of_no_targets_asks_for_a_name(tmp_path, good):
+    assert "no target is asked for" in problems_of(tmp_path, good, targets=[])
+
+
+def test_a_pose_number_that_stands_for_its_neighbours_too_is_refused(tmp_path, good):
+    rows = len(good["x_mm"])
+    good["pose"] = np.arange(rows, dtype=float)
+    good["pose"][3] = 1e300
+    assert "column pose, line 5: 1e+300; allowed: whole numbers" in problems_of(tmp_path, good)

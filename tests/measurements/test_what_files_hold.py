@@ -1,0 +1,289 @@
+"""All that a measurement file may state beside one pose per row, and the real files as examples."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kinacc.artifacts import store
+from kinacc.config.load import load
+from kinacc.config.schema import defaults
+from kinacc.errors import InputError
+from kinacc.geometry import exp_so3, log_so3, rotation_from_quaternion
+from kinacc.kinematics import dh, robot
+from kinacc.measurements.reader import UNCERTAINTY, read
+from kinacc.workflow.stages import measurements as stage
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / ".." / "shared" / "data"
+ARM = robot.load("ur10")
+COUNT = 8
+MARKS = dict.fromkeys(("kinacc_version", "config_hash", "code_hash", "inputs_hash"), "x")
+
+
+@pytest.fixture
+def joints():
+    """Columns of joints in degrees."""
+    q_deg = np.random.default_rng(3).uniform(-150, 150, (COUNT, 6))
+    return {f"q{i + 1}_deg": q_deg[:, i] for i in range(6)}
+
+
+def points(prefix="", start=0.0):
+    return {
+        f"{prefix}{axis}_mm": start + np.arange(COUNT) * 7.0 + i for i, axis in enumerate("xyz")
+    }
+
+
+def reading(folder, table, arm=ARM, kind="none", orientation=(), **section):
+    path = folder / "poses.csv"
+    rows = [",".join(map(str, row)) for row in zip(*table.values(), strict=True)]
+    path.write_text("\n".join([",".join(table), *rows]) + "\n")
+    given = defaults()["measurements"]["file"] | {"path": str(path)} | section
+    given["orientation"] = given["orientation"] | {"kind": kind} | dict(orientation)
+    return read(given, arm, strict=False)
+
+
+def words(*values):
+    return np.array(values, dtype=object)
+
+
+def refused(folder, columns, **given) -> str:
+    with pytest.raises(InputError) as caught:
+        reading(folder, columns, **given)
+    return str(caught.value)
+
+
+def test_targets_are_found_by_their_names_and_may_be_missing(tmp_path, joints):
+    one, two = points("mA_"), {n: v.astype(object) for n, v in points("ball 2_", 100.0).items()}
+    for name in two:
+        two[name][[1, 4]] = ""
+    columns = reading(tmp_path, joints | one | two).columns
+    assert list(columns["target"][:3]) == ["mA", "ball 2", "mA"]
+    second = columns["target"] == "ball 2"
+    np.testing.assert_array_equal(columns["pose"][second], [0, 2, 3, 5, 6, 7])
+    np.testing.assert_array_equal(columns["row"][second], [2, 4, 5, 7, 8, 9])
+    np.testing.assert_array_equal(columns["x_mm"][second], 100.0 + 7.0 * columns["pose"][second])
+    assert (columns["repeat"] == 0).all()
+    assert np.isnan(columns["qw"]).all()
+
+
+def test_a_row_without_any_target_is_left_out_and_named(tmp_path, joints):
+    one = {n: v.astype(object) for n, v in points().items()}
+    for name in one:
+        one[name][5] = " "
+    found = reading(tmp_path, joints | one)
+    assert len(found.columns["pose"]) == COUNT - 1
+    assert found.left_out() == ["nothing was measured in line 7"]
+
+
+def test_half_a_point_is_refused(tmp_path, joints):
+    one = {n: v.astype(object) for n, v in points("mA_").items()}
+    one["mA_y_mm"][2] = ""
+    text = refused(tmp_path, joints | one)
+    assert "columns mA_x_mm, mA_y_mm, mA_z_mm, line 4: some of them are empty" in text
+
+
+def test_only_the_targets_asked_for(tmp_path, joints):
+    table = joints | points("mA_") | points("goal_")
+    found = reading(tmp_path, table, targets=["mA"])
+    assert set(found.columns["target"]) == {"mA"}
+    assert found.unused == ("goal_x_mm", "goal_y_mm", "goal_z_mm")
+    text = refused(tmp_path, table, targets=["mB"])
+    assert "column mB_x_mm or mB_x_m: is missing" in text
+
+
+def test_one_row_per_target_with_the_target_in_a_column(tmp_path, joints):
+    table = joints | points() | {"pose": np.repeat(np.arange(4), 2)}
+    table["target"] = words(*["left", "right"] * 4)
+    columns = reading(tmp_path, table).columns
+    assert list(columns["target"][:2]) == ["left", "right"]
+    assert (columns["repeat"] == 0).all()
+
+
+def test_mapped_names_of_several_targets(tmp_path, joints):
+    table = joints | {f"Ball A {axis}": np.arange(COUNT) * 0.01 for axis in "XYZ"} | points("mB_")
+    names = {f"mA_{axis}": f"Ball A {axis.upper()}" for axis in "xyz"}
+    columns = reading(tmp_path, table, columns=names, length_unit="m").columns
+    first = columns["target"] == "mA"
+    np.testing.assert_allclose(columns["x_mm"][first], np.arange(COUNT) * 10.0)
+    np.testing.assert_allclose(columns["y_mm"][~first], np.arange(COUNT) * 7.0 + 1)
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_quaternions_in_a_stated_order(tmp_path, joints, order):
+    turn = Rotation.random(COUNT, random_state=4)
+    values = turn.as_quat(scalar_first=order == "wxyz")
+    table = joints | points() | {f"quat{i + 1}": values[:, i] for i in range(4)}
+    columns = reading(tmp_path, table, kind="quaternion", orientation={"order": order}).columns
+    found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
+    np.testing.assert_allclose(rotation_from_quaternion(found), turn.as_matrix(), atol=1e-9)
+
+
+@pytest.mark.parametrize("convention", ["XYZ", "ZYX", "zxy", "YXZ", "ZYZ", "xzx"])
+def test_euler_angles_by_axis_and_in_order(tmp_path, joints, convention):
+    turn = Rotation.random(COUNT, random_state=4)
+    angles = turn.as_euler(convention, degrees=True)
+    ordered = {f"e{i + 1}_deg": angles[:, i] for i in range(3)}
+    names = [f"r{axis}_deg" for axis in convention.lower()]
+    if len(set(names)) < 3:
+        names = ["rx_deg", "ry_deg", "rz_deg"]
+    by_axis = {name: angles[:, i] for i, name in enumerate(names)}
+    for given in (ordered, by_axis):
+        orientation = {"convention": convention}
+        table = joints | points() | given
+        columns = reading(tmp_path, table, kind="euler", orientation=orientation).columns
+        found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
+        np.testing.assert_allclose(rotation_from_quaternion(found), turn.as_matrix(), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "convention"), [("euler", "ZXY"), ("euler", "zyx"), ("rotation_vector", "XYZ")]
+)
+def test_spread_of_angles_becomes_spread_of_the_rotation(tmp_path, joints, kind, convention):
+    """Against simulated angles: the turn between noisy and noise-free orientation."""
+    angles = np.random.default_rng(8).uniform(-1.2, 1.2, (COUNT, 3))
+    std = np.array([1e-5, 2e-5, 4e-5])
+    names = [f"r{axis}" for axis in (convention.lower() if kind == "euler" else "xyz")]
+    table = joints | points() | {f"{name}_rad": angles[:, i] for i, name in enumerate(names)}
+    table |= {f"std_{name}_rad": np.full(COUNT, std[i]) for i, name in enumerate(names)}
+    columns = reading(tmp_path, table, kind=kind, orientation={"convention": convention}).columns
+
+    def matrices(values):
+        if kind == "rotation_vector":
+            return exp_so3(values)
+        return Rotation.from_euler(convention, values).as_matrix()
+
+    noise = np.random.default_rng(9).normal(size=(20000, 3)) * std
+    for row in range(COUNT):
+        clean = matrices(angles[row][None])[0]
+        seen = log_so3(matrices(angles[row] + noise) @ clean.T).std(axis=0)
+        stated = [columns[f"std_r{axis}_rad"][row] for axis in "xyz"]
+        np.testing.assert_allclose(stated, seen, rtol=0.03)
+
+
+def test_a_stated_standard_deviation_of_zero_says_nothing(tmp_path, joints):
+    table = joints | points() | {f"std_{axis}_m": np.full(COUNT, 2e-5) for axis in "xyz"}
+    table["std_y_m"][3] = 0.0
+    columns = reading(tmp_path, table).columns
+    np.testing.assert_allclose(columns["std_x_mm"], 0.02)
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(columns["std_y_mm"])), [3])
+    table["std_z_m"][6] = -1e-5
+    assert "column std_z_m, line 8: standard deviation -1e-05" in refused(tmp_path, table)
+
+
+def test_a_full_covariance(tmp_path, joints):
+    root = np.array([[2.0, 0.0, 0.0], [0.5, 1.0, 0.0], [-0.3, 0.2, 0.4]]) * 0.01
+    full = root @ root.T
+    pairs = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
+    table = joints | points("a_")
+    table |= {f"a_cov_{name}_mm2": np.full(COUNT, full[at]) for name, at in pairs.items()}
+    columns = reading(tmp_path, table).columns
+    std = np.sqrt(np.diag(full))
+    for i, axis in enumerate("xyz"):
+        np.testing.assert_allclose(columns[f"std_{axis}_mm"], std[i])
+    np.testing.assert_allclose(columns["corr_xz"], full[0, 2] / std[0] / std[2])
+    table["a_cov_xy_mm2"][4] = 1.0
+    assert "line 6: is no covariance" in refused(tmp_path, table)
+    del table["a_cov_xy_mm2"]
+    assert "a_cov_xy: is missing beside a_cov_xx, a_cov_xz" in refused(tmp_path, table)
+
+
+def test_sessions_count_their_poses_anew(tmp_path, joints):
+    table = joints | points() | {"pose": np.tile(np.arange(4), 2), "temp_C": np.full(COUNT, 21.5)}
+    table["session"] = words(*["monday"] * 4 + ["tuesday"] * 4)
+    columns = reading(tmp_path, table).columns
+    np.testing.assert_array_equal(columns["pose"], np.arange(COUNT))
+    assert list(columns["session"][[0, 7]]) == ["monday", "tuesday"]
+    assert (columns["temperature_c"] == 21.5).all()
+
+
+def test_poses_may_have_names(tmp_path, joints):
+    table = joints | points() | {"pose": words("P9", "P9", "P2", "P2", "P9", "P1", "P1", "P1")}
+    columns = reading(tmp_path, table).columns
+    np.testing.assert_array_equal(columns["pose"], [0, 0, 1, 1, 0, 2, 2, 2])
+    np.testing.assert_array_equal(columns["repeat"], [0, 1, 0, 1, 2, 0, 1, 2])
+
+
+def test_commanded_joints_beside_those_read_back(tmp_path, joints):
+    commanded = {name.replace("_deg", "_cmd_deg"): np.round(v) for name, v in joints.items()}
+    found = reading(tmp_path, joints | commanded | points())
+    expected = np.deg2rad(np.stack(list(commanded.values()), axis=1))
+    np.testing.assert_allclose(found.commanded, expected)
+    assert found.unused == ()
+    del commanded["q3_cmd_deg"]
+    assert "column q3_cmd: is missing beside" in refused(tmp_path, joints | commanded | points())
+
+
+def test_lines_above_and_under_the_names_are_skipped(tmp_path, joints):
+    table = joints | points()
+    rows = [",".join(map(str, row)) for row in zip(*table.values(), strict=True)]
+    text = ["Instrument 4711", "", ",".join(table), ",".join(["unit"] * len(table)), *rows]
+    path = tmp_path / "foreign.csv"
+    path.write_text("\n".join(text))
+    section = defaults()["measurements"]["file"] | {"path": str(path)}
+    section |= {"skip_lines": 2, "skip_under_names": 1, "orientation": {"kind": "none"}}
+    section["orientation"] |= {"convention": "XYZ", "unit": "deg"}
+    found = read(section, ARM, strict=False)
+    np.testing.assert_array_equal(found.columns["row"], np.arange(5, 5 + COUNT))
+
+
+def test_a_sliding_joint_is_read_as_a_length(tmp_path, joints):
+    slides = np.arange(6) == 2
+    arm = dataclasses.replace(ARM, dh=dataclasses.replace(ARM.dh, prismatic=slides))
+    joints["q3_m"] = joints.pop("q3_deg") / 1000.0
+    columns = reading(tmp_path, joints | points(), arm=arm).columns
+    np.testing.assert_allclose(columns["q3"], joints["q3_m"] * 1000.0)
+    np.testing.assert_allclose(columns["q2"], np.deg2rad(joints["q2_deg"]))
+
+
+def test_what_a_file_states_stands_in_the_artefact(tmp_path, joints):
+    table = joints | points("mA_") | {f"mA_std_{axis}_mm": np.full(COUNT, 0.01) for axis in "xyz"}
+    table["session"] = words(*["a"] * COUNT)
+    found = reading(tmp_path, table)
+    settings = {"seed": 1, "measurements": defaults()["measurements"]}
+    path = tmp_path / "measurements.parquet"
+    store.write(path, "measurements", stage.split(found.columns, settings), MARKS | {"seed": 1})
+    again = store.read(path)
+    assert list(again["session"]) == ["a"] * COUNT
+    np.testing.assert_allclose(again["std_x_mm"], 0.01)
+    np.testing.assert_array_equal(again["row"], np.arange(2, 2 + COUNT))
+    assert np.isnan(again["temperature_c"]).all()
+
+
+def example(name: str, dataset: str):
+    config = load([ROOT / "config.yaml", ROOT / "examples" / name], folder=ROOT)[dataset]
+    file = config["measurements"]["file"]
+    return read(file | {"path": str(ROOT / file["path"])}, robot.load(config["robot"]))
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the measured data sets are not beside the project")
+def test_a_published_file_is_used_as_its_publisher_wrote_it():
+    published = example("ur10_published.yaml", "ur10_published_d")
+    plain = example("ur10.yaml", "ur10_d")
+    assert published.unused == (
+        *("Timestamp", "Goal x", "Goal y", "Goal z", "Goal roll", "Goal pitch", "Goal yaw"),
+    )
+    assert set(published.columns) == set(plain.columns)
+    for name in set(plain.columns) - {"target", "session"}:
+        np.testing.assert_allclose(
+            published.columns[name], plain.columns[name], atol=1e-7, err_msg=name
+        )
+    assert np.isfinite(np.stack([published.columns[name] for name in UNCERTAINTY[:3]])).all()
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the measured data sets are not beside the project")
+def test_three_reflectors_read_ten_times():
+    found = example("fanuc.yaml", "fanuc")
+    assert found.unused == ()
+    poses, readings = np.unique(found.columns["pose"], return_counts=True)
+    assert len(poses) == 24
+    assert (readings == 30).all()
+    assert set(found.columns["target"]) == {"mA", "mB", "mC"}
+    arm = robot.load("fanuc_r2000ic_165f")
+    q_rad = np.stack([found.columns[f"q{i}"] for i in range(1, 7)], axis=1)
+    reach = np.linalg.norm(dh.forward(arm.dh, robot.dh_angles(arm, q_rad)).position_mm, axis=1)
+    assert (reach < 3500).all()

@@ -1,0 +1,215 @@
+"""Fields, worlds and sums of the tournament: fixed, fair and counted right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+from kinacc.assess import ASSESSORS
+from kinacc.assess.registry import ADAPTIVE
+from kinacc.errors import InputError
+from kinacc.study.tournament import contest, summary
+from kinacc.study.tournament.fields import FAMILIES, Field, of_measurements, of_points, synthetic
+
+SMALL = contest.Size((0.1, 0.3), {20: (10, 40)}, 3, 2, (0,))
+
+
+@pytest.fixture(scope="module")
+def field() -> Field:
+    """Thirty errors in random directions."""
+    rng = np.random.default_rng(1)
+    q_rad = rng.uniform(-0.5, 0.5, (30, 6))
+    return Field("made_up", "synthetic", "mh180", q_rad, 0.4 * rng.normal(size=(30, 3)))
+
+
+@pytest.fixture(scope="module")
+def rows(field):
+    """All campaigns of the small tournament."""
+    parts = [contest.campaigns(job, range(3), 5)[0] for job in contest.jobs([field], SMALL)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_synthetic_fields_are_the_size_of_a_calibrated_arms_errors(name):
+    made = synthetic(name, 0)
+    size = np.linalg.norm(made.error_mm, axis=1)
+    assert made.points == 1000
+    assert 0.05 < size.mean() < 2.0
+    assert 0.3 < size.max() < 5.0
+    assert np.array_equal(made.error_mm, synthetic(name, 0).error_mm)
+
+
+def test_a_defect_and_rare_poses_make_a_heavier_tail_than_smooth_errors():
+    def tail(name):
+        size = np.linalg.norm(synthetic(name, 0).error_mm, axis=1)
+        return size.max() / np.median(size)
+
+    assert tail("defect") > 1.2 * tail("smooth")
+    assert tail("rare") > 3.0 * tail("smooth")
+
+
+def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_fitted():
+    errors = {
+        "comparison": np.array(["dh_vs_measured"] * 4 + ["vec_vs_measured"], object),
+        "estimate": np.array(["cross_validated"] * 3 + ["train"] * 2, object),
+        "pose": np.array([7, 7, 8, 9, 9]),
+        "target": np.array(["tool"] * 5, object),
+        "ex_mm": np.array([1.0, 3.0, 5.0, 50.0, 50.0]),
+        "ey_mm": np.zeros(5),
+        "ez_mm": np.zeros(5),
+    }
+    measurements = {"pose": np.array([9, 8, 7, 7]), "q1": np.array([0.9, 0.8, 0.7, 0.71])}
+    made = of_measurements("arm", "ur10", errors, measurements)
+    assert made.error_mm[:, 0].tolist() == [2.0, 5.0]
+    assert made.q_rad[:, 0].tolist() == [0.7, 0.8]
+
+
+def test_a_field_without_cross_validated_errors_says_what_to_do():
+    columns = {name: np.array(["train"], object) for name in ("comparison", "estimate")}
+    with pytest.raises(InputError, match=r"measurements\.folds"):
+        of_measurements("arm", "ur10", columns, {})
+
+
+def test_points_of_the_paper_become_its_field():
+    points = {f"q{i}": np.arange(3.0) for i in range(1, 7)}
+    points |= {f"e{axis}_mm": np.arange(3.0) for axis in "xyz"} | {"true_error_mm": np.zeros(3)}
+    assert of_points("mh180", "mh180", points).error_mm.shape == (3, 3)
+
+
+def test_errors_that_are_not_finite_are_refused():
+    with pytest.raises(InputError, match="not finite"):
+        Field("bad", "measured", "ur10", np.zeros((2, 6)), np.full((2, 3), np.nan))
+
+
+def test_every_assessor_is_in_every_cell(rows):
+    assert set(rows["assessor"]) == {*ASSESSORS, *ADAPTIVE}
+    first = rows["assessor"] == "search_and_confirm"
+    first &= rows["target"] == "measured"
+    assert first.sum() == 2 * 2 * 3
+    assert np.all(rows["measurements"] <= rows["budget"])
+    assert np.all(rows["points_visited"] <= rows["candidates"])
+
+
+def test_parts_of_any_number_give_the_same_table(field):
+    names = ("maximum", "single_shot")
+
+    def table(parts):
+        found = []
+        for number in range(1, parts + 1):
+            work = contest.part_of(contest.jobs([field], SMALL), number, parts)
+            found.append(contest.summed(work, replace(SMALL, repetitions=2), 5, names))
+        joined = {name: np.concatenate([each[name] for each in found]) for name in found[0]}
+        return summary.in_order(joined)
+
+    whole, scattered = table(1), table(7)
+    assert len(whole["assessor"]) == 4 + 4 * 2
+    for name, column in whole.items():
+        assert repr(column.tolist()) == repr(scattered[name].tolist())
+
+
+def test_larger_budgets_see_the_same_first_readings(field):
+    cell = contest.Cell(field, 20, 0.1)
+    few, many = (contest.world_of(cell, 1, visits, 5)[0] for visits in (10, 40))
+    assert np.array_equal(few.error_mm, many.error_mm)
+    assert np.array_equal(few.reading_mm(3, 9), many.reading_mm(3, 9))
+
+
+def test_a_field_takes_part_with_the_candidate_counts_it_is_large_enough_for(field):
+    def counts(*wanted):
+        size = replace(SMALL, budgets=dict.fromkeys(wanted, (10,)))
+        return {cell.candidates for cell in contest.cells([field], size)}
+
+    assert counts(20, 31) == {20}
+    assert counts(40, 50) == {30}  # smaller than all of them: as it is
+    assert {job.budget for job in contest.jobs([field], replace(SMALL, budgets={40: (7,)}))} == {7}
+
+
+def test_each_target_is_graded_against_its_own_truth(rows):
+    one = (rows["assessor"] == "search_and_confirm") & (rows["budget"] == 10)
+    measured, everywhere = (
+        rows["true_mm"][one & (rows["target"] == target)] for target in ("measured", "candidates")
+    )
+    assert np.all(measured <= everywhere)
+    assert np.any(measured < everywhere)
+
+
+def graded(**columns) -> dict:
+    """Rows of one cell, five campaigns."""
+    row = {
+        "assessor": "a",
+        "target": "measured",
+        "field": "f",
+        "candidates": 20,
+        "noise_mm": 0.1,
+        "budget": 10,
+        "true_mm": 1.0,
+        "value_mm": 1.1,
+        "lower_mm": 0.9,
+        "upper_mm": 1.2,
+        "confidence": 0.95,
+        "assumption": "none",
+        "measurements": 10,
+        "points_visited": 8,
+        **columns,
+    }
+    text = ("assessor", "target", "field", "assumption")
+    return {
+        name: np.array(np.broadcast_to(value, 5), object if name in text else None)
+        for name, value in row.items()
+    }
+
+
+def test_a_cell_is_summed_up_as_by_hand():
+    said = graded(
+        upper_mm=[1.2, 0.8, 1.4, np.nan, 9.0],
+        assumption=np.array(["holds", "holds", "none", "none", "broken"], object),
+        value_mm=[1.1, 0.9, 1.1, 0.9, 1.3],
+        lower_mm=[0.9, 1.1, 0.9, np.nan, 0.9],
+    )
+    (cell,) = [
+        dict(zip(summary.KINDS, values, strict=True))
+        for values in zip(*summary.summed(said).values(), strict=True)
+    ]
+    assert (cell["repetitions"], cell["stated"], cell["broken"]) == (5, 4, 1)
+    assert cell["sound"] == 4
+    assert cell["upper_holds"] == pytest.approx(2 / 3)
+    assert cell["excess_mm"] == pytest.approx((0.2 - 0.2 + 0.4) / 3)
+    assert cell["lower_holds"] == pytest.approx(3 / 4)
+    assert cell["bias_mm"] == pytest.approx(0.06)
+    assert cell["rmse_mm"] == pytest.approx(np.sqrt((4 * 0.01 + 0.09) / 5))
+    exact = binomtest(2, 3).proportion_ci(0.95, "exact")
+    assert (cell["upper_low"], cell["upper_high"]) == pytest.approx((exact.low, exact.high))
+
+
+def test_holm_stops_at_the_first_that_is_not_small_enough():
+    chances = np.array([0.004, 0.5, 0.001, 0.003, 0.0051])
+    assert summary.holm(chances, 0.01).tolist() == [False, False, True, False, False]
+    assert summary.holm(np.array([0.001, 0.002, 0.9]), 0.01).tolist() == [True, True, False]
+
+
+def test_an_assessor_that_claims_too_much_is_caught():
+    honest = {name: np.tile(column, 200) for name, column in graded().items()}
+    assert summary.judged(summary.summed(honest))["rejected"].tolist() == [0]
+    bold = graded(upper_mm=[1.2, 1.2, 1.2, 1.2, 0.9])
+    bold = {name: np.tile(column, 200) for name, column in bold.items()}
+    found = summary.judged(summary.summed(bold))
+    assert (found["rejected"][0], found["below"][0]) == (1, 1)
+    assert found["worst_holds"][0] == pytest.approx(0.8)
+
+
+def test_silence_counts_where_what_it_would_rest_on_is_true():
+    said = graded(
+        upper_mm=[1.2, np.nan, np.nan, np.nan, 1.3],
+        assumption=np.array(["holds", "holds", "broken", "broken", "broken"], object),
+    )
+    found = summary.judged(summary.summed(said))
+    assert found["withheld"].tolist() == [pytest.approx(3 / 5)]
+    assert found["withheld_sound"].tolist() == [pytest.approx(1 / 2)]
+
+
+def test_few_campaigns_do_not_tell_three_points_from_chance():
+    few = graded(upper_mm=[1.2, 1.2, 1.2, 1.2, 0.9])
+    assert summary.judged(summary.summed(few))["below"].tolist() == [0]

@@ -1,0 +1,209 @@
+"""The map and the assessment points as stages: tables in, tables that fit the contract out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinacc.artifacts.store import to_table
+from kinacc.geometry import quaternion_from_rotation, rotation_z
+from kinacc.kinematics import dh, robot, tables, vec
+from kinacc.kinematics.inverse import limits
+from kinacc.kinematics.vec import ERRORS
+from kinacc.workflow import evaluation
+from kinacc.workflow.stages import accuracy_map, assessment_points
+
+ARM = robot.load("mh180")
+PROVENANCE = {
+    "kinacc_version": "0",
+    "config_hash": "0",
+    "code_hash": "0",
+    "inputs_hash": "0",
+    "seed": 1,
+}
+EVALUATION = {
+    "space": "cylinder",
+    "cylinder": {
+        "inner_radius_mm": 1200.0,
+        "radial_span_mm": 900.0,
+        "bottom_mm": 0.0,
+        "height_mm": 500.0,
+        "angle_deg": [0.0, 60.0],
+    },
+    "joint_box": {"joints_deg": None},
+    "reference_orientation_deg": [180.0, 0.0, 0.0],
+    "rotation_deg": 45.0,
+    "rotations": "signs_and_zero",
+    "tool_mm": [0.0, 0.0, 0.0],
+    "sequence": "sobol",
+    "points": 30,
+    "points_in": "space",
+    "invert_with": "dh",
+    "travel_direction": 0,
+}
+LAYOUT = {"slices_deg": [0.0, 15.0, 30.0], "grid_mm": 250.0}
+
+
+def vec_of(travel: bool = False) -> vec.VECModel:
+    lower, upper = (
+        np.deg2rad([-20, -40, -90, -190, -130, -190]),
+        np.deg2rad([80, 70, 30, 190, 130, 190]),
+    )
+    rng = np.random.default_rng(4)
+    scale = np.array([0.05] * 3 + [1e-4] * 3)[:, None]
+    offsets = rng.normal(size=(6, 2)) * 1e-4 * travel
+    return vec.VECModel(ARM.dh, lower, upper, rng.normal(size=(6, 6, 4)) * scale, offsets)
+
+
+def vec_columns(model: vec.VECModel, shuffled: bool = False) -> dict[str, np.ndarray]:
+    rows = [
+        (joint, error, 0, order, model.coefficients[joint, ERRORS.index(error), order])
+        for joint in range(6)
+        for error in ERRORS
+        for order in range(model.order + 1)
+    ]
+    rows += [
+        (joint, "eps_z", direction, 0, model.direction_offsets_rad[joint, column])
+        for joint in range(6)
+        for column, direction in enumerate((-1, 1))
+        if model.direction_offsets_rad.any()
+    ]
+    if shuffled:
+        rows = [rows[i] for i in np.random.default_rng(0).permutation(len(rows))]
+    joint, error, direction, order, value = (np.array(column) for column in zip(*rows, strict=True))
+    columns = {
+        "joint": joint + 1,
+        "error": error.astype(object),
+        "direction": direction,
+        "order": order,
+        "coefficient": value,
+        "std": np.full(len(rows), np.nan),
+        "q_min_rad": model.q_min_rad[joint],
+        "q_max_rad": model.q_max_rad[joint],
+    }
+    return columns | {name: getattr(model.dh, name)[joint] for name in dh.PARAMETERS}
+
+
+def dh_columns(model: dh.DHModel) -> dict[str, np.ndarray]:
+    columns = {"joint": np.arange(1, 7)}
+    return columns | {name: getattr(model, name) for name in dh.PARAMETERS}
+
+
+def frames(tool_mm: tuple[float, float, float]) -> dict[str, np.ndarray]:
+    names = [(model, frame) for model in ("vec", "dh") for frame in ("base", "tool")]
+    position = np.array([tool_mm if frame == "tool" else (0, 0, 0) for _, frame in names], float)
+    columns = {
+        "model": np.array([model for model, _ in names], dtype=object),
+        "frame": np.array([frame for _, frame in names], dtype=object),
+    }
+    columns |= {f"{axis}_mm": position[:, i] for i, axis in enumerate("xyz")}
+    turned = quaternion_from_rotation(rotation_z(np.full(len(names), 0.0)))
+    return columns | {name: turned[:, i] for i, name in enumerate(("qw", "qx", "qy", "qz"))}
+
+
+def inputs(travel: bool = False) -> dict[str, dict[str, np.ndarray]]:
+    return {"vec_model": vec_columns(vec_of(travel)), "dh_model": dh_columns(ARM.dh)}
+
+
+def settings(**changed) -> dict:
+    return {"robot": "mh180", "evaluation": {**EVALUATION, **changed}, "map": LAYOUT}
+
+
+def joints(columns: dict, letter: str = "q") -> np.ndarray:
+    return np.stack([columns[f"{letter}{i}"] for i in range(1, 7)], axis=1)
+
+
+@pytest.mark.parametrize("travel", [False, True])
+def test_models_come_back_from_their_tables_in_any_row_order(travel):
+    model = vec_of(travel)
+    read = tables.vec_model(vec_columns(model, shuffled=True))
+    for name in ("coefficients", "direction_offsets_rad", "q_min_rad", "q_max_rad"):
+        assert np.array_equal(getattr(read, name), getattr(model, name))
+    assert all(
+        np.array_equal(getattr(read.dh, name), getattr(model.dh, name)) for name in dh.PARAMETERS
+    )
+
+
+def test_the_map_fits_its_contract_and_keeps_the_slices_as_configured():
+    columns = accuracy_map.run(inputs(), settings())["accuracy_map"]
+    table = to_table("accuracy_map", columns, PROVENANCE)
+    assert table.num_rows == 3 * 5 * 3
+    assert np.unique(columns["slice_deg"]).tolist() == [0.0, 15.0, 30.0]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {},
+        {"points_in": "joints"},
+        {"space": "joint_box"},
+        {"space": "joint_box", "joint_box": {"joints_deg": [[-10, 10]] * 6}},
+        {"sequence": "halton", "rotations": "all_27", "invert_with": "vec"},
+        {"travel_direction": -1},
+    ],
+)
+def test_points_fit_their_contract_and_state_the_error_of_their_joints(changed):
+    columns = assessment_points.run(inputs(True), settings(**changed))["assessment_points"]
+    to_table("assessment_points", columns, PROVENANCE)
+    q, s = joints(columns), joints(columns, "s")
+    model = vec_of(True)
+    assert (s == changed.get("travel_direction", 0)).all()
+    error = vec.pose(model, q, s).position_mm - dh.forward(ARM.dh, q).position_mm
+    stated = np.stack([columns[f"e{axis}_mm"] for axis in "xyz"], axis=1)
+    assert np.allclose(stated, error, atol=1e-9)
+    assert np.allclose(columns["true_error_mm"], np.linalg.norm(error, axis=1))
+    assert limits.within(q, model.q_min_rad, model.q_max_rad).all()
+
+
+def test_a_joint_box_is_in_millimetres_where_a_joint_slides():
+    slides = np.array([False, False, True, False, False, False])
+    arm = replace(ARM, dh=replace(ARM.dh, prismatic=slides))
+    ranges = [[-10, 20], [0, 90], [-50, 150], [0, 1], [0, 1], [0, 1]]
+    low, high = evaluation.joint_box({"joint_box": {"joints_deg": ranges}}, arm)
+    np.testing.assert_allclose(low[:3], [np.deg2rad(-10), 0.0, -50.0])
+    np.testing.assert_allclose(high[:3], [np.deg2rad(20), np.pi / 2, 150.0])
+    assert evaluation.joint_box({"joint_box": {"joints_deg": None}}, arm) is None
+
+
+def test_a_fitted_tool_carries_the_point_assessed():
+    tool = (0.0, 0.0, 200.0)
+    given = {**inputs(), "frames": frames(tool)}
+    columns = assessment_points.run(given, settings())["assessment_points"]
+    configured = assessment_points.run(inputs(), settings(tool_mm=list(tool)))["assessment_points"]
+    assert all(np.array_equal(columns[name], configured[name]) for name in columns)
+    height = dh.forward(ARM.dh, joints(columns))
+    tip = height.position_mm + height.rotation @ np.array(tool)
+    assert (tip[:, 2] >= -1e-5).all()
+    assert (tip[:, 2] <= 500 + 1e-5).all()
+
+
+def test_measured_points_are_cross_validated_errors_averaged_over_readings():
+    count = 12
+    rows = np.repeat(np.arange(count), 2)
+    rng = np.random.default_rng(1)
+    measurements = {f"q{i}": rng.normal(size=2 * count) for i in range(1, 7)}
+    measurements |= {f"s{i}": np.ones(2 * count, dtype=np.int8) for i in range(1, 7)}
+    comparison = np.repeat(["dh_vs_measured", "vec_vs_measured"], 4 * count).astype(object)
+    estimate = np.tile(np.repeat(["train", "cross_validated"], 2 * count), 2).astype(object)
+    errors = {
+        "comparison": comparison,
+        "estimate": estimate,
+        "row": np.tile(np.arange(2 * count), 4),
+        "pose": np.tile(rows, 4),
+        "target": np.full(8 * count, "tool", dtype=object),
+    }
+    errors |= {f"e{axis}_mm": rng.normal(size=8 * count) for axis in "xyz"}
+    given = {"pose_errors": errors, "measurements": measurements}
+    columns = assessment_points.run(given, settings(space="measured", points=5))[
+        "assessment_points"
+    ]
+    to_table("assessment_points", columns, PROVENANCE)
+    assert len(columns["point"]) == 5
+    held_out = (comparison == "dh_vs_measured") & (estimate == "cross_validated")
+    for i in range(5):
+        row = np.flatnonzero(measurements["q1"] == columns["q1"][i])[0]
+        same = held_out & (errors["pose"] == rows[row])
+        assert same.sum() == 2
+        assert np.isclose(columns["ey_mm"][i], errors["ey_mm"][same].mean())

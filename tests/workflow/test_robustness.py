@@ -1,0 +1,82 @@
+"""Further draws through fits, study and claims: the same answers as the workflow's own stages."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+
+from kinacc.config.schema import defaults
+from kinacc.errors import InputError
+from kinacc.study.claims.evaluate import all_claims, evaluate
+from kinacc.workflow import in_memory
+from kinacc.workflow.stages import robustness_chunk, robustness_table
+
+
+@pytest.fixture(scope="module")
+def config() -> dict:
+    config = {"robot": "mh180", **copy.deepcopy(defaults())}
+    config["map"]["grid_mm"] = 300.0
+    config["study"]["repetitions"] = 3
+    config["evaluation"]["points"] = 60
+    config["study"]["measurements"] = 60
+    config["robustness"]["draws"] = 3
+    return config
+
+
+@pytest.fixture(scope="module")
+def rows(config):
+    return robustness_chunk.run({}, config)["robustness_chunk"]
+
+
+def test_every_claim_on_every_further_draw_and_not_on_the_shipped_one(rows):
+    wanted = [claim.id for claim in all_claims()]
+    assert np.unique(rows["draw"]).tolist() == [1, 2, 3]
+    for draw in (1, 2, 3):
+        assert rows["claim"][rows["draw"] == draw].tolist() == wanted
+
+
+def test_a_draw_gets_the_verdicts_it_would_get_as_the_data_set(config, rows):
+    own = copy.deepcopy(config)
+    own["measurements"]["synthetic"]["draw"] = 2
+    stages = ("measurements", *robustness_chunk.STAGES)
+    whole = evaluate(in_memory.run(stages, own, {}), paper_arm=True)
+    ours = rows["draw"] == 2
+    assert rows["verdict"][ours].tolist() == whole["verdict"].tolist()
+    assert np.array_equal(rows["reproduced"][ours], whole["reproduced"], equal_nan=True)
+
+
+def test_numbers_of_the_tables_agree_on_accepted_draws(config):
+    # With the default points: the true accuracy belongs to the 200 of the paper.
+    full = {**config, "evaluation": defaults()["evaluation"]}
+    found = robustness_chunk.claims_on(1, full)
+    numbers = [
+        verdict
+        for claim, verdict in zip(found["claim"], found["verdict"], strict=True)
+        if claim.startswith(("table1_", "table3_")) or claim == "true_accuracy"
+    ]
+    assert numbers == ["agrees"] * 13
+
+
+@pytest.mark.parametrize("parts", [2, 5])
+def test_parts_make_the_same_table(config, rows, parts):
+    whole = robustness_table.run({"robustness_chunk": rows}, {})["robustness"]
+    pieces = [
+        robustness_chunk.run({}, {**config, "part": {"number": number, "of": parts}})
+        for number in range(1, parts + 1)
+    ]
+    joined = {
+        name: np.concatenate([piece["robustness_chunk"][name] for piece in pieces]) for name in rows
+    }
+    again = robustness_table.run({"robustness_chunk": joined}, {})["robustness"]
+    for name, column in whole.items():
+        if name == "reproduced":
+            assert np.array_equal(again[name], column, equal_nan=True)
+        else:
+            assert again[name].tolist() == column.tolist()
+
+
+def test_more_draws_than_were_accepted_is_refused(config):
+    with pytest.raises(InputError, match=r"robustness\.draws"):
+        robustness_chunk.run({}, {**config, "robustness": {"draws": 5000}})
