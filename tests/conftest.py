@@ -8,7 +8,8 @@ from pathlib import Path
 from hypothesis import settings
 
 # Works in every pytest import mode, from tests/ and from any folder below it.
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+TESTS = Path(__file__).resolve().parent
+sys.path[:0] = [str(TESTS), str(TESTS.parent / "tools")]
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")

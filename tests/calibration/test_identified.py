@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import dh_fit, identified, mask, tables, terms, uncertainty
+from kinacc.calibration import dh_fit, identified, tables, terms, uncertainty
 from kinacc.calibration.frames import MOTIONS
+from kinacc.config import parameter_rules as mask
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import dh_fit, frames, mask, robust, terms, uncertainty
+from kinacc.calibration import dh_fit, frames, robust, terms, uncertainty
 from kinacc.calibration.constrained import ConstrainedFrames
+from kinacc.config import parameter_rules as mask
 from kinacc.errors import InputError
 from kinacc.geometry import compose, log_so3
 from kinacc.kinematics import dh, robot

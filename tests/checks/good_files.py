@@ -9,10 +9,10 @@ import pytest
 
 from kinacc.checks import check
 from kinacc.checks.report import Report
-from kinacc.config.load import load
 from kinacc.geometry import exp_so3, log_so3
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
+from kinacc.workflow.contradictions import load
 
 SHARED = Path(__file__).parents[2] / ".." / "shared" / "data"
 MEASURED = {

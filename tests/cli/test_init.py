@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from kinacc.cli.group import main
-from kinacc.config.load import load
 from kinacc.kinematics import robot
+from kinacc.workflow.contradictions import load
 
 SHARED = Path(__file__).parents[2] / ".." / "shared" / "data"
 

@@ -9,10 +9,10 @@ from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 from kinacc.cli.group import main
-from kinacc.config.load import load
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
+from kinacc.workflow.contradictions import load
 
 ROWS = 14
 ARM = robot.load("ur10")

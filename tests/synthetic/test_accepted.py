@@ -9,8 +9,9 @@ import pytest
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
-from kinacc.synthetic import acceptance, accepted, measure
+from kinacc.synthetic import accepted, measure
 from kinacc.synthetic.draw import TABLE_II, Scales
+from kinacc.workflow import arm_acceptance as acceptance
 from kinacc.workflow import arm_search as search
 from kinacc.workflow import in_memory
 

@@ -5,7 +5,7 @@ the check of a finished results folder all read this one description.
 
 A column named with an asterisk (``q*``) stands for one column per joint: ``q1`` .. ``qk``.
 A value that does not apply is null, never zero. After a change run
-``python -m kinacc.artifacts.document``, which rewrites docs/artifacts.md.
+``python tools/document_artifacts.py``, which rewrites docs/artifacts.md.
 """
 
 from __future__ import annotations

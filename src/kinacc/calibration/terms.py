@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.calibration import mask
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.frames import Frames, coordinates, known
-from kinacc.calibration.mask import Rule
 from kinacc.calibration.observations import Observations
+from kinacc.config import parameter_rules as mask
+from kinacc.config.parameter_rules import Rule
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel

@@ -75,8 +75,8 @@ def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = Non
 
 def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict]:
     """The data sets to check: those asked for, or all that are read from a file."""
-    from kinacc.config.load import load
     from kinacc.errors import InputError, Problem
+    from kinacc.workflow.contradictions import load
 
     full = load(files)
     measured = [n for n, c in full.items() if c["measurements"]["source"] == "file"]

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from kinacc.config.contradictions import contradictions
 from kinacc.config.reading import Document, KeyPath, dotted, read
 from kinacc.config.schema import Section, plain, settings
 from kinacc.config.validate import (
@@ -21,23 +20,31 @@ from kinacc.config.validate import (
 from kinacc.config.values import shown
 from kinacc.errors import InputError, Problem
 
+Contradictions = Callable[..., Iterable[Problem]]
 COMMAND_LINE = "command line"
 _MOST_DATASETS = 500
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
 
 
+def _none(*given: Any) -> tuple[Problem, ...]:
+    """Settings that are each fine are all well together."""
+    return ()
+
+
 def load(
     paths: Sequence[Path | str],
     overrides: Mapping[str, Any] | None = None,
     folder: Path | str = ".",
+    contradictions: Contradictions = _none,
 ) -> dict[str, dict[str, Any]]:
     """Full settings of every data set, by name.
 
     ``paths`` are merged in order as Snakemake merges its ``--configfile``: sections key by key, all
     else replaced. ``overrides`` (nested, as from ``--config``) come last. Paths of data and robots
-    are relative to ``folder``. Every data set has ``robot``, ``seed`` and all sections of
-    schema.yaml, numbers in the units their names carry.
+    are relative to ``folder``. ``contradictions`` (name, robot, full settings, place, folder)
+    yields what is wrong with settings that are each fine. Every data set has ``robot``, ``seed``
+    and all sections of schema.yaml, numbers in the units their names carry.
 
     Raises InputError listing every problem in all files.
     """
@@ -55,7 +62,7 @@ def load(
     for document in documents:
         merged = overlay(merged, document.data)
     if merged or not problems:
-        resolved, found = _resolve(merged, documents, Path(folder))
+        resolved, found = _resolve(merged, documents, Path(folder), contradictions)
         problems += found
     if problems:
         problems.sort(key=_reading_order([document.name for document in documents]))
@@ -79,7 +86,10 @@ def _reading_order(names: Sequence[str]) -> Callable[[Problem], tuple[int, int]]
 
 
 def _resolve(
-    merged: Mapping[str, Any], documents: Sequence[Document], folder: Path
+    merged: Mapping[str, Any],
+    documents: Sequence[Document],
+    folder: Path,
+    contradictions: Contradictions,
 ) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
     def place(path: KeyPath) -> str:
         return _place(documents, path)
@@ -103,12 +113,14 @@ def _resolve(
     resolved = {}
     for name, content in datasets.items():
         problems += check_dataset_name(name, place)
-        resolved[name], found = _dataset(name, content, shared, place, folder)
+        resolved[name], found = _dataset(name, content, shared, place, folder, contradictions)
         problems += found
     return resolved, list(dict.fromkeys(problems))
 
 
-def _dataset(name, content, shared, place, folder) -> tuple[dict[str, Any], list[Problem]]:
+def _dataset(
+    name, content, shared, place, folder, contradictions
+) -> tuple[dict[str, Any], list[Problem]]:
     path = ("datasets", name)
     problems: list[Problem] = []
     known = Section("", "", (ROBOT, *settings().entries))

@@ -274,7 +274,7 @@ def _rows(key, value, path, place):
 
 
 def _parameters(key, value, path, place):
-    from kinacc.calibration import mask
+    from kinacc.config import parameter_rules as mask
 
     if not isinstance(value, dict):
         return _refuse(key, path, place, f"{shown(value)} is not a mapping")

@@ -13,11 +13,12 @@ from kinacc.kinematics import robot, tables, vec
 from kinacc.kinematics.robot import Robot
 from kinacc.progress import reporting
 from kinacc.study.claims.numbers import number_claims
-from kinacc.synthetic import acceptance, columns
+from kinacc.synthetic import columns
 from kinacc.synthetic.accepted import GEOMETRY, AcceptedDraw, geometry_columns
 from kinacc.synthetic.draw import TABLE_II, Scales
 from kinacc.synthetic.response import Response, linearise
 from kinacc.synthetic.tuning import Targets, targets_of, tuned
+from kinacc.workflow import arm_acceptance as acceptance
 from kinacc.workflow import calibration_settings, in_memory
 from kinacc.workflow.stages.measurements import split
 

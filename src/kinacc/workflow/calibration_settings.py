@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinacc.calibration import mask, selection, tables
+from kinacc.calibration import selection, tables
 from kinacc.calibration.dh_fit import DH_FIX
 from kinacc.calibration.models import Options
 from kinacc.calibration.observations import Observations, from_columns
@@ -15,6 +15,7 @@ from kinacc.calibration.selection import Grid
 from kinacc.calibration.system import require_enough
 from kinacc.calibration.terms import parallel_joints, require_known
 from kinacc.calibration.vec_fit import VEC_FIX, Prior
+from kinacc.config import parameter_rules as mask
 from kinacc.kinematics.robot import Robot, carried
 
 AUTO = "auto"

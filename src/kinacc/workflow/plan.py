@@ -26,8 +26,8 @@ def planned(
 
     Raises InputError listing every problem in them.
     """
-    from kinacc.config.load import load
     from kinacc.config.schema import without_execution_keys
+    from kinacc.workflow.contradictions import load
 
     full = load(paths, _read_words(overrides or {}))
     formats = {name: tuple(config["figures"]["formats"]) for name, config in full.items()}

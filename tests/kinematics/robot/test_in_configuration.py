@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from test_urdf import SCARA, UR10, text_of
 
-from kinacc.config.load import load
 from kinacc.errors import InputError
+from kinacc.workflow.contradictions import load
 from kinacc.workflow.plan import planned
 
 PAPER = Path(__file__).parents[2] / "config.yaml"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import document_tournament as document
 import numpy as np
 import pytest
 
 from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
 from kinacc.errors import InputError
 from kinacc.figures import save, tournament
-from kinacc.study.tournament import contest, document, pages, summary
+from kinacc.study.tournament import contest, pages, summary
 from kinacc.study.tournament.fields import Field, described
 
 SIZE = contest.Size((0.1, 0.3), {200: (200,)}, 2, 2, (0,))
@@ -98,4 +99,4 @@ def test_the_documented_pages_follow_from_the_documented_tables():
         pytest.skip("no tournament is documented")
     for path, text in document.texts(known).items():
         found = (document.DOCS / path).read_text(encoding="utf-8")
-        assert found == text, f"{path}: run python -m kinacc.study.tournament.document"
+        assert found == text, f"{path}: run python tools/document_tournament.py"

@@ -16,7 +16,7 @@ NAMES = (*ASSESSORS, *ADAPTIVE)
 SHOWN = (200, 200)  # candidates and budget of pictures and tables
 _YARDSTICK, _BOUND = "model_invalidation", "single_shot"
 _TAIL = """
-Written by `python -m kinacc.study.tournament.document` from the tables here; do not edit.
+Written by `python tools/document_tournament.py` from the tables here; do not edit.
 """
 
 Tables = Mapping[str, Mapping]

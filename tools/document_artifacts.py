@@ -1,4 +1,4 @@
-"""Write docs/artifacts.md from the contract: ``python -m kinacc.artifacts.document``."""
+"""Write docs/artifacts.md from the contract: ``python tools/document_artifacts.py``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ made on request by `kinacc tournament` or `snakemake tournament`.
 
 `kinacc check-results results/` holds a folder to all of this.
 
-Written from the contract by `python -m kinacc.artifacts.document`.
+Written from the contract by `python tools/document_artifacts.py`.
 """
 
 
@@ -74,7 +74,7 @@ def _row(column: Column) -> str:
 
 def main() -> None:
     """Rewrite docs/artifacts.md of the repository the package lies in."""
-    path = Path(__file__).parents[3] / "docs" / "artifacts.md"
+    path = Path(__file__).parents[1] / "docs" / "artifacts.md"
     path.parent.mkdir(exist_ok=True)
     path.write_text(artifacts_markdown(), encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""Write the tournament's pages: ``python -m kinacc.study.tournament.document [NAME=FOLDER ...]``.
+"""Write the tournament's pages: ``python tools/document_tournament.py [NAME=FOLDER ...]``.
 
 docs/tournament/<name>/ holds the tables of a tournament that are part of the documentation. Given
 ``NAME=FOLDER`` the tables of a results folder are taken over under that name first. Then the pages
@@ -17,7 +17,7 @@ from kinacc.artifacts.store import read, read_metadata
 from kinacc.figures import save, tournament
 from kinacc.study.tournament import pages
 
-DOCS = Path(__file__).parents[4] / "docs"
+DOCS = Path(__file__).parents[1] / "docs"
 TABLES = ("tournament_cells", "tournament_verdicts", "tournament_fields")
 
 

@@ -1,7 +1,7 @@
 """Write config.yaml and docs/configuration.md from the schema.
 
-Run it as ``python -m kinacc.config.document``. config.yaml holds every key with its default, unit
-and meaning; a test keeps both files and the schema together.
+Run it as ``python tools/document_configuration.py``. config.yaml holds every key with its default,
+unit and meaning; a test keeps both files and the schema together.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _HEAD = """\
 # Top-level sections are defaults of every data set; a data set under `datasets` may give any of
 # them anew. Further files add data sets:
 #     snakemake -c2 --configfile config.yaml examples/ur10.yaml
-# Written from the schema by `python -m kinacc.config.document`; the test of the configuration
+# Written from the schema by `python tools/document_configuration.py`; the test of the configuration
 # fails when the two drift apart. Settings of your own go into a file of your own, given after
 # this one, where they replace what stands here.
 """
@@ -38,7 +38,7 @@ Every key of `config.yaml`. Top-level sections are defaults of every data set; a
 `datasets:` gives its `robot` and may give any section anew, key by key. Numbers are in the unit the
 name carries. Files given after `--configfile` are merged in order.
 
-Written from the schema by `python -m kinacc.config.document`.
+Written from the schema by `python tools/document_configuration.py`.
 """
 
 
@@ -130,7 +130,7 @@ def _table(title: str, about: str, section: Section, path: str) -> list[str]:
 
 def main() -> None:
     """Rewrite both files of the repository the package lies in."""
-    root = Path(__file__).parents[3]
+    root = Path(__file__).parents[1]
     (root / "config.yaml").write_text(config_yaml(), encoding="utf-8")
     (root / "docs").mkdir(exist_ok=True)
     (root / "docs" / "configuration.md").write_text(configuration_markdown(), encoding="utf-8")

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from kinacc.calibration.mask import JOINTS, rules, strangers
+from kinacc.config import load as configuration
+from kinacc.config.parameter_rules import JOINTS, rules, strangers
 from kinacc.config.validate import ROBOTS
 from kinacc.config.values import shown
 from kinacc.errors import InputError, Problem
@@ -22,6 +23,18 @@ _SYNTHESISED = "mh180"
 _MOST_CELLS, _MOST_TERMS = 2_000_000, 1_000_000
 _MOST_SIMULATIONS, _MOST_READINGS, _MOST_HELD = 200_000, 10**9, 10**8
 _FOLDS_TO_CHOOSE = 3  # one held out of the choice, one to try candidates on, one to fit them to
+
+
+def load(
+    paths: Sequence[Path | str],
+    overrides: Mapping[str, Any] | None = None,
+    folder: Path | str = ".",
+) -> dict[str, dict[str, Any]]:
+    """Full settings of every data set, by name, held to each other and to the robots they name.
+
+    As :func:`kinacc.config.load.load`. Raises InputError listing every problem in all files.
+    """
+    return configuration.load(paths, overrides, folder, contradictions)
 
 
 def contradictions(

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import yaml
 
-from kinacc.calibration import mask
-from kinacc.calibration.mask import FRAMES, JOINTS
 from kinacc.calibration.terms import arm_terms, free_parameters, parallel_joints
+from kinacc.config import parameter_rules as mask
+from kinacc.config.parameter_rules import FRAMES, JOINTS
 from kinacc.kinematics.robot import load, shipped
 
 
