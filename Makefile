@@ -32,6 +32,7 @@ robustness: $(KINACC)
 test: $(KINACC) $(TOOLS)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
+	.venv/bin/lint-imports --no-cache --no-logo
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PY) -m pytest -n $(CORES)

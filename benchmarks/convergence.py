@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "calibration"))
 
 from simulated import POINT, POSE, THREE, disturbed, far_off, joints, measure
 
-from kinacc.calibration import dh_fit, terms
+from kinacc.calibration import constraints, dh_fit
 from kinacc.errors import FitError
 from kinacc.kinematics import robot
 
@@ -32,7 +32,9 @@ SAME = 1e-6  # relative difference of the costs of one optimum
 def costs(name: str, kind: str, starts: int) -> np.ndarray:
     """Costs (starts,) the fits end at, NaN where one does not converge."""
     arm, rng = robot.load(name), np.random.default_rng(0)
-    free = terms.free_parameters(arm.dh.joints, terms.parallel_joints(arm.dh), instead=True)
+    free = constraints.free_parameters(
+        arm.dh.joints, constraints.parallel_joints(arm.dh), instead=True
+    )
     data = measure(disturbed(arm.dh, free, rng), joints(arm, POSES, rng), kind, rng)
     found = np.full(starts, np.nan)
     for number in range(starts):

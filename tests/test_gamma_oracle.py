@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles.assessors import gamma_fit
 from scipy import stats
 
-from kinacc import distributions as gamma
+from kinacc import distributions
 
 
 @settings(max_examples=60)
@@ -22,12 +22,12 @@ from kinacc import distributions as gamma
 def test_gamma_fit_and_quantile_equal_scipy(seed, n, shape, scale):
     sample = np.random.default_rng(seed).gamma(shape, scale, n)
     expected_shape, _, expected_scale = gamma_fit(sample)
-    fitted = gamma.fit(sample)
+    fitted = distributions.fit(sample)
     assert fitted.shape == pytest.approx(expected_shape, rel=1e-8)
     assert fitted.scale == pytest.approx(expected_scale, rel=1e-8)
     expected = stats.gamma.ppf(0.99, expected_shape, scale=expected_scale)
-    assert gamma.gamma99(sample) == pytest.approx(expected, rel=1e-9)
-    assert gamma.quantile(fitted, 0.5) == pytest.approx(
+    assert distributions.gamma99(sample) == pytest.approx(expected, rel=1e-9)
+    assert distributions.quantile(fitted, 0.5) == pytest.approx(
         stats.gamma.median(expected_shape, scale=expected_scale), rel=1e-8
     )
 
@@ -36,7 +36,7 @@ def test_gamma_fit_and_quantile_equal_scipy(seed, n, shape, scale):
 def test_gamma_fit_is_a_stationary_point_of_the_likelihood(seed):
     rng = np.random.default_rng(seed)
     sample = rng.gamma(rng.uniform(1, 8), rng.uniform(0.05, 2), 200)
-    fitted = gamma.fit(sample)
+    fitted = distributions.fit(sample)
 
     def log_likelihood(shape, scale):
         return stats.gamma.logpdf(sample, shape, scale=scale).sum()

@@ -9,7 +9,7 @@ import pytest
 from oracles import assessors as oracle
 from oracles import worlds
 
-from kinacc.study import monte_carlo as study
+from kinacc.study import monte_carlo
 from kinacc.study.histories import HistorySettings, histories
 
 NOISE = (0.01, 0.03)
@@ -64,12 +64,12 @@ def expected_row(table, i, error, seed, settings, order=None):
 
 @pytest.fixture(scope="module")
 def rows():
-    settings = study.StudySettings(**SMALL)
-    return study.simulate(small_errors(), NOISE, range(3), settings, seed=99)
+    settings = monte_carlo.StudySettings(**SMALL)
+    return monte_carlo.simulate(small_errors(), NOISE, range(3), settings, seed=99)
 
 
 def test_every_row_of_a_small_study_equals_the_oracle(rows):
-    settings, error = study.StudySettings(**SMALL), small_errors()
+    settings, error = monte_carlo.StudySettings(**SMALL), small_errors()
     count = len(rows["assessed_mm"])
     # One row of the maximum, three of outlier rejection, twelve of model invalidation.
     assert count == 2 * 3 * 16
@@ -80,20 +80,24 @@ def test_every_row_of_a_small_study_equals_the_oracle(rows):
 
 
 def test_parts_of_the_study_join_to_the_whole(rows):
-    settings = study.StudySettings(**SMALL)
+    settings = monte_carlo.StudySettings(**SMALL)
     parts = [
-        study.simulate(small_errors(), NOISE[::-1], study.part_of(3, n, 2), settings, seed=99)
+        monte_carlo.simulate(
+            small_errors(), NOISE[::-1], monte_carlo.part_of(3, n, 2), settings, seed=99
+        )
         for n in (2, 1)
     ]
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    joined, whole = study.ordered(joined), study.ordered(rows)
+    joined, whole = monte_carlo.ordered(joined), monte_carlo.ordered(rows)
     for name in whole:
         assert [str(x) for x in joined[name]] == [str(x) for x in whole[name]]
 
 
 def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
-    settings = study.StudySettings(**{**SMALL, "measurements": 5, "visiting_order": "shuffled"})
-    shuffled = study.simulate(small_errors(), NOISE[:1], range(1), settings, seed=99)
+    settings = monte_carlo.StudySettings(
+        **{**SMALL, "measurements": 5, "visiting_order": "shuffled"}
+    )
+    shuffled = monte_carlo.simulate(small_errors(), NOISE[:1], range(1), settings, seed=99)
     order = np.random.default_rng([99, 10000, 0, 1]).permutation(9)
     for i in range(len(shuffled["assessed_mm"])):
         assessed, measurements, points = expected_row(
@@ -107,10 +111,10 @@ def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
 
 
 def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):
-    settings = study.StudySettings(**SMALL)
-    default = study.default_reading(rows, settings)
+    settings = monte_carlo.StudySettings(**SMALL)
+    default = monte_carlo.default_reading(rows, settings)
     assert len(default["assessed_mm"]) == 2 * 3 * 3
-    summary = study.summary(default, 0.07)
+    summary = monte_carlo.summary(default, 0.07)
     assert len(summary["assessor"]) == 6
     for i, (assessor, noise) in enumerate(
         zip(summary["assessor"], summary["noise_mm"], strict=True)
@@ -132,7 +136,7 @@ def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):
         assert summary["bias_mm"][i] == pytest.approx(mean - 0.07, abs=1e-14)
         rmse = math.sqrt(math.fsum((v - 0.07) ** 2 for v in values) / 3)
         assert summary["rmse_mm"][i] == pytest.approx(rmse, rel=1e-12)
-    ablation = study.readings(rows, 0.07)
+    ablation = monte_carlo.readings(rows, 0.07)
     # Three readings of outlier rejection and twelve of model invalidation per noise.
     assert len(ablation["assessor"]) == 2 * 15
     for i in range(30):
@@ -154,8 +158,8 @@ def test_a_full_size_simulation_stands_just_above_its_highest_rejected_bound():
     rng = np.random.default_rng(6)
     error = rng.normal(size=(200, 3)) * 0.23
     error *= 0.906 / np.linalg.norm(error, axis=1).max()
-    settings = study.StudySettings(noise_mm=(0.3,), repetitions=2)
-    table = study.simulate(error, (0.3,), [1], settings, seed=7)
+    settings = monte_carlo.StudySettings(noise_mm=(0.3,), repetitions=2)
+    table = monte_carlo.simulate(error, (0.3,), [1], settings, seed=7)
     reading = worlds.simulation(error.tolist(), 0.3, 1, 7)
     top = max(oracle.norm(reading(j, 1)) for j in range(200))
     for i in range(len(table["assessed_mm"])):
@@ -226,7 +230,7 @@ def test_histories_are_the_first_runs_of_the_studys_worlds_that_satisfy_the_rule
     table = histories(
         error,
         HistorySettings(simulations_searched=200),
-        study.StudySettings(measurements=60),
+        monte_carlo.StudySettings(measurements=60),
         seed=3,
         point=np.arange(60) + 500,
     )

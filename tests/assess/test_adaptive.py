@@ -9,17 +9,17 @@ import pytest
 
 from kinacc.assess import Maximum, OutlierRejection, drawn_world, measured_world
 from kinacc.assess.adaptive import Candidates, Ledger, conduct
-from kinacc.assess.causes import joint_errors
+from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
-from kinacc.assess.looks import share
 from kinacc.assess.paper_methods import InvalidationAt, OncePerPoint
 from kinacc.assess.population import largest_size
+from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
 from kinacc.assess.search_and_confirm import SearchAndConfirm, companions, hardly_missed, records
 from kinacc.assess.sequential import Sequential
+from kinacc.assess.sequential_limits import share
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS
-from kinacc.assess.streams import key_of
 from kinacc.assess.two_stage import TwoStage
 from kinacc.errors import InputError
 from kinacc.kinematics import robot

@@ -19,7 +19,7 @@ from kinacc.assess import (
     every_reading,
     measured_world,
 )
-from kinacc.assess.streams import key_of
+from kinacc.assess.random_numbers import key_of
 from kinacc.errors import InputError
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from kinacc.assess import ModelInvalidation, drawn_world, measured_world
 from kinacc.assess import invalidation_kernels as kernels
-from kinacc.assess.streams import key_of
+from kinacc.assess.random_numbers import key_of
 
 SWITCHES = list(product(("squared", "as_printed"), ("r", "sqrt_r")))
 

@@ -10,18 +10,18 @@ from scipy.stats import binom, gamma
 
 from kinacc.assess import drawn_world
 from kinacc.assess.adaptive import Candidates, conduct
-from kinacc.assess.causes import joint_errors
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.ellipsoid import BallDistances, mahalanobis_beyond
+from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.gamma_quantile import GammaQuantile
 from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, boundary
 from kinacc.assess.invalidation_full import ModelInvalidationFull
 from kinacc.assess.kinematic import Kinematic
 from kinacc.assess.kinematic_model import Basis, fitted_scales
 from kinacc.assess.paper_methods import InvalidationAt
+from kinacc.assess.random_numbers import key_of
 from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
-from kinacc.assess.streams import key_of
 from kinacc.errors import InputError
 from kinacc.kinematics import dh, robot
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from oracles.worlds import philox_words
 from scipy import stats
 
-from kinacc.assess import streams
+from kinacc.assess import random_numbers
 from kinacc.assess.world import drawn_world
 
 words = st.integers(0, 2**64 - 1)
@@ -18,13 +18,15 @@ words = st.integers(0, 2**64 - 1)
 
 @given(key0=words, key1=words, visit=st.integers(0, 1000), point=st.integers(0, 10**6))
 def test_words_are_those_of_numpy_philox(key0, key1, visit, point):
-    mine = streams.philox(np.uint64(key0), np.uint64(key1), np.uint64(visit), np.uint64(point))
+    mine = random_numbers.philox(
+        np.uint64(key0), np.uint64(key1), np.uint64(visit), np.uint64(point)
+    )
     assert [int(x) for x in mine] == philox_words([key0, key1], visit, point)
 
 
 def test_noise_is_standard_normal_and_independent_by_address():
     m, visits = 400, 40
-    key = streams.key_of(2024, 3, 17)
+    key = random_numbers.key_of(2024, 3, 17)
     world = drawn_world(np.zeros((m, 3)), 1.0, key, visits).complete()
     noise = np.array([[world.reading_mm(j, v) for v in range(visits)] for j in range(m)])
     # A correct generator fails each of these once in ten thousand keys; the key is fixed.
@@ -41,7 +43,7 @@ def test_noise_is_standard_normal_and_independent_by_address():
 def test_a_reading_belongs_to_its_point_whatever_the_order_and_the_rest():
     rng = np.random.default_rng(0)
     error = rng.normal(size=(12, 3))
-    key = streams.key_of(1, 2, 3)
+    key = random_numbers.key_of(1, 2, 3)
     plain = drawn_world(error, 0.2, key, 9)
     order = rng.permutation(12)
     shuffled = drawn_world(error, 0.2, key, 30, order)
@@ -64,7 +66,7 @@ def test_a_reading_belongs_to_its_point_whatever_the_order_and_the_rest():
 
 def test_keys_of_different_simulations_differ():
     keys = {
-        tuple(int(x) for x in streams.key_of(seed, level, repetition))
+        tuple(int(x) for x in random_numbers.key_of(seed, level, repetition))
         for seed in range(3)
         for level in range(6)
         for repetition in range(100)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinacc.calibration.frames import Frames, coordinates
+from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.calibration.start import closed_form_start
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
 

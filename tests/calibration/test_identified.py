@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import dh_fit, identified, tables, terms, uncertainty
+from kinacc.calibration import constraints, dh_fit, identified, tables, uncertainty
 from kinacc.calibration.frames import MOTIONS
-from kinacc.config import parameter_rules as mask
+from kinacc.config import parameter_rules
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
 
@@ -16,14 +16,16 @@ from kinacc.kinematics import dh, robot
 def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, poses=80):
     """Parameters of a fit to simulated poses by name; joints not in ``moving`` stand still."""
     arm, rng = robot.load(name), np.random.default_rng(0)
-    hayati = terms.parallel_joints(arm.dh)
-    free = terms.free_parameters(arm.dh.joints, hayati, instead)
+    hayati = constraints.parallel_joints(arm.dh)
+    free = constraints.free_parameters(arm.dh.joints, hayati, instead)
     q = joints(arm, poses, rng)
     for joint in range(arm.dh.joints) if moving else ():
         if joint + 1 not in moving:
             q[:, joint] = 0.3
     data = measure(disturbed(arm.dh, free, rng), q, kind, rng, sessions=sessions)
-    known = terms.arm_terms(arm.dh, free, mask.rules(rules or {}, mask.JOINTS)[0])
+    known = constraints.arm_terms(
+        arm.dh, free, parameter_rules.rules(rules or {}, parameter_rules.JOINTS)[0]
+    )
     fit = dh_fit.fit(
         data,
         known.nominal,
@@ -85,7 +87,7 @@ def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
     q[:, 4] = q[:, 0]  # the last axis keeps its direction
     q[:, 3] = -q[:, 1] - q[:, 2]
     q[:, 5] = rng.uniform(-1.0, 1.0, 80)
-    free = terms.free_parameters(6, (2, 3))
+    free = constraints.free_parameters(6, (2, 3))
     data = measure(disturbed(arm.dh, free, rng), q, POSE, rng)
     fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
     told = uncertainty.of_dh(fit, data.target_names)
@@ -133,7 +135,7 @@ def test_a_prior_is_named_and_settles_what_hung_on_it():
 def test_directions_in_words_move_no_pose_anywhere(kind):
     """The twin of the sentences: finite steps along each structural direction."""
     arm, rng = robot.load("ur10"), np.random.default_rng(3)
-    free = terms.free_parameters(6, (2, 3))
+    free = constraints.free_parameters(6, (2, 3))
     data = measure(disturbed(arm.dh, free, rng), joints(arm, 80, rng), kind, rng)
     fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
     told = uncertainty.of_dh(fit, data.target_names)

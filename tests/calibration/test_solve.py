@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from kinacc.calibration import ridge, solve
-from kinacc.calibration import truncated as truncated_svd
+from kinacc.calibration import map_estimate, solve, truncated_svd
 from kinacc.errors import FitError
 
 
@@ -143,7 +142,7 @@ def test_prior_solution_is_ridge_with_the_variance_its_residuals_leave():
     system = Linear(a, a @ truth + 0.3 * rng.normal(size=200))
     prior_std = np.array([0.5] * 7 + [np.inf])
     mean = rng.normal(size=8)
-    found = ridge.minimise_with_prior(system, np.zeros(8), mean, prior_std, np.full(8, 2.0))
+    found = map_estimate.minimise_with_prior(system, np.zeros(8), mean, prior_std, np.full(8, 2.0))
     precision = np.diag(np.where(np.isinf(prior_std), 0.0, prior_std**-2))
     covariance = np.linalg.inv(a.T @ a / found.variance + precision)
     wanted = covariance @ (a.T @ system.b / found.variance + precision @ mean)
@@ -161,7 +160,7 @@ def test_directions_nobody_sees_stay_at_the_prior_mean():
     a[:, 3] = 0.0
     mean = np.array([0.0, 0.0, 0.0, 5.0])
     system = Linear(a, rng.normal(size=60))
-    found = ridge.minimise_with_prior(system, np.zeros(4), mean, np.full(4, 0.7), np.ones(4))
+    found = map_estimate.minimise_with_prior(system, np.zeros(4), mean, np.full(4, 0.7), np.ones(4))
     assert found.x[3] == pytest.approx(5.0)
     assert found.std[3] == pytest.approx(0.7)
 
@@ -169,7 +168,7 @@ def test_directions_nobody_sees_stay_at_the_prior_mean():
 def test_noise_free_data_is_met_exactly_despite_the_prior():
     rng = np.random.default_rng(7)
     a, truth = rng.normal(size=(50, 5)), rng.normal(size=5)
-    found = ridge.minimise_with_prior(
+    found = map_estimate.minimise_with_prior(
         Linear(a, a @ truth), np.zeros(5), np.zeros(5), np.full(5, 0.1), np.ones(5)
     )
     np.testing.assert_allclose(found.x, truth, atol=1e-6)
@@ -178,7 +177,7 @@ def test_noise_free_data_is_met_exactly_despite_the_prior():
 def test_undetermined_direction_without_prior_is_refused():
     a = np.ones((10, 2))
     with pytest.raises(FitError, match="not positive definite"):
-        ridge.minimise_with_prior(
+        map_estimate.minimise_with_prior(
             Linear(a, np.zeros(10)), np.ones(2), np.zeros(2), np.full(2, np.inf), np.ones(2)
         )
 

@@ -7,7 +7,7 @@ import pytest
 from test_system import Frames, coordinates, flange_models, observations, random_pose
 
 from kinacc.calibration import solve
-from kinacc.calibration.spread import Group, gram, spread
+from kinacc.calibration.basis_expansion import Group, gram, spread
 from kinacc.calibration.system import PoseSystem
 from kinacc.kinematics import robot
 

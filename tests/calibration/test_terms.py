@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import dh_fit, frames, robust, terms, uncertainty
+from kinacc.calibration import constraints, dh_fit, frames, robust, uncertainty
 from kinacc.calibration.constrained import ConstrainedFrames
-from kinacc.config import parameter_rules as mask
+from kinacc.config import parameter_rules
 from kinacc.errors import InputError
 from kinacc.geometry import compose, log_so3
 from kinacc.kinematics import dh, robot
@@ -27,15 +27,17 @@ def seen(kind=POSE, count=60, seed=0, noise_mm=0.05, sessions=1):
 
 
 def fitted(observations, arm_rules=None, frame_rules=None, **given):
-    arm = terms.arm_terms(ARM.dh, FREE, mask.rules(arm_rules or {}, mask.JOINTS)[0])
+    arm = constraints.arm_terms(
+        ARM.dh, FREE, parameter_rules.rules(arm_rules or {}, parameter_rules.JOINTS)[0]
+    )
     stated = frames.known(
         ARM.base,
         robot.carried(ARM),
         sessions=len(observations.session_names),
         targets=len(observations.target_names),
     )
-    of_frames = terms.frame_terms(
-        observations, stated, mask.rules(frame_rules or {}, mask.FRAMES)[0]
+    of_frames = constraints.frame_terms(
+        observations, stated, parameter_rules.rules(frame_rules or {}, parameter_rules.FRAMES)[0]
     )
     return dh_fit.fit(
         observations,

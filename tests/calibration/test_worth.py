@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.calibration import worth
+from kinacc.calibration import model_comparison
 from kinacc.calibration.residuals import Errors
 
 
@@ -20,8 +20,10 @@ def scattered(count, size, seed):
 def test_a_gain_that_may_be_chance_is_none():
     configuration, fold = np.arange(24), np.arange(24) % 6
     by_dh, by_vec = scattered(24, 0.2, 1), scattered(24, 0.198, 2)
-    assert worth.gain(errors(by_dh), errors(by_vec), configuration, fold).selected == "dh"
-    found = worth.gain(errors(by_dh), errors(0.5 * by_dh), configuration, fold)
+    assert (
+        model_comparison.gain(errors(by_dh), errors(by_vec), configuration, fold).selected == "dh"
+    )
+    found = model_comparison.gain(errors(by_dh), errors(0.5 * by_dh), configuration, fold)
     assert found.selected == "vec"
     assert found.mean_mm2 == pytest.approx(0.75 * np.mean(np.sum(by_dh**2, axis=1)))
     assert found.rms_mm["vec"] == pytest.approx(0.5 * found.rms_mm["dh"])
@@ -29,23 +31,25 @@ def test_a_gain_that_may_be_chance_is_none():
 
 def test_a_worse_model_is_never_selected():
     by_dh = scattered(400, 0.2, 3)
-    found = worth.gain(errors(by_dh), errors(1.001 * by_dh), np.arange(400), np.arange(400) % 5)
+    found = model_comparison.gain(
+        errors(by_dh), errors(1.001 * by_dh), np.arange(400), np.arange(400) % 5
+    )
     assert found.selected == "dh"
     assert found.mean_mm2 < 0.0
 
 
 def test_repeats_of_a_configuration_are_one_witness():
     by_dh, by_vec = scattered(12, 0.2, 4), scattered(12, 0.15, 5)
-    once = worth.gain(errors(by_dh), errors(by_vec), np.arange(12), np.arange(12) % 3)
+    once = model_comparison.gain(errors(by_dh), errors(by_vec), np.arange(12), np.arange(12) % 3)
     again = np.repeat(np.arange(12), 50)
-    often = worth.gain(errors(by_dh[again]), errors(by_vec[again]), again, again % 3)
+    often = model_comparison.gain(errors(by_dh[again]), errors(by_vec[again]), again, again % 3)
     assert often.configurations == 12
     assert often.std_error_mm2 == pytest.approx(once.std_error_mm2)
 
 
 def test_without_held_out_rows_nothing_speaks_for_vec():
     nothing = errors(np.full((5, 3), np.nan))
-    found = worth.gain(nothing, nothing, np.arange(5), np.full(5, -1))
+    found = model_comparison.gain(nothing, nothing, np.arange(5), np.full(5, -1))
     assert (found.selected, found.configurations) == ("dh", 0)
 
 
@@ -54,8 +58,8 @@ def test_a_bias_shows_in_the_region_of_its_joint():
     vectors = scattered(3000, 0.1, 7)
     vectors[q[:, 1] > 2 / 3, 2] += 0.5
     vectors[0] = np.nan
-    found = list(worth.bias(errors(vectors), q))
-    assert len(found) == 2 * worth.REGIONS
+    found = list(model_comparison.bias(errors(vectors), q))
+    assert len(found) == 2 * model_comparison.REGIONS
     last = found[-1]
     assert (last.joint, last.low_rad) == (1, pytest.approx(2 / 3, abs=0.01))
     assert last.mean_mm[2] == pytest.approx(0.5, abs=4 * last.std_error_mm[2])
@@ -68,4 +72,4 @@ def test_worst_rows_come_largest_first_without_missing_ones():
     vectors = np.zeros((6, 3))
     vectors[[1, 3, 5], 0] = 1.0, 3.0, 1.0
     vectors[2] = np.nan
-    np.testing.assert_array_equal(worth.worst(errors(vectors), 4), [3, 1, 5, 0])
+    np.testing.assert_array_equal(model_comparison.worst(errors(vectors), 4), [3, 1, 5, 0])

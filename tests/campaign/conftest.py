@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinacc.assess import drawn_world
-from kinacc.assess.streams import key_of
+from kinacc.assess.random_numbers import key_of
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, Plan, assessor_of

@@ -13,9 +13,9 @@ from kinacc.artifacts import store
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.assess import drawn_world
 from kinacc.assess.adaptive import conduct
-from kinacc.assess.streams import key_of
+from kinacc.assess.random_numbers import key_of
 from kinacc.campaign import folder as campaigns
-from kinacc.campaign import foreseen
+from kinacc.campaign import prediction_check
 from kinacc.campaign.reading import Reading
 from kinacc.cli import campaigns_answers
 from kinacc.geometry import Pose, exp_so3
@@ -440,7 +440,7 @@ def test_what_the_calibration_is_unsure_of_is_said_before_anything_is_written(
         seen.append(folder.exists())
         return ["warning: doubtful"]
 
-    monkeypatch.setattr(foreseen.Unsure, "in_words", doubts)
+    monkeypatch.setattr(prediction_check.Unsure, "in_words", doubts)
     done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
                 "--model", "dh", "--noise-mm", "0.1", "--json")  # fmt: skip
     assert done.exit_code == 0, done.output

@@ -9,8 +9,8 @@ import pytest
 
 from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
 from kinacc.campaign import begin
-from kinacc.campaign.foreseen import unsure
 from kinacc.campaign.instrument import instruments
+from kinacc.campaign.prediction_check import unsure
 from kinacc.deployment.planning.candidates import spread
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import Residual

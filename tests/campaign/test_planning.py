@@ -10,10 +10,10 @@ import pytest
 from command_line import call
 
 from kinacc.assess.adaptive import conduct
+from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
-from kinacc.assess.streams import key_of
 from kinacc.assess.world import drawn_world
 from kinacc.campaign.power import Aim, Row, repetitions_to_show, rows, smallest_budget
 from kinacc.campaign.simulate import Outcome, Pool, outcomes

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
-from kinacc.calibration.terms import arm_terms, free_parameters, parallel_joints
-from kinacc.config import parameter_rules as mask
+from kinacc.calibration.constraints import arm_terms, free_parameters, parallel_joints
+from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import FRAMES, JOINTS
 from kinacc.kinematics.robot import load, shipped
 
 
 def joint_rules(content):
-    found, problems = mask.rules(content, JOINTS)
+    found, problems = parameter_rules.rules(content, JOINTS)
     assert not problems
     return found
 
@@ -68,7 +68,7 @@ def test_every_fault_is_named_at_once():
         "joint 2 d": {"prior_std_mm": True, "std_mm": 1.0},
         "j2.d_mm": "free",
     }
-    _, problems = mask.rules(content, JOINTS)
+    _, problems = parameter_rules.rules(content, JOINTS)
     text = "\n".join(str(each) for each in problems)
     for words in (
         "joint 3 e: 'joint 3 e' is no parameter of joints",
@@ -89,14 +89,14 @@ def test_every_fault_is_named_at_once():
 
 def test_frames_are_named_as_in_the_tables():
     content = {"base": "fixed", "tool.rz_rad": {"prior_std_deg": 1.0}, "mA x": {"value_mm": 3}}
-    found, problems = mask.rules(content, FRAMES)
+    found, problems = parameter_rules.rules(content, FRAMES)
     assert not problems
     assert [(rule.frame, rule.parameter) for rule in found] == [
         ("base", None),
         ("tool", "rz_rad"),
         ("mA", "x_mm"),
     ]
-    _, problems = mask.rules({"joint 3 d": "fixed", "base q": "fixed"}, FRAMES)
+    _, problems = parameter_rules.rules({"joint 3 d": "fixed", "base q": "fixed"}, FRAMES)
     assert "it belongs in calibration.dh.parameters" in str(problems[0])
     assert len(problems) == 2
 
@@ -121,6 +121,6 @@ def test_the_mask_on_the_page_about_fitting_is_one():
     page = (Path(__file__).parents[2] / "docs" / "fitting.md").read_text(encoding="utf-8")
     shown = yaml.safe_load(page.split("```yaml")[1].split("```")[0])["calibration"]
     for about, content in ((FRAMES, shown["frames"]), (JOINTS, shown["dh"]["parameters"])):
-        found, problems = mask.rules(content, about)
+        found, problems = parameter_rules.rules(content, about)
         assert not problems
         assert len(found) == len(content)

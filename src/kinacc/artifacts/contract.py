@@ -15,9 +15,10 @@ from kinacc.artifacts import (
     calibration_tables,
     campaign_tables,
     covariance_tables,
+    data_check_tables,
+    model_comparison_tables,
     robot_table,
     tournament_tables,
-    worth_tables,
 )
 from kinacc.artifacts.columns import Artefact
 
@@ -28,7 +29,7 @@ ARTEFACTS: dict[str, Artefact] = {
     for artefact in (
         calibration_tables.MEASUREMENTS,
         robot_table.ROBOT,
-        worth_tables.DATA_CHECK,
+        data_check_tables.DATA_CHECK,
         calibration_tables.VEC_MODEL,
         calibration_tables.VEC_FRAMES,
         calibration_tables.VEC_FIT,
@@ -41,10 +42,10 @@ ARTEFACTS: dict[str, Artefact] = {
         covariance_tables.DH_IDENTIFIED,
         calibration_tables.RESIDUALS,
         calibration_tables.POSE_ERRORS,
-        worth_tables.EXCLUDED_ROWS,
-        worth_tables.MODEL_SELECTION,
-        worth_tables.JOINT_BIAS,
-        worth_tables.WORST_ROWS,
+        data_check_tables.EXCLUDED_ROWS,
+        model_comparison_tables.MODEL_SELECTION,
+        model_comparison_tables.JOINT_BIAS,
+        model_comparison_tables.WORST_ROWS,
         assessment_tables.ACCURACY_MAP,
         assessment_tables.ASSESSMENT_POINTS,
         assessment_tables.STUDY_CHUNK,

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import Candidates, check_budget
-from kinacc.assess.once import OnceCampaign
+from kinacc.assess.single_pass import OnceCampaign
 from kinacc.assess.statement import REGION, Statement
 from kinacc.errors import InputError, Problem
 

@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.ellipsoid import largest_size
 from kinacc.assess.invalidation_full import ChallengeCampaign, invalidation_problems
-from kinacc.assess.looks import Looks
+from kinacc.assess.sequential_limits import Looks
 from kinacc.assess.single_shot import about_all_if_all_measured
 from kinacc.assess.statement import MEASURED, Statement
 from kinacc.errors import InputError

@@ -2,7 +2,7 @@
 
 All compiled code is in this one file: numba's cache is aware of changes in the file of the function
 called, not in files that function's helpers come from. The first part draws the readings, on which
-see :mod:`kinacc.assess.streams`.
+see :mod:`kinacc.assess.random_numbers`.
 
 The plain twin of :func:`run` is :func:`kinacc.assess.model_invalidation.history`. Bounds on the
 grid are integers k with eta = k / 1000 mm. ``power`` is the exponent of the number of readings in a

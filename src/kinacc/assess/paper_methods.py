@@ -17,7 +17,7 @@ import numpy as np
 from kinacc.assess.adaptive import Candidates, LedgerCampaign
 from kinacc.assess.assessor import Assessor, check
 from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
-from kinacc.assess.once import OnceCampaign
+from kinacc.assess.single_pass import OnceCampaign
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.world import measured_world
 from kinacc.errors import InputError, Problem

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import Candidates, LedgerCampaign, check_budget
-from kinacc.assess.looks import Looks
 from kinacc.assess.population import LargestSize, largest_size
 from kinacc.assess.sequential import bounding_point, first_points
+from kinacc.assess.sequential_limits import Looks
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.errors import InputError, Problem
 
@@ -34,18 +34,18 @@ class SearchAndConfirm:
     deviation exceeds the likely largest size; the point with the largest upper limit is measured
     until its next look.
 
-    ``measured``: the bounds of :mod:`kinacc.assess.looks`. They hold whatever the errors are,
-    for readings that are normal with known covariance (eq. 9) and points in random order. Where
-    readings decide the number of points, the allowed error is divided by 1 + the expected number
-    of largest-so-far points among those that come after the ones visited in any case. Stated from
-    60 % of the visit on; who ends it early must do so for other reasons than the readings.
-    ``candidates``: without an assumption where 2 % at most can have missed the largest. Otherwise
-    the bound for the measured points times ``isolation``: it holds if the largest error is not
-    isolated, at least so many candidates (stated in the assumption) having an error above the
-    largest divided by ``isolation`` that missing them all is improbable. Withheld where
-    that number is more than ``crowd`` of the candidates, and where the largest error measured
-    stands so far above all others that the assumption is broken by what was seen.
-    The value is the median of the posterior of :mod:`kinacc.assess.population`.
+    ``measured``: the bounds of :mod:`kinacc.assess.sequential_limits`. They hold whatever the
+    errors are, for readings that are normal with known covariance (eq. 9) and points in random
+    order. Where readings decide the number of points, the allowed error is divided by 1 + the
+    expected number of largest-so-far points among those that come after the ones visited in any
+    case. Stated from 60 % of the visit on; who ends it early must do so for other reasons than the
+    readings. ``candidates``: without an assumption where 2 % at most can have missed the largest.
+    Otherwise the bound for the measured points times ``isolation``: it holds if the largest error
+    is not isolated, at least so many candidates (stated in the assumption) having an error above
+    the largest divided by ``isolation`` that missing them all is improbable. Withheld where that
+    number is more than ``crowd`` of the candidates, and where the largest error measured stands so
+    far above all others that the assumption is broken by what was seen. The value is the median of
+    the posterior of :mod:`kinacc.assess.population`.
     """
 
     measurements: int = 200

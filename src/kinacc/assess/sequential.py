@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import Candidates, Ledger, LedgerCampaign, check_budget
-from kinacc.assess.looks import Looks
+from kinacc.assess.sequential_limits import Looks
 from kinacc.assess.single_shot import about_all_if_all_measured
 from kinacc.assess.statement import MEASURED, Statement
 from kinacc.errors import InputError, Problem
@@ -19,12 +19,12 @@ from kinacc.errors import InputError, Problem
 class Sequential:
     """Visit a fixed number of points, then double the readings of the one with the largest limit.
 
-    ``visited`` is the share of the budget spent on visiting points (all candidates where the
-    budget allows one and a half times as many). The bound is the largest upper limit of the
-    points, each limit valid at all times at once (:mod:`kinacc.assess.looks`), so it holds at
-    whatever moment the campaign is stopped: at the end of the budget, or as soon as upper and
-    lower bound are within ``width_mm`` of each other (null: never early). Assumes normal readings
-    of known covariance (eq. 9).
+    ``visited`` is the share of the budget spent on visiting points (all candidates where the budget
+    allows one and a half times as many). The bound is the largest upper limit of the points, each
+    limit valid at all times at once (:mod:`kinacc.assess.sequential_limits`), so it holds at
+    whatever moment the campaign is stopped: at the end of the budget, or as soon as upper and lower
+    bound are within ``width_mm`` of each other (null: never early). Assumes normal readings of
+    known covariance (eq. 9).
     """
 
     measurements: int = 200

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Candidates, Ledger, check_budget
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.once import OnceCampaign
+from kinacc.assess.single_pass import OnceCampaign
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.errors import InputError
 

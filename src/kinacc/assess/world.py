@@ -55,7 +55,7 @@ class World:
     def reading_mm(self, row: int, visit: int) -> np.ndarray:
         """Error vector (3,) of reading number ``visit`` (0 = first) at a row, robot base frame."""
         if visit >= self.known[row]:
-            from kinacc.assess.streams import extend
+            from kinacc.assess.random_numbers import extend
 
             extend(self.arrays, row, visit)
         return self.readings_mm[row, visit]
@@ -115,9 +115,10 @@ def drawn_world(
     """World of simulated readings: true error plus white normal noise (eq. 9).
 
     error_mm: (m, 3) true errors, robot base frame; sigma_mm: a number or (m,), standard deviation
-    per axis; key: (2,) uint64 from :func:`kinacc.assess.streams.key_of`; visits: readings available
-    at each point; order: (m,) point numbers in visiting order, default 0 .. m-1. The noise at a
-    point belongs to its number, not to its place in the order. Raises InputError on bad input.
+    per axis; key: (2,) uint64 from :func:`kinacc.assess.random_numbers.key_of`; visits: readings
+    available at each point; order: (m,) point numbers in visiting order, default 0 .. m-1. The
+    noise at a point belongs to its number, not to its place in the order. Raises InputError on bad
+    input.
     """
     error = np.array(error_mm, dtype=np.float64)
     problems = _shape_problems(error, "true errors")
@@ -141,7 +142,7 @@ def draw(error_mm, sigma_mm, key, visits: int, index, readings=None) -> World:
 
     ``readings`` (m, visits, 3) is memory to draw into; a world drawn there earlier is lost.
     """
-    from kinacc.assess.streams import extend_all
+    from kinacc.assess.random_numbers import extend_all
 
     points = index.size
     if readings is None:

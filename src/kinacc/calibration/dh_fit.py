@@ -6,21 +6,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration import refined, robust
+from kinacc.calibration import reweighted, robust
 from kinacc.calibration.constrained import (
     ConstrainedFrames,
     ConstrainedSystem,
     FrameTerms,
     constrained,
 )
+from kinacc.calibration.constraints import free_parameters  # noqa: F401 (the usual mask of a fit)
 from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
+from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
-from kinacc.calibration.start import closed_form_start
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
-from kinacc.calibration.terms import free_parameters  # noqa: F401 (the usual mask of a fit)
-from kinacc.calibration.truncated import unseen
+from kinacc.calibration.truncated_svd import unseen
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
@@ -89,7 +89,7 @@ def fit(
     if isinstance(coords, ConstrainedFrames):
         expected, frame_std = coords.known()
     arm_std = np.full(mask.sum(), np.inf) if std is None else std.ravel()[mask]
-    task = refined.Task(
+    task = reweighted.Task(
         system=system,
         start=np.concatenate([np.zeros(coords.size), dh.to_vector(start)[mask]]),
         nominal=np.concatenate([expected, held[mask]]),
@@ -100,7 +100,7 @@ def fit(
         name="DH fit",
         is_rotation=observations.is_rotation if observations.has_rotation.any() else None,
     )
-    solution, weights = refined.minimise(task, observations, loss)
+    solution, weights = reweighted.minimise(task, observations, loss)
     vector, found = held.copy(), np.full(held.size, np.nan)
     vector[mask] = solution.x[coords.size :]
     found[mask] = solution.std[coords.size :]

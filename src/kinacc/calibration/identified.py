@@ -11,7 +11,7 @@ from kinacc.calibration import blind_groups, blind_words
 from kinacc.calibration.constrained import ConstrainedFrames
 from kinacc.calibration.dh_fit import DHFit, unseen_anywhere
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.truncated import TOUCH_SQUARED
+from kinacc.calibration.truncated_svd import TOUCH_SQUARED
 from kinacc.calibration.uncertainty import (
     Uncertainty,
     dh_parameter_names,

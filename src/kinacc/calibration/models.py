@@ -8,13 +8,13 @@ import numpy as np
 
 from kinacc.calibration import dh_fit, selection, vec_fit
 from kinacc.calibration.constrained import FrameTerms
+from kinacc.calibration.constraints import ArmTerms, arm_terms, frame_terms, free_parameters
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import BASE, Frames, coordinates, known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.robust import SQUARES
 from kinacc.calibration.selection import Choice, Grid
 from kinacc.calibration.solve import Spectrum
-from kinacc.calibration.terms import ArmTerms, arm_terms, frame_terms, free_parameters
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.config.parameter_rules import Rule
 from kinacc.geometry import IDENTITY, Pose, compose

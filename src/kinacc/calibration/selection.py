@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.calibration import vec_fit
+from kinacc.calibration.basis_expansion import gram
 from kinacc.calibration.frames import Frames, both, coordinates
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.spread import gram
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
 from kinacc.errors import InputError, Problem

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.calibration.basis_expansion import Group, gram, spread
 from kinacc.calibration.frames import FrameCoordinates, inverse_left_jacobian, left_jacobian
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.spread import Group, gram, spread
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, exp_so3, log_so3, skew
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD, DHFit
-from kinacc.calibration.truncated import TOUCH_SQUARED
+from kinacc.calibration.truncated_svd import TOUCH_SQUARED
 from kinacc.calibration.vec_fit import VECFit
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.vec import ERRORS, VECModel

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinacc.calibration.basis_expansion import Group
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.frames import FrameCoordinates, Frames, both, coordinates
+from kinacc.calibration.map_estimate import minimise_with_prior
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.ridge import minimise_with_prior
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
-from kinacc.calibration.spread import Group
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.kinematics import vec
 from kinacc.kinematics.vec import ERRORS, VECModel

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
+from kinacc.assess.random_numbers import key_of
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
-from kinacc.assess.streams import key_of
 from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError, Problem
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinacc.checks import tails, trial
+from kinacc.checks import robust_fit, tails
 from kinacc.checks.changes import Meaning
 from kinacc.checks.fitting import Fitted
 from kinacc.checks.suspicion import Suspicion, suspicion
@@ -30,8 +30,8 @@ def compared(
     seen, arm = fitted.seen, fitted.trial.arm
     places = []
     for joints in (q, np.where(both[:, None], commanded, q)):
-        other = trial.Seen(seen.cells, meaning.joints(joints), seen.base, seen.target)
-        places.append(trial.residuals(arm, other))
+        other = robust_fit.Seen(seen.cells, meaning.joints(joints), seen.base, seen.target)
+        places.append(robust_fit.residuals(arm, other))
     apart = np.linalg.norm(places[1].position_mm - places[0].position_mm, axis=1)
     # What is apart everywhere (a following error of a few um) is how the arm is.
     usual = tails.limit(apart[both], 3) if (apart[both] > 0).any() else 0.0
@@ -53,8 +53,8 @@ def compared(
                 largest_mm=float(apart[rows].max()),
             )
         )
-    every = trial.sigma_of(places[1].position_mm[both])
-    if every < 0.7 * trial.sigma_of(places[0].position_mm[both]):
+    every = robust_fit.sigma_of(places[1].position_mm[both])
+    if every < 0.7 * robust_fit.sigma_of(places[0].position_mm[both]):
         suspicions.append(
             suspicion(
                 "commanded_joints",
@@ -123,8 +123,10 @@ def _rounding_mm(fitted: Fitted, grid_rad: float) -> float:
     rng = np.random.default_rng(0)
     seen, arm = fitted.seen, fitted.trial.arm
     off = rng.uniform(-0.5, 0.5, seen.q.shape) * grid_rad * ~arm.model.prismatic
-    moved = trial.Seen(seen.cells, seen.q + off, seen.base, seen.target)
-    apart = trial.residuals(arm, moved).predicted.position_mm - fitted.left.predicted.position_mm
+    moved = robust_fit.Seen(seen.cells, seen.q + off, seen.base, seen.target)
+    apart = (
+        robust_fit.residuals(arm, moved).predicted.position_mm - fitted.left.predicted.position_mm
+    )
     return float(np.median(np.linalg.norm(apart, axis=1)))
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.checks import start, steps, tails, trial
-from kinacc.checks.trial import Residuals, Seen, Trial
+from kinacc.checks import hand_eye, robust_fit, steps, tails
+from kinacc.checks.robust_fit import Residuals, Seen, Trial
 from kinacc.geometry import log_so3
 from kinacc.kinematics.dh import DHModel
 
@@ -69,10 +69,10 @@ class Fitted:
 
 def fit(seen: Seen, model: DHModel) -> Fitted:
     """The robust fit of at most ``_FITTED_ROWS`` readings, and what it leaves of all."""
-    chosen = start.thinned(np.arange(len(seen.q)), _FITTED_ROWS)
+    chosen = hand_eye.thinned(np.arange(len(seen.q)), _FITTED_ROWS)
     few = seen.select(chosen)
-    found = trial.best(few, start.found(few, model))
-    left = trial.residuals(found.arm, seen)
+    found = robust_fit.best(few, hand_eye.found(few, model))
+    left = robust_fit.residuals(found.arm, seen)
     left_mm = np.linalg.norm(left.position_mm, axis=1)
     left_rad = np.linalg.norm(left.turn_rad, axis=1)
     left_mm[chosen] = np.linalg.norm(found.left_out_mm, axis=1)
@@ -175,7 +175,7 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
 def _coarse(fitted: Fitted, rows: np.ndarray, kinds: list) -> list[tuple]:
     """Splits at a few places of a base's readings that leave clearly less, by short fits."""
     seen, strength = fitted.seen, fitted.trial.strength
-    chosen = start.thinned(rows, _COARSE_ROWS)
+    chosen = hand_eye.thinned(rows, _COARSE_ROWS)
     few = seen.select(chosen)
     if len(few.q) < 4 * _FEWEST:
         return []
@@ -183,15 +183,15 @@ def _coarse(fitted: Fitted, rows: np.ndarray, kinds: list) -> list[tuple]:
     used = np.unique(few.target, return_inverse=True)[1].ravel()
     few = Seen(few.cells, few.q, few.base, used)
     nominal = fitted.trial.nominal
-    begin = start.found(few, nominal)
-    here = _typical(few, trial.fit(few, begin, nominal, strength, huber=True))
+    begin = hand_eye.found(few, nominal)
+    here = _typical(few, robust_fit.fit(few, begin, nominal, strength, huber=True))
     found = []
     for share in range(1, 8):
         row = len(chosen) * share // 8
         for kind in kinds:
             split = _split(few, row, None if kind is None else int(few.target[row]))[0]
-            arm = start.found(split, nominal, draws=0, stretches=())
-            left = _typical(split, trial.fit(split, arm, nominal, strength, huber=True))
+            arm = hand_eye.found(split, nominal, draws=0, stretches=())
+            left = _typical(split, robust_fit.fit(split, arm, nominal, strength, huber=True))
             if left < 0.9 * here:
                 found.append((here / left, int(chosen[row]), kind))
             if kind is not None:
@@ -218,7 +218,7 @@ def _refined(fitted: Fitted, row: int, target: int | None) -> int | None:
     for index in (one, other):
         part = seen.select(rows)
         frames = {"base": part.base, "target": part.target} | {change: np.full(len(rows), index)}
-        left = trial.residuals(arm, Seen(part.cells, part.q, **frames)).position_mm
+        left = robust_fit.residuals(arm, Seen(part.cells, part.q, **frames)).position_mm
         length = np.linalg.norm(left, axis=1)
         costs.append(np.minimum(length, _CAP * fitted.trial.sigma_mm))
     before = np.concatenate([[0.0], np.cumsum(costs[0])])

@@ -14,10 +14,10 @@ from itertools import combinations
 
 import numpy as np
 
-from kinacc.checks import changes, start, trial
+from kinacc.checks import changes, hand_eye, robust_fit
 from kinacc.checks.cells import Cells
 from kinacc.checks.changes import Meaning
-from kinacc.checks.trial import Seen, Trial
+from kinacc.checks.robust_fit import Seen, Trial
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 
@@ -75,7 +75,7 @@ def find(cells: Cells, robot: Robot, written: Trial, progress: Progress) -> Find
     # One session: each has its own base, and a meaning holds for all of them.
     largest = np.argmax(np.bincount(cells.session))
     part = cells.select(np.flatnonzero(cells.session == largest))
-    few = part.select(start.thinned(np.arange(len(part)), _TRIED_ROWS))
+    few = part.select(hand_eye.thinned(np.arange(len(part)), _TRIED_ROWS))
     misfit = Misfit(few, robot)
     least = misfit(as_it_is)
     good = written.sigma_mm < _GOOD * spread
@@ -88,7 +88,7 @@ def find(cells: Cells, robot: Robot, written: Trial, progress: Progress) -> Find
     best = better[0][0]
     close = [pair for pair in better if pair[0] < 1.5 * best]
     close.sort(key=lambda pair: (*_simplicity(pair[1]), pair[0]))
-    many = part.select(start.thinned(np.arange(len(part)), _FITTED_ROWS))
+    many = part.select(hand_eye.thinned(np.arange(len(part)), _FITTED_ROWS))
     fitted = [
         (_left(many, robot, each), each)
         for _, each in progress(close[:_FITTED], "meanings of the file fitted")
@@ -165,11 +165,11 @@ class Misfit:
         """Rotations (n, 3, 3) of the flange in the instrument's frame, by the positions alone."""
         return self._left(meaning).flange
 
-    def _left(self, meaning: Meaning) -> trial.Residuals:
+    def _left(self, meaning: Meaning) -> robust_fit.Residuals:
         seen = seen_as(self.cells, meaning)
         points = replace(seen.cells, rotation=np.full_like(seen.cells.rotation, np.nan))
         one = Seen(points, seen.q, np.zeros_like(seen.base), seen.target)
-        return trial.residuals(start.found(one, self.robot.dh, draws=0, stretches=()), one)
+        return robust_fit.residuals(hand_eye.found(one, self.robot.dh, draws=0, stretches=()), one)
 
     def ratio(self, meaning: Meaning) -> float:
         """Spread of the measured points over that of the flange."""
@@ -181,7 +181,7 @@ def _left(cells: Cells, robot: Robot, meaning: Meaning) -> float:
     """Standard deviation per axis left by the corrected arm, in the file's own lengths."""
     seen = seen_as(cells, meaning)
     seen = Seen(seen.cells, seen.q, np.zeros_like(seen.base), seen.target)
-    fitted = trial.best(seen, start.found(seen, robot.dh))
+    fitted = robust_fit.best(seen, hand_eye.found(seen, robot.dh))
     return fitted.sigma_mm / meaning.scale
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.checks import trial, turns
+from kinacc.checks import robust_fit, turns
 from kinacc.checks.changes import Change, Meaning
 from kinacc.checks.fitting import Fitted
+from kinacc.checks.robust_fit import Seen
 from kinacc.checks.suspicion import Suspicion, suspicion
-from kinacc.checks.trial import Seen
 from kinacc.kinematics import dh
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.orientation import rotations
@@ -43,7 +43,7 @@ def found(fitted: Fitted, raw: Raw) -> list[Suspicion]:
     open_rows = bad
     suspicions = []
     for change, seen in _explanations(fitted, raw, bad):
-        left = trial.residuals(fitted.trial.arm, seen)
+        left = robust_fit.residuals(fitted.trial.arm, seen)
         fits = _within(left, fitted)
         rows = np.intersect1d(open_rows, bad[fits])
         if rows.size:
@@ -63,7 +63,7 @@ def found(fitted: Fitted, raw: Raw) -> list[Suspicion]:
     return suspicions
 
 
-def _within(left: trial.Residuals, fitted: Fitted) -> np.ndarray:
+def _within(left: robust_fit.Residuals, fitted: Fitted) -> np.ndarray:
     good = np.linalg.norm(left.position_mm, axis=1) <= fitted.limit_mm
     angle = np.linalg.norm(left.turn_rad, axis=1)
     return good & ~(angle > fitted.limit_rad)
@@ -197,7 +197,7 @@ def _outliers(fitted: Fitted, rows: np.ndarray) -> list[Suspicion]:
 def _one_joint(fitted: Fitted, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Joint (m,) whose displacement alone explains a reading, -1 where none, and by how much."""
     seen, arm = fitted.seen.select(rows), fitted.trial.arm
-    left = trial.residuals(arm, seen)
+    left = robust_fit.residuals(arm, seen)
     jacobian = dh.joint_jacobian(arm.model, seen.q)
     base = arm.base.rotation[seen.base]
     swing = np.einsum("nij,nj->ni", left.flange, arm.targets.position_mm[seen.target])

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
+from kinacc.checks.robust_fit import HUBER, Residuals, Seen, sigma_of
 from kinacc.checks.tails import FAMILY_WISE
-from kinacc.checks.trial import HUBER, Residuals, Seen, sigma_of
 from kinacc.geometry import skew
 
 WINDOW = 300  # readings looked at together: drifts are slower

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.checks import changes, start, turns
+from kinacc.checks import changes, hand_eye, turns
 from kinacc.checks.cells import Cells
 from kinacc.checks.changes import Meaning
 from kinacc.checks.meaning import Misfit, seen_as
@@ -40,7 +40,7 @@ def find(cells: Cells, robot: Robot, here: Meaning, least_rad: float) -> Turned 
     """
     largest = np.argmax(np.bincount(cells.session[cells.turned]))
     rows = np.flatnonzero(cells.turned & (cells.session == largest))
-    few = cells.select(start.thinned(rows, _ROWS))
+    few = cells.select(hand_eye.thinned(rows, _ROWS))
     misfit = Misfit(few, robot)
     before, limit = _scatter(few, misfit, here), _AS_GOOD * max(misfit(here), _SHOWN)
     rivals = [r for r in changes.single(here, robot.dh.prismatic) if misfit(r) < limit]

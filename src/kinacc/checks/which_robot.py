@@ -41,12 +41,12 @@ def _left(reading: Reading, arm) -> float:
 
     The arm is taken as described: corrected, an arm of similar build would fit as well.
     """
-    from kinacc.checks import cells, changes, meaning, start, trial
+    from kinacc.checks import cells, changes, hand_eye, meaning, robust_fit
 
     every = cells.merged(cells.of_columns(reading.columns, arm.dh.joints))[0]
-    few = every.select(start.thinned(np.arange(len(every)), _ROWS))
+    few = every.select(hand_eye.thinned(np.arange(len(every)), _ROWS))
     point = few.position_mm - np.median(few.position_mm, axis=0)
     spread = float(np.median(np.linalg.norm(point, axis=1)))
     seen = meaning.seen_as(few, changes.as_written(arm.joint_map))
-    fitted = trial.best(seen, start.found(seen, arm.dh), strengths=(0.0,))
+    fitted = robust_fit.best(seen, hand_eye.found(seen, arm.dh), strengths=(0.0,))
     return fitted.sigma_mm / max(spread, 1e-9)

@@ -120,7 +120,7 @@ def pool_of(name: str) -> Pool:
 
 def _of_folder(path: Path) -> Pool:
     from kinacc.artifacts import store
-    from kinacc.assess.causes import joint_errors
+    from kinacc.assess.error_effects import joint_errors
     from kinacc.deployment.folder import recorded_robot
     from kinacc.study.tournament import fields
 

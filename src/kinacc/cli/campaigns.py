@@ -21,7 +21,7 @@ from kinacc.errors import InputError, Problem
 
 def start(given: Mapping) -> None:
     """Begin a campaign and say what was begun."""
-    from kinacc.campaign import begin, foreseen
+    from kinacc.campaign import begin, prediction_check
     from kinacc.cli import campaign_candidates, campaign_options, rows
 
     problems = folder.in_the_way(given["folder"])
@@ -61,7 +61,9 @@ def start(given: Mapping) -> None:
         arm, points, assessor, instruments, limits, given["seed"], joints_now, about,
         by_travel=given["visit"] == "travel",
     )  # fmt: skip
-    unsure = foreseen.unsure(arm, points, instruments, given["point"], limits.implausible_mm)
+    unsure = prediction_check.unsure(
+        arm, points, instruments, given["point"], limits.implausible_mm
+    )
     for line in [] if unsure is None else unsure.in_words():
         click.echo(line, err=True)
     folder.start(given["folder"], begun)

@@ -19,7 +19,7 @@ from kinacc.geometry import invert
 
 if TYPE_CHECKING:
     from kinacc.campaign.forecast import Forecast
-    from kinacc.campaign.foreseen import Unsure
+    from kinacc.campaign.prediction_check import Unsure
 
 
 def begun_facts(folder: str, begun: Plan, unsure: Unsure | None) -> dict[str, object]:

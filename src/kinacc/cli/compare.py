@@ -47,17 +47,17 @@ def compare(
       kinacc compare results/ur10_b results/ur10_d --picture moved.svg
       kinacc compare before.yaml after.yaml --json
     """
-    from kinacc.cli import sheet, side_by_side
+    from kinacc.cli import comparison_report, sheet
     from kinacc.deployment.compare import compare as compared
     from kinacc.progress import reporting
 
     sheet.check_output(output, force)
     sheet.check_output(picture, force, PICTURES)
     with reporting("compare", bar=True):
-        arms = [side_by_side.source(each, model, robot, config) for each in (first, second)]
-        q_rad = side_by_side.joints(arms, (first, second), joints, count)
+        arms = [comparison_report.source(each, model, robot, config) for each in (first, second)]
+        q_rad = comparison_report.joints(arms, (first, second), joints, count)
         found = compared(*arms, q_rad)
-    answer = side_by_side.answer(found, arms, len(q_rad))
+    answer = comparison_report.answer(found, arms, len(q_rad))
     if picture is not None:
         from pathlib import Path
 
@@ -65,7 +65,7 @@ def compare(
         from kinacc.figures.save import write
 
         path = Path(picture)
-        write(draw(found, *side_by_side.short_names(arms)), {path.suffix[1:]: path})
+        write(draw(found, *comparison_report.short_names(arms)), {path.suffix[1:]: path})
     choice.deliver(answer, output, as_json, force)
     if not as_json:
-        click.echo(side_by_side.in_words(found, arms))
+        click.echo(comparison_report.in_words(found, arms))

@@ -37,19 +37,19 @@ def compensate(
     \b
     Example:
       kinacc compensate results/mh180 --pose "1500,200,900,0,1,0,0"
-      kinacc compensate results/ur10_b wanted.csv -o joints.csv
+      kinacc compensate results/ur10_b target_poses.csv -o joints.csv
       kinacc compensate results/mh180 --program program.csv -o corrected.csv
     """
-    from kinacc.cli import rows, sheet, wanted
+    from kinacc.cli import rows, sheet, target_poses
     from kinacc.deployment.compensate import compensate as joints_for
     from kinacc.progress import reporting
 
     sheet.check_output(output, force)
     arm = choice.calibration_of(folder, model, robot, config, session)
-    given = wanted.poses(arm, poses, pose, near_deg, program, frame, point)
+    given = target_poses.poses(arm, poses, pose, near_deg, program, frame, point)
     with reporting("compensate", bar=True):
         found = joints_for(arm, given.pose, given.joints, given.directions, frame, point)
-    answer = wanted.compensated(arm, given, found, frame, point, program is not None)
+    answer = target_poses.compensated(arm, given, found, frame, point, program is not None)
     choice.deliver(answer, output, as_json, force)
     rows.say_unused(given)
     missed = int((found.q_rad != found.q_rad).any(axis=1).sum())

@@ -274,13 +274,13 @@ def _rows(key, value, path, place):
 
 
 def _parameters(key, value, path, place):
-    from kinacc.config import parameter_rules as mask
+    from kinacc.config import parameter_rules
 
     if not isinstance(value, dict):
         return _refuse(key, path, place, f"{shown(value)} is not a mapping")
     if len(value) > _MOST_NAMES:
         return _refuse(key, path, place, f"has {len(value)} names, more than {_MOST_NAMES}")
-    problems = mask.rules(value, key.choices[0], lambda name: place((*path, name)))[1]
+    problems = parameter_rules.rules(value, key.choices[0], lambda name: place((*path, name)))[1]
     return (INVALID if problems else dict(value)), problems
 
 

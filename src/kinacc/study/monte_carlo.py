@@ -108,7 +108,7 @@ def world_of(
     Holds the points the budget can reach, in visiting order. ``memory`` (points, measurements, 3)
     is reused for the readings if given; the world drawn there before is lost.
     """
-    from kinacc.assess.streams import key_of
+    from kinacc.assess.random_numbers import key_of
 
     entropy = (seed, _nanometres(noise_mm), repetition)
     order = np.arange(error_mm.shape[0])

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from kinacc.calibration import selection, tables
+from kinacc.calibration.constraints import parallel_joints, require_known
 from kinacc.calibration.dh_fit import DH_FIX
 from kinacc.calibration.models import Options
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.selection import Grid
 from kinacc.calibration.system import require_enough
-from kinacc.calibration.terms import parallel_joints, require_known
 from kinacc.calibration.vec_fit import VEC_FIX, Prior
-from kinacc.config import parameter_rules as mask
+from kinacc.config import parameter_rules
 from kinacc.kinematics.robot import Robot, carried
 
 AUTO = "auto"
@@ -29,7 +29,9 @@ def options(calibration: Mapping, arm: Robot) -> Options:
         "tool": carried(arm),
         "rotation_weight_mm_per_rad": float(calibration["rotation_weight_mm_per_rad"]),
         "frames_estimated": calibration["base_and_tool"] == "estimated",
-        "frame_rules": tuple(mask.rules(calibration["frames"], mask.FRAMES)[0]),
+        "frame_rules": tuple(
+            parameter_rules.rules(calibration["frames"], parameter_rules.FRAMES)[0]
+        ),
     }
     if "vec" in calibration:
         section = calibration["vec"]
@@ -48,7 +50,9 @@ def options(calibration: Mapping, arm: Robot) -> Options:
             "dh_to_vec": section["fit_to"] == "vec",
             "hayati_joints": hayati_joints(section, arm),
             "hayati_instead": section["hayati_joints"] == AUTO,
-            "arm_rules": tuple(mask.rules(section["parameters"], mask.JOINTS)[0]),
+            "arm_rules": tuple(
+                parameter_rules.rules(section["parameters"], parameter_rules.JOINTS)[0]
+            ),
             "loss": section["loss"],
             "threshold": float(section["truncation"]),
         }

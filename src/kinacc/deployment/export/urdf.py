@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.calibration.start import closed_form_start
 from kinacc.deployment.export import links
 from kinacc.deployment.export.description import robot_name
 from kinacc.deployment.record import TOOL, Calibration

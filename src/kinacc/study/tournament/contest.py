@@ -17,9 +17,9 @@ import numpy as np
 
 from kinacc.assess import ASSESSORS
 from kinacc.assess.adaptive import conduct
+from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
-from kinacc.assess.streams import key_of
 from kinacc.assess.world import World, drawn_world
 from kinacc.errors import InputError, Problem
 from kinacc.study.tournament import summary

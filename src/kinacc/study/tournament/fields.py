@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kinacc.assess.causes import joint_errors
+from kinacc.assess.error_effects import joint_errors
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh, robot
 from kinacc.study.operating_points import readings_of

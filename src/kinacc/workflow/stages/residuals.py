@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kinacc.calibration import tables, worth_columns
+from kinacc.calibration import model_comparison_columns, tables
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import (
     COMPARISONS,
@@ -51,7 +51,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     return {
         "residuals": _residuals(every.fold, folds, seen, held_out, trained),
         "pose_errors": _pose_errors(inputs["measurements"], train, seen, held_out, bool(folds)),
-        **worth_columns.columns(inputs["measurements"], every, train, seen, held_out),
+        **model_comparison_columns.columns(inputs["measurements"], every, train, seen, held_out),
     }
 
 

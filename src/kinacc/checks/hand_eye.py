@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.checks.cells import nearest_rotation
-from kinacc.checks.trial import Arm, Seen, residuals
+from kinacc.checks.robust_fit import Arm, Seen, residuals
 from kinacc.geometry import Pose
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel

@@ -11,7 +11,7 @@ from kinacc.calibration import robust
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution, System
-from kinacc.calibration.truncated import minimise_truncated
+from kinacc.calibration.truncated_svd import minimise_truncated
 from kinacc.errors import FitError
 
 MAX_PASSES = 100

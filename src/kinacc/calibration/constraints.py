@@ -10,7 +10,7 @@ import numpy as np
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.frames import Frames, coordinates, known
 from kinacc.calibration.observations import Observations
-from kinacc.config import parameter_rules as mask
+from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
@@ -70,12 +70,12 @@ def arm_terms(nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()) ->
     chosen, std = free.copy(), np.full(free.shape, np.inf)
     for joint, column in np.ndindex(free.shape):
         name = PARAMETERS[column]
-        rule = mask.rule_for(rules, name, joint=joint + 1)
+        rule = parameter_rules.rule_for(rules, name, joint=joint + 1)
         if rule is None or (rule.parameter is None and not free[joint, column]):
             continue
         chosen[joint, column] = rule.free
-        values[joint, column] = rule.value.get(mask.unit(name), values[joint, column])
-        std[joint, column] = rule.std.get(mask.unit(name), np.inf)
+        values[joint, column] = rule.value.get(parameter_rules.unit(name), values[joint, column])
+        std[joint, column] = rule.std.get(parameter_rules.unit(name), np.inf)
     return ArmTerms(dh.with_vector(nominal, values.ravel()), chosen, std)
 
 
@@ -94,12 +94,12 @@ def frame_terms(
         frame, _, component = name.rpartition(".")
         if component[1:] == "_mm":
             value[number] = at[frames.index(frame)]["xyz".index(component[0])]
-        rule = mask.rule_for(rules, component, frame=frame)
+        rule = parameter_rules.rule_for(rules, component, frame=frame)
         if rule is None:
             continue
         free[number] = rule.free
-        value[number] = rule.value.get(mask.unit(component), value[number])
-        std[number] = rule.std.get(mask.unit(component), np.inf)
+        value[number] = rule.value.get(parameter_rules.unit(component), value[number])
+        std[number] = rule.std.get(parameter_rules.unit(component), np.inf)
     return FrameTerms(names, free, value, std, stated)
 
 
@@ -115,8 +115,8 @@ def require_known(rules: Sequence[Rule], observations: Observations) -> None:
         frame, _, component = name.rpartition(".")
         frames.setdefault(frame, []).append(component)
     problems = [
-        Problem(f"{mask.KEYS[mask.FRAMES]}, {rule.name!r}", what, allowed)
-        for rule, what, allowed in mask.strangers(rules, observations.joints, frames)
+        Problem(f"{parameter_rules.KEYS[parameter_rules.FRAMES]}, {rule.name!r}", what, allowed)
+        for rule, what, allowed in parameter_rules.strangers(rules, observations.joints, frames)
     ]
     if problems:
         raise InputError(problems)

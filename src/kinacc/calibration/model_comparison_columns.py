@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kinacc.calibration import worth
+from kinacc.calibration import model_comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import COMPARISONS, Errors
 from kinacc.measurements import folds
@@ -49,8 +49,8 @@ def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Co
     """``model_selection`` from errors ``held_out`` of every row."""
     same = folds.configurations(every.pose, every.q_rad, _SAME_CONFIGURATION_RAD)
     errors = held_out["dh_vs_measured"], held_out["vec_vs_measured"]
-    found = worth.gain(*errors, same, every.fold)
-    names = (worth.DH, worth.VEC)
+    found = model_comparison.gain(*errors, same, every.fold)
+    names = (model_comparison.DH, model_comparison.VEC)
     unknown = 0.0 if found.configurations else np.nan
     return {
         "model": np.array(names, dtype=object),
@@ -66,13 +66,13 @@ def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Co
 
 
 def _bias_rows(errors: Errors, q_rad: np.ndarray) -> Iterator[tuple]:
-    for each in worth.bias(errors, q_rad):
+    for each in model_comparison.bias(errors, q_rad):
         span = each.joint + 1, each.low_rad, each.high_rad, each.n
         yield (*span, *each.mean_mm, *each.std_error_mm, each.rms_mm)
 
 
 def _worst_rows(errors: Errors, rows: np.ndarray, measurements: Mapping) -> Iterator[tuple]:
-    for rank, index in enumerate(worth.worst(errors), 1):
+    for rank, index in enumerate(model_comparison.worst(errors), 1):
         row, vector = int(rows[index]), errors.position_mm[index]
         line = float(np.asarray(measurements["row"], dtype=float)[row])
         place = row, line, measurements["pose"][row], measurements["target"][row]
