@@ -132,3 +132,44 @@ def test_the_picture_marks_every_parameter():
     assert "a$_{2}$" in labels
     assert render(figure, ["svg"])["svg"].startswith(b"<?xml")
     assert render(draw(found, "before", "after"), ["svg"]) == render(figure, ["svg"])
+
+
+def bars(figure):
+    """Length of every parameter's bar, by its place; without a bar NaN."""
+    ax = figure.axes[0]
+    places = {}
+    for container in ax.containers:
+        for bar in container:
+            places[round(bar.get_y() + bar.get_height() / 2)] = bar.get_width()
+    return np.array([places.get(place, np.nan) for place in range(len(ax.get_yticks()))])
+
+
+def test_the_picture_of_two_robot_files_shows_a_length_that_moved_by_a_millimetre():
+    before = nominal(robot.load("mh180"), "before")
+    found = compare(before, changed(before, j2_a_mm=1.0, j4_alpha_rad=-2e-3), joints("mh180", 60))
+    figure = draw(found, "before", "after")
+    assert found.parameters.names == ("j2.a_mm", "j4.alpha_rad")
+    assert bars(figure) == pytest.approx([1.0, -2.0])
+    assert figure.axes[0].get_xlim()[1] > 2.0
+    assert "lengths in mm, angles in mrad" in figure.axes[0].get_xlabel()
+    assert not [line for line in figure.axes[0].lines if line.get_marker() == "x"]
+
+
+def test_the_picture_of_a_folder_and_a_robot_file_shows_what_moved():
+    before = calibrated("mh180", "dh", 60, 3)
+    after = replace(nominal(before.robot, "after"), model=changed(before, j2_a_mm=1.0).model)
+    found = compare(before, after, joints("mh180", 60))
+    drawn = bars(draw(found, "before", "after"))
+    place = found.parameters.names.index("j2.a_mm")
+    assert drawn[place] == pytest.approx(1.0)
+    assert np.delete(drawn, place)[np.isfinite(np.delete(drawn, place))] == pytest.approx(0.0)
+
+
+def test_the_picture_tells_the_change_of_a_parameter_that_both_fits_held():
+    before = calibrated("mh180", "dh", 60, 3)
+    after = changed(calibrated("mh180", "dh", 60, 4), j6_beta_rad=1e-3)
+    found = compare(before, after, joints("mh180", 60))
+    assert np.isfinite(bars(draw(found, "before", "after"))).any()
+    texts = draw(found, "before", "after").axes[0].texts
+    of = {found.parameters.names[round(each.get_position()[1])]: each.get_text() for each in texts}
+    assert of == {"j6.beta_rad": " +1 mrad"}

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinacc.calibrated.compare import Comparison, Parameters, Shift
+from kinacc.calibration.uncertainty import is_angle
 from kinacc.figures import style
 
 _FAR = 3.0  # standard deviations
@@ -32,22 +33,37 @@ def draw(found: Comparison, first: str, second: str) -> Figure:
 
 
 def _parameters(ax: Axes, parameters: Parameters) -> None:
+    """Bars of standard deviations; of mm and mrad where no standard deviation is known."""
     places = np.arange(len(parameters.names))
-    sigmas = parameters.sigmas
-    known = np.isfinite(sigmas)
-    far = known & (np.abs(sigmas) > _FAR)
+    angle = np.array([is_angle(name) for name in parameters.names], dtype=bool)
+    moved = parameters.difference * np.where(angle, 1e3, 1.0)
+    undetermined = np.array([bool(where) for where in parameters.undetermined_in], dtype=bool)
+    in_sigmas = bool(np.isfinite(parameters.sigmas).any())
+    values = parameters.sigmas if in_sigmas else np.where(undetermined, np.nan, moved)
+    known = np.isfinite(values)
+    largest = float(np.max(np.abs(values[known]), initial=0.0)) * 1.1
+    far = known & in_sigmas & (np.abs(values) > _FAR)
     near = known & ~far
-    limit = max(_FAR * 1.5, float(np.max(np.abs(sigmas[known]), initial=0.0)) * 1.1)
-    ax.axvspan(-_FAR, _FAR, color=style.FAINT, alpha=0.5, lw=0)
-    ax.barh(places[near], sigmas[near], 0.62, color=style.BLUE)
-    ax.barh(places[far], sigmas[far], 0.62, color=style.VERMILION, hatch="////", ec="white", lw=0)
-    ax.plot(np.zeros(int((~known).sum())), places[~known], "x", color=style.MUTED, ms=4)
+    if in_sigmas:
+        largest = max(_FAR * 1.5, largest)
+        ax.axvspan(-_FAR, _FAR, color=style.FAINT, alpha=0.5, lw=0)
+    ax.barh(places[near], values[near], 0.62, color=style.BLUE)
+    ax.barh(places[far], values[far], 0.62, color=style.VERMILION, hatch="////", ec="white", lw=0)
+    if undetermined.any():
+        at = places[undetermined]
+        ax.plot(np.zeros(len(at)), at, "x", color=style.MUTED, ms=4)
+    # Held by both fits and yet another value: there is no deviation to draw it by.
+    for place in places[~known & ~undetermined & (moved != 0.0)]:
+        words = f" {moved[place]:+.3g} {'mrad' if angle[place] else 'mm'}"
+        ax.text(0.0, place, words, va="center", fontsize=style.SMALL_PT, color=style.VERMILION)
     ax.axvline(0.0, color=style.MUTED, lw=0.6)
     ax.set_yticks(places, [_label(name) for name in parameters.names])
     ax.tick_params(axis="y", length=0)
     ax.grid(visible=False, axis="y")
-    ax.set(xlim=(-limit, limit), ylim=(len(places) - 0.4, -0.6))
-    ax.set_xlabel("Change (standard deviations; ×: undetermined)")
+    ax.set(xlim=(-(largest or 1.0), largest or 1.0), ylim=(len(places) - 0.4, -0.6))
+    units = "standard deviations" if in_sigmas else "lengths in mm, angles in mrad"
+    crosses = "; ×: undetermined" if undetermined.any() else ""
+    ax.set_xlabel(f"Change ({units}{crosses})")
 
 
 def _shifts(ax: Axes, found: Comparison) -> None:
