@@ -27,7 +27,6 @@ reproduce: $(KINACC)
 
 robustness: $(KINACC)
 	@$(PY) -m snakemake --cores $(CORES) robustness
-	@$(PY) -m snakemake --cores $(CORES)
 
 test: $(KINACC) $(TOOLS)
 	$(PY) -m ruff check .

@@ -131,3 +131,42 @@ def test_the_picture_marks_every_parameter():
     assert "a$_{2}$" in labels
     assert render(figure, ["svg"])["svg"].startswith(b"<?xml")
     assert render(draw(found, "before", "after"), ["svg"]) == render(figure, ["svg"])
+
+
+def drawn(found):
+    """Length of the bar, or else the words beside the mark, of every parameter of the picture."""
+    ax = draw(found, "before", "after").axes[0]
+    bars = [bar for group in ax.containers for bar in group]
+    told = {round(bar.get_y() + bar.get_height() / 2): bar.get_width() for bar in bars}
+    told |= {round(text.xy[1]): text.get_text() for text in ax.texts}
+    return {name: told.get(row, "") for row, name in enumerate(found.parameters.names)}
+
+
+def test_the_picture_of_two_robot_files_shows_the_millimetre_by_which_they_differ():
+    before = nominal(robot.load("mh180"), "before")
+    after = changed(before, j4_d_mm=1.0, j2_alpha_rad=-2e-3)
+    found = compare(before, after, joints("mh180", 60))
+    bars = drawn(found)
+    assert bars["j4.d_mm"] == pytest.approx(1.0)
+    assert bars["j2.alpha_rad"] == pytest.approx(-2.0)  # mrad
+    label = draw(found, "before", "after").axes[0].get_xlabel()
+    assert "mm" in label
+    assert "mrad" in label
+    assert "standard deviations" not in label.partition(";")[0]
+
+
+def test_the_picture_shows_how_far_a_parameter_moved_that_no_pose_determines():
+    before = calibrated("mh180", "dh", 60, 3)
+    after = changed(before, j2_d_mm=5.0, j3_d_mm=5.0, j5_beta_rad=4e-3)  # beta is held in both
+    bars = drawn(compare(before, after, joints("mh180", 60)))
+    assert bars["j2.d_mm"] == "+5 mm"
+    assert bars["j5.beta_rad"] == "+4 mrad"
+    assert bars["j1.a_mm"] == 0.0
+
+
+def test_the_picture_of_a_robot_file_against_itself_has_nothing_to_list():
+    arm = nominal(robot.load("mh180"), "one")
+    found = compare(arm, arm, joints("mh180", 60))
+    assert [ax.get_xlabel() for ax in draw(found, "one", "one").axes] == [
+        "Change of flange position (mm)"
+    ]

@@ -1,5 +1,7 @@
 """A user changes one thing and runs again: what depends on it is remade, and nothing else."""
 
+import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 FIGURES = {f"fig{number}" for number in range(1, 7)}
@@ -126,3 +128,13 @@ def test_one_artefact_asked_for_by_name(project):
     project.snakemake("results/mh180/accuracy_map.parquet")
     after = project.digests()
     assert {name for name in after if after[name] != before[name]} == {"mh180/accuracy_map.parquet"}
+
+
+def test_the_shares_are_in_the_claims_after_one_command(project):
+    project.configure("robustness: {draws: 1}")
+    claims = project.folder / "results" / "mh180" / "claims.parquet"
+    assert np.isnan(pq.read_table(claims)["share"].to_numpy()).all()
+    project.snakemake("robustness")
+    assert np.isfinite(pq.read_table(claims)["share"].to_numpy()).any()
+    assert project.to_do() == {}
+    assert "Nothing to be done" in project.snakemake("robustness", options=("--dry-run",))

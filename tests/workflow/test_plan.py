@@ -117,11 +117,14 @@ def test_other_picture_formats_for_one_data_set_are_refused(plan_of):
         plan_of("datasets: {two: {robot: mh180, figures: {formats: [png]}}}")
 
 
-def test_robustness_counts_for_the_claims_once_it_is_there(plan_of, tmp_path):
+def test_robustness_counts_for_the_claims_once_it_is_asked_for_or_there(plan_of, tmp_path):
     plan = Plan(plan_of().datasets, {"arm": 2}, ("svg",), str(tmp_path))
     assert "robustness" not in plan.inputs("claims", "arm")
-    assert not [path for path in plan.targets("arm") if path.endswith("robustness.parquet")]
     table = tmp_path / "arm" / "robustness.parquet"
+    assert str(table) not in plan.targets("arm")
+    asked = plan.targets("arm", on_request=True)
+    assert {str(table), str(tmp_path / "arm" / "claims.parquet")} <= set(asked)
+    assert plan.inputs("claims", "arm", on_request=True)["robustness"] == str(table)
     table.parent.mkdir()
     table.touch()
     assert plan.inputs("claims", "arm")["robustness"] == str(table)

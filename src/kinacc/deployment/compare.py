@@ -27,7 +27,7 @@ _SPAN = 1e-3  # directions closer than this are one
 _TOUCHED = 1e-4  # as in the fits: 1 % of a parameter in a direction nobody sees
 _STEPS = 8
 _ANOTHER = 0.005  # of the length of an arm; a calibration changes far less
-_ROUNDING = 1e-9  # mm and mrad
+ROUNDING = 1e-9  # mm and mrad
 
 
 class Parameters(NamedTuple):
@@ -151,7 +151,7 @@ def _parameters(first: Calibration, second: Calibration) -> Parameters:
     values = [dh.to_vector(arm.model) for arm in (first, second)]
     free = [_free(arm) for arm in (first, second)]
     units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
-    differ = np.abs(values[1] - values[0]) > _ROUNDING * units
+    differ = np.abs(values[1] - values[0]) > ROUNDING * units
     shown = [
         number
         for number, name in enumerate(names)

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.deployment.compare import Comparison, Parameters, Shift
+from kinacc.calibration.uncertainty import is_angle
+from kinacc.deployment.compare import ROUNDING, Comparison, Parameters, Shift
 from kinacc.figures import style
 
 _FAR = 3.0  # standard deviations
@@ -21,7 +22,7 @@ def draw(found: Comparison, first: str, second: str) -> Figure:
     with style.house():
         height = max(2.6, 0.13 * rows + 0.9)
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, height)
-        if found.parameters:
+        if rows:
             left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
             _parameters(left, found.parameters)
         else:
@@ -32,9 +33,22 @@ def draw(found: Comparison, first: str, second: str) -> Figure:
 
 
 def _parameters(ax: Axes, parameters: Parameters) -> None:
+    """Changes in standard deviations; in mm and mrad where none has a standard deviation."""
     places = np.arange(len(parameters.names))
+    known = np.isfinite(parameters.sigmas)
+    if known.any():
+        _in_deviations(ax, parameters, places, known)
+    else:
+        _in_units(ax, parameters, places)
+    ax.axvline(0.0, color=style.MUTED, lw=0.6)
+    ax.set_yticks(places, [_label(name) for name in parameters.names])
+    ax.tick_params(axis="y", length=0)
+    ax.grid(visible=False, axis="y")
+    ax.set(ylim=(len(places) - 0.4, -0.6))
+
+
+def _in_deviations(ax: Axes, parameters: Parameters, places: np.ndarray, known: np.ndarray) -> None:
     sigmas = parameters.sigmas
-    known = np.isfinite(sigmas)
     far = known & (np.abs(sigmas) > _FAR)
     near = known & ~far
     limit = max(_FAR * 1.5, float(np.max(np.abs(sigmas[known]), initial=0.0)) * 1.1)
@@ -42,12 +56,41 @@ def _parameters(ax: Axes, parameters: Parameters) -> None:
     ax.barh(places[near], sigmas[near], 0.62, color=style.BLUE)
     ax.barh(places[far], sigmas[far], 0.62, color=style.VERMILION, hatch="////", ec="white", lw=0)
     ax.plot(np.zeros(int((~known).sum())), places[~known], "x", color=style.MUTED, ms=4)
-    ax.axvline(0.0, color=style.MUTED, lw=0.6)
-    ax.set_yticks(places, [_label(name) for name in parameters.names])
-    ax.tick_params(axis="y", length=0)
-    ax.grid(visible=False, axis="y")
-    ax.set(xlim=(-limit, limit), ylim=(len(places) - 0.4, -0.6))
-    ax.set_xlabel("Change (standard deviations; ×: undetermined)")
+    # What has no standard deviation has no place on this axis: its change is written beside it.
+    for place in places[~known & (_change(parameters) != 0.0)]:
+        words = f"{_change(parameters)[place]:+.3g} {_unit(parameters.names[place])}"
+        beside = {"xytext": (4, 0), "textcoords": "offset points", "va": "center"}
+        ax.annotate(words, (0.0, place), fontsize=style.SMALL_PT, color=style.MUTED, **beside)
+    ax.set_xlim(-limit, limit)
+    ax.set_xlabel("Change (standard deviations)\n×: without one; the change, if any, beside it")
+
+
+def _in_units(ax: Axes, parameters: Parameters, places: np.ndarray) -> None:
+    change = _change(parameters)
+    turns = np.array([is_angle(name) for name in parameters.names], dtype=bool)
+    angles = {"color": style.ORANGE, "hatch": "////", "ec": "white", "lw": 0}
+    kinds = ((~turns, "mm", {"color": style.BLUE}), (turns, "mrad", angles))
+    for which, unit, look in kinds:
+        if which.any():
+            ax.barh(places[which], change[which], 0.62, label=unit, **look)
+    blind = np.array([where != "" for where in parameters.undetermined_in], dtype=bool)
+    ax.plot(change[blind], places[blind], "x", color=style.MUTED, ms=4)
+    limit = 1.1 * float(np.max(np.abs(change), initial=0.0)) or 1.0
+    units = ", ".join(unit for which, unit, _ in kinds if which.any())
+    ax.set_xlim(-limit, limit)
+    ax.set_xlabel(f"Change ({units}{'; ×: undetermined' if blind.any() else ''})")
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+
+
+def _change(parameters: Parameters) -> np.ndarray:
+    """Differences (P,) in mm and mrad; what is no more than rounding is 0."""
+    unit = np.where([is_angle(name) for name in parameters.names], 1e3, 1.0)
+    change = parameters.difference * unit
+    return np.where(np.abs(change) > ROUNDING, change, 0.0)
+
+
+def _unit(name: str) -> str:
+    return "mrad" if is_angle(name) else "mm"
 
 
 def _shifts(ax: Axes, found: Comparison) -> None:
@@ -55,8 +98,12 @@ def _shifts(ax: Axes, found: Comparison) -> None:
     _curve(ax, found.apart_from_frames, "after best base and tool", style.GREEN, (0, (4, 1.5)))
     ax.set(xlabel="Change of flange position (mm)", ylabel="Share of poses", ylim=(0.0, 1.02))
     ax.set_xlim(left=0.0)
+    shifts = (found.as_they_stand, found.apart_from_frames)
+    dotted = any(np.isfinite(shift.chance_mm) for shift in shifts)
     ax.legend(
-        loc="lower right", title="dotted: rms expected by chance", title_fontsize=style.SMALL_PT
+        loc="best",
+        title="dotted: rms expected by chance" if dotted else None,
+        title_fontsize=style.SMALL_PT,
     )
 
 

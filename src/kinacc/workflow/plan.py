@@ -97,25 +97,28 @@ class Plan:
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
     def targets(self, dataset: str, on_request: bool = False) -> list[str]:
-        """Every file the data set leaves in a plain run, or those made only on request."""
+        """Every file the data set leaves in a run, a plain one or with what is made on request."""
         return [
             path
             for name, stage in self.stages(dataset).items()
-            if stage.on_request == on_request and not stage.scattered
+            if stage.on_request <= on_request and not stage.scattered
             for path in self.outputs(name, dataset).values()
         ]
 
-    def inputs(self, name: str, dataset: str) -> dict[str, str | list[str]]:
+    def inputs(
+        self, name: str, dataset: str, on_request: bool = False
+    ) -> dict[str, str | list[str]]:
         """Files a stage reads: artefact -> path, or paths of its parts; role -> other file.
 
-        An optional artefact counts if the data set has it; one made on request, once it is there.
+        An optional artefact counts if the data set has it; one made on request, where ``on_request``
+        says that this run makes it or once it is there.
         """
         stage = STAGES[name]
         available = {
             made
             for each in self.stages(dataset).values()
             for made in each.outputs
-            if not each.on_request or os.path.exists(self._table(made, dataset))
+            if each.on_request <= on_request or os.path.exists(self._table(made, dataset))
         }
         wanted = (*stage.inputs, *(extra for extra in stage.optional if extra in available))
         found: dict[str, str | list[str]] = {}
