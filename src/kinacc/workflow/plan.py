@@ -110,8 +110,8 @@ class Plan:
     ) -> dict[str, str | list[str]]:
         """Files a stage reads: artefact -> path, or paths of its parts; role -> other file.
 
-        An optional artefact counts if the data set has it; one made on request, where ``on_request``
-        says that this run makes it or once it is there.
+        An optional artefact counts if the data set has it; one made on request, once it is there or
+        where ``on_request`` says that this run makes it.
         """
         stage = STAGES[name]
         available = {
