@@ -25,12 +25,12 @@ Progress = Callable[[Iterable, str], Iterable]
 _PER_POSE = 6  # a rigid body has no more, however many targets it carries
 
 
-def run(inputs: Mapping, settings: Mapping, progress: Progress) -> dict[str, Columns]:
+def run(inputs: Mapping, settings: Mapping, progress: Progress | None = None) -> dict[str, Columns]:
     """``data_check``: every finding with its level and, where it was accepted, the reason.
 
     Raises InputError where findings stop the workflow, one problem each.
     """
-    report = examined(settings, "", progress)
+    report = examined(settings, "", progress or (lambda items, words: items))
     if report.stopping:
         title = f"{report.path} is not ready to be fitted"
         raise InputError([_problem(report.path, each) for each in report.stopping], title)
