@@ -6,8 +6,11 @@ Tables in memory are plain dictionaries of columns. A null number is NaN, a null
 from __future__ import annotations
 
 import os
+import re
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -144,7 +147,10 @@ def read(path: Path | str) -> dict[str, np.ndarray]:
     Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
     Raises InputError if the file is absent or not Parquet.
     """
-    return _open(path, lambda file: _columns(_unpacked(file, path)))
+    try:
+        return _open(path, lambda file: _columns(_unpacked(file, path)))
+    except InputError as error:
+        raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
 
 
 def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
@@ -154,6 +160,15 @@ def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
         allowed = f"at most {_MOST_VALUES} values"
         raise InputError(Problem(str(path), f"{rows} rows of {columns} columns", allowed))
     return file.read(use_threads=False)
+
+
+def remake(path: Path | str) -> str:
+    """What to do about an artefact that is of no use, for the message of who came upon it."""
+    folder = Path(path).parent
+    if re.fullmatch(r"\d+-of-\d+", Path(path).stem):
+        folder = folder.parent
+    command = shlex.join(["kinacc", "check-results", str(folder)])
+    return f"`{command}` prints the command that makes it again"
 
 
 def read_schema(path: Path | str) -> pa.Schema:

@@ -172,7 +172,7 @@ def check_results(folder: str, as_json: bool, config: tuple[str, ...]) -> None:
     from kinacc.workflow.plan import planned
     from kinacc.workflow.verification import check
 
-    sys.exit(check.main(folder, as_json, planned(config) if config else None))
+    sys.exit(check.main(folder, as_json, planned(config) if config else None, config))
 
 
 @main.command("draw-robots")

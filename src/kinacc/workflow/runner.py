@@ -122,7 +122,7 @@ def _content(name: str, paths: str | Sequence[str]) -> str:
     """
     if isinstance(paths, str):
         return provenance.file_hash(paths)
-    from kinacc.artifacts.store import read_metadata
+    from kinacc.artifacts.store import read_metadata, remake
 
     origins = {tuple(sorted(read_metadata(path).items())) for path in paths}
     if len(origins) != 1:
@@ -131,7 +131,7 @@ def _content(name: str, paths: str | Sequence[str]) -> str:
                 ", ".join(paths),
                 f"parts of {name} made from {len(origins)} different states",
                 "parts of one run",
-                "run all parts again",
+                remake(paths[0]),
             )
         )
     return provenance.inputs_hash({"origin": repr(origins.pop())})

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator
+import os
+import shlex
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +17,11 @@ from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES
-from kinacc.workflow.plan import Plan
+from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, maker_of
+from kinacc.workflow.plan import RESULTS, Plan
 from kinacc.workflow.verification.conformity import check_file
-from kinacc.workflow.verification.lineage import check_lineage, made_without, parts
+from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts
+from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_command
 from kinacc.workflow.verification.pictures import check_picture
 from kinacc.workflow.verification.rules import contradictions
 
@@ -27,12 +30,19 @@ FORMATS = ("svg", "png", "pdf")
 
 @dataclass(frozen=True)
 class DatasetReport:
-    """What was found in one data set's folder: files checked, problems, and notes beside them."""
+    """What was found in one data set's folder: files checked, problems, and notes beside them.
+
+    ``doubts`` are the stages the problems leave in doubt, ``marks`` the provenance of every
+    readable table. ``advice`` says what to do where no stage of the study can help.
+    """
 
     name: str
     checked: tuple[str, ...]
     problems: tuple[Problem, ...]
     notes: tuple[str, ...] = ()
+    doubts: frozenset[Doubt] = frozenset()
+    marks: Marks = field(default_factory=dict, repr=False)
+    advice: str = ""
 
     def to_dict(self) -> dict:
         """Plain values for JSON."""
@@ -47,11 +57,15 @@ class DatasetReport:
 
 @dataclass(frozen=True)
 class Report:
-    """What was found in a results folder; ``ok`` if there is no problem anywhere."""
+    """What was found in a results folder; ``ok`` if there is no problem anywhere.
+
+    ``advice`` says what to do about the problems.
+    """
 
     folder: str
     datasets: tuple[DatasetReport, ...]
     problems: tuple[Problem, ...] = ()
+    advice: str = ""
 
     @property
     def ok(self) -> bool:
@@ -69,6 +83,7 @@ class Report:
             "ok": self.ok,
             "folder": self.folder,
             "problems": [_plain(problem) for problem in self.problems],
+            "advice": self.advice,
             "datasets": [each.to_dict() for each in self.datasets],
         }
 
@@ -81,33 +96,45 @@ class Report:
             lines.append(f"{each.name}: {len(each.checked)} files checked, {found}")
             lines += [f"  - {problem}" for problem in each.problems]
             lines += [f"  note: {note}" for note in each.notes]
+        lines += [self.advice] if self.advice else []
         return "\n".join(lines)
 
 
-def check_results(results: Path | str, plan: Plan | None = None) -> Report:
+def check_results(
+    results: Path | str, plan: Plan | None = None, configs: Sequence[str] = ()
+) -> Report:
     """Check every data set's folder below ``results``.
 
     Every artefact present, its schema, units and provenance keys as the contract says, values in
     their limits, rows and tables consistent, inputs still those it was made from, claims readable,
-    pictures whole. With a ``plan`` (the configuration) also that its data sets are all there and
-    that the artefacts were made with these settings and files.
+    pictures whole. With a ``plan`` (the configuration, read from the files ``configs``) also that
+    its data sets are all there and that the artefacts were made with these settings and files.
     """
     folder = Path(results)
+    if not folder.name.strip("."):
+        folder = Path(os.path.abspath(folder))
     if not folder.is_dir():
-        problem = Problem(str(folder), "no such folder", "a results folder", "run snakemake -c2")
+        is_there = folder.name == RESULTS and folder.parent.is_dir()
+        fix = f"run {shlex.join(workflow_command(configs, folder.parent))}" if is_there else ""
+        problem = Problem(str(folder), "no such folder", "a results folder", fix)
         return Report(str(folder), (), (problem,))
     if (folder / f"{CAMPAIGN[0].name}.parquet").is_file():
-        return Report(str(folder), (check_campaign(folder),))
+        return _advised(Report(str(folder), (check_campaign(folder),)), folder)
     if folder.name == TOURNAMENT:
-        return Report(str(folder), (check_tournament(folder),))
+        return _advised(Report(str(folder), (check_tournament(folder),)), folder)
     if _is_dataset(folder):
-        return Report(str(folder), (check_dataset(folder, plan),))
+        if plan is not None and folder.name not in plan.datasets:
+            allowed = ", ".join(plan.datasets)
+            problem = Problem(str(folder), "no data set of the configuration", allowed)
+            return Report(str(folder), (), (problem,))
+        report = Report(str(folder), (check_dataset(folder, plan),))
+        return _advised(report, folder.parent, plan, configs)
     names = sorted(
         path.name
         for path in folder.iterdir()
         if path.is_dir() and not path.name.startswith(".") and path.name != TOURNAMENT
     )
-    problems = []
+    problems, missing = [], []
     if plan is not None:
         missing = [name for name in plan.datasets if name not in names]
         problems = [Problem(str(folder / name), "no such folder: not run") for name in missing]
@@ -117,7 +144,27 @@ def check_results(results: Path | str, plan: Plan | None = None) -> Report:
     reports = [check_dataset(folder / name, plan) for name in names]
     if (folder / TOURNAMENT).is_dir():
         reports.append(check_tournament(folder / TOURNAMENT))
-    return Report(str(folder), tuple(reports), tuple(problems))
+    report = Report(str(folder), tuple(reports), tuple(problems))
+    return _advised(report, folder, plan, configs, missing)
+
+
+def _advised(
+    report: Report,
+    folder: Path,
+    plan: Plan | None = None,
+    configs: Sequence[str] = (),
+    missing: Sequence[str] = (),
+) -> Report:
+    """The report with what to do about its problems in the results folder."""
+    said = [each.advice for each in report.datasets if each.problems and each.advice]
+    wrong = [each for each in report.datasets if each.problems and not each.advice]
+    doubts: Mapping[str, Collection[Doubt]] = dict.fromkeys(missing, ()) | {
+        each.name: each.doubts for each in wrong
+    }
+    if doubts:
+        marks = {each.name: each.marks for each in wrong}
+        said.append(remedy(folder, doubts, marks, plan, configs))
+    return replace(report, advice="\n".join(said))
 
 
 def _is_dataset(folder: Path) -> bool:
@@ -127,12 +174,14 @@ def _is_dataset(folder: Path) -> bool:
 
 def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
     """Check the folder of one data set; see :func:`check_results`."""
-    checked, problems, tables, marks = [], [], {}, {}
+    checked, found, tables, marks = [], [], {}, {}
     for name, path in _tables_there(folder):
         checked.append(str(path))
-        columns, found = check_file(path, ARTEFACTS[name])
-        problems += found
-        if path.parent != folder:
+        is_part = path.parent != folder
+        doubt = Doubt(maker_of(name).name, path.stem if is_part else None)
+        columns, wrong = check_file(path, ARTEFACTS[name])
+        found += [(problem, (doubt,)) for problem in wrong]
+        if is_part:
             continue  # parts of a table are held to its schema; the whole is held to the rules
         if columns is not None:
             tables[name] = columns
@@ -146,15 +195,23 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         f"{reason}"
         for reason in dict.fromkeys(r for n, r in left_out.items() if not STAGES[n].measured)
     ]
-    problems += _missing(folder, left_out)
-    for picture in _pictures(folder, plan, left_out):
+    found += _missing(folder, left_out)
+    for name, picture in _pictures(folder, plan, left_out):
         checked += [str(picture)] if picture.exists() else []
-        problems += check_picture(picture)
-    problems += [_placed(folder, problem) for problem in contradictions(tables)]
-    found, said = check_lineage(folder, marks, plan)
+        found += [(problem, (Doubt(name),)) for problem in check_picture(picture)]
+    for problem, names in contradictions(tables):
+        doubts = tuple(Doubt(maker_of(name).name) for name in names)
+        found.append((_placed(folder, problem), doubts))
+    of_lineage, said = check_lineage(folder, marks, plan)
+    found += of_lineage
     leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
     return DatasetReport(
-        folder.name, tuple(checked), tuple(problems + found), (*notes, *said, *leftovers)
+        folder.name,
+        tuple(checked),
+        tuple(problem for problem, _ in found),
+        (*notes, *said, *leftovers),
+        frozenset(doubt for _, doubts in found for doubt in doubts),
+        marks,
     )
 
 
@@ -169,12 +226,15 @@ def check_tournament(folder: Path) -> DatasetReport:
                 marks[name] = store.read_metadata(path)
     gathered = [each.name for each in tournament_tables.ALL[1:]]
     problems += [
-        Problem(str(folder / f"{name}.parquet"), "missing", fix="run kinacc tournament again")
+        Problem(str(folder / f"{name}.parquet"), "missing")
         for name in gathered
         if name not in marks and any(other in marks for other in gathered)
     ]
     leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
-    return DatasetReport(folder.name, tuple(checked), tuple(problems), tuple(leftovers))
+    advice = "To mend the tournament, run `kinacc tournament` again with the options it had."
+    return DatasetReport(
+        folder.name, tuple(checked), tuple(problems), tuple(leftovers), advice=advice
+    )
 
 
 def check_campaign(folder: Path) -> DatasetReport:
@@ -183,7 +243,7 @@ def check_campaign(folder: Path) -> DatasetReport:
     for artefact in CAMPAIGN:
         path = folder / f"{artefact.name}.parquet"
         if not path.is_file():
-            problems.append(Problem(str(path), "missing", fix="run kinacc campaign report again"))
+            problems.append(Problem(str(path), "missing"))
             continue
         checked.append(str(path))
         tables[artefact.name], found = check_file(path, artefact)
@@ -191,16 +251,21 @@ def check_campaign(folder: Path) -> DatasetReport:
         with suppress(InputError):
             marks.append(store.read_metadata(path))
     if any(each != marks[0] for each in marks):
-        fix = "run kinacc campaign report again"
-        problems.append(Problem(str(folder), "tables of different states of a campaign", fix=fix))
+        problems.append(Problem(str(folder), "tables of different states of a campaign"))
     if not problems:
         problems += campaign_tables.contradictions(tables)
-    return DatasetReport(folder.name, tuple(checked), tuple(problems), ())
+    advice = "To mend this, run `kinacc campaign report` again: it writes all of its files anew."
+    return DatasetReport(folder.name, tuple(checked), tuple(problems), advice=advice)
 
 
-def main(folder: str, as_json: bool = False, plan: Plan | None = None) -> int:
+def main(
+    folder: str,
+    as_json: bool = False,
+    plan: Plan | None = None,
+    configs: Sequence[str] = (),
+) -> int:
     """Print what is found in a results folder; the exit code."""
-    report = check_results(folder, plan)
+    report = check_results(folder, plan, configs)
     print(json.dumps(report.to_dict(), indent=2) if as_json else report)
     return report.exit_code
 
@@ -242,9 +307,12 @@ def _without_map(folder: Path, marks: dict) -> dict[str, str]:
     return dict.fromkeys(("accuracy_map", "fig3"), "the claims were made without a map")
 
 
-def _missing(folder: Path, left_out: Collection[str]) -> list[Problem]:
+def _missing(folder: Path, left_out: Collection[str]) -> list[Found]:
     return [
-        Problem(str(folder / f"{name}.parquet"), "missing", fix=f"made by {stage.message}")
+        (
+            Problem(str(folder / f"{name}.parquet"), "missing", fix=f"made by {stage.message}"),
+            (Doubt(stage.name),),
+        )
         for stage in STAGES.values()
         if not (stage.on_request or stage.scattered or stage.is_figure or stage.name in left_out)
         for name in stage.outputs
@@ -252,11 +320,14 @@ def _missing(folder: Path, left_out: Collection[str]) -> list[Problem]:
     ]
 
 
-def _pictures(folder: Path, plan: Plan | None, left_out: Collection[str]) -> Iterator[Path]:
+def _pictures(
+    folder: Path, plan: Plan | None, left_out: Collection[str]
+) -> Iterator[tuple[str, Path]]:
     formats = FORMATS if plan is None else plan.formats
     for name, stage in STAGES.items():
         if stage.is_figure and name not in left_out:
-            yield from (folder / FIGURE_FOLDER / f"{name}.{kind}" for kind in formats)
+            for kind in formats:
+                yield name, folder / FIGURE_FOLDER / f"{name}.{kind}"
 
 
 def _leftovers(folder: Path) -> list[Path]:

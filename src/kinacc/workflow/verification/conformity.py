@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ def check_file(
         schema = store.read_schema(path)
         columns = store.read(path)
     except InputError as error:
-        return None, list(error.problems)
+        return None, [replace(problem, fix="") for problem in error.problems]
     structure = _structure(path, artefact, schema)
     problems = [*structure, *_provenance(path, schema.metadata or {})]
     known = {column.name: column for column in artefact.for_joints(joint_count(artefact, columns))}

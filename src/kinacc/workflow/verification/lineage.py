@@ -6,53 +6,62 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
+from kinacc import __version__
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import STAGES, Stage
+from kinacc.workflow.catalogue import STAGES, Stage, maker_of
 from kinacc.workflow.plan import Plan
 from kinacc.workflow.runner import Job, stage_provenance
+from kinacc.workflow.verification.mending import Doubt, Marks
 
-Marks = Mapping[str, Mapping[str, str]]
 Inputs = dict[str, "str | list[str]"]
 
-_AGAIN = "run the workflow again: it remakes what is out of date"
+# A problem, and the stages whose files it leaves in doubt.
+Found = tuple[Problem, tuple[Doubt, ...]]
 
 
 def check_lineage(
     folder: Path, marks: Marks, plan: Plan | None = None
-) -> tuple[list[Problem], list[str]]:
+) -> tuple[list[Found], list[str]]:
     """Problems and notes on the provenance of the tables in a data set's folder.
 
     ``marks`` holds the provenance of every readable table by artefact. Without a ``plan``, files
     from outside the folder (measurements, a robot of one's own) and configuration are not known.
     """
-    problems = list(_one_version(folder, marks))
+    found = list(_one_version(folder, marks))
     older: list[str] = []
-    of_robot_file: dict[str, list[Problem]] = {}
+    held: dict[str, _Held] = {}
+    of_robot_file: dict[str, _Held] = {}
     for stage in STAGES.values():
         made = [name for name in stage.outputs if name in marks]
-        problems += _one_run(folder, made, marks)
+        torn = list(_one_run(folder, made, marks))
+        found += [(problem, (Doubt(stage.name),)) for problem in torn]
         if stage.scattered and plan is not None:
-            problems += _parts_held_to_settings(folder, stage, plan)
+            found += _parts_held_to_settings(folder, stage, plan)
         if not made or stage.scattered or (plan is None and "measurements_file" in _roles(stage)):
             continue
-        found, is_current = _held_to_inputs(folder, stage, marks[made[0]], plan)
-        if plan is None and stage.files:
-            of_robot_file[made[0]] = found
-        else:
-            problems += found
-        older += [] if is_current else made
+        own = _held_to_inputs(folder, stage, marks[made[0]], plan)
+        own = own._replace(vouched_for=set() if torn else own.vouched_for)
+        (of_robot_file if plan is None and stage.files else held)[made[0]] = own
+        older += [] if own.is_current else made
     notes = []
-    if len(of_robot_file) > 1 and all(of_robot_file.values()):
+    if len(of_robot_file) > 1 and all(own.problems for own in of_robot_file.values()):
         # One robot serves all stages: where every one that reads it differs, it has a file.
         names = ", ".join(of_robot_file)
         notes.append(f"{folder}: its robot file is not checked without --config: {names}")
     else:
-        problems += [each for found in of_robot_file.values() for each in found]
+        held |= of_robot_file
+    sound = set().union(*(own.vouched_for for own in held.values()))
+    for name, own in held.items():
+        stage = maker_of(name).name
+        makers = {maker_of(each).name for each in own.in_doubt - sound}
+        doubts = tuple(map(Doubt, (stage, *sorted(makers))))
+        found += [(problem, doubts) for problem in own.problems]
     if older:
         names = ", ".join(older)
         notes.append(f"{folder}: made with other code or library versions than installed: {names}")
-    return problems, notes
+    return found, notes
 
 
 def made_without(folder: Path, artefact: str, marks: Marks) -> bool:
@@ -88,15 +97,21 @@ def _roles(stage: Stage) -> set[str]:
     return {"measurements_file"} if "measurements.file.path" in stage.files else set()
 
 
-def _one_version(folder: Path, marks: Marks) -> Iterator[Problem]:
+def _one_version(folder: Path, marks: Marks) -> Iterator[Found]:
     for key in ("kinacc_version", "seed"):
         groups: dict[str, list[str]] = {}
         for name, own in marks.items():
             if key in own:
                 groups.setdefault(own[key], []).append(name)
-        if len(groups) > 1:
-            said = "; ".join(f"{value} in {', '.join(names)}" for value, names in groups.items())
-            yield Problem(str(folder), f"{key} {said}", "the same in all artefacts", _AGAIN)
+        if len(groups) < 2:
+            continue
+        said = "; ".join(f"{value} in {', '.join(names)}" for value, names in groups.items())
+        problem = Problem(str(folder), f"{key} {said}", "the same in all artefacts")
+        right = __version__ if __version__ in groups else max(groups, key=lambda v: len(groups[v]))
+        stages = {
+            maker_of(name).name for value in groups if value != right for name in groups[value]
+        }
+        yield problem, tuple(map(Doubt, sorted(stages)))
 
 
 def _one_run(folder: Path, made: Sequence[str], marks: Marks) -> Iterator[Problem]:
@@ -105,13 +120,23 @@ def _one_run(folder: Path, made: Sequence[str], marks: Marks) -> Iterator[Proble
             if marks[name].get(key, value) != value:
                 where = str(folder / f"{name}.parquet")
                 what = f"{key} {marks[name][key]} differs from {value} of {made[0]}.parquet"
-                yield Problem(where, what, "tables of one stage are made together", _AGAIN)
+                yield Problem(where, what, "tables of one stage are made together")
 
 
-def _held_to_inputs(
-    folder: Path, stage: Stage, own: Mapping[str, str], plan: Plan | None
-) -> tuple[list[Problem], bool]:
-    """Problems of one stage's provenance, and whether it was made with the code installed."""
+class _Held(NamedTuple):
+    """What the provenance of one stage says of it and of its inputs.
+
+    ``vouched_for`` are inputs that are those it was made from; of those ``in_doubt`` one or
+    another is not. ``is_current`` is whether it was made with the code installed.
+    """
+
+    problems: list[Problem]
+    vouched_for: set[str]
+    in_doubt: set[str]
+    is_current: bool
+
+
+def _held_to_inputs(folder: Path, stage: Stage, own: Mapping[str, str], plan: Plan | None) -> _Held:
     where = str(folder / f"{stage.outputs[0]}.parquet")
     settings, seed = {}, 0
     candidates = _candidates(folder, stage)
@@ -125,28 +150,36 @@ def _held_to_inputs(
             if all(Path(each).is_file() for each in files.values())
         ]
     if not candidates:
-        return [], True
+        return _Held([], set(), set(), True)
+    artefacts = {name for name in candidates[0] if not name.endswith("_file")}
     problems = []
     try:
         expected = [_expected(stage, inputs, settings, seed) for inputs in candidates]
     except InputError as error:
-        return list(error.problems), True
-    if own.get("inputs_hash") not in [each["inputs_hash"] for each in expected]:
+        return _Held(list(error.problems), set(), artefacts, True)
+    matching = [
+        inputs
+        for inputs, each in zip(candidates, expected, strict=True)
+        if each["inputs_hash"] == own.get("inputs_hash")
+    ]
+    if not matching:
         names = ", ".join(candidates[0]) or "nothing"
-        fix = _AGAIN
+        fix = ""
         if plan is None and stage.files:
-            fix += "; if the robot is a file of your own, give the configuration too"
+            fix = "if the robot is a file of your own, give the configuration too"
         what = f"inputs_hash {own.get('inputs_hash')} is not that of the inputs now there ({names})"
         problems.append(Problem(where, what, expected[0]["inputs_hash"], fix))
     if plan is not None and own.get("config_hash") != expected[0]["config_hash"]:
         what = f"config_hash {own.get('config_hash')}: made with another configuration"
-        problems.append(Problem(where, what, expected[0]["config_hash"], _AGAIN))
+        problems.append(Problem(where, what, expected[0]["config_hash"]))
     if plan is not None and own.get("seed") != str(seed):
-        problems.append(Problem(where, f"seed {own.get('seed')}", str(seed), _AGAIN))
-    return problems, own.get("code_hash") == expected[0]["code_hash"]
+        problems.append(Problem(where, f"seed {own.get('seed')}", str(seed)))
+    vouched = set(matching[0]) if matching and not problems else set()
+    is_current = own.get("code_hash") == expected[0]["code_hash"]
+    return _Held(problems, vouched, set() if matching else artefacts, is_current)
 
 
-def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[Problem]:
+def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[Found]:
     """Parts of a scattered table that were made with other settings than the plan's."""
     from kinacc.artifacts.store import read_metadata
 
@@ -159,7 +192,7 @@ def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[
             continue  # an unreadable part is reported where parts are held to the contract
         if own != wanted:
             what = f"config_hash {own}: made with another configuration"
-            yield Problem(str(path), what, wanted, _AGAIN)
+            yield Problem(str(path), what, wanted), (Doubt(stage.name, part),)
 
 
 def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dict[str, object]:

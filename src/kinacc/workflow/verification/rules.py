@@ -12,10 +12,11 @@ from kinacc.workflow.verification.rule import Tables
 RULES = (*calibration_rules.RULES, *assessment_rules.RULES)
 
 
-def contradictions(tables: Tables) -> list[Problem]:
-    """Everything the tables of one data set say that cannot be."""
-    problems: list[Problem] = []
-    for needed, rule in RULES:
-        if all(name in tables and len(next(iter(tables[name].values()))) for name in needed):
-            problems += rule(tables)
-    return problems
+def contradictions(tables: Tables) -> list[tuple[Problem, tuple[str, ...]]]:
+    """Everything the tables of one data set say that cannot be, with the tables it may lie in."""
+    return [
+        (problem, needed)
+        for needed, rule in RULES
+        if all(name in tables and len(next(iter(tables[name].values()))) for name in needed)
+        for problem in rule(tables)
+    ]

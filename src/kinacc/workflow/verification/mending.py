@@ -1,0 +1,151 @@
+"""The command that makes a results folder good again, as text to be typed.
+
+A plain run of the workflow is no remedy: Snakemake goes by the dates of files, so it leaves a
+changed artefact as it is, or takes it for a newer input and carries the change on.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from kinacc.errors import InputError
+from kinacc.artifacts.provenance import config_hash
+from kinacc.workflow.catalogue import STAGES, maker_of
+from kinacc.workflow.plan import RESULTS, Plan, planned
+
+CONFIG = "config.yaml"
+
+Marks = Mapping[str, Mapping[str, str]]
+
+
+class Doubt(NamedTuple):
+    """A stage whose files cannot be relied on; of a scattered stage those of one ``part``."""
+
+    stage: str
+    part: str | None = None
+
+
+def remedy(
+    folder: Path,
+    doubts: Mapping[str, Collection[Doubt]],
+    marks: Mapping[str, Marks],
+    plan: Plan | None,
+    configs: Sequence[str] = (),
+) -> str:
+    """Sentence and command, on a line of its own, that mend a results folder.
+
+    ``doubts`` and ``marks`` (the provenance of every readable table by artefact) are those of every
+    data set with a problem; ``configs`` are the files of the ``plan``. Where no plan is given,
+    that of config.yaml serves if the tables not in doubt were made with it; else the configuration
+    is asked for, because another one would remake everything differently.
+    """
+    if plan is None:
+        plan = _beside(folder, doubts, marks)
+    if plan is None or not set(doubts) <= set(plan.datasets):
+        again = shlex.join(["kinacc", "check-results", str(folder), "--config", CONFIG])
+        return (
+            "Give the configuration these results were made with, and the command that mends them "
+            f"is printed: {again}, and --config for each further file."
+        )
+    made, unmade = _files(folder, doubts, plan)
+    commands = [shlex.join(["rm", *unmade])] if unmade else []
+    if folder.name == RESULTS:
+        commands.append(_snakemake(folder, configs, made))
+    else:
+        commands += _by_hand(folder, doubts, plan, configs)
+    return f"To mend this, run\n  {' && '.join(commands)}"
+
+
+def workflow_command(configs: Sequence[str], folder: Path | str = ".") -> list[str]:
+    """Words of the command that runs the workflow from here, with its results in ``folder``."""
+    words, is_here = ["snakemake", "-c2"], os.path.samefile(folder, ".")
+    near, own = Path(folder) / "Snakefile", Path(__file__).parents[3] / "Snakefile"
+    if not is_here or (own.is_file() and not near.is_file()):
+        words += ["-s", str(near if near.is_file() else own)]
+    if not is_here:
+        words += ["--directory", str(folder)]
+    if configs and not (is_here and list(configs) == [CONFIG]):
+        words += ["--configfile", *configs]
+    return words
+
+
+def _snakemake(folder: Path, configs: Sequence[str], made: Sequence[str]) -> str:
+    words = workflow_command(configs, folder.parent)
+    return shlex.join([*words, "--forcerun", *made] if made else words)
+
+
+def _by_hand(
+    folder: Path, doubts: Mapping[str, Collection[Doubt]], plan: Plan, configs: Sequence[str]
+) -> list[str]:
+    """Commands for a folder that only ``kinacc run --results`` leaves."""
+    options = [word for name in configs for word in ("--config", name)]
+    commands = []
+    for dataset, own in doubts.items():
+        wanted = {doubt.stage for doubt in own}
+        for name, stage in plan.stages(dataset).items():
+            if name in wanted or (wanted & _above(name) and not stage.on_request):
+                words = ["kinacc", "run", name, "--dataset", dataset, *options]
+                commands.append(shlex.join([*words, "--results", str(folder)]))
+    return commands
+
+
+def _files(
+    folder: Path, doubts: Mapping[str, Collection[Doubt]], plan: Plan
+) -> tuple[list[str], list[str]]:
+    """One file of every job to be run again, and files in doubt that no job makes.
+
+    What follows from a job is run again with it and needs no mention.
+    """
+    made, unmade = [], []
+    for dataset, own in doubts.items():
+        stages = plan.stages(dataset)
+        wanted = {doubt.stage for doubt in own}
+        for doubt in sorted(
+            own, key=lambda each: (list(STAGES).index(each.stage), each.part or "")
+        ):
+            names = plan.part_names(doubt.stage, dataset)
+            if doubt.stage not in stages or (doubt.part and doubt.part not in names):
+                paths = plan.outputs(doubt.stage, dataset, doubt.part).values()
+                here = [folder / Path(path).relative_to(plan.results) for path in paths]
+                unmade += [os.path.relpath(path) for path in here if path.exists()]
+            elif not wanted & _above(doubt.stage):
+                parts = [doubt.part] if doubt.part else names
+                made += [next(iter(plan.outputs(doubt.stage, dataset, p).values())) for p in parts]
+    return list(dict.fromkeys(made)), list(dict.fromkeys(unmade))
+
+
+def _order(doubt: Doubt) -> tuple[int, str]:
+    return list(STAGES).index(doubt.stage), doubt.part or ""
+
+
+def _above(name: str) -> set[str]:
+    """Names of all stages that a stage follows from."""
+    stage = STAGES[name]
+    direct = {maker_of(each).name for each in (*stage.inputs, *stage.optional)}
+    return direct.union(*map(_above, direct))
+
+
+def _beside(
+    folder: Path, doubts: Mapping[str, Collection[Doubt]], marks: Mapping[str, Marks]
+) -> Plan | None:
+    """The plan of config.yaml, if the folder's workflow runs here and the tables follow from it."""
+    if not folder.is_dir() or not os.path.samefile(folder.parent, "."):
+        return None
+    try:
+        plan = planned([CONFIG])
+    except InputError:
+        return None
+    for dataset, own in marks.items():
+        if dataset not in plan.datasets:
+            return None
+        doubtful = {doubt.stage for doubt in doubts.get(dataset, ())}
+        for artefact, known in own.items():
+            name = maker_of(artefact).name
+            expected = config_hash(plan.settings(name, dataset))
+            if name not in doubtful and known.get("config_hash") != expected:
+                return None
+    return plan
