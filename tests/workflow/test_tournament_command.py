@@ -116,6 +116,22 @@ def test_results_of_a_tournament_are_checked(results):
     assert [problem.what for problem in check_results(folder).datasets[0].problems] == ["missing"]
 
 
+@pytest.mark.parametrize("where", ["tournament_chunk/1-of-2", "tournament_verdicts"])
+def test_a_damaged_tournament_is_mended_by_running_it_again(results, where):
+    run(results, "--parts", "2")
+    before, folder = left(results), results / "tournament"
+    path = folder / f"{where}.parquet"
+    content = bytearray(path.read_bytes())
+    content[8:60] = bytes(52)  # its provenance, at the end, stays readable
+    path.write_bytes(content)
+    found = check_results(folder)
+    assert not found.ok
+    assert "kinacc tournament" in str(found)
+    assert run(results, "--parts", "2").exit_code == 0
+    assert check_results(folder).ok
+    assert left(results) == before
+
+
 def test_everything_wrong_is_said(results):
     (results / "mh180" / "assessment_points.parquet").unlink()
     said = run(results)

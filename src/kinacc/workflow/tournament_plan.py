@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from kinacc.artifacts.provenance import stage_code_hash
 from kinacc.artifacts.tournament_tables import FOLDER
@@ -118,12 +119,17 @@ class TournamentPlan:
 
 
 def is_done(job: Job) -> bool:
-    """Whether the files of a job are there, made from the same inputs, settings and code."""
+    """Whether the files of a job are there, whole, made from the same inputs, settings and code."""
+    from kinacc.artifacts.conformity import check_file
+    from kinacc.artifacts.contract import ARTEFACTS
     from kinacc.artifacts.store import read_metadata
 
     wanted = {name: str(value) for name, value in stage_provenance(job).items()}
     try:
-        return all(read_metadata(path) == wanted for path in job.outputs.values())
+        return all(
+            read_metadata(path) == wanted and not check_file(Path(path), ARTEFACTS[name])[1]
+            for name, path in job.outputs.items()
+        )
     except InputError:
         return False
 
