@@ -120,9 +120,9 @@ class TournamentPlan:
 
 def is_done(job: Job) -> bool:
     """Whether the files of a job are there, whole, made from the same inputs, settings and code."""
-    from kinacc.artifacts.conformity import check_file
     from kinacc.artifacts.contract import ARTEFACTS
     from kinacc.artifacts.store import read_metadata
+    from kinacc.workflow.verification.conformity import check_file
 
     wanted = {name: str(value) for name, value in stage_provenance(job).items()}
     try:

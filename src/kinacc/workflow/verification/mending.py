@@ -12,8 +12,8 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from kinacc.errors import InputError
 from kinacc.artifacts.provenance import config_hash
+from kinacc.errors import InputError
 from kinacc.workflow.catalogue import STAGES, maker_of
 from kinacc.workflow.plan import RESULTS, Plan, planned
 
