@@ -69,7 +69,7 @@ def _spoken_of(arm: Calibration, given: Mapping, box, inside) -> np.ndarray:
     while True:
         drawn = spread(arm.robot, count, box, inside, arm.point(given["point"]))
         if arm.choice == "vec":  # coupled joints have no box of their own
-            drawn = drawn[~arm.outside_range(drawn @ arm.robot.joint_map.T).any(axis=1)]
+            drawn = drawn[~arm.outside_range(arm.robot.dh_joints(drawn)).any(axis=1)]
         if len(drawn) >= wanted:
             return drawn[:wanted]
         if count >= _MOST_DRAWS * wanted:

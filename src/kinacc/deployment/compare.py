@@ -97,7 +97,7 @@ def compare(
         parameters = _parameters(first, second)
         test = _test(first, second)
     before, after = (
-        arm.pose(q_rad @ arm.robot.joint_map.T, None, "base", FLANGE) for arm in (first, second)
+        arm.pose(arm.robot.dh_joints(q_rad), None, "base", FLANGE) for arm in (first, second)
     )
     plain = _difference(before, after)
     slopes = _frame_slopes(before)
@@ -258,7 +258,7 @@ def _scatter(arm: Calibration, q_rad: np.ndarray) -> np.ndarray | None:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fit."""
     if arm.known is None:
         return None
-    return sensitivity(arm, q_rad @ arm.robot.joint_map.T, None, "base", FLANGE) @ arm.root
+    return sensitivity(arm, arm.robot.dh_joints(q_rad), None, "base", FLANGE) @ arm.root
 
 
 def _without_frames(scatter: np.ndarray, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -148,7 +148,7 @@ class Goals:
         """Revolute joints on the turn nearest to the given joints that lies within the box."""
         robot = self.calibration.robot
         lower, upper = self.box
-        near = self.near[rows] @ robot.joint_map.T
+        near = robot.dh_joints(self.near[rows])
         turn = 2.0 * np.pi * ~robot.dh.prismatic
         base = q_dh + turn * np.rint((near - q_dh) / (2.0 * np.pi))
         best, lowest = base, np.full(base.shape, np.inf)
@@ -200,7 +200,7 @@ class Goals:
         low, high = robot.q_min_rad, robot.q_max_rad
         count = _FEW_STARTS if self.has_few_axes else _STARTS
         share = points("sobol", count, robot.dh.joints)
-        starts = (low + share * (high - low)) @ robot.joint_map.T
+        starts = robot.dh_joints(low + share * (high - low))
         found = np.full((len(rows), count, robot.dh.joints), np.nan)
         functions = functions_of(self.plain, None)
         for number, start in enumerate(starts):

@@ -54,7 +54,7 @@ def predict(
     ``s`` (n, k): travel directions, unknown where not given. ``point``: a target by name or
     ``flange``; the tool where not given. Raises InputError for an unknown frame or point.
     """
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float)) @ calibration.robot.joint_map.T
+    q_rad = calibration.robot.dh_joints(np.atleast_2d(q_rad))
     count, outside = len(q_rad), calibration.outside_range(q_rad)
     silent = outside.any(axis=1) & isinstance(calibration.model, VECModel)
     said = np.flatnonzero(~silent)

@@ -12,7 +12,7 @@ from kinacc.kinematics import dh as _dh
 from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
 from kinacc.kinematics.region import Cylinder, Orientations
-from kinacc.kinematics.robot import Robot, dh_angles
+from kinacc.kinematics.robot import Robot
 from kinacc.study.accuracy_map import ModelPair, errors_at, joints_of
 
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
@@ -106,7 +106,7 @@ def in_joints(
             )
             raise InputError(problem)
         unit = region.points(sequence, block, len(lower), first)
-        q_rad = dh_angles(robot, lower + unit * (upper - lower))
+        q_rad = robot.dh_joints(lower + unit * (upper - lower))
         good = limits.within(q_rad, pair.vec.q_min_rad, pair.vec.q_max_rad)
         if cylinder is not None:
             tool = compose(robot.base, compose(_dh.forward(pair.dh, q_rad), pair.dh_tool))

@@ -11,7 +11,7 @@ from kinacc.errors import InputError
 from kinacc.workflow.contradictions import load
 from kinacc.workflow.plan import planned
 
-PAPER = Path(__file__).parents[2] / "config.yaml"
+PAPER = Path(__file__).parents[3] / "config.yaml"
 
 
 def own(tmp_path: Path, robot: Path, more: str = "") -> list[Path]:

@@ -95,7 +95,7 @@ def test_reach_is_the_makers(name):
 
 # --- measured FANUC -------------------------------------------------------------------------------
 
-POSES = Path(__file__).parents[3] / "shared" / "data" / "fanuc_r2000ic" / "poses.csv"
+POSES = Path(__file__).parents[4] / "shared" / "data" / "fanuc_r2000ic" / "poses.csv"
 
 
 def unmodelled_rms_mm(signs) -> float:

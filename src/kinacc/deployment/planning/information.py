@@ -63,7 +63,7 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     count = len(names)
     blank = Uncertainty(names, np.eye(count), np.zeros((0, count)))
     arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
-    slopes = _slopes(arm, np.atleast_2d(q_rad) @ robot.joint_map.T, experiment)
+    slopes = _slopes(arm, robot.dh_joints(np.atleast_2d(q_rad)), experiment)
     _, values, right = np.linalg.svd(slopes.reshape(-1, count), full_matrices=False)
     rank = int(np.sum(values > experiment.threshold * values[0]))
     lost = right[rank:] if len(right) == count else _complement(right[:rank])

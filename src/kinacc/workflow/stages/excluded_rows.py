@@ -23,7 +23,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
     reasons = excluded_lines(section)
     used = inputs["measurements"]
-    every = from_columns(used, arm.joint_map)
+    every = from_columns(used, arm)
     models = delivered_models(inputs, arm.dh, every)
     reading, _ = read_excluded(section, arm)
     rows: list[tuple] = []
@@ -34,7 +34,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
             name: np.concatenate([np.asarray(used[name]), left_out[name]]) for name in left_out
         }
         joined["fold"] = np.full(len(joined["pose"]), np.nan)
-        seen = errors(models, from_columns(joined, arm.joint_map).select(slice(len(every), None)))
+        seen = errors(models, from_columns(joined, arm).select(slice(len(every), None)))
         lines = left_out["row"].astype(int).tolist()
         for name in COMPARISONS:
             rows += _rows(name, left_out, lines, reasons, seen[name], count)

@@ -21,7 +21,7 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
     evaluation = settings["evaluation"]
     return fig2.draw(
         model,
-        robot.dh_angles(arm, reported),
+        arm.dh_joints(reported),
         tool_mm=_tool_mm(inputs.get("frames"), evaluation, arm),
         cylinder=evaluation["cylinder"] if evaluation["space"] == "cylinder" else None,
         dataset=settings.get("dataset"),
