@@ -75,7 +75,7 @@ def test_every_base_keeps_its_session_in_the_tables():
     again = tables.frames_of(columns, "dh", seen.target_names, seen.session_names)
     np.testing.assert_allclose(again.bases.rotation, found.frames.bases.rotation, atol=1e-12)
     np.testing.assert_array_equal(again.bases.position_mm, found.frames.bases.position_mm)
-    names = uncertainty.of_dh(found, seen.target_names).names
+    names = uncertainty.of_fit(found, seen.target_names).names
     assert [name for name in names if name.endswith(".rx_rad")] == [
         "base.rx_rad",
         "base2.rx_rad",

@@ -48,14 +48,14 @@ def orientations(evaluation: Mapping) -> region.Orientations:
 
 def models(inputs: Mapping, evaluation: Mapping, arm: Robot) -> ModelPair:
     """VEC and DH model with their bases and tools, joints travelling as the settings say."""
-    vec = tables.vec_model(inputs["vec_model"], arm.dh.prismatic)
+    found = tables.models(inputs, arm.dh)
     direction = int(evaluation["travel_direction"])
     return ModelPair(
-        vec,
-        tables.dh_model(inputs["dh_model"], arm.dh.prismatic),
+        found["vec"],
+        found["dh"],
         _tool(inputs, evaluation, arm, "vec"),
         _tool(inputs, evaluation, arm, "dh"),
-        np.full(vec.joints, direction) if direction else None,
+        np.full(arm.dh.joints, direction) if direction else None,
         _vec_base(inputs),
     )
 

@@ -14,7 +14,7 @@ from kinacc.calibration import blind_groups, blind_words, frames
 from kinacc.calibration.dh_fit import joints_anywhere
 from kinacc.calibration.frames import BASE, MOTIONS
 from kinacc.calibration.identified import STRUCTURAL
-from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
+from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal
 from kinacc.geometry import Pose
@@ -99,7 +99,7 @@ def parameter_names(robot: Robot, experiment: Experiment) -> tuple[str, ...]:
     """Names (P,) of what is fitted, base and tool first."""
     free = [
         name
-        for name in dh_parameter_names(robot.dh.joints)
+        for name in robot.dh.parameter_names
         if not name.endswith("beta_rad") or int(name[1]) in experiment.hayati_joints
     ]
     if not experiment.frames_estimated:

@@ -19,7 +19,7 @@ from kinacc.calibration.residuals import (
 )
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.tables import dh_model, vec_model
+from kinacc.kinematics.tables import models
 from kinacc.workflow import calibration_settings as shared
 
 Columns = dict[str, np.ndarray]
@@ -61,10 +61,11 @@ def delivered_models(inputs: Mapping, nominal: DHModel, every: Observations) -> 
         model: tables.frames_of(inputs["frames"], model, every.target_names, every.session_names)
         for model in ("vec", "dh", "nominal")
     }
+    found = models(inputs, nominal)
     return FittedModels(
-        vec=vec_model(inputs["vec_model"], nominal.prismatic),
+        vec=found["vec"],
         vec_frames=frames["vec"],
-        dh=dh_model(inputs["dh_model"], nominal.prismatic),
+        dh=found["dh"],
         dh_frames=frames["dh"],
         nominal=nominal,
         nominal_frames=frames["nominal"],
