@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import simulated
 
-from kinacc.calibration import dh_fit, frames, residuals, tables, uncertainty
+from kinacc.calibration import dh_fit, frames, models, residuals, tables, uncertainty
 from kinacc.calibration.models import Options
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
@@ -87,7 +87,7 @@ def test_every_base_keeps_its_session_in_the_tables():
 def test_errors_of_every_session_are_in_its_own_base():
     seen = observed(simulated.POSE, 3, noise_mm=1e-4)
     span = seen.q_rad.min(axis=0), seen.q_rad.max(axis=0)
-    fitted = residuals.fit_all(seen, ARM.dh, span, OPTIONS)
+    fitted = models.fit_all(seen, ARM.dh, span, OPTIONS)
     errors = residuals.errors(fitted, seen)
     assert np.abs(errors["dh_vs_measured"].position_mm).max() < 0.03
     assert np.abs(errors["dh_vs_vec"].position_mm).max() < 0.03
