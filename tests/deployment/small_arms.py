@@ -70,7 +70,7 @@ def results(name: str, count: int = 80, seed: int = 3) -> dict:
     known = uncertainty.of_fit(dh_found, ("tool",))
     return {
         "vec_model": vec_found.model.to_columns(vec_found.std),
-        "dh_model": dh_found.model.to_columns(dh_found.std),
+        "dh_model": dh_found.model.to_columns(dh_found.std.ravel()),
         "frames": tables.frames_columns(of, ("tool",)),
         "dh_fit": tables.dh_fit_columns(dh_found, known),
         "dh_covariance": tables.covariance_columns(known),

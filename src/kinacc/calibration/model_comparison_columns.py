@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from kinacc.artifacts.allowed import SELECTABLE
 from kinacc.calibration import model_comparison
-from kinacc.calibration.models import COMPARISONS, MEASURED, SELECTABLE, Comparison
+from kinacc.calibration.models import COMPARISONS, MEASURED, Comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
 from kinacc.measurements import folds

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinacc.artifacts import allowed
 from kinacc.calibration import dh_fit, selection, vec_fit
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.constraints import ArmTerms, arm_terms, frame_terms, free_parameters
@@ -48,13 +49,7 @@ class Comparison(NamedTuple):
         return f"{self.model}_vs_{self.reference}"
 
 
-COMPARISONS = (
-    Comparison(MEASURED, VECModel.kind),
-    Comparison(VECModel.kind, DHModel.kind),
-    Comparison(MEASURED, DHModel.kind),
-    Comparison(MEASURED, NOMINAL),
-)
-SELECTABLE = (DHModel.kind, VECModel.kind)  # the plainest first: others have to be worth it
+COMPARISONS = tuple(Comparison(*pair) for pair in allowed.COMPARED)
 
 
 @dataclass(frozen=True)

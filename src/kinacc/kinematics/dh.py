@@ -80,7 +80,8 @@ class DHModel:
         return parameter_jacobian(self, q_rad).reshape(len(q_rad), 6, -1)
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
-        """The table ``dh_model``: parameters and their ``std`` (k, 5), NaN where undetermined."""
+        """The table ``dh_model``: parameters and their ``std`` (5k,), NaN where undetermined."""
+        std = np.reshape(std, (self.joints, len(PARAMETERS)))
         columns = {"joint": np.arange(1, self.joints + 1)}
         columns |= {name: getattr(self, name) for name in PARAMETERS}
         return columns | {f"std_{name}": std[:, i] for i, name in enumerate(PARAMETERS)}

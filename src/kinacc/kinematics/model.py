@@ -52,7 +52,7 @@ class ErrorModel(Protocol):
         """Jacobian (n, 6, P) of ``pose`` in the parameters, rows as in ``joint_jacobian``."""
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
-        """The table ``<kind>_model``; ``std``: standard deviations, NaN where undetermined."""
+        """The table ``<kind>_model``; ``std`` (P,), NaN where undetermined."""
 
     @classmethod
     def from_columns(

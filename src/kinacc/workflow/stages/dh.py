@@ -33,7 +33,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     known = uncertainty.of_fit(fitted, every.target_names)
     told = identified.parameters(fitted, known, observations)
     return {
-        "dh_model": fitted.model.to_columns(fitted.std),
+        "dh_model": fitted.model.to_columns(fitted.std.ravel()),
         "frames": {
             name: np.concatenate([np.asarray(kept[name]), values])
             for name, values in others.items()
