@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from oracles import inverse as brute
 from oracles import kinematics as oracle
+from two_models import two_models
 
 from kinacc.geometry import Pose, rotation_y
 from kinacc.kinematics import dh, region, robot, vec
 from kinacc.kinematics.inverse import Status
 from kinacc.study import accuracy_map as maps
-from kinacc.study.accuracy_map import ModelPair
+from kinacc.study.accuracy_map import Models
 
 ARM = robot.load("mh180")
 SPACE = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, np.pi / 3)
@@ -47,18 +48,18 @@ def tip(frame: np.ndarray, tool: Pose) -> np.ndarray:
     return frame @ end
 
 
-def slow_cell(pair: ModelPair, angle, radius, height):
+def slow_cell(models: Models, angle, radius, height):
     """Largest errors of one cell: every pose solved from the arm's working posture on."""
-    table, model = table_of(pair.dh), pair.vec
+    table, model = table_of(models.by_name["dh"].model), models.by_name["vec"].model
     nominal = table_of(model.dh)
-    travel = np.zeros(6, int) if pair.travel is None else pair.travel
+    travel = np.zeros(6, int) if models.travel is None else models.travel
     largest = {"position": (-1.0, None), "orientation": (-1.0, None)}
     for turn, name in zip(NINE.rotation, NINE.names, strict=True):
         c, s = np.cos(angle), np.sin(angle)
         wanted = np.eye(4)
         wanted[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ DOWN @ turn
         wanted[:3, 3] = radius * c, radius * s, height
-        flange = wanted @ np.linalg.inv(tip(np.eye(4), pair.dh_tool))
+        flange = wanted @ np.linalg.inv(tip(np.eye(4), models.by_name["dh"].tool))
         solutions = []
         for roll in np.deg2rad([-150, -100, -50, 0, 50, 100, 150]):
             for bend in (-0.7, 0.7, -1.5, 1.5):
@@ -83,9 +84,9 @@ def slow_cell(pair: ModelPair, angle, radius, height):
                         travel,
                     )
                 ),
-                pair.vec_tool,
+                models.by_name["vec"].tool,
             )
-            modelled = tip(oracle.dh_forward(table, q), pair.dh_tool)
+            modelled = tip(oracle.dh_forward(table, q), models.by_name["dh"].tool)
             error = brute.pose_error(true, modelled)
             branch = f"{name}, front-up-{'noflip' if q[4] > 0 else 'flip'}"
             for key, value in (
@@ -101,17 +102,17 @@ OTHER_TOOL = Pose(rotation_y(np.array(0.2003)), np.array([20.1, -10.0, 150.1]))
 
 
 @pytest.mark.parametrize(
-    "pair",
+    "models",
     [
-        ModelPair(wavy(), TABLE_II),
-        ModelPair(wavy(), TABLE_II, TOOL, OTHER_TOOL, np.array([1, -1, 1, 1, -1, 1])),
+        two_models(wavy(), TABLE_II),
+        two_models(wavy(), TABLE_II, TOOL, OTHER_TOOL, np.array([1, -1, 1, 1, -1, 1])),
     ],
     ids=["flange", "tool and travel"],
 )
-def test_a_cell_is_what_a_slow_loop_makes_of_it(pair):
+def test_a_cell_is_what_a_slow_loop_makes_of_it(models):
     cells = region.Cells(np.array([0.3]), np.array([1725.0]), np.array([150.0]))
-    found = maps.accuracy_map(ARM, pair, cells, DOWN, NINE)
-    slow = slow_cell(pair, 0.3, 1725.0, 150.0)
+    found = maps.accuracy_map(ARM, models, cells, DOWN, NINE)
+    slow = slow_cell(models, 0.3, 1725.0, 150.0)
     assert found.solutions[0] == found.wanted[0] == 18
     assert abs(found.position_max_mm[0] - slow["position"][0]) < 1e-6
     assert abs(found.orientation_max_mrad[0] - slow["orientation"][0]) < 1e-6
@@ -121,7 +122,7 @@ def test_a_cell_is_what_a_slow_loop_makes_of_it(pair):
 
 def test_the_default_space_is_reached_in_every_pose():
     cells = region.grid(SPACE, np.deg2rad([0.0, 60.0]), 100.0)
-    found = maps.accuracy_map(ARM, ModelPair(wavy(), TABLE_II), cells, DOWN, NINE)
+    found = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), cells, DOWN, NINE)
     assert (found.solutions == 18).all()
     assert (found.extrapolating == 0).all()
     assert np.isfinite(found.position_max_mm).all()
@@ -129,7 +130,7 @@ def test_the_default_space_is_reached_in_every_pose():
 
 def test_unreachable_cells_are_marked_and_the_others_not_touched():
     cells = region.Cells(np.zeros(3), np.array([1500.0, 2600.0, 4000.0]), np.zeros(3))
-    found = maps.accuracy_map(ARM, ModelPair(wavy(), TABLE_II), cells, DOWN, NINE)
+    found = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), cells, DOWN, NINE)
     assert found.solutions[0] == 18
     assert 0 < found.solutions[1] < 18
     assert np.isfinite(found.position_max_mm[1])
@@ -139,7 +140,7 @@ def test_unreachable_cells_are_marked_and_the_others_not_touched():
     assert found.worst_branch[2] is None
     assert found.orientation_worst_branch[2] is None
     alone = region.Cells(*(axis[:1] for axis in cells))
-    first = maps.accuracy_map(ARM, ModelPair(wavy(), TABLE_II), alone, DOWN, NINE)
+    first = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), alone, DOWN, NINE)
     assert first.position_max_mm[0] == found.position_max_mm[0]
 
 
@@ -147,7 +148,7 @@ def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
     lower, upper = (np.array(bound) for bound in RANGE)
     upper[4] = np.deg2rad(10.0)  # leaves only one wrist
     cells = region.grid(SPACE, np.array([0.2]), 300.0)
-    found = maps.accuracy_map(ARM, ModelPair(wavy((lower, upper)), TABLE_II), cells, DOWN, NINE)
+    found = maps.accuracy_map(ARM, two_models(wavy((lower, upper)), TABLE_II), cells, DOWN, NINE)
     assert (found.solutions == 9).all()
     assert (found.extrapolating == 9).all()
     assert all(name.endswith("front-up-flip") for name in found.worst_branch)
@@ -155,15 +156,15 @@ def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
 
 @pytest.mark.parametrize("invert_with", ["dh", "vec", "nominal"])
 def test_the_chosen_model_is_the_one_whose_tool_reaches_the_pose(invert_with):
-    pair = ModelPair(wavy(), TABLE_II, TOOL, OTHER_TOOL)
+    models = two_models(wavy(), TABLE_II, TOOL, OTHER_TOOL, nominal=ARM.dh)
     cells = region.grid(SPACE, np.array([0.1]), 250.0)
     tool = region.tool_poses(cells, DOWN, np.eye(3))
-    solved = maps.joints_of(ARM, pair, tool, invert_with=invert_with)
+    solved = maps.joints_of(ARM, models, tool, invert_with=invert_with)
     assert (solved.status == Status.FOUND).all()
     for branch in range(2):
         for i, q in enumerate(solved.q_rad[:, branch]):
             if invert_with == "vec":
-                model = pair.vec
+                model = models.by_name["vec"].model
                 args = (
                     model.coefficients,
                     model.q_min_rad,
@@ -174,14 +175,14 @@ def test_the_chosen_model_is_the_one_whose_tool_reaches_the_pose(invert_with):
                 )
                 reached = tip(oracle.projected(oracle.vec_forward(table_of(model.dh), *args)), TOOL)
             else:
-                model = pair.dh if invert_with == "dh" else ARM.dh
+                model = models.by_name[invert_with].model
                 reached = tip(oracle.dh_forward(table_of(model), q), OTHER_TOOL)
             assert np.linalg.norm(reached[:3, 3] - tool.position_mm[i]) < 2e-6
             assert np.abs(reached[:3, :3] - tool.rotation[i]).max() < 1e-8
 
 
 def test_no_error_where_the_models_agree():
-    same = ModelPair(vec.without_errors(TABLE_II, *RANGE, 2), TABLE_II)
+    same = two_models(vec.without_errors(TABLE_II, *RANGE, 2), TABLE_II)
     cells = region.grid(SPACE, np.array([0.0]), 300.0)
     found = maps.accuracy_map(ARM, same, cells, DOWN, NINE)
     assert found.position_max_mm.max() < 1e-9

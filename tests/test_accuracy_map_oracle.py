@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from oracles import kinematics as oracle
 from oracles import maps
+from two_models import two_models
 
 from kinacc import geometry
 from kinacc.kinematics import dh, region, robot, vec
@@ -39,8 +40,8 @@ def arms() -> maps.Arms:
 
 
 @pytest.fixture(scope="module")
-def pair(arms) -> accuracy_map.ModelPair:
-    return accuracy_map.ModelPair(
+def models(arms) -> accuracy_map.Models:
+    return two_models(
         vec=vec.VECModel(
             dh.DHModel(*arms.nominal.T), arms.low, arms.high, arms.series, arms.offsets
         ),
@@ -56,11 +57,11 @@ def pair(arms) -> accuracy_map.ModelPair:
     [(15, 1500.0, 200.0), (60, 1950.0, 0.0), (30, 1200.0, 0.0), (0, 2600.0, 500.0)],
     ids=["inside", "outer", "inner", "beyond_reach"],
 )
-def test_cell_equals_brute_force(arms, pair, angle_deg, radius, height):
+def test_cell_equals_brute_force(arms, models, angle_deg, radius, height):
     angle = math.radians(angle_deg)
     cells = region.Cells(np.array([angle]), np.array([radius]), np.array([height]))
     found = accuracy_map.accuracy_map(
-        robot.load("mh180"), pair, cells, REFERENCE, region.orientations(TURN)
+        robot.load("mh180"), models, cells, REFERENCE, region.orientations(TURN)
     )
     position, turn, name, count = maps.cell(arms, LIMITS, angle, radius, height, REFERENCE, TURN)
     assert found.wanted[0] == 18
@@ -74,10 +75,10 @@ def test_cell_equals_brute_force(arms, pair, angle_deg, radius, height):
     assert found.worst_branch[0] == name
 
 
-def test_errors_at_joints_are_true_minus_model_tool(arms, pair):
+def test_errors_at_joints_are_true_minus_model_tool(arms, models):
     q = np.random.default_rng(0).uniform(LOW, HIGH, (30, 6))
-    errors = accuracy_map.errors_at(pair, q)
-    points = operating_points.with_errors(pair, q)
+    errors = accuracy_map.errors_at(models, q)
+    points = operating_points.with_errors(models, q)
     for i, row in enumerate(q):
         true, model = arms.true_at(row), arms.model_at(row)
         gap = true[:3, 3] - model[:3, 3]
@@ -89,10 +90,10 @@ def test_errors_at_joints_are_true_minus_model_tool(arms, pair):
 
 
 @pytest.mark.parametrize("sequence", ["sobol", "halton"])
-def test_operating_points_stand_in_the_space_with_a_wanted_orientation(arms, pair, sequence):
+def test_operating_points_stand_in_the_space_with_a_wanted_orientation(arms, models, sequence):
     rotations = region.orientations(TURN)
     wanted = operating_points.PosesWanted(CYLINDER, REFERENCE, rotations)
-    q = operating_points.in_space(robot.load("mh180"), pair, wanted, sequence, 40)
+    q = operating_points.in_space(robot.load("mh180"), models, wanted, sequence, 40)
     assert q.shape == (40, 6)
     seen = set()
     for row in q:

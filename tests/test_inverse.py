@@ -253,7 +253,7 @@ def test_reported_joints_carry_signs_and_couplings():
     coupling[2, 1] = -1.0  # joint 3 is reported against the horizontal
     arm = replace(ARM, joint_map=coupling)
     reported = random_joints(1, 20)
-    q = robot.dh_angles(arm, reported)
+    q = arm.dh_joints(reported)
     assert np.allclose(limits.reported_joints(arm, q), reported)
     assert limits.within_limits(arm, q).all()
     assert limits.uncoupled(arm).tolist() == [True, False, False, True, True, True]

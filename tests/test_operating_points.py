@@ -7,21 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from test_accuracy_map import ARM, DOWN, NINE, RANGE, SPACE, TABLE_II, wavy
+from two_models import two_models
 
 from kinacc.errors import InputError
+from kinacc.geometry import IDENTITY
 from kinacc.kinematics import dh, region, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.study import operating_points
-from kinacc.study.accuracy_map import ModelPair
 from kinacc.study.operating_points import PosesWanted
 
-PAIR = ModelPair(wavy(), TABLE_II)
+TRUE = wavy()
+MODELS = two_models(TRUE, TABLE_II)
 WANTED = PosesWanted(SPACE, DOWN, NINE)
 
 
 @pytest.mark.parametrize("sequence", region.SEQUENCES)
 def test_points_in_space_lie_in_it_with_the_orientations_of_the_set(sequence):
-    q = operating_points.in_space(ARM, PAIR, WANTED, sequence, 200)
+    q = operating_points.in_space(ARM, MODELS, WANTED, sequence, 200)
     assert q.shape == (200, 6)
     pose = dh.forward(TABLE_II, q)
     grown = replace(SPACE, inner_radius_mm=1199.999, radial_span_mm=900.002)
@@ -39,24 +41,19 @@ def test_points_in_space_lie_in_it_with_the_orientations_of_the_set(sequence):
 
 
 def test_a_longer_set_begins_with_the_shorter_one():
-    short = operating_points.in_space(ARM, PAIR, WANTED, "sobol", 64)
-    long = operating_points.in_space(ARM, PAIR, WANTED, "sobol", 128)
+    short = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 64)
+    long = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 128)
     assert np.abs(long[:64] - short).max() < 1e-9
 
 
 def test_errors_are_vec_minus_dh_of_each_ones_tool():
-    q = operating_points.in_space(ARM, PAIR, WANTED, "halton", 20)
+    q = operating_points.in_space(ARM, MODELS, WANTED, "halton", 20)
     tool = np.array([10.0, 20.0, 30.0])
     travel = np.array([1, -1, 0, 1, -1, 1])
-    pair = ModelPair(
-        PAIR.vec,
-        PAIR.dh,
-        vec_tool=PAIR.vec_tool._replace(position_mm=tool),
-        dh_tool=PAIR.vec_tool._replace(position_mm=2 * tool),
-        travel=travel,
-    )
-    points = operating_points.with_errors(pair, q)
-    true = vec.pose(PAIR.vec, q, np.tile(travel, (20, 1)))
+    tools = (IDENTITY._replace(position_mm=each) for each in (tool, 2 * tool))
+    models = two_models(TRUE, TABLE_II, *tools, travel)
+    points = operating_points.with_errors(models, q)
+    true = vec.pose(TRUE, q, np.tile(travel, (20, 1)))
     modelled = dh.forward(TABLE_II, q)
     expected = true.position_mm + true.rotation @ tool
     expected -= modelled.position_mm + modelled.rotation @ (2 * tool)
@@ -66,11 +63,11 @@ def test_errors_are_vec_minus_dh_of_each_ones_tool():
 
 def test_points_in_joints_lie_in_the_box_and_in_the_cylinder():
     everything = ARM.q_min_rad, ARM.q_max_rad
-    q = operating_points.in_joints(ARM, PAIR, everything, "sobol", 100, SPACE)
+    q = operating_points.in_joints(ARM, MODELS, everything, "sobol", 100, SPACE)
     assert region.contains(SPACE, dh.forward(TABLE_II, q).position_mm).all()
     assert limits.within(q, *RANGE).all()
     box = np.deg2rad([-10.0] * 6), np.deg2rad([10.0] * 6)
-    q = operating_points.in_joints(ARM, PAIR, box, "halton", 50)
+    q = operating_points.in_joints(ARM, MODELS, box, "halton", 50)
     assert limits.within(q, *box).all()
 
 
@@ -79,7 +76,7 @@ def test_a_box_of_coupled_joints_is_in_reported_angles():
     coupling[2, 1] = -1.0
     arm = replace(ARM, joint_map=coupling)
     box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([10.0, 40, 0, 20, 10, 10])
-    q = operating_points.in_joints(arm, PAIR, box, "sobol", 60)
+    q = operating_points.in_joints(arm, MODELS, box, "sobol", 60)
     assert limits.within(limits.reported_joints(arm, q), *box).all()
     assert limits.within(q, *RANGE).all()
     assert (q[:, 3] < 0).all()
@@ -88,14 +85,14 @@ def test_a_box_of_coupled_joints_is_in_reported_angles():
 def test_boxes_without_anything_to_assess_name_every_joint():
     box = np.deg2rad([100.0, -10, -10, -10, -10, 200]), np.deg2rad([110.0, 10, 10, 10, 10, 210])
     with pytest.raises(InputError) as refusal:
-        operating_points.in_joints(ARM, PAIR, box, "sobol", 10)
+        operating_points.in_joints(ARM, MODELS, box, "sobol", 10)
     assert [problem.where for problem in refusal.value.problems] == ["joint 1", "joint 6"]
 
 
 def test_a_space_out_of_reach_is_refused_with_the_reasons_counted():
     far = WANTED._replace(cylinder=replace(SPACE, inner_radius_mm=4000.0))
     with pytest.raises(InputError, match="out of reach"):
-        operating_points.in_space(ARM, PAIR, far, "sobol", 2)
+        operating_points.in_space(ARM, MODELS, far, "sobol", 2)
 
 
 def test_rows_are_spread_over_the_measured_ones_each_once():

@@ -51,7 +51,7 @@ def test_effects_are_the_derivatives_of_the_arm():
     q_rad = joints(4)
     effects = joint_errors(ARM, q_rad, tool_mm=np.array([10.0, 20.0, 30.0])).reshape(4, 3, 6, 6)
     step = 1e-4
-    angles = robot.dh_angles(ARM, q_rad)
+    angles = ARM.dh_joints(q_rad)
     for joint in range(5):
         for name, cause, unit in (("d_mm", 2, 1.0), ("theta_offset_rad", 5, 1e3)):
             moved = []

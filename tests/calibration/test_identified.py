@@ -34,7 +34,7 @@ def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, p
         rotation_weight_mm_per_rad=500.0,
         threshold=1e-3,
     )
-    told = uncertainty.of_dh(fit, data.target_names)
+    told = uncertainty.of_fit(fit, data.target_names)
     return {each.name: each for each in identified.parameters(fit, told, data)}, fit, told
 
 
@@ -90,7 +90,7 @@ def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
     free = constraints.free_parameters(6, (2, 3))
     data = measure(disturbed(arm.dh, free, rng), q, POSE, rng)
     fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
-    told = uncertainty.of_dh(fit, data.target_names)
+    told = uncertainty.of_fit(fit, data.target_names)
     said = [text for text, _ in identified.statements(fit, told, data)]
     weak = (
         "a shift of the base along y of the robot's base cannot be told from a shift of the tool "
@@ -117,7 +117,7 @@ def test_every_undetermined_parameter_has_a_statement_and_no_other(name):
     found, fit, _ = asked(name, THREE)
     for each in found.values():
         assert bool(each.statement) == (each.status != "identified"), each
-    names = uncertainty.dh_parameter_names(len(fit.free))
+    names = fit.model.parameter_names
     for place, parameter in enumerate(names):
         std = fit.std.ravel()[place]
         assert np.isnan(std) == (found[parameter].status in ("undetermined", "fixed"))
@@ -138,7 +138,7 @@ def test_directions_in_words_move_no_pose_anywhere(kind):
     free = constraints.free_parameters(6, (2, 3))
     data = measure(disturbed(arm.dh, free, rng), joints(arm, 80, rng), kind, rng)
     fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
-    told = uncertainty.of_dh(fit, data.target_names)
+    told = uncertainty.of_fit(fit, data.target_names)
     groups = identified.groups(fit, told, data)
     assert sum(len(each) for each, structural in groups if structural) == 8
     directions = np.concatenate([each for each, structural in groups if structural])

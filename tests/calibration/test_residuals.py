@@ -9,8 +9,8 @@ import pytest
 
 from kinacc.calibration import residuals
 from kinacc.calibration.frames import Frames
+from kinacc.calibration.models import COMPARISONS, Fit
 from kinacc.calibration.observations import full_poses
-from kinacc.calibration.residuals import COMPARISONS, FittedModels
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot, vec
 
@@ -25,11 +25,12 @@ def frames(base=BASE):
     return Frames(base, Pose(TOOL.rotation[None], TOOL.position_mm[None]))
 
 
-def fitted(base_shift_mm=(0.0, 0.0, 0.0)) -> FittedModels:
+def fitted(base_shift_mm=(0.0, 0.0, 0.0)) -> dict[str, Fit]:
     """All three models the nominal arm; the VEC's base moved (instrument's frame)."""
     moved = Pose(BASE.rotation, BASE.position_mm + base_shift_mm)
     empty = vec.without_errors(ARM.dh, np.full(6, -1.0), np.full(6, 1.0), 1)
-    return FittedModels(empty, frames(moved), ARM.dh, frames(), ARM.dh, frames())
+    plain = Fit(ARM.dh, frames())
+    return {"vec": Fit(empty, frames(moved)), "dh": plain, "nominal": plain}
 
 
 def measured(shift_mm, turn_rad):
@@ -98,7 +99,7 @@ def test_every_row_is_judged_by_a_model_that_has_not_seen_its_fold():
         shown[number] = set(train.pose.tolist())
         # Each fold's model is told apart by where its base is.
         moved = Pose(BASE.rotation, BASE.position_mm + np.array([10.0 * (number + 1), 0, 0]))
-        return replace(fitted(), dh_frames=frames(moved))
+        return {**fitted(), "dh": Fit(ARM.dh, frames(moved))}
 
     held_out, trained = residuals.cross_validated(seen, refit, [0, 1, 2])
     size = np.linalg.norm(held_out["dh_vs_measured"].position_mm, axis=1)
@@ -109,4 +110,4 @@ def test_every_row_is_judged_by_a_model_that_has_not_seen_its_fold():
         np.testing.assert_allclose(size[rows], 10.0 * (number + 1), atol=1e-9)
         assert len(trained[number]["dh_vs_measured"].position_mm) == COUNT - len(rows)
     assert np.isnan(size[fold < 0]).all()
-    assert set(held_out) == set(COMPARISONS)
+    assert set(held_out) == {each.name for each in COMPARISONS}

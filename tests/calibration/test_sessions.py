@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import simulated
 
-from kinacc.calibration import dh_fit, frames, residuals, tables, uncertainty
+from kinacc.calibration import dh_fit, frames, models, residuals, tables, uncertainty
 from kinacc.calibration.models import Options
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
@@ -75,7 +75,7 @@ def test_every_base_keeps_its_session_in_the_tables():
     again = tables.frames_of(columns, "dh", seen.target_names, seen.session_names)
     np.testing.assert_allclose(again.bases.rotation, found.frames.bases.rotation, atol=1e-12)
     np.testing.assert_array_equal(again.bases.position_mm, found.frames.bases.position_mm)
-    names = uncertainty.of_dh(found, seen.target_names).names
+    names = uncertainty.of_fit(found, seen.target_names).names
     assert [name for name in names if name.endswith(".rx_rad")] == [
         "base.rx_rad",
         "base2.rx_rad",
@@ -87,7 +87,7 @@ def test_every_base_keeps_its_session_in_the_tables():
 def test_errors_of_every_session_are_in_its_own_base():
     seen = observed(simulated.POSE, 3, noise_mm=1e-4)
     span = seen.q_rad.min(axis=0), seen.q_rad.max(axis=0)
-    fitted = residuals.fit_all(seen, ARM.dh, span, OPTIONS)
+    fitted = models.fit_all(seen, ARM.dh, span, OPTIONS)
     errors = residuals.errors(fitted, seen)
     assert np.abs(errors["dh_vs_measured"].position_mm).max() < 0.03
     assert np.abs(errors["dh_vs_vec"].position_mm).max() < 0.03

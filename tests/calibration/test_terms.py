@@ -97,7 +97,7 @@ def test_one_angle_of_a_tool_can_be_fixed():
     assert log_so3(turned[None])[0][2] == pytest.approx(np.deg2rad(20.0), abs=1e-9)
     based = found.frames.base.rotation @ ARM.base.rotation.T
     assert log_so3(based[None])[0][0] == pytest.approx(3e-3, abs=1e-9)
-    known = uncertainty.of_dh(found, data.target_names)
+    known = uncertainty.of_fit(found, data.target_names)
     at = known.names.index("t0.rz_rad")
     assert known.covariance[at, at] == pytest.approx(0.0, abs=1e-5)
 
@@ -146,11 +146,11 @@ def test_a_prior_determines_what_the_data_leave_open():
 def test_a_prior_on_a_frame_settles_the_base_against_joint_one():
     _, data = seen()
     plain = fitted(data)
-    known = uncertainty.of_dh(plain, data.target_names)
+    known = uncertainty.of_fit(plain, data.target_names)
     assert not known.determined[known.names.index("base.z_mm")]
     at = float(plain.frames.base.position_mm[2])
     found = fitted(data, {"joint 1": "fixed"}, {"base z": {"value_mm": at, "prior_std_mm": 0.01}})
-    known = uncertainty.of_dh(found, data.target_names)
+    known = uncertainty.of_fit(found, data.target_names)
     place = known.names.index("base.z_mm")
     assert known.determined[place]
     assert np.sqrt(known.covariance[place, place]) == pytest.approx(0.01, rel=0.5)

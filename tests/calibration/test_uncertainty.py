@@ -63,7 +63,7 @@ def moved_arm(fit, names, direction, size):
         return Pose(exp_so3(motion[3:]) @ pose.rotation, pose.position_mm + motion[:3])
 
     vector = dh.to_vector(fit.model).copy()
-    for index, name in enumerate(uncertainty.dh_parameter_names(6)):
+    for index, name in enumerate(fit.model.parameter_names):
         vector[index] += of.get(name, 0.0)
     tool = frame(fit.frames.tool, "tool")
     base = frame(fit.frames.base, "base")
@@ -78,7 +78,7 @@ def test_undetermined_directions_move_no_measured_pose():
     arm = robot.load("mh180")
     observations = measured(arm)
     fit = fitted(arm, observations)
-    known = uncertainty.of_dh(fit, ("tool",))
+    known = uncertainty.of_fit(fit, ("tool",))
     assert len(known.undetermined) == 24 - fit.solution.spectrum.rank > 3
     before = seen_by(fit.model, fit.frames, observations.q_rad)
     for direction in known.undetermined:
@@ -103,7 +103,7 @@ def test_predicted_spread_is_that_of_repeated_fits():
     fits = [fitted(arm, measured(arm, poses=40, seed=seed)) for seed in range(40)]
     seen = np.array([seen_by(f.model, f.frames, q_far).position_mm for f in fits])
     scatter = seen.var(axis=0, ddof=1).sum(axis=1)
-    known = uncertainty.of_dh(fits[0], ("tool",))
+    known = uncertainty.of_fit(fits[0], ("tool",))
     units = np.where([uncertainty.is_angle(n) for n in known.names], 1e-3, 1.0)
     values, vectors = np.linalg.eigh(known.covariance / np.outer(units, units))
     root = units[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
@@ -130,7 +130,7 @@ def test_vec_parameters_are_named_frames_first():
         frames=frames.known(BASE, TOOL),
         frames_free=True,
     )
-    known = uncertainty.of_vec(fit, ("tool",))
+    known = uncertainty.of_fit(fit, ("tool",))
     assert known.names[0] == "base.x_mm"
     assert known.names[12] == "j1.delta_x.0"
     assert len(known.names) == len(known.covariance) == 12 + 6 * 6 * 2

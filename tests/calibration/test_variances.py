@@ -50,7 +50,7 @@ def test_predictions_are_off_by_as_much_as_is_said(std_rad):
     squares = []
     for seed in range(20):
         fit = fitted(arm, measured(arm, q_rad, std_rad, seed))
-        known = uncertainty.of_dh(fit, ("tool",))
+        known = uncertainty.of_fit(fit, ("tool",))
         frames = fit.frames.base, {"tool": fit.frames.tool}
         said = predict(
             Calibration("arm", arm, "dh", fit.model, *frames, known),

@@ -13,6 +13,11 @@ def errors(vectors):
     return Errors(np.asarray(vectors, dtype=float), np.full(np.shape(vectors), np.nan))
 
 
+def selection(by_dh, by_vec, configuration, fold):
+    held_out = {"dh": errors(by_dh), "vec": errors(by_vec)}
+    return model_comparison.select(held_out, configuration, fold)
+
+
 def scattered(count, size, seed):
     return size * np.random.default_rng(seed).normal(size=(count, 3))
 
@@ -20,36 +25,44 @@ def scattered(count, size, seed):
 def test_a_gain_that_may_be_chance_is_none():
     configuration, fold = np.arange(24), np.arange(24) % 6
     by_dh, by_vec = scattered(24, 0.2, 1), scattered(24, 0.198, 2)
-    assert (
-        model_comparison.gain(errors(by_dh), errors(by_vec), configuration, fold).selected == "dh"
-    )
-    found = model_comparison.gain(errors(by_dh), errors(0.5 * by_dh), configuration, fold)
+    assert selection(by_dh, by_vec, configuration, fold).selected == "dh"
+    found = selection(by_dh, 0.5 * by_dh, configuration, fold)
     assert found.selected == "vec"
-    assert found.mean_mm2 == pytest.approx(0.75 * np.mean(np.sum(by_dh**2, axis=1)))
-    assert found.rms_mm["vec"] == pytest.approx(0.5 * found.rms_mm["dh"])
+    assert found.standings["vec"].gain_mm2 == pytest.approx(
+        0.75 * np.mean(np.sum(by_dh**2, axis=1))
+    )
+    dh, vec = found.standings["dh"], found.standings["vec"]
+    assert vec.rms_mm == pytest.approx(0.5 * dh.rms_mm)
 
 
 def test_a_worse_model_is_never_selected():
     by_dh = scattered(400, 0.2, 3)
-    found = model_comparison.gain(
-        errors(by_dh), errors(1.001 * by_dh), np.arange(400), np.arange(400) % 5
-    )
+    found = selection(by_dh, 1.001 * by_dh, np.arange(400), np.arange(400) % 5)
     assert found.selected == "dh"
-    assert found.mean_mm2 < 0.0
+    assert found.standings["vec"].gain_mm2 < 0.0
 
 
 def test_repeats_of_a_configuration_are_one_witness():
     by_dh, by_vec = scattered(12, 0.2, 4), scattered(12, 0.15, 5)
-    once = model_comparison.gain(errors(by_dh), errors(by_vec), np.arange(12), np.arange(12) % 3)
+    once = selection(by_dh, by_vec, np.arange(12), np.arange(12) % 3)
     again = np.repeat(np.arange(12), 50)
-    often = model_comparison.gain(errors(by_dh[again]), errors(by_vec[again]), again, again % 3)
+    often = selection(by_dh[again], by_vec[again], again, again % 3)
     assert often.configurations == 12
-    assert often.std_error_mm2 == pytest.approx(once.std_error_mm2)
+    errors_mm2 = [each.standings["vec"].std_error_mm2 for each in (often, once)]
+    assert errors_mm2[0] == pytest.approx(errors_mm2[1])
+
+
+def test_of_two_models_worth_it_the_better_is_selected_wherever_it_stands():
+    plain, configuration, fold = scattered(60, 0.2, 8), np.arange(60), np.arange(60) % 5
+    better, best = errors(0.6 * plain), errors(0.5 * plain)
+    for others in ({"a": better, "b": best}, {"b": best, "a": better}):
+        held_out = {"dh": errors(plain), **others}
+        assert model_comparison.select(held_out, configuration, fold).selected == "b"
 
 
 def test_without_held_out_rows_nothing_speaks_for_vec():
-    nothing = errors(np.full((5, 3), np.nan))
-    found = model_comparison.gain(nothing, nothing, np.arange(5), np.full(5, -1))
+    nothing = np.full((5, 3), np.nan)
+    found = selection(nothing, nothing, np.arange(5), np.full(5, -1))
     assert (found.selected, found.configurations) == ("dh", 0)
 
 

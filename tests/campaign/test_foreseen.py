@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
+from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.prediction_check import unsure
@@ -26,7 +26,7 @@ def points(arm):
 @pytest.fixture(scope="module")
 def calibrated(arm):
     """The nominal arm with a deviation of the first joint's zero, and directions nobody saw."""
-    names = tuple(dh_parameter_names(arm.model.joints))
+    names = arm.model.parameter_names
 
     def make(std_rad, blind_per_unit=0.0):
         covariance = np.zeros((len(names), len(names)))

@@ -67,14 +67,14 @@ def results(name: str, count: int = 80, seed: int = 3) -> dict:
         frames_free=True,
     )
     of = {"vec": vec_found.frames, "dh": dh_found.frames, "nominal": nominal.frames}
-    known = uncertainty.of_dh(dh_found, ("tool",))
+    known = uncertainty.of_fit(dh_found, ("tool",))
     return {
-        "vec_model": tables.vec_model_columns(vec_found),
-        "dh_model": tables.dh_model_columns(dh_found),
+        "vec_model": vec_found.model.to_columns(vec_found.std),
+        "dh_model": dh_found.model.to_columns(dh_found.std.ravel()),
         "frames": tables.frames_columns(of, ("tool",)),
         "dh_fit": tables.dh_fit_columns(dh_found, known),
         "dh_covariance": tables.covariance_columns(known),
-        "vec_covariance": tables.covariance_columns(uncertainty.of_vec(vec_found, ("tool",))),
+        "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found, ("tool",))),
         "residuals": _residuals(seen, of, dh_found.model, vec_found.model),
     }
 

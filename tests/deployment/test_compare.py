@@ -17,9 +17,7 @@ from kinacc.kinematics import dh, robot
 
 def changed(arm, **by_name):
     """The calibration with DH parameters changed: ``j2_a_mm=0.5``."""
-    from kinacc.calibration.uncertainty import dh_parameter_names
-
-    vector, names = dh.to_vector(arm.model).copy(), dh_parameter_names(arm.model.joints)
+    vector, names = dh.to_vector(arm.model).copy(), arm.model.parameter_names
     for name, value in by_name.items():
         vector[names.index(name.replace("_", ".", 1))] += value
     return replace(arm, model=dh.with_vector(arm.model, vector))

@@ -5,7 +5,7 @@ import pytest
 from small_arms import BASE, TOOL, calibrated, joints, truth
 
 from kinacc.calibration.frames import MOTIONS
-from kinacc.calibration.uncertainty import dh_parameter_names, is_angle
+from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.predict import predict, sensitivity
 from kinacc.deployment.record import nominal
 from kinacc.errors import InputError
@@ -23,15 +23,9 @@ def moved(arm, names, step):
         motion = np.array([of.get(f"{name}.{each}", 0.0) for each in MOTIONS])
         return Pose(exp_so3(motion[3:]) @ pose.rotation, pose.position_mm + motion[:3])
 
-    if isinstance(arm.model, dh.DHModel):
-        vector, own = dh.to_vector(arm.model).copy(), dh_parameter_names(arm.model.joints)
-        model = dh.with_vector(arm.model, vector + [of.get(name, 0.0) for name in own])
-    else:
-        from kinacc.calibration.uncertainty import vec_parameter_names
-
-        own = vec_parameter_names(arm.model)
-        vector = vec.to_vector(arm.model) + [of.get(name, 0.0) for name in own]
-        model = vec.with_vector(arm.model, vector)
+    kind = {"dh": dh, "vec": vec}[arm.model.kind]
+    vector = kind.to_vector(arm.model) + [of.get(name, 0.0) for name in arm.model.parameter_names]
+    model = kind.with_vector(arm.model, vector)
     targets = {name: frame(pose, name) for name, pose in arm.targets.items()}
     return replace(arm, model=model, base=frame(arm.base, "base"), targets=targets)
 

@@ -285,5 +285,5 @@ def test_three_reflectors_read_ten_times():
     assert set(found.columns["target"]) == {"mA", "mB", "mC"}
     arm = robot.load("fanuc_r2000ic_165f")
     q_rad = np.stack([found.columns[f"q{i}"] for i in range(1, 7)], axis=1)
-    reach = np.linalg.norm(dh.forward(arm.dh, robot.dh_angles(arm, q_rad)).position_mm, axis=1)
+    reach = np.linalg.norm(dh.forward(arm.dh, arm.dh_joints(q_rad)).position_mm, axis=1)
     assert (reach < 3500).all()

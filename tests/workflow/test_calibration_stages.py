@@ -14,7 +14,7 @@ from kinacc.geometry import Pose, compose, exp_so3, quaternion_from_rotation
 from kinacc.kinematics import dh as dh_kinematics
 from kinacc.kinematics import robot
 from kinacc.kinematics import vec as vec_kinematics
-from kinacc.kinematics.tables import dh_model, frame, vec_model
+from kinacc.kinematics.tables import frame, models
 from kinacc.workflow.plan import planned
 from kinacc.workflow.stages import assessment_points, dh, measurements, residuals, vec
 
@@ -113,7 +113,8 @@ def test_configurations_visited_twice_are_held_out_together(tables):
 
 
 def test_models_can_be_read_back_from_their_tables(tables):
-    volumetric, fitted = vec_model(tables["vec_model"]), dh_model(tables["dh_model"])
+    found = models(tables, robot.load("mh180").dh)
+    volumetric, fitted = found["vec"], found["dh"]
     assert (volumetric.order, volumetric.joints) == (2, 6)
     train = tables["measurements"]["subset"] == "train"
     q = np.stack([tables["measurements"][f"q{i}"] for i in range(1, 7)], axis=1)
@@ -261,9 +262,10 @@ def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(plan):
     points = made["assessment_points"]
     q = np.stack([points[f"q{i}"] for i in range(1, 7)], axis=1)
     seen = {}
+    of = models(found, robot.load("mh180").dh)
     for name, pose in (
-        ("vec", vec_kinematics.pose(vec_model(found["vec_model"]), q)),
-        ("dh", dh_kinematics.forward(dh_model(found["dh_model"]), q)),
+        ("vec", vec_kinematics.pose(of["vec"], q)),
+        ("dh", dh_kinematics.forward(of["dh"], q)),
     ):
         ends = (frame(found["frames"], name, which) for which in ("base", "tool"))
         at, carried = ends

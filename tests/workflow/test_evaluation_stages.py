@@ -9,7 +9,7 @@ import pytest
 
 from kinacc.artifacts.store import to_table
 from kinacc.geometry import quaternion_from_rotation, rotation_z
-from kinacc.kinematics import dh, robot, tables, vec
+from kinacc.kinematics import dh, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.vec import ERRORS
 from kinacc.workflow import evaluation
@@ -118,7 +118,7 @@ def joints(columns: dict, letter: str = "q") -> np.ndarray:
 @pytest.mark.parametrize("travel", [False, True])
 def test_models_come_back_from_their_tables_in_any_row_order(travel):
     model = vec_of(travel)
-    read = tables.vec_model(vec_columns(model, shuffled=True))
+    read = vec.VECModel.from_columns(vec_columns(model, shuffled=True))
     for name in ("coefficients", "direction_offsets_rad", "q_min_rad", "q_max_rad"):
         assert np.array_equal(getattr(read, name), getattr(model, name))
     assert all(

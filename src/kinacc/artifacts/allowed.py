@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 MODELS = ("vec", "dh", "nominal")
+SELECTABLE = ("dh", "vec")  # the plainest first: others have to be worth it
 SUBSETS = ("train", "validation")
 QUANTITIES = ("position", "orientation")
 UNITS_OF_RESIDUALS = ("mm", "mrad")
-COMPARISONS = ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured")
+COMPARED = (  # reference and model
+    ("measured", "vec"),
+    ("vec", "dh"),
+    ("measured", "dh"),
+    ("measured", "nominal"),
+)
+COMPARISONS = tuple(f"{model}_vs_{reference}" for reference, model in COMPARED)
 ESTIMATES = ("train", "cross_validated")
 FINDING_LEVELS = ("stops", "warning", "note")
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")

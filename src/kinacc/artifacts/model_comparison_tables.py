@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.allowed import COMPARISONS, ESTIMATES
+from kinacc.artifacts.allowed import COMPARISONS, ESTIMATES, SELECTABLE
 from kinacc.artifacts.columns import (
     ERROR_MM,
     JOINTS_MAX,
@@ -22,7 +22,7 @@ MODEL_SELECTION = Artefact(
     "more than two standard errors (paired by configuration) and rms and mean of folds fall too; "
     "DH otherwise, and where nothing was held out.",
     (
-        text("model", "the model", ("dh", "vec")),
+        text("model", "the model", SELECTABLE),
         whole("selected", "1 = selected", 0, 1),
         magnitude("held_out_rms_mm", "mm", "position rms over all held-out rows", 1e4, True),
         magnitude("mean_of_folds_mm", "mm", "mean over folds of the position rms", 1e4, True),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.kinematics import dh
-from kinacc.kinematics import robot as _robot
 from kinacc.kinematics.robot import Robot
 
 CAUSES_PER_JOINT = 6
@@ -18,7 +17,7 @@ def joint_errors(robot: Robot, q_rad: np.ndarray, tool_mm: np.ndarray | None = N
     The errors are those of eq. 5 in order delta_x, delta_y, delta_z (mm), eps_x, eps_y, eps_z
     (mrad), joint by joint, in the frame behind the joint.
     """
-    frames = dh.chain(robot.dh, _robot.dh_angles(robot, q_rad))
+    frames = dh.chain(robot.dh, robot.dh_joints(q_rad))
     axes = frames.rotation[:, 1:]  # (n, k, 3, 3): columns are the axes of the frames
     offset = np.zeros(3) if tool_mm is None else np.asarray(tool_mm, dtype=float)
     tip = frames.position_mm[:, -1] + np.einsum(

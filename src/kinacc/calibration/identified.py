@@ -14,7 +14,6 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.truncated_svd import TOUCH_SQUARED
 from kinacc.calibration.uncertainty import (
     Uncertainty,
-    dh_parameter_names,
     is_angle,
     named_directions,
 )
@@ -61,7 +60,7 @@ def parameters(fit: DHFit, known: Uncertainty, seen: Observations) -> list[Param
         elif name in fixed:
             status, statement = FIXED, "fixed by calibration.frames"
         found.append(Parameter(name, status, float(share[number]), statement))
-    for name, free in zip(dh_parameter_names(len(fit.free)), fit.free.ravel(), strict=True):
+    for name, free in zip(fit.model.parameter_names, fit.free.ravel(), strict=True):
         if not free:
             found.append(Parameter(name, FIXED, 0.0, "not fitted"))
     return found
@@ -95,7 +94,7 @@ def recorded(table: Mapping[str, Sequence]) -> list[str]:
 
 def _priors(fit: DHFit) -> dict[str, float]:
     """Standard deviations of the priors by parameter, mm and rad."""
-    found = _finite(dh_parameter_names(len(fit.free)), fit.prior_std.ravel())
+    found = _finite(fit.model.parameter_names, fit.prior_std.ravel())
     if isinstance(fit.coordinates, ConstrainedFrames):
         terms = fit.coordinates.terms
         found |= _finite(terms.names, terms.std)

@@ -2,61 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from kinacc.calibration.residuals import Errors
 
-DH, VEC = "dh", "vec"
 STANDARD_ERRORS = 2.0  # by which a gain must exceed zero
 REGIONS = 6  # of equal width in every joint's measured range
 WORST = 20
 
 
 @dataclass(frozen=True)
-class Gain:
-    """Held-out squared position error that VEC takes off DH, per configuration, in mm^2.
+class Standing:
+    """How a model did on held-out rows: position errors, and what it gains on the plainest model.
 
-    ``selected`` is VEC where the mean exceeds STANDARD_ERRORS standard errors (a one-sided paired
-    test over ``configurations``) and its rms over all rows and mean over folds are lower as well.
+    ``rms_mm`` over all rows and the mean over folds of theirs, ``folds_mm``; ``gain_mm2``: squared
+    error taken off that of the plainest model per configuration, and its standard error.
     """
 
-    configurations: int
-    mean_mm2: float
+    rms_mm: float
+    folds_mm: float
+    gain_mm2: float
     std_error_mm2: float
-    rms_mm: dict[str, float]
-    folds_mm: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The model ``selected`` on so many ``configurations`` held out, and how every model did."""
+
     selected: str
+    configurations: int
+    standings: dict[str, Standing]
 
 
-def gain(by_dh: Errors, by_vec: Errors, configuration: np.ndarray, fold: np.ndarray) -> Gain:
-    """Compare both models on rows held out of them; rows that neither was tried on are NaN.
+def select(
+    held_out: Mapping[str, Errors], configuration: np.ndarray, fold: np.ndarray
+) -> Selection:
+    """Choose among models by their errors on rows held out of them, the plainest model first.
 
-    ``configuration`` (n,) and ``fold`` (n,) of the rows. DH is selected where nothing was held out.
+    Another one is selected where its mean gain exceeds STANDARD_ERRORS standard errors (a one-sided
+    paired test over configurations) and its rms over all rows and mean over folds are lower as
+    well; of several the one of the lowest rms. ``configuration`` (n,) and ``fold`` (n,) of the
+    rows; rows that a model was not tried on are NaN. The plainest is selected where nothing was
+    held out.
     """
-    squared = {
-        DH: np.sum(by_dh.position_mm**2, axis=1),
-        VEC: np.sum(by_vec.position_mm**2, axis=1),
-    }
-    rows = np.isfinite(squared[DH]) & np.isfinite(squared[VEC])
+    squared = {name: np.sum(each.position_mm**2, axis=1) for name, each in held_out.items()}
+    plainest = next(iter(squared))
+    rows = np.isfinite(list(squared.values())).all(axis=0)
     if not rows.any():
-        nothing = {DH: np.nan, VEC: np.nan}
-        return Gain(0, np.nan, np.nan, nothing, nothing, DH)
+        return Selection(plainest, 0, dict.fromkeys(squared, Standing(*[np.nan] * 4)))
     unit = np.unique(configuration[rows], return_inverse=True)[1]
-    less = np.bincount(unit, (squared[DH] - squared[VEC])[rows]) / np.bincount(unit)
-    count = less.size
-    error = float(less.std(ddof=1) / np.sqrt(count)) if count > 1 else np.inf
-    rms = {name: float(np.sqrt(each[rows].mean())) for name, each in squared.items()}
-    numbers = np.unique(fold[rows])
-    folds = {
-        name: float(np.mean([np.sqrt(each[rows & (fold == k)].mean()) for k in numbers]))
-        for name, each in squared.items()
-    }
-    better = less.mean() > STANDARD_ERRORS * error
-    better = better and rms[VEC] < rms[DH] and folds[VEC] < folds[DH]
-    return Gain(count, float(less.mean()), error, rms, folds, VEC if better else DH)
+    numbers, count = np.unique(fold[rows]), unit.max() + 1
+    standings = {}
+    for name, each in squared.items():
+        rms = float(np.sqrt(each[rows].mean()))
+        folds = float(np.mean([np.sqrt(each[rows & (fold == k)].mean()) for k in numbers]))
+        gain = error = 0.0
+        if name != plainest:
+            less = np.bincount(unit, (squared[plainest] - each)[rows]) / np.bincount(unit)
+            gain = float(less.mean())
+            error = float(less.std(ddof=1) / np.sqrt(count)) if count > 1 else np.inf
+        standings[name] = Standing(rms, folds, gain, error)
+    plain, best = standings[plainest], plainest
+    for name, each in standings.items():
+        worth = each.gain_mm2 > STANDARD_ERRORS * each.std_error_mm2
+        worth = worth and each.rms_mm < plain.rms_mm and each.folds_mm < plain.folds_mm
+        if worth and each.rms_mm < standings[best].rms_mm:
+            best = name
+    return Selection(best, int(count), standings)
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from kinacc.artifacts.allowed import SELECTABLE
 from kinacc.calibration import model_comparison
+from kinacc.calibration.models import COMPARISONS, MEASURED, Comparison
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.residuals import COMPARISONS, Errors
+from kinacc.calibration.residuals import Errors
 from kinacc.measurements import folds
 
 Columns = dict[str, np.ndarray]
@@ -29,13 +31,13 @@ def columns(
 ) -> dict[str, Columns]:
     """The three tables from errors ``seen`` at the rows that ``train`` and ``held_out`` (n,)."""
     bias, worst = [], []
-    for name in COMPARISONS:
+    for name, reference in ((each.name, each.reference) for each in COMPARISONS):
         for estimate, errors, rows in (
             ("train", seen[name], np.flatnonzero(train)),
             ("cross_validated", held_out[name], np.arange(len(train))),
         ):
             bias += [(name, estimate, *each) for each in _bias_rows(errors, every.q_rad[rows])]
-            if name.endswith("_vs_measured"):
+            if reference == MEASURED:
                 found = _worst_rows(errors, rows, measurements)
                 worst += [(name, estimate, *each) for each in found]
     return {
@@ -48,20 +50,18 @@ def columns(
 def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Columns:
     """``model_selection`` from errors ``held_out`` of every row."""
     same = folds.configurations(every.pose, every.q_rad, _SAME_CONFIGURATION_RAD)
-    errors = held_out["dh_vs_measured"], held_out["vec_vs_measured"]
-    found = model_comparison.gain(*errors, same, every.fold)
-    names = (model_comparison.DH, model_comparison.VEC)
-    unknown = 0.0 if found.configurations else np.nan
+    errors = {name: held_out[Comparison(MEASURED, name).name] for name in SELECTABLE}
+    found = model_comparison.select(errors, same, every.fold)
+    standings = found.standings.values()
+    gain_error = np.array([each.std_error_mm2 for each in standings])
     return {
-        "model": np.array(names, dtype=object),
-        "selected": np.array([int(name == found.selected) for name in names]),
-        "held_out_rms_mm": np.array([found.rms_mm[name] for name in names]),
-        "mean_of_folds_mm": np.array([found.folds_mm[name] for name in names]),
-        "gain_mm2": np.array([unknown, found.mean_mm2]),
-        "gain_std_error_mm2": np.nan_to_num(
-            np.array([unknown, found.std_error_mm2]), nan=np.nan, posinf=np.nan
-        ),
-        "configurations": np.full(2, found.configurations),
+        "model": np.array(SELECTABLE, dtype=object),
+        "selected": np.array([int(name == found.selected) for name in SELECTABLE]),
+        "held_out_rms_mm": np.array([each.rms_mm for each in standings]),
+        "mean_of_folds_mm": np.array([each.folds_mm for each in standings]),
+        "gain_mm2": np.array([each.gain_mm2 for each in standings]),
+        "gain_std_error_mm2": np.where(np.isfinite(gain_error), gain_error, np.nan),
+        "configurations": np.full(len(standings), found.configurations),
     }
 
 

@@ -1,11 +1,14 @@
-"""The three models of an arm fitted to observations: VEC, DH and nominal, by stated options."""
+"""The models of an arm fitted to observations by stated options, and how they are compared."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from kinacc.artifacts import allowed
 from kinacc.calibration import dh_fit, selection, vec_fit
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.constraints import ArmTerms, arm_terms, frame_terms, free_parameters
@@ -20,7 +23,33 @@ from kinacc.config.parameter_rules import Rule
 from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import ErrorModel
+from kinacc.kinematics.tables import NOMINAL
 from kinacc.kinematics.vec import VECModel
+
+MEASURED = "measured"
+
+
+class Fit(NamedTuple):
+    """A model with the base and targets it was fitted with."""
+
+    model: ErrorModel
+    frames: Frames
+
+
+class Comparison(NamedTuple):
+    """Whose error is meant: that of ``reference``, a model or the measurement, minus ``model``."""
+
+    reference: str
+    model: str
+
+    @property
+    def name(self) -> str:
+        """As artefacts name it."""
+        return f"{self.model}_vs_{self.reference}"
+
+
+COMPARISONS = tuple(Comparison(*pair) for pair in allowed.COMPARED)
 
 
 @dataclass(frozen=True)
@@ -79,6 +108,30 @@ class Options:
         bases = {BASE, *(f"{BASE}{number}" for number in range(2, count + 1))}
         of_base = np.array([name.partition(".")[0] in bases for name in terms.names])
         return bool(terms.free[of_base].any()), bool(terms.free[~of_base].any())
+
+
+def fit_all(
+    observations: Observations,
+    nominal: DHModel,
+    joint_range_rad: tuple[np.ndarray, np.ndarray],
+    options: Options,
+    near: Mapping[str, Fit] | None = None,
+) -> dict[str, Fit]:
+    """Every model by name, fitted to ``observations``; starts may be those ``near``.
+
+    Raises FitError.
+    """
+    start = near[VECModel.kind].model if near else None
+    # High orders are worth it; the end is the same to a few nm, which the paper's tables keep.
+    worth = options.grid is not None and start is not None and start.order == options.order
+    volumetric = fit_vec(observations, nominal, joint_range_rad, options, start if worth else None)
+    best = fit_dh(observations, nominal, options, volumetric.model, volumetric.frames)
+    plain = fit_nominal(observations, nominal, options)
+    return {
+        VECModel.kind: Fit(volumetric.model, volumetric.frames),
+        DHModel.kind: Fit(best.model, best.frames),
+        NOMINAL: Fit(nominal, plain.frames),
+    }
 
 
 def fit_vec(

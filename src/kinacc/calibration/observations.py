@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from kinacc.geometry import Pose, rotation_from_quaternion
+from kinacc.kinematics.robot import Robot
 
 TOOL = "tool"
 
@@ -110,9 +111,9 @@ def full_poses(
     )
 
 
-def from_columns(columns: Mapping[str, np.ndarray], joint_map: np.ndarray) -> Observations:
-    """Observations from the columns of ``measurements``; ``joint_map`` (k, k) of the robot."""
-    joints = len(joint_map)
+def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observations:
+    """Observations from the columns of ``measurements``, made with ``robot``."""
+    joints = robot.dh.joints
     reported = np.stack([columns[f"q{i}"] for i in range(1, joints + 1)], axis=1).astype(float)
     s = np.stack([columns[f"s{i}"] for i in range(1, joints + 1)], axis=1).astype(np.int8)
     quaternion = np.stack([columns[name] for name in ("qw", "qx", "qy", "qz")], axis=1)
@@ -123,7 +124,7 @@ def from_columns(columns: Mapping[str, np.ndarray], joint_map: np.ndarray) -> Ob
     session_names = tuple(dict.fromkeys(sessions))
     session_index = {name: number for number, name in enumerate(session_names)}
     return Observations(
-        q_rad=reported @ np.asarray(joint_map).T,
+        q_rad=robot.dh_joints(reported),
         s=s,
         position_mm=np.stack([columns[name] for name in ("x_mm", "y_mm", "z_mm")], axis=1),
         rotation=rotation_from_quaternion(quaternion.astype(float)),

@@ -2,34 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.calibration import models
 from kinacc.calibration.frames import Frames
-from kinacc.calibration.models import Options
+from kinacc.calibration.models import COMPARISONS, MEASURED, Fit
 from kinacc.calibration.observations import Observations
 from kinacc.distributions import gamma99
 from kinacc.geometry import Pose, compose, log_so3
-from kinacc.kinematics import dh, vec
-from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.vec import VECModel
-
-COMPARISONS = ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured")
-
-
-@dataclass(frozen=True)
-class FittedModels:
-    """The models of one fit with their frames."""
-
-    vec: VECModel
-    vec_frames: Frames
-    dh: DHModel
-    dh_frames: Frames
-    nominal: DHModel
-    nominal_frames: Frames
 
 
 @dataclass(frozen=True)
@@ -59,49 +41,24 @@ class Statistics:
     gamma99: float
 
 
-def fit_all(
-    observations: Observations,
-    nominal: DHModel,
-    joint_range_rad: tuple[np.ndarray, np.ndarray],
-    options: Options,
-    near: VECModel | None = None,
-) -> FittedModels:
-    """Every model fitted to ``observations``; the VEC model starts ``near``. Raises FitError."""
-    # High orders are worth it; the end is the same to a few nm, which the paper's tables keep.
-    worth = options.grid is not None and near is not None and near.order == options.order
-    start = near if worth else None
-    volumetric = models.fit_vec(observations, nominal, joint_range_rad, options, start)
-    best = models.fit_dh(observations, nominal, options, volumetric.model, volumetric.frames)
-    plain = models.fit_nominal(observations, nominal, options)
-    return FittedModels(
-        volumetric.model, volumetric.frames, best.model, best.frames, nominal, plain.frames
-    )
+def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Errors]:
+    """Errors of every comparison by its name at ``observations``, of models by theirs.
 
-
-def errors(fitted: FittedModels, observations: Observations) -> dict[str, Errors]:
-    """Errors of every comparison at ``observations``.
-
-    Comparisons with the measurement are in the base of the model compared. ``dh_vs_vec`` (VEC minus
-    DH) takes both through their own base to the instrument and from there to the DH model's base.
+    Each is in the base of the model compared. A model that is the reference is taken through its
+    own base to the instrument, and from there to that base.
     """
-    q_rad, s = observations.q_rad, observations.s
-    by_vec = _seen(vec.pose(fitted.vec, q_rad, s), fitted.vec_frames, observations)
-    by_dh = _seen(dh.forward(fitted.dh, q_rad), fitted.dh_frames, observations)
-    by_nominal = _seen(dh.forward(fitted.nominal, q_rad), fitted.nominal_frames, observations)
-    measured = observations.measured
+    bases = {name: _bases(fit.frames, observations) for name, fit in fits.items()}
+    seen = {name: _seen(fit, bases[name], observations) for name, fit in fits.items()}
+    seen[MEASURED] = observations.measured
     return {
-        "vec_vs_measured": _difference(measured, by_vec, _bases(fitted.vec_frames, observations)),
-        "dh_vs_vec": _difference(by_vec, by_dh, _bases(fitted.dh_frames, observations)),
-        "dh_vs_measured": _difference(measured, by_dh, _bases(fitted.dh_frames, observations)),
-        "nominal_vs_measured": _difference(
-            measured, by_nominal, _bases(fitted.nominal_frames, observations)
-        ),
+        each.name: _difference(seen[each.reference], seen[each.model], bases[each.model])
+        for each in COMPARISONS
     }
 
 
 def cross_validated(
     observations: Observations,
-    refit: Callable[[Observations, int], FittedModels],
+    refit: Callable[[Observations, int], Mapping[str, Fit]],
     folds: Iterable[int],
 ) -> tuple[dict[str, Errors], dict[int, dict[str, Errors]]]:
     """Errors of every row by a model that has not seen its fold, and each fold's training errors.
@@ -110,12 +67,7 @@ def cross_validated(
     (-1) always train and stay NaN.
     """
     count = len(observations)
-    blank = Errors(np.full((count, 3), np.nan), np.full((count, 3), np.nan))
-    held_out = {name: replace(blank) for name in COMPARISONS}
-    held_out = {
-        name: Errors(each.position_mm.copy(), each.rotation_rad.copy())
-        for name, each in held_out.items()
-    }
+    held_out = {each.name: Errors(*np.full((2, count, 3), np.nan)) for each in COMPARISONS}
     trained: dict[int, dict[str, Errors]] = {}
     for fold in folds:
         out = observations.fold == fold
@@ -145,12 +97,12 @@ def statistics(vectors: np.ndarray) -> Statistics | None:
     )
 
 
-def _seen(flange: Pose, frames: Frames, observations: Observations) -> Pose:
+def _seen(fit: Fit, bases: Pose, observations: Observations) -> Pose:
     targets = Pose(
-        frames.targets.rotation[observations.target],
-        frames.targets.position_mm[observations.target],
+        fit.frames.targets.rotation[observations.target],
+        fit.frames.targets.position_mm[observations.target],
     )
-    return compose(_bases(frames, observations), compose(flange, targets))
+    return compose(bases, compose(fit.model.pose(observations.q_rad, observations.s), targets))
 
 
 def _bases(frames: Frames, observations: Observations) -> Pose:

@@ -1,4 +1,4 @@
-"""Fits as columns of ``vec_model``, ``dh_model``, ``frames``, ``vec_fit`` and ``dh_fit``."""
+"""Fits as columns of ``frames``, ``vec_fit``, ``dh_fit`` and what else is known of them."""
 
 from __future__ import annotations
 
@@ -11,48 +11,12 @@ from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.identified import IDENTIFIED, PRIOR, Parameter
 from kinacc.calibration.selection import Choice
 from kinacc.calibration.solve import Solution, Spectrum
-from kinacc.calibration.uncertainty import Uncertainty, is_angle, vec_parameter_names
+from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import quaternion_from_rotation
-from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.tables import frame
-from kinacc.kinematics.vec import ERRORS
 
 Columns = dict[str, np.ndarray]
-_DIRECTIONS = (-1, 1)
-
-
-def vec_model_columns(fit: VECFit) -> Columns:
-    """``vec_model``: coefficients of both directions, then the offsets that were fitted."""
-    model = fit.model
-    joints, errors, terms = model.coefficients.shape
-    split = model.coefficients.size
-    joint, error, order = (part.ravel() for part in np.indices((joints, errors, terms)))
-    offset_std = fit.std[split:].reshape(joints, 2)
-    more, which = np.nonzero(np.isfinite(offset_std))
-    joint = np.concatenate([joint, more])
-    columns: Columns = {
-        "joint": joint + 1,
-        "error": np.array(ERRORS, dtype=object)[
-            np.concatenate([error, np.full(more.size, ERRORS.index("eps_z"))])
-        ],
-        "direction": np.concatenate([np.zeros(split, int), np.array(_DIRECTIONS)[which]]),
-        "order": np.concatenate([order, np.zeros(more.size, int)]),
-        "coefficient": np.concatenate(
-            [model.coefficients.ravel(), model.direction_offsets_rad[more, which]]
-        ),
-        "std": np.concatenate([fit.std[:split], offset_std[more, which]]),
-        "q_min_rad": model.q_min_rad[joint],
-        "q_max_rad": model.q_max_rad[joint],
-    }
-    return columns | {name: getattr(model.dh, name)[joint] for name in PARAMETERS}
-
-
-def dh_model_columns(fit: DHFit) -> Columns:
-    """``dh_model``: parameters and their standard deviations, NaN where undetermined."""
-    columns: Columns = {"joint": np.arange(1, fit.model.joints + 1)}
-    columns |= {name: getattr(fit.model, name) for name in PARAMETERS}
-    return columns | {f"std_{name}": fit.std[:, i] for i, name in enumerate(PARAMETERS)}
 
 
 def frames_columns(
@@ -97,7 +61,7 @@ def frames_of(
 def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:
     """``vec_fit``: figures of the fit, the prior of every coefficient, singular values."""
     rows = [*_solution_rows(fit.solution), *_spectrum_rows(gauge)]
-    names = vec_parameter_names(fit.model)
+    names = fit.model.parameter_names
     units = ["mm" if "delta" in name else "rad" for name in names]
     rows += [
         ("prior_std", number, name, value, unit)

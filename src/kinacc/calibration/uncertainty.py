@@ -10,14 +10,13 @@ the frame the motion is given in. DH parameters are ``j1.d_mm`` and the like, VE
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD, DHFit
 from kinacc.calibration.truncated_svd import TOUCH_SQUARED
 from kinacc.calibration.vec_fit import VECFit
-from kinacc.kinematics.dh import PARAMETERS
-from kinacc.kinematics.vec import ERRORS, VECModel
 
 
 @dataclass(frozen=True)
@@ -39,39 +38,13 @@ class Uncertainty:
         return np.sum(self.undetermined**2, axis=0) <= TOUCH_SQUARED
 
 
-def of_dh(fit: DHFit, target_names: tuple[str, ...]) -> Uncertainty:
-    """Uncertainty of a DH fit: base and targets if estimated, then its free parameters."""
-    names = dh_parameter_names(len(fit.free))
-    free = [name for name, chosen in zip(names, fit.free.ravel(), strict=True) if chosen]
-    return _uncertainty(fit, target_names, free)
-
-
-def of_vec(fit: VECFit, target_names: tuple[str, ...]) -> Uncertainty:
-    """Posterior uncertainty of a VEC fit: base and targets if estimated, then coefficients."""
-    names = vec_parameter_names(fit.model)
-    free = [name for name, chosen in zip(names, fit.free, strict=True) if chosen]
-    return _uncertainty(fit, target_names, free)
-
-
-def dh_parameter_names(joints: int) -> list[str]:
-    """Names (5k,) of the DH parameters, ordered as ``dh.to_vector``: j1.theta_offset_rad, ..."""
-    return [f"j{joint}.{name}" for joint in range(1, joints + 1) for name in PARAMETERS]
-
-
-def vec_parameter_names(model: VECModel) -> list[str]:
-    """Names (P,) of the coefficients, ordered as ``vec.to_vector``: j1.delta_x.0, ..."""
-    coefficients = [
-        f"j{joint}.{error}.{order}"
-        for joint in range(1, model.joints + 1)
-        for error in ERRORS
-        for order in range(model.order + 1)
-    ]
-    offsets = [
-        f"j{joint}.eps_z.{direction}"
-        for joint in range(1, model.joints + 1)
-        for direction in ("minus", "plus")
-    ]
-    return coefficients + offsets
+def of_fit(fit: DHFit | VECFit, target_names: tuple[str, ...]) -> Uncertainty:
+    """Uncertainty of base and targets if estimated, then of the parameters that took part."""
+    names, change = _named(fit, target_names)
+    undetermined = np.zeros((0, len(names)))
+    if fit.solution.undetermined is not None:
+        undetermined = _directions(fit, fit.solution.undetermined, names, change)
+    return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
 
 
 def is_angle(name: str) -> bool:
@@ -79,29 +52,18 @@ def is_angle(name: str) -> bool:
     return name.endswith("_rad") or ".eps_" in name
 
 
-def _uncertainty(
-    fit: DHFit | VECFit, target_names: tuple[str, ...], free: list[str]
-) -> Uncertainty:
-    names, change = _named(fit, target_names, free)
-    undetermined = np.zeros((0, len(names)))
-    if fit.solution.undetermined is not None:
-        undetermined = _directions(fit, fit.solution.undetermined, names, change)
-    return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
-
-
 def named_directions(
     fit: DHFit, target_names: tuple[str, ...], directions: np.ndarray
 ) -> np.ndarray:
     """Directions (m, P) of a fit's own coordinates, in units of its scale, as of its names."""
-    names = dh_parameter_names(len(fit.free))
-    free = [name for name, chosen in zip(names, fit.free.ravel(), strict=True) if chosen]
-    return _directions(fit, directions, *_named(fit, target_names, free))
+    return _directions(fit, directions, *_named(fit, target_names))
 
 
 def _named(
-    fit: DHFit | VECFit, target_names: tuple[str, ...], free: list[str]
+    fit: DHFit | VECFit, target_names: tuple[str, ...]
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Names of motions and parameters, and their derivative in the fit's own coordinates."""
+    free = list(compress(fit.model.parameter_names, fit.free.ravel()))
     frames, moving = fit.coordinates.size, fit.coordinates.motion_names(target_names)
     names = (*moving, *free)
     change = np.zeros((len(names), len(fit.solution.x)))

@@ -17,7 +17,6 @@ from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose, invert
 from kinacc.kinematics.inverse.limits import travel_unit
-from kinacc.kinematics.vec import VECModel
 
 _ROUTED = 400  # points beyond which the route is built in stretches of so many
 
@@ -48,7 +47,7 @@ def points_of(
         problems.append(Problem("candidates", what, "one name per point"))
     if problems:
         raise InputError(problems, "These candidates cannot be measured against the model")
-    q_dh = joints @ arm.robot.joint_map.T
+    q_dh = arm.robot.dh_joints(joints)
     where = arm.pose(q_dh, directions, "base", point).position_mm
     slope = arm.joint_jacobian(q_dh, directions, "base", point)[:, :3] @ arm.robot.joint_map
     return Points(tuple(label), joints, directions, where, slope)
@@ -123,8 +122,8 @@ def _outside(arm: Calibration, joints: np.ndarray, label: list[str]) -> list[Pro
         low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
         bad = (joints[:, joint] < low - 1e-9) | (joints[:, joint] > high + 1e-9)
         problems += _said(bad, label, f"joint {joint + 1} outside the limits of {robot.name}")
-    if isinstance(arm.model, VECModel):
-        outside = arm.outside_range(joints @ robot.joint_map.T)
+    if arm.model.domain is not None:
+        outside = arm.outside_range(robot.dh_joints(joints))
         for joint in np.flatnonzero(outside.any(axis=0)):
             words = f"joint {joint + 1} outside the range the data cover: no prediction"
             problems += _said(outside[:, joint], label, words)

@@ -63,13 +63,13 @@ def candidates(given: Mapping, arm: Calibration) -> Found:
 
 
 def _spoken_of(arm: Calibration, given: Mapping, box, inside) -> np.ndarray:
-    """Joints drawn from a box, without those that a VEC model says nothing of."""
+    """Joints drawn from a box, without those that the model says nothing of."""
     wanted = given["drawn"]
     count = wanted
     while True:
         drawn = spread(arm.robot, count, box, inside, arm.point(given["point"]))
-        if arm.choice == "vec":  # coupled joints have no box of their own
-            drawn = drawn[~arm.outside_range(drawn @ arm.robot.joint_map.T).any(axis=1)]
+        if arm.model.domain is not None:  # coupled joints have no box of their own
+            drawn = drawn[~arm.outside_range(arm.robot.dh_joints(drawn)).any(axis=1)]
         if len(drawn) >= wanted:
             return drawn[:wanted]
         if count >= _MOST_DRAWS * wanted:
@@ -84,8 +84,8 @@ def _region(given: Mapping, arm: Calibration):
     if wanted is None:
         wanted = "configured" if _is_configured(given, arm) else "fitted"
     if wanted == "limits":
-        if arm.choice == "vec":
-            what = "the VEC model says nothing beyond the joints the data cover"
+        if arm.model.domain is not None:
+            what = f"the {arm.choice.upper()} model says nothing beyond the joints the data cover"
             raise InputError(Problem("--region limits", what, "fitted"))
         return None, None, "drawn evenly from the joint limits"
     if wanted == "fitted":

@@ -108,7 +108,7 @@ def joints_in_words(outside: np.ndarray) -> str:
 
 
 def _where(arm: Calibration, outside: np.ndarray) -> np.ndarray:
-    said = "no prediction" if arm.choice == "vec" else "extrapolated"
+    said = "extrapolated" if arm.model.domain is None else "no prediction"
     words = [
         f"{said}: {joints_in_words(row)} outside the range the data cover" if row.any() else "ok"
         for row in outside

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from kinacc.calibration.uncertainty import dh_parameter_names, is_angle
+from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.errors import InputError, Problem
@@ -63,7 +63,7 @@ class Shift(NamedTuple):
 class Comparison:
     """Two calibrations side by side.
 
-    ``parameters`` is None unless both are DH models. ``statistic`` is the squared distance in the
+    ``parameters`` is None unless both are DH tables. ``statistic`` is the squared distance in the
     ``directions`` both determine, in units of their covariances, and ``probability`` that of one at
     least as large where nothing changed; NaN where not both know their covariance.
     ``as_they_stand`` are shifts of the flange in the base, ``apart_from_frames`` after the best
@@ -93,11 +93,11 @@ def compare(
     """
     require_alike(first, second)
     parameters, test = None, (np.nan, 0, np.nan)
-    if isinstance(first.model, DHModel) and isinstance(second.model, DHModel):
+    if first.model.table is not None and second.model.table is not None:
         parameters = _parameters(first, second)
         test = _test(first, second)
     before, after = (
-        arm.pose(q_rad @ arm.robot.joint_map.T, None, "base", FLANGE) for arm in (first, second)
+        arm.pose(arm.robot.dh_joints(q_rad), None, "base", FLANGE) for arm in (first, second)
     )
     plain = _difference(before, after)
     slopes = _frame_slopes(before)
@@ -147,8 +147,8 @@ def _length(model: DHModel) -> float:
 
 
 def _parameters(first: Calibration, second: Calibration) -> Parameters:
-    names = dh_parameter_names(first.model.joints)
-    values = [dh.to_vector(arm.model) for arm in (first, second)]
+    names = first.model.parameter_names
+    values = [dh.to_vector(arm.model.table) for arm in (first, second)]
     free = [_free(arm) for arm in (first, second)]
     units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
     differ = np.abs(values[1] - values[0]) > ROUNDING * units
@@ -175,7 +175,7 @@ def _free(arm: Calibration) -> set[str]:
     return set(arm.known.names) if arm.known else set()
 
 
-def _deviations(arm: Calibration, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
+def _deviations(arm: Calibration, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Variances (P,), NaN without a covariance and 0 where held, and which are undetermined."""
     if arm.known is None:
         return np.full(len(names), np.nan), np.zeros(len(names), dtype=bool)
@@ -197,9 +197,9 @@ def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
     """Squared distance, number of directions and probability, over what both determine."""
     if first.known is None or second.known is None:
         return np.nan, 0, np.nan
-    names = dh_parameter_names(first.model.joints)
+    names = first.model.parameter_names
     units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
-    difference = (dh.to_vector(second.model) - dh.to_vector(first.model)) / units
+    difference = (dh.to_vector(second.model.table) - dh.to_vector(first.model.table)) / units
     total, blind = np.zeros((len(names), len(names))), []
     for arm in (first, second):
         pick = np.zeros((len(names), len(arm.known.names)))
@@ -258,7 +258,7 @@ def _scatter(arm: Calibration, q_rad: np.ndarray) -> np.ndarray | None:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fit."""
     if arm.known is None:
         return None
-    return sensitivity(arm, q_rad @ arm.robot.joint_map.T, None, "base", FLANGE) @ arm.root
+    return sensitivity(arm, arm.robot.dh_joints(q_rad), None, "base", FLANGE) @ arm.root
 
 
 def _without_frames(scatter: np.ndarray, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:

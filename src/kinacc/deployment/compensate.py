@@ -69,7 +69,7 @@ def compensate(
     best = _Best.none(count, robot.dh.joints, given)
     if given:
         every = np.arange(count)
-        best.offer(arm.judged(near @ robot.joint_map.T, every), every)
+        best.offer(arm.judged(robot.dh_joints(near), every), every)
     rows = np.flatnonzero(~best.settled())
     for start, own in arm.postures(rows) if len(rows) else ():
         wanting = ~best.settled()[own]
@@ -89,7 +89,7 @@ def _require_numbers(wanted: Pose) -> None:
 def programmed(calibration: Calibration, q_rad: np.ndarray, point: str | None = None) -> Pose:
     """Where the nominal arm would put ``point`` in its base at reported joints (n, k)."""
     robot = calibration.robot
-    end = dh.forward(robot.dh, np.atleast_2d(q_rad) @ robot.joint_map.T)
+    end = dh.forward(robot.dh, robot.dh_joints(np.atleast_2d(q_rad)))
     return compose(robot.base, compose(end, calibration.programmed_point(point)))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +14,14 @@ from kinacc.geometry import Pose
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
+from kinacc.kinematics.tables import KINDS
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 
-_NEEDED = ("vec_model", "dh_model", "frames")
+_NEEDED = (*(f"{kind}_model" for kind in KINDS), "frames")
 # Used where they are there.
 _WANTED = ("dh_fit", "dh_identified", "residuals", "model_selection")
-_COVARIANCE = {"dh": "dh_covariance", "vec": "vec_covariance"}
+_COVARIANCE = tuple(f"{kind}_covariance" for kind in KINDS)
 _SAME = 1e-9
 
 
@@ -37,7 +37,7 @@ def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
     ]
     if missing:
         raise InputError(missing, f"{folder} holds no calibration")
-    names = [*_NEEDED, *_WANTED, *_COVARIANCE.values()]
+    names = [*_NEEDED, *_WANTED, *_COVARIANCE]
     present = [name for name in names if (folder / f"{name}.parquet").is_file()]
     return {name: store.read(folder / f"{name}.parquet") for name in present}
 
@@ -71,14 +71,9 @@ def calibration(
     choice = selected_model(tables) if model is None else model
     if choice not in MODELS:
         raise InputError(Problem("model", f"{choice!r}", ", ".join(MODELS)))
-    slides = robot.dh.prismatic  # which joints slide is the robot's to say
-    volumetric = model_tables.vec_model(tables["vec_model"])
-    _require_same_arm(volumetric.dh, robot, name)
-    made = {
-        "vec": replace(volumetric, dh=replace(volumetric.dh, prismatic=slides)),
-        "dh": replace(model_tables.dh_model(tables["dh_model"]), prismatic=slides),
-        "nominal": robot.dh,
-    }
+    made = model_tables.models(tables, robot.dh)
+    bounded = next(each for each in made.values() if each.domain is not None)
+    _require_same_arm(bounded.dh, robot, name)
     frames = tables["frames"]
     of_model = np.asarray(frames["model"]) == choice
     names = [str(each) for each in np.asarray(frames["frame"])[of_model]]
@@ -91,17 +86,19 @@ def calibration(
         model=made[choice],
         base=model_tables.frame(frames, choice, "base", session),
         base_name="base" if number == 0 else f"base{number + 1}",
-        anchor=_anchor(frames, targets, session) if choice == "vec" else None,
+        anchor=_anchor(frames, choice, targets, session) if made[choice].table is None else None,
         targets={each: model_tables.frame(frames, choice, each) for each in targets},
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
-        fitted_range_rad=(volumetric.q_min_rad, volumetric.q_max_rad),
+        fitted_range_rad=bounded.domain,
     )
 
 
-def _anchor(frames: Mapping, targets: Sequence[str], session: str | None) -> Anchor | None:
-    """Base and targets of the DH model; None where the VEC model has the very same base."""
-    bases = [model_tables.frame(frames, each, "base", session) for each in ("dh", "vec")]
+def _anchor(
+    frames: Mapping, choice: str, targets: Sequence[str], session: str | None
+) -> Anchor | None:
+    """Base and targets of the DH model; None where the model chosen has the very same base."""
+    bases = [model_tables.frame(frames, each, "base", session) for each in ("dh", choice)]
     if all(np.array_equal(one, other) for one, other in zip(*bases, strict=True)):
         return None
     tools = {each: model_tables.frame(frames, "dh", each) for each in targets}
@@ -128,7 +125,7 @@ def selected_model(tables: Tables) -> str:
     recorded = _recorded(tables)
     if recorded:
         return recorded
-    rms = {each: residual(tables, each, "validation") for each in ("dh", "vec")}
+    rms = {each: residual(tables, each, "validation") for each in KINDS}
     if any(each is None for each in rms.values()):
         what = "was not selected, and there are no held-out residuals to choose by"
         raise InputError(Problem("model", what, ", ".join(MODELS), "give --model"))
@@ -161,7 +158,7 @@ def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual
 
 def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
     """Covariance and undetermined directions of a fit; None where the tables lack them."""
-    columns = tables.get(_COVARIANCE.get(choice, ""))
+    columns = tables.get(f"{choice}_covariance")
     if columns is None:
         return None
     names = list(dict.fromkeys(str(each) for each in columns["parameter"]))
@@ -174,7 +171,7 @@ def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
 
 
 def _undetermined(tables: Tables, choice: str, place: Mapping[str, int]) -> np.ndarray:
-    fit = tables.get("dh_fit") if choice == "dh" else None
+    fit = tables.get(f"{choice}_fit")
     if fit is None:
         return np.zeros((0, len(place)))
     rows = np.flatnonzero(np.asarray(fit["quantity"]) == "undetermined_direction")

@@ -17,7 +17,6 @@ from kinacc.kinematics.inverse import few_axes, limits, newton
 from kinacc.kinematics.inverse import solve as all_branches
 from kinacc.kinematics.inverse.onto_model import Functions, functions_of
 from kinacc.kinematics.region import points
-from kinacc.kinematics.vec import VECModel
 
 POSITION_TOLERANCE_MM = newton.POSITION_TOLERANCE_MM
 ROTATION_TOLERANCE_RAD = newton.ROTATION_TOLERANCE_RAD
@@ -67,10 +66,10 @@ class Goals:
         self.wanted = compose(goal, self.carried)
         self.turn_tolerance_rad = FEW_AXES_TURN_RAD if self.has_few_axes else ROTATION_TOLERANCE_RAD
         self.model = calibration.model
-        self.is_vec = isinstance(self.model, VECModel)
-        self.plain = self.model.dh if self.is_vec else self.model
+        self.is_bounded = self.model.domain is not None
+        self.plain = self.model.dh
         lower, upper = limits.dh_limits(calibration.robot)
-        if self.is_vec:  # of several turns, one the model speaks of
+        if self.is_bounded:  # of several turns, one the model speaks of
             low, high = calibration.fitted_range_rad
             cut = np.maximum(lower, low), np.minimum(upper, high)
             lower, upper = np.where(cut[0] < cut[1], cut, (lower, upper))
@@ -86,7 +85,7 @@ class Goals:
         reported = limits.reported_joints(calibration.robot, start)
         reach = limits.travel_unit(calibration.robot) * SAME_POSTURE_RAD
         beyond_limits = ~within_each(calibration, reported, reach).all(axis=1)
-        beyond_range = calibration.outside_range(start, reach).any(axis=1) & self.is_vec
+        beyond_range = calibration.outside_range(start, reach).any(axis=1) & self.is_bounded
         hopeless = beyond_limits | beyond_range
         status = np.where(beyond_limits, Status.OUTSIDE_LIMITS, Status.OUTSIDE_RANGE)
         unknown = np.full(count, np.nan)
@@ -100,18 +99,18 @@ class Goals:
 
     def _tried(self, start: np.ndarray, rows: np.ndarray) -> Judged:
         calibration = self.calibration
-        with np.errstate(all="ignore"):  # far outside its range a VEC model is no number
+        with np.errstate(all="ignore"):  # far outside its range a model may be no number
             q_dh = self._refined(start, rows)
             turned = self.turned(q_dh, rows)
             again = np.flatnonzero((np.abs(turned - q_dh) > 1.0).any(axis=1))
             q_dh[again] = turned[again]
-            if len(again) and self.is_vec:  # another turn is another place of a Chebyshev series
+            if len(again) and self.is_bounded:  # errors need not repeat after a turn
                 q_dh[again] = self._refined(turned[again], rows[again])
             off, angle = self._left(q_dh, rows)
         hit = (off <= POSITION_TOLERANCE_MM) & (angle <= self.turn_tolerance_rad)
         reported = limits.reported_joints(calibration.robot, q_dh)
         covered = ~calibration.outside_range(q_dh).any(axis=1)
-        beyond = Status.OUTSIDE_RANGE if self.is_vec else Status.EXTRAPOLATED
+        beyond = Status.OUTSIDE_RANGE if self.is_bounded else Status.EXTRAPOLATED
         status = np.where(covered, Status.CONVERGED, beyond)
         inside = within_each(calibration, reported).all(axis=1)
         status = np.where(inside, status, Status.OUTSIDE_LIMITS)
@@ -148,7 +147,7 @@ class Goals:
         """Revolute joints on the turn nearest to the given joints that lies within the box."""
         robot = self.calibration.robot
         lower, upper = self.box
-        near = self.near[rows] @ robot.joint_map.T
+        near = robot.dh_joints(self.near[rows])
         turn = 2.0 * np.pi * ~robot.dh.prismatic
         base = q_dh + turn * np.rint((near - q_dh) / (2.0 * np.pi))
         best, lowest = base, np.full(base.shape, np.inf)
@@ -161,7 +160,7 @@ class Goals:
         return best
 
     def _refined(self, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        if self.s is None or not self.is_vec:
+        if self.s is None or self.model.table is not None:
             return self._onto(functions_of(self.model, None), start, rows)
         # Travel directions differ by row, and a refinement drops rows as they converge.
         found = np.empty_like(start)
@@ -200,7 +199,7 @@ class Goals:
         low, high = robot.q_min_rad, robot.q_max_rad
         count = _FEW_STARTS if self.has_few_axes else _STARTS
         share = points("sobol", count, robot.dh.joints)
-        starts = (low + share * (high - low)) @ robot.joint_map.T
+        starts = robot.dh_joints(low + share * (high - low))
         found = np.full((len(rows), count, robot.dh.joints), np.nan)
         functions = functions_of(self.plain, None)
         for number, start in enumerate(starts):

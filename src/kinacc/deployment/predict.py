@@ -8,11 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.calibration.frames import MOTIONS
-from kinacc.calibration.uncertainty import dh_parameter_names, vec_parameter_names
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.geometry import Pose, compose, skew
-from kinacc.kinematics import dh, vec
-from kinacc.kinematics.vec import VECModel
 
 BLOCK = 512  # poses per pass: bounds the memory of the sensitivities
 
@@ -26,8 +23,8 @@ class Prediction(NamedTuple):
     ``blind_mm`` and ``blind_rad`` (n,): how far the pose moves when the parameters move by one unit
     (1 mm or 1 mrad) along the directions the calibration could not see, root of the summed squares.
     ``residual_mm`` and ``residual_rad`` (n,): rms of what the model left unexplained.
-    ``outside`` (n, k): joints outside the range the data cover; there a VEC model says nothing, and
-    all else is NaN.
+    ``outside`` (n, k): joints outside the range the data cover; where the model
+    has a domain it says nothing there, and all else is NaN.
     """
 
     pose: Pose
@@ -54,9 +51,9 @@ def predict(
     ``s`` (n, k): travel directions, unknown where not given. ``point``: a target by name or
     ``flange``; the tool where not given. Raises InputError for an unknown frame or point.
     """
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float)) @ calibration.robot.joint_map.T
+    q_rad = calibration.robot.dh_joints(np.atleast_2d(q_rad))
     count, outside = len(q_rad), calibration.outside_range(q_rad)
-    silent = outside.any(axis=1) & isinstance(calibration.model, VECModel)
+    silent = outside.any(axis=1) & (calibration.model.domain is not None)
     said = np.flatnonzero(~silent)
     pose = Pose(np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan))
     std, blind = np.full((count, 6), np.nan), np.full((count, 2), np.nan)
@@ -106,10 +103,10 @@ def sensitivity(
     end = calibration.forward(q_rad, s)
     slopes = np.zeros((len(q_rad), 6, len(calibration.known.names)))
     place = {each: number for number, each in enumerate(calibration.known.names)}
-    jacobian, names = _model_jacobian(calibration, q_rad, s)
-    chosen = [(place[each], number) for number, each in enumerate(names) if each in place]
+    names = enumerate(calibration.model.parameter_names)
+    chosen = [(place[each], number) for number, each in names if each in place]
     columns, numbers = np.array(chosen, dtype=int).reshape(-1, 2).T
-    slopes[:, :, columns] = jacobian[:, :, numbers]
+    slopes[:, :, columns] = calibration.model.parameter_jacobian(q_rad, s)[:, :, numbers]
     # A turn of the last frame swings the point: w x arm = -[arm] w.
     arm = (end.rotation @ carried.position_mm[:, None])[..., 0]
     slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
@@ -123,17 +120,6 @@ def sensitivity(
         seen = compose(origin, compose(end, carried)).position_mm - origin.position_mm
         _fill(slopes, place, calibration.base_name, np.broadcast_to(turn, end.rotation.shape), seen)
     return slopes
-
-
-def _model_jacobian(
-    calibration: Calibration, q_rad: np.ndarray, s: np.ndarray | None
-) -> tuple[np.ndarray, list[str]]:
-    """Jacobian (n, 6, P) of the last frame in the model's parameters, and their names (P,)."""
-    model = calibration.model
-    if isinstance(model, VECModel):
-        return vec.parameter_jacobian(model, q_rad, s), vec_parameter_names(model)
-    jacobian = dh.parameter_jacobian(model, q_rad)
-    return jacobian.reshape(len(q_rad), 6, -1), dh_parameter_names(model.joints)
 
 
 def _fill(

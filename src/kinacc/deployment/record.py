@@ -12,12 +12,11 @@ from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
-from kinacc.kinematics import dh, vec
-from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot
-from kinacc.kinematics.vec import VECModel
+from kinacc.kinematics.tables import KINDS, NOMINAL
 
-MODELS = ("dh", "vec", "nominal")
+MODELS = (*KINDS, NOMINAL)
 FRAMES = ("base", "instrument")
 FLANGE, TOOL = "flange", "tool"
 _LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
@@ -44,7 +43,7 @@ class Anchor:
 class Calibration:
     """One model of one calibrated arm.
 
-    ``choice`` is nominal, dh or vec. ``base`` is the first DH frame in the instrument's frame,
+    ``choice`` is one of ``MODELS``. ``base`` is the first DH frame in the instrument's frame,
     ``targets`` are tool and other targets in the last DH frame. ``known`` is the uncertainty of the
     fit (None for the nominal model), ``residual`` what the model does not explain.
     ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides).
@@ -57,7 +56,7 @@ class Calibration:
     name: str
     robot: Robot
     choice: str
-    model: DHModel | VECModel
+    model: ErrorModel
     base: Pose
     targets: Mapping[str, Pose]
     known: Uncertainty | None = None
@@ -100,9 +99,7 @@ class Calibration:
 
     def forward(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
         """Last DH frame in the first one, (n, ...), at DH joints (n, k)."""
-        if isinstance(self.model, VECModel):
-            return vec.pose(self.model, q_rad, s)
-        return dh.forward(self.model, q_rad)
+        return self.model.pose(q_rad, s)
 
     def pose(
         self,
@@ -122,10 +119,7 @@ class Calibration:
         point: str | None = None,
     ) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the DH joints; rows as in ``dh.joint_jacobian``."""
-        if isinstance(self.model, VECModel):
-            slopes = vec.joint_jacobian(self.model, q_rad, s)
-        else:
-            slopes = dh.joint_jacobian(self.model, q_rad)
+        slopes = self.model.joint_jacobian(q_rad, s)
         # A turn of the last frame swings the point: w x arm = -[arm] w.
         arm = self.forward(q_rad, s).rotation @ self.point(point).position_mm
         slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
@@ -160,4 +154,4 @@ class Calibration:
 def nominal(robot: Robot, name: str = "") -> Calibration:
     """A robot as its maker describes it, as a calibration that nothing was learned for."""
     tool = compose(robot.flange, robot.tool)
-    return Calibration(name or robot.name, robot, "nominal", robot.dh, IDENTITY, {TOOL: tool})
+    return Calibration(name or robot.name, robot, NOMINAL, robot.dh, IDENTITY, {TOOL: tool})

@@ -9,7 +9,9 @@ Joints ``q_rad`` are in rad; those of prismatic joints, columns of the same arra
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -36,6 +38,9 @@ class DHModel:
     beta_rad: np.ndarray
     prismatic: np.ndarray | None = None
 
+    kind: ClassVar[str] = "dh"
+    domain: ClassVar[None] = None
+
     def __post_init__(self) -> None:
         if self.prismatic is None:
             object.__setattr__(self, "prismatic", np.zeros(np.size(self.d_mm), dtype=bool))
@@ -49,6 +54,45 @@ class DHModel:
     def joints(self) -> int:
         """Number of joints k."""
         return self.theta_offset_rad.size
+
+    @property
+    def dh(self) -> Self:
+        """The model itself: it has no errors but those in its parameters."""
+        return self
+
+    table = dh
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names (5k,) ordered as ``to_vector``: j1.theta_offset_rad, ..."""
+        return tuple(f"j{i}.{name}" for i in range(1, self.joints + 1) for name in PARAMETERS)
+
+    def pose(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+        """Poses (n, ...), the same in any travel direction; see ``forward``."""
+        return forward(self, q_rad)
+
+    def joint_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+        """Jacobian (n, 6, k) of ``pose`` in the joints."""
+        return joint_jacobian(self, q_rad)
+
+    def parameter_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+        """Jacobian (n, 6, 5k) of ``pose`` in the parameters."""
+        return parameter_jacobian(self, q_rad).reshape(len(q_rad), 6, -1)
+
+    def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
+        """The table ``dh_model``: parameters and their ``std`` (5k,), NaN where undetermined."""
+        std = np.reshape(std, (self.joints, len(PARAMETERS)))
+        columns = {"joint": np.arange(1, self.joints + 1)}
+        columns |= {name: getattr(self, name) for name in PARAMETERS}
+        return columns | {f"std_{name}": std[:, i] for i, name in enumerate(PARAMETERS)}
+
+    @classmethod
+    def from_columns(
+        cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
+    ) -> Self:
+        """The model of a ``dh_model`` table; ``prismatic`` (k,) is the robot's to say."""
+        order = np.argsort(columns["joint"], kind="stable")
+        return cls(*(np.asarray(columns[name], float)[order] for name in PARAMETERS), prismatic)
 
 
 def to_vector(model: DHModel) -> np.ndarray:

@@ -1,55 +1,35 @@
-"""Models from the columns of their tables (``vec_model``, ``dh_model``, ``frames``)."""
+"""The kinds of error models there are, and models and frames from their tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
-from kinacc.kinematics.dh import PARAMETERS, DHModel
-from kinacc.kinematics.vec import ERRORS, VECModel
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import ErrorModel
+from kinacc.kinematics.vec import VECModel
 
 Columns = Mapping[str, np.ndarray]
+KINDS: dict[str, type[ErrorModel]] = {each.kind: each for each in (DHModel, VECModel)}
+NOMINAL = "nominal"  # the maker's model, which nothing was fitted for
 _ROUNDING = 1e-9
 
 
-def dh_model(columns: Columns, prismatic: np.ndarray | None = None) -> DHModel:
-    """DH model of a ``dh_model`` table; ``prismatic`` (k,) is the robot's to say."""
-    order = np.argsort(columns["joint"], kind="stable")
-    values = (np.asarray(columns[name], dtype=float)[order] for name in PARAMETERS)
-    return DHModel(*values, prismatic)
+def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorModel]:
+    """Every model of an arm by name: those of tables ``<kind>_model``, and its ``nominal`` one."""
+    made = {
+        kind: each.from_columns(tables[f"{kind}_model"], nominal.prismatic)
+        for kind, each in KINDS.items()
+    }
+    return {**made, NOMINAL: nominal}
 
 
-def vec_model(columns: Columns, prismatic: np.ndarray | None = None) -> VECModel:
-    """VEC model of a ``vec_model`` table; coefficients it does not list are zero.
-
-    ``prismatic`` (k,): joints that slide, which is the robot's to say.
-    """
-    joint = np.asarray(columns["joint"]).astype(int) - 1
-    order = np.asarray(columns["order"]).astype(int)
-    direction = np.asarray(columns["direction"]).astype(int)
-    error = np.array([ERRORS.index(name) for name in columns["error"]])
-    value = np.asarray(columns["coefficient"], dtype=float)
-    joints = joint.max() + 1
-    first = [np.flatnonzero(joint == number)[0] for number in range(joints)]
-
-    def per_joint(name: str) -> np.ndarray:
-        return np.asarray(columns[name], dtype=float)[first]
-
-    both = direction == 0
-    coefficients = np.zeros((joints, len(ERRORS), order.max() + 1))
-    coefficients[joint[both], error[both], order[both]] = value[both]
-    offsets = np.zeros((joints, 2))
-    offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
-    return VECModel(
-        DHModel(*(per_joint(name) for name in PARAMETERS), prismatic),
-        per_joint("q_min_rad"),
-        per_joint("q_max_rad"),
-        coefficients,
-        offsets,
-    )
+def fitted_range(models: Iterable[ErrorModel]) -> tuple[np.ndarray, np.ndarray]:
+    """DH joints (k,), (k,) that models of one data set were fitted over."""
+    return next(each.domain for each in models if each.domain is not None)
 
 
 def frame(columns: Columns, model: str, name: str, session: str | None = None) -> Pose:

@@ -8,16 +8,19 @@ first at -1, the second at +1.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from kinacc.geometry import Pose, project_so3, skew, vee
 from kinacc.kinematics import chain as _chain
 from kinacc.kinematics import dh as _dh
-from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.dh import PARAMETERS, DHModel
 
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
+_DIRECTIONS = np.array([-1, 1])
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,9 @@ class VECModel:
     coefficients: np.ndarray
     direction_offsets_rad: np.ndarray
 
+    kind: ClassVar[str] = "vec"
+    table: ClassVar[None] = None
+
     def __post_init__(self) -> None:
         for field in fields(self)[1:]:
             value = np.array(getattr(self, field.name), dtype=float)
@@ -49,6 +55,82 @@ class VECModel:
     def joints(self) -> int:
         """Number of joints k."""
         return self.dh.joints
+
+    @property
+    def domain(self) -> tuple[np.ndarray, np.ndarray]:
+        """The fitted range of the DH joints (k,), (k,): a polynomial says nothing beyond it."""
+        return self.q_min_rad, self.q_max_rad
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names (P,) of the coefficients, ordered as ``to_vector``: j1.delta_x.0, ..."""
+        joints, orders = range(1, self.joints + 1), range(self.order + 1)
+        coefficients = [f"j{i}.{error}.{n}" for i in joints for error in ERRORS for n in orders]
+        offsets = [f"j{i}.eps_z.{direction}" for i in joints for direction in ("minus", "plus")]
+        return (*coefficients, *offsets)
+
+    def pose(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+        """Poses (n, ...) with the rotation projected to SO(3)."""
+        return pose(self, q_rad, s)
+
+    def joint_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+        """Jacobian (n, 6, k) of ``pose`` in the joints."""
+        return joint_jacobian(self, q_rad, s)
+
+    def parameter_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+        """Jacobian (n, 6, P) of ``pose`` in the coefficients."""
+        return parameter_jacobian(self, q_rad, s)
+
+    def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
+        """The table ``vec_model``: coefficients of both directions, then offsets that have a std.
+
+        ``std`` (P,) as ``to_vector``.
+        """
+        joints, errors, terms = self.coefficients.shape
+        split = self.coefficients.size
+        joint, error, order = (part.ravel() for part in np.indices((joints, errors, terms)))
+        offset_std = std[split:].reshape(joints, 2)
+        more, which = np.nonzero(np.isfinite(offset_std))
+        joint = np.concatenate([joint, more])
+        error = np.concatenate([error, np.full(more.size, ERRORS.index("eps_z"))])
+        offsets = self.direction_offsets_rad[more, which]
+        columns = {
+            "joint": joint + 1,
+            "error": np.array(ERRORS, dtype=object)[error],
+            "direction": np.concatenate([np.zeros(split, int), _DIRECTIONS[which]]),
+            "order": np.concatenate([order, np.zeros(more.size, int)]),
+            "coefficient": np.concatenate([self.coefficients.ravel(), offsets]),
+            "std": np.concatenate([std[:split], offset_std[more, which]]),
+            "q_min_rad": self.q_min_rad[joint],
+            "q_max_rad": self.q_max_rad[joint],
+        }
+        return columns | {name: getattr(self.dh, name)[joint] for name in PARAMETERS}
+
+    @classmethod
+    def from_columns(
+        cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
+    ) -> Self:
+        """The model of a ``vec_model`` table; coefficients it does not list are zero.
+
+        ``prismatic`` (k,): joints that slide, which is the robot's to say.
+        """
+        joint = np.asarray(columns["joint"]).astype(int) - 1
+        order = np.asarray(columns["order"]).astype(int)
+        direction = np.asarray(columns["direction"]).astype(int)
+        error = np.array([ERRORS.index(name) for name in columns["error"]])
+        value = np.asarray(columns["coefficient"], dtype=float)
+        first = [np.flatnonzero(joint == number)[0] for number in range(joint.max() + 1)]
+        per_joint = {
+            name: np.asarray(columns[name], dtype=float)[first]
+            for name in (*PARAMETERS, "q_min_rad", "q_max_rad")
+        }
+        both = direction == 0
+        coefficients = np.zeros((len(first), len(ERRORS), order.max() + 1))
+        coefficients[joint[both], error[both], order[both]] = value[both]
+        offsets = np.zeros((len(first), 2))
+        offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
+        span = per_joint.pop("q_min_rad"), per_joint.pop("q_max_rad")
+        return cls(DHModel(**per_joint, prismatic=prismatic), *span, coefficients, offsets)
 
 
 def without_errors(
@@ -157,7 +239,7 @@ def parameter_jacobian(
 
 def direction_basis(s: np.ndarray) -> np.ndarray:
     """Indicators (n, k, 2) of the travel directions -1 and +1 in ``s`` (n, k)."""
-    return (np.asarray(s)[..., None] == np.array([-1, 1])).astype(float)
+    return (np.asarray(s)[..., None] == _DIRECTIONS).astype(float)
 
 
 @dataclass(frozen=True)

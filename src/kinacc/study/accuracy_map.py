@@ -1,43 +1,61 @@
-"""Largest error of a DH model over the evaluation space, against a VEC model (paper, IV-B).
+"""Largest error of a model over the evaluation space, against another one (paper, IV-B).
 
-The true arm is the VEC model. At every cell of the grid the flange takes all orientations and both
-wrist configurations; joints come from the model a controller would use.
+The true arm is the reference, a VEC model unless said otherwise. At every cell of the
+grid the flange takes all orientations and both wrist configurations; joints come from the model a
+controller would use.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from kinacc.geometry import IDENTITY, Pose, compose, invert
-from kinacc.kinematics import dh as _dh
 from kinacc.kinematics import inverse
-from kinacc.kinematics import vec as _vec
-from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse import Status
 from kinacc.kinematics.inverse.newton import pose_error
+from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.region import Cells, Orientations, tool_poses
 from kinacc.kinematics.robot import Robot
-from kinacc.kinematics.vec import VECModel
 
 _CELLS_PER_BLOCK = 256
 
 
-class ModelPair(NamedTuple):
-    """The true arm (``vec``), the model under assessment (``dh``), and what they carry.
+class Equipped(NamedTuple):
+    """A model with the tool centre point it carries in its last frame.
 
-    ``vec_tool`` and ``dh_tool`` are the tool centre point in the flange frame of each; ``travel``
-    (k,) is the travel direction of every joint, or None for unknown. ``vec_base`` is the first
-    frame of ``vec`` in that of ``dh`` where the two were fitted with bases of their own.
+    ``base``: its first frame in that of the robot, None where they are the same.
     """
 
-    vec: VECModel
-    dh: DHModel
-    vec_tool: Pose = IDENTITY
-    dh_tool: Pose = IDENTITY
+    model: ErrorModel
+    tool: Pose = IDENTITY
+    base: Pose | None = None
+
+    def tool_poses(self, q_rad: np.ndarray, travel: np.ndarray | None) -> Pose:
+        """Tool poses (n, ...) at joints (n, k), which travel in the directions (k,)."""
+        s = None if travel is None else np.broadcast_to(travel, q_rad.shape)
+        end = compose(self.model.pose(q_rad, s), self.tool)
+        return end if self.base is None else compose(self.base, end)
+
+
+class Models(NamedTuple):
+    """Models of one arm: of which one stands for the true arm, and which one is assessed.
+
+    ``travel`` (k,) is the travel direction of every joint, or None for unknown.
+    """
+
+    by_name: Mapping[str, Equipped]
     travel: np.ndarray | None = None
-    vec_base: Pose | None = None
+    reference: str = "vec"
+    assessed: str = "dh"
+
+    @property
+    def range_rad(self) -> tuple[np.ndarray, np.ndarray]:
+        """DH joints (k,), (k,) that the reference says something of."""
+        true = self.by_name[self.reference].model
+        return true.domain or (np.full(true.joints, -np.inf), np.full(true.joints, np.inf))
 
 
 class AccuracyMap(NamedTuple):
@@ -52,48 +70,43 @@ class AccuracyMap(NamedTuple):
     extrapolating: np.ndarray
 
 
-def errors_at(pair: ModelPair, q_rad: np.ndarray) -> np.ndarray:
-    """VEC minus DH at joints (n, k), as (n, 6): tool position in mm, rotation vector in rad.
+def errors_at(models: Models, q_rad: np.ndarray) -> np.ndarray:
+    """Reference minus assessed model at joints (n, k), as (n, 6): tool position in mm, turn in rad.
 
-    Both in the DH base; the rotation vector turns the DH orientation into the (projected) VEC
-    orientation.
+    Both in the base of the assessed model; the rotation vector turns its orientation into that of
+    the reference.
     """
-    travel = None if pair.travel is None else np.broadcast_to(pair.travel, q_rad.shape)
-    true = compose(_vec.pose(pair.vec, q_rad, travel), pair.vec_tool)
-    if pair.vec_base is not None:
-        true = compose(pair.vec_base, true)
-    modelled = compose(_dh.forward(pair.dh, q_rad), pair.dh_tool)
+    names = models.reference, models.assessed
+    true, modelled = (models.by_name[name].tool_poses(q_rad, models.travel) for name in names)
     return pose_error(true, modelled)
 
 
 def joints_of(
     robot: Robot,
-    pair: ModelPair,
+    models: Models,
     tool: Pose,
     branches: tuple[str, ...] | None = None,
     invert_with: str = "dh",
 ) -> inverse.Solutions:
-    """Joints of tool poses (n, ...) per branch, from the ``dh``, ``vec`` or ``nominal`` model.
+    """Joints of tool poses (n, ...) per branch, from the model named ``invert_with``.
 
     Tool poses are in the arm's base frame; without ``branches`` they are taken in those of
-    ``inverse.machining_branches``. The nominal model carries the tool of the DH model. A solution
-    outside the joint range the VEC model was fitted over is Status.OUTSIDE_RANGE.
+    ``inverse.machining_branches``. A solution outside the joint range of the reference is
+    Status.OUTSIDE_RANGE.
     """
-    models = {"dh": pair.dh, "vec": pair.vec, "nominal": robot.dh}
-    carried = pair.vec_tool if invert_with == "vec" else pair.dh_tool
-    flange = compose(tool, invert(carried))
+    chosen = models.by_name[invert_with]
+    flange = compose(tool, invert(chosen.tool))
     if robot.base is not IDENTITY:
         flange = compose(invert(robot.base), flange)
-    if invert_with == "vec" and pair.vec_base is not None:
-        flange = compose(invert(pair.vec_base), flange)
+    if chosen.base is not None:
+        flange = compose(invert(chosen.base), flange)
     branches = inverse.machining_branches(robot) if branches is None else branches
-    fitted = pair.vec.q_min_rad, pair.vec.q_max_rad
-    return inverse.solve(robot, models[invert_with], flange, branches, pair.travel, fitted)
+    return inverse.solve(robot, chosen.model, flange, branches, models.travel, models.range_rad)
 
 
 def accuracy_map(
     robot: Robot,
-    pair: ModelPair,
+    models: Models,
     cells: Cells,
     reference: np.ndarray,
     orientations: Orientations,
@@ -102,18 +115,18 @@ def accuracy_map(
 ) -> AccuracyMap:
     """Largest errors at cells (n,) over ``orientations`` and ``branches``.
 
-    ``solutions`` counts the combinations reached within the joint limits and within the range the
-    VEC model was fitted over, of ``wanted``; only those enter the maxima, since beyond its range a
-    Chebyshev error says nothing. ``extrapolating`` counts the combinations left out for that
-    reason alone. Cells without a solution have NaN maxima and None branches, which read
-    ``X+ Y- Z0, front-up-flip``. Without ``branches`` those of ``inverse.machining_branches``.
+    ``solutions`` counts the combinations reached within the joint limits and within the range of
+    the reference, of ``wanted``; only those enter the maxima, since beyond its range it says
+    nothing. ``extrapolating`` counts the combinations left out for that reason alone. Cells without
+    a solution have NaN maxima and None branches, which read ``X+ Y- Z0, front-up-flip``. Without
+    ``branches`` those of ``inverse.machining_branches``.
     """
     branches = inverse.machining_branches(robot) if branches is None else branches
     count = len(cells.radius_mm)
     parts = [
         _block(
             robot,
-            pair,
+            models,
             Cells(*(axis[begin : begin + _CELLS_PER_BLOCK] for axis in cells)),
             reference,
             orientations,
@@ -127,7 +140,7 @@ def accuracy_map(
 
 def _block(
     robot: Robot,
-    pair: ModelPair,
+    models: Models,
     cells: Cells,
     reference: np.ndarray,
     orientations: Orientations,
@@ -138,10 +151,10 @@ def _block(
     count = len(cells.radius_mm)
     repeated = Cells(*(np.repeat(axis, turns) for axis in cells))
     tool = tool_poses(repeated, reference, np.tile(orientations.rotation, (count, 1, 1)))
-    solved = joints_of(robot, pair, tool, branches, invert_with)
+    solved = joints_of(robot, models, tool, branches, invert_with)
     found = solved.status == Status.FOUND
     position, orientation = np.full((2, *found.shape), -np.inf)
-    error = errors_at(pair, solved.q_rad[found])
+    error = errors_at(models, solved.q_rad[found])
     position[found] = np.linalg.norm(error[:, :3], axis=1)
     orientation[found] = np.linalg.norm(error[:, 3:], axis=1) * 1e3
     shape = (count, turns * len(branches))

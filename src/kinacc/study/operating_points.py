@@ -8,12 +8,11 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose
-from kinacc.kinematics import dh as _dh
 from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
 from kinacc.kinematics.region import Cylinder, Orientations
-from kinacc.kinematics.robot import Robot, dh_angles
-from kinacc.study.accuracy_map import ModelPair, errors_at, joints_of
+from kinacc.kinematics.robot import Robot
+from kinacc.study.accuracy_map import Models, errors_at, joints_of
 
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
 
@@ -39,15 +38,15 @@ class PosesWanted(NamedTuple):
     invert_with: str = "dh"
 
 
-def with_errors(pair: ModelPair, q_rad: np.ndarray) -> OperatingPoints:
-    """The points at joints (n, k), their error VEC minus DH of the tool in the robot base."""
-    travel = np.zeros(q_rad.shape[1]) if pair.travel is None else pair.travel
+def with_errors(models: Models, q_rad: np.ndarray) -> OperatingPoints:
+    """The points at joints (n, k), their error of the tool (``errors_at``) in the robot base."""
+    travel = np.zeros(q_rad.shape[1]) if models.travel is None else models.travel
     directions = np.broadcast_to(np.asarray(travel, dtype=np.int8), q_rad.shape)
-    return OperatingPoints(q_rad, directions, errors_at(pair, q_rad)[:, :3])
+    return OperatingPoints(q_rad, directions, errors_at(models, q_rad)[:, :3])
 
 
 def in_space(
-    robot: Robot, pair: ModelPair, wanted: PosesWanted, sequence: str, count: int
+    robot: Robot, models: Models, wanted: PosesWanted, sequence: str, count: int
 ) -> np.ndarray:
     """Joints (count, k) of tool poses drawn from a quasi-random sequence, in drawing order.
 
@@ -60,7 +59,7 @@ def in_space(
         if first > _DRAWS_PER_POINT * count:
             raise _too_few(sum(map(len, found)), count, counts)
         unit = region.points(sequence, count, 5, first)
-        q_rad, status = _solve_draws(robot, pair, wanted, unit)
+        q_rad, status = _solve_draws(robot, models, wanted, unit)
         counts += np.bincount(status, minlength=len(Status))
         found.append(q_rad[status == Status.FOUND])
         first += count
@@ -68,21 +67,21 @@ def in_space(
 
 
 def _solve_draws(
-    robot: Robot, pair: ModelPair, wanted: PosesWanted, unit: np.ndarray
+    robot: Robot, models: Models, wanted: PosesWanted, unit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     cells = region.fill(wanted.cylinder, unit[:, :3])
     turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
     branches = inverse.machining_branches(robot) if wanted.branches is None else wanted.branches
     branch = (unit[:, 4] * len(branches)).astype(int)
     tool = region.tool_poses(cells, wanted.reference, wanted.orientations.rotation[turn])
-    solved = joints_of(robot, pair, tool, branches, wanted.invert_with)
+    solved = joints_of(robot, models, tool, branches, wanted.invert_with)
     rows = np.arange(len(unit))
     return solved.q_rad[rows, branch], solved.status[rows, branch]
 
 
 def in_joints(
     robot: Robot,
-    pair: ModelPair,
+    models: Models,
     box_rad: tuple[np.ndarray, np.ndarray],
     sequence: str,
     count: int,
@@ -90,11 +89,11 @@ def in_joints(
 ) -> np.ndarray:
     """DH joint angles (count, k) drawn evenly in a box of reported joints (k,), (k,).
 
-    Only configurations within the joint limits and within the range the VEC model was fitted over
-    are kept, and with ``cylinder`` only those whose tool (DH model) lies in it. Raises InputError
+    Only configurations within the joint limits and within the range of the reference are
+    kept, and with ``cylinder`` only those whose tool (assessed model) lies in it. Raises InputError
     naming the joints of which nothing is left, or saying how few configurations qualify.
     """
-    lower, upper = _assessable_box(robot, pair, *box_rad)
+    lower, upper = _assessable_box(robot, models, *box_rad)
     found, first, block = [], 1, max(count, 1024)
     while sum(map(len, found)) < count:
         if first > _DRAWS_PER_POINT * block:
@@ -106,10 +105,11 @@ def in_joints(
             )
             raise InputError(problem)
         unit = region.points(sequence, block, len(lower), first)
-        q_rad = dh_angles(robot, lower + unit * (upper - lower))
-        good = limits.within(q_rad, pair.vec.q_min_rad, pair.vec.q_max_rad)
+        q_rad = robot.dh_joints(lower + unit * (upper - lower))
+        good = limits.within(q_rad, *models.range_rad)
         if cylinder is not None:
-            tool = compose(robot.base, compose(_dh.forward(pair.dh, q_rad), pair.dh_tool))
+            tool = models.by_name[models.assessed].tool_poses(q_rad, models.travel)
+            tool = compose(robot.base, tool)
             good &= region.contains(cylinder, tool.position_mm)
         found.append(q_rad[good])
         first += block
@@ -117,14 +117,14 @@ def in_joints(
 
 
 def _assessable_box(
-    robot: Robot, pair: ModelPair, lower_rad: np.ndarray, upper_rad: np.ndarray
+    robot: Robot, models: Models, lower_rad: np.ndarray, upper_rad: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """A box of reported joints cut to the joint limits and, where uncoupled, the fitted range."""
     lower = np.maximum(lower_rad, robot.q_min_rad)
     upper = np.minimum(upper_rad, robot.q_max_rad)
     for joint in np.flatnonzero(limits.uncoupled(robot)):
         sign = robot.joint_map[joint, joint]
-        ends = pair.vec.q_min_rad[joint] / sign, pair.vec.q_max_rad[joint] / sign
+        ends = [end[joint] / sign for end in models.range_rad]
         lower[joint] = max(lower[joint], min(ends))
         upper[joint] = min(upper[joint], max(ends))
     problems = [

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.config.schema import defaults
-from kinacc.kinematics import robot, tables, vec
+from kinacc.kinematics import robot, vec
 from kinacc.kinematics.robot import Robot
 from kinacc.progress import reporting
 from kinacc.study.claims.numbers import number_claims
@@ -61,7 +61,7 @@ def bench_of(config: Mapping) -> Bench:
     # Poses, folds, joint range and points are those of any arm on the geometry of Table II.
     start = {"measurements": measured(bench, _UNTUNED)}
     made = in_memory.run(("vec", "dh", "residuals", "assessment_points"), config, start)
-    fitted = tables.vec_model(made["vec_model"])
+    fitted = vec.VECModel.from_columns(made["vec_model"])
     empty = vec.without_errors(TABLE_II, fitted.q_min_rad, fitted.q_max_rad, fitted.order)
     seen = made["measurements"]
     options = calibration_settings.options(config["calibration"], bench.robot)

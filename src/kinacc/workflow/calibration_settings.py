@@ -99,7 +99,7 @@ def chosen(options: Options, choices: Mapping, fold: int | None) -> Options:
 def observed(inputs: Mapping, robot: Robot) -> tuple[Observations, np.ndarray]:
     """All observations of ``measurements`` and the mask (n,) of the rows that train."""
     columns = inputs["measurements"]
-    return from_columns(columns, robot.joint_map), np.asarray(columns["subset"]) == TRAIN
+    return from_columns(columns, robot), np.asarray(columns["subset"]) == TRAIN
 
 
 def held_out_fold(every: Observations, train: np.ndarray) -> int | None:

@@ -10,7 +10,7 @@ from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import region, robot, tables
 from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
-from kinacc.study.accuracy_map import ModelPair
+from kinacc.study.accuracy_map import Equipped, Models
 
 
 def joint_box(evaluation: Mapping, arm: Robot) -> tuple[np.ndarray, np.ndarray] | None:
@@ -46,27 +46,30 @@ def orientations(evaluation: Mapping) -> region.Orientations:
     return region.orientations(np.deg2rad(evaluation["rotation_deg"]), evaluation["rotations"])
 
 
-def models(inputs: Mapping, evaluation: Mapping, arm: Robot) -> ModelPair:
-    """VEC and DH model with their bases and tools, joints travelling as the settings say."""
-    vec = tables.vec_model(inputs["vec_model"], arm.dh.prismatic)
+def models(inputs: Mapping, evaluation: Mapping, arm: Robot) -> Models:
+    """The arm's models with their bases and tools, joints travelling as the settings say.
+
+    The nominal model carries the tool of the DH model.
+    """
     direction = int(evaluation["travel_direction"])
-    return ModelPair(
-        vec,
-        tables.dh_model(inputs["dh_model"], arm.dh.prismatic),
-        _tool(inputs, evaluation, arm, "vec"),
-        _tool(inputs, evaluation, arm, "dh"),
-        np.full(vec.joints, direction) if direction else None,
-        _vec_base(inputs),
-    )
+    by_name = {
+        name: Equipped(
+            model,
+            _tool(inputs, evaluation, arm, model.kind),
+            _base(inputs, name) if model.table is None else None,
+        )
+        for name, model in tables.models(inputs, arm.dh).items()
+    }
+    return Models(by_name, np.full(arm.dh.joints, direction) if direction else None)
 
 
-def _vec_base(inputs: Mapping) -> Pose | None:
-    """The VEC model's base in that of the DH model; None where both were fitted to one."""
+def _base(inputs: Mapping, model: str) -> Pose | None:
+    """A model's base in that of the DH model; None where both were fitted to one."""
     if "frames" not in inputs:
         return None
-    vec, dh = (tables.frame(inputs["frames"], model, "base") for model in ("vec", "dh"))
-    same = all(np.array_equal(a, b) for a, b in zip(vec, dh, strict=True))
-    return None if same else compose(invert(dh), vec)
+    own, dh = (tables.frame(inputs["frames"], name, "base") for name in (model, "dh"))
+    same = all(np.array_equal(a, b) for a, b in zip(own, dh, strict=True))
+    return None if same else compose(invert(dh), own)
 
 
 def _tool(inputs: Mapping, evaluation: Mapping, arm: Robot, model: str) -> Pose:

@@ -66,7 +66,7 @@ def test_a_coupled_joint_is_turned_by_both(arm):
     pose = robot.forward(coupled, q)
     same = robot.forward(plain, np.array([[0.1, 0.2, 30.0, 0.6]]))
     assert np.allclose(pose.position_mm, same.position_mm)
-    assert np.allclose(robot.dh_angles(coupled, q), [[0.1, 0.2, 30.0, 0.6]])
+    assert np.allclose(coupled.dh_joints(q), [[0.1, 0.2, 30.0, 0.6]])
 
 
 def test_base_flange_and_tool_frames_are_read(arm):

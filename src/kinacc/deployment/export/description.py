@@ -125,9 +125,9 @@ def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
 
 
 def _dh_of(arm: Calibration) -> DHModel:
-    if not isinstance(arm.model, DHModel):
-        raise TypeError("a VEC model has no DH table: choose dh")
-    return arm.model
+    if arm.model.table is None:
+        raise TypeError(f"a {arm.choice} model has no DH table: choose dh")
+    return arm.model.table
 
 
 def _kind(dh: DHModel, joint: int) -> str:

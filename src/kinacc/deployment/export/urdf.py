@@ -129,7 +129,7 @@ def _ends_in_file(arm: Calibration, chain: list[Joint], path: Path) -> tuple[Pos
     low, high = np.maximum(robot.q_min_rad, -3.0e3), np.minimum(robot.q_max_rad, 3.0e3)
     q_rad = low + rng.uniform(0.0, 1.0, (_PROBES, len(low))) * (high - low)
     wanted = _forward(chain, q_rad)
-    ends = _dh.forward(robot.dh, q_rad @ robot.joint_map.T)
+    ends = _dh.forward(robot.dh, robot.dh_joints(q_rad))
     options = [(robot.base, robot.flange)]
     start = closed_form_start(full_poses(q_rad, wanted), ends)
     options.append((start.base, start.tool))

@@ -50,5 +50,5 @@ def spread(
 
 
 def _tool_positions(robot: Robot, joints: np.ndarray, tool: Pose | None) -> np.ndarray:
-    end = compose(robot.base, dh.forward(robot.dh, joints @ robot.joint_map.T))
+    end = compose(robot.base, dh.forward(robot.dh, robot.dh_joints(joints)))
     return end.position_mm if tool is None else compose(end, tool).position_mm

@@ -14,7 +14,7 @@ from kinacc.calibration import blind_groups, blind_words, frames
 from kinacc.calibration.dh_fit import joints_anywhere
 from kinacc.calibration.frames import BASE, MOTIONS
 from kinacc.calibration.identified import STRUCTURAL
-from kinacc.calibration.uncertainty import Uncertainty, dh_parameter_names
+from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal
 from kinacc.geometry import Pose
@@ -63,7 +63,7 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     count = len(names)
     blank = Uncertainty(names, np.eye(count), np.zeros((0, count)))
     arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
-    slopes = _slopes(arm, np.atleast_2d(q_rad) @ robot.joint_map.T, experiment)
+    slopes = _slopes(arm, robot.dh_joints(np.atleast_2d(q_rad)), experiment)
     _, values, right = np.linalg.svd(slopes.reshape(-1, count), full_matrices=False)
     rank = int(np.sum(values > experiment.threshold * values[0]))
     lost = right[rank:] if len(right) == count else _complement(right[:rank])
@@ -99,7 +99,7 @@ def parameter_names(robot: Robot, experiment: Experiment) -> tuple[str, ...]:
     """Names (P,) of what is fitted, base and tool first."""
     free = [
         name
-        for name in dh_parameter_names(robot.dh.joints)
+        for name in robot.dh.parameter_names
         if not name.endswith("beta_rad") or int(name[1]) in experiment.hayati_joints
     ]
     if not experiment.frames_estimated:

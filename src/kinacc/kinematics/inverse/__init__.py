@@ -11,7 +11,6 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
-from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse import (
     closed_form,
     limits,
@@ -22,8 +21,8 @@ from kinacc.kinematics.inverse import (
 )
 from kinacc.kinematics.inverse.closed_form import BRANCHES
 from kinacc.kinematics.inverse.onto_model import Functions
+from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot
-from kinacc.kinematics.vec import VECModel
 
 __all__ = [
     "BRANCHES",
@@ -108,7 +107,7 @@ def machining_branches(robot: Robot) -> tuple[str, ...]:
 
 def solve(
     robot: Robot,
-    model: DHModel | VECModel,
+    model: ErrorModel,
     pose: Pose,
     branches: tuple[str, ...] | None = None,
     travel: np.ndarray | None = None,

@@ -10,11 +10,10 @@ import numpy as np
 
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh as _dh
-from kinacc.kinematics import vec as _vec
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse import newton
 from kinacc.kinematics.inverse.chain_rows import behind_first, rows_of, targets_of
-from kinacc.kinematics.vec import VECModel
+from kinacc.kinematics.model import ErrorModel
 
 SAME_POSTURE_RAD = 1e-6
 _SAME_PLACE_MM = 1e-3
@@ -26,8 +25,8 @@ _COMPILED_MM = 3e-7  # what the compiled refinement leaves, a radian counting as
 class Functions(NamedTuple):
     """A forward model (m, k) -> Pose, its joint Jacobian (m, 6, k), and one that is nearly that.
 
-    ``prismatic`` (k,) says which joints are in mm. ``dh`` is the model where it is a
-    DH model, with joint 1 at ``first`` if that is given.
+    ``prismatic`` (k,) says which joints are in mm. ``dh`` is the model as a
+    table of DH parameters where it is one, with joint 1 at ``first`` if that is given.
     """
 
     forward: Callable[[np.ndarray], Pose]
@@ -38,22 +37,21 @@ class Functions(NamedTuple):
     first: float | None = None
 
 
-def functions_of(model: DHModel | VECModel, travel: np.ndarray | None) -> Functions:
-    """The functions of a model; a VEC model's pose is its projected one at ``travel`` (k,)."""
-    if isinstance(model, DHModel):
-        forward, jacobian = partial(_dh.forward, model), partial(_dh.joint_jacobian, model)
-        return Functions(forward, jacobian, None, model.prismatic, model)
+def functions_of(model: ErrorModel, travel: np.ndarray | None) -> Functions:
+    """The functions of a model whose joints travel in the directions ``travel`` (k,)."""
 
     def directions(q_rad: np.ndarray) -> np.ndarray | None:
         return None if travel is None else np.broadcast_to(travel, q_rad.shape)
 
+    # Errors of a milliradian change the slopes by a thousandth: each step still gains three
+    # digits, at a fifth of the cost.
+    cheap = partial(_dh.joint_jacobian, model.dh) if model.table is None else None
     return Functions(
-        lambda q: _vec.pose(model, q, directions(q)),
-        lambda q: _vec.joint_jacobian(model, q, directions(q)),
-        # Error terms of a milliradian change the slopes by a thousandth: each step still gains
-        # three digits, at a fifth of the cost.
-        partial(_dh.joint_jacobian, model.dh),
+        lambda q: model.pose(q, directions(q)),
+        lambda q: model.joint_jacobian(q, directions(q)),
+        cheap,
         model.dh.prismatic,
+        model.table,
     )
 
 

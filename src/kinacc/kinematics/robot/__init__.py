@@ -4,14 +4,13 @@ A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
 """
 
 from kinacc.kinematics.robot.description import files, load, of_text, shipped
-from kinacc.kinematics.robot.record import Robot, carried, dh_angles, forward, in_own_units
+from kinacc.kinematics.robot.record import Robot, carried, forward, in_own_units
 from kinacc.kinematics.robot.written import as_yaml
 
 __all__ = [
     "Robot",
     "as_yaml",
     "carried",
-    "dh_angles",
     "files",
     "forward",
     "in_own_units",

@@ -37,15 +37,14 @@ class Robot:
     tool: Pose = IDENTITY
     joint_names: tuple[str, ...] = ()
 
-
-def dh_angles(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
-    """DH joint values (n, k) of reported joints (n, k)."""
-    return np.asarray(q_rad, dtype=float) @ robot.joint_map.T
+    def dh_joints(self, reported: np.ndarray) -> np.ndarray:
+        """DH joints (..., k) of reported joints (..., k); ``limits.reported_joints`` goes back."""
+        return np.asarray(reported, dtype=float) @ self.joint_map.T
 
 
 def forward(robot: Robot, q_rad: np.ndarray) -> Pose:
     """Flange poses (n, ...) in the arm's base frame at reported joints (n, k), nominal model."""
-    end = _dh.forward(robot.dh, dh_angles(robot, np.atleast_2d(q_rad)))
+    end = _dh.forward(robot.dh, robot.dh_joints(np.atleast_2d(q_rad)))
     return compose(compose(robot.base, end), robot.flange)
 
 

@@ -27,15 +27,15 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
 
 
 def _drawn(arm: Robot, inputs: Mapping, evaluation: Mapping) -> OperatingPoints:
-    pair = shared.models(inputs, evaluation, arm)
+    models = shared.models(inputs, evaluation, arm)
     sequence, count = evaluation["sequence"], int(evaluation["points"])
     limited = arm.q_min_rad, arm.q_max_rad
     if evaluation["space"] == "joint_box":
         box = shared.joint_box(evaluation, arm) or limited
-        q_rad = operating_points.in_joints(arm, pair, box, sequence, count)
+        q_rad = operating_points.in_joints(arm, models, box, sequence, count)
     elif evaluation["points_in"] == "joints":
         space = shared.cylinder(evaluation)
-        q_rad = operating_points.in_joints(arm, pair, limited, sequence, count, space)
+        q_rad = operating_points.in_joints(arm, models, limited, sequence, count, space)
     else:
         wanted = PosesWanted(
             shared.cylinder(evaluation),
@@ -43,8 +43,8 @@ def _drawn(arm: Robot, inputs: Mapping, evaluation: Mapping) -> OperatingPoints:
             shared.orientations(evaluation),
             invert_with=evaluation["invert_with"],
         )
-        q_rad = operating_points.in_space(arm, pair, wanted, sequence, count)
-    return operating_points.with_errors(pair, q_rad)
+        q_rad = operating_points.in_space(arm, models, wanted, sequence, count)
+    return operating_points.with_errors(models, q_rad)
 
 
 def _columns(arm: Robot, points: OperatingPoints) -> Columns:

@@ -67,7 +67,7 @@ def in_words(table: Mapping) -> list[str]:
 def _few_poses(reading: Reading, arm: Robot, calibration: Mapping) -> list[Suspicion]:
     """Whether the VEC model has more coefficients than the poses give independent readings."""
     count = len(reading.columns["pose"])
-    seen = from_columns({**reading.columns, "fold": np.full(count, np.nan)}, arm.joint_map)
+    seen = from_columns({**reading.columns, "fold": np.full(count, np.nan)}, arm)
     options = shared.options(calibration, arm)
     same = configurations(reading.columns)
     # A target adds three components to a pose, an orientation three; repeats add none.

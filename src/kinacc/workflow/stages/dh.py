@@ -8,7 +8,7 @@ import numpy as np
 
 from kinacc.calibration import identified, models, tables, uncertainty
 from kinacc.kinematics import robot
-from kinacc.kinematics.tables import vec_model
+from kinacc.kinematics.vec import VECModel
 from kinacc.workflow import calibration_settings as shared
 
 
@@ -24,16 +24,16 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     vec_frames = tables.frames_of(
         inputs["vec_frames"], "vec", every.target_names, every.session_names
     )
-    volumetric = vec_model(inputs["vec_model"], arm.dh.prismatic)
+    volumetric = VECModel.from_columns(inputs["vec_model"], arm.dh.prismatic)
     fitted = models.fit_dh(observations, arm.dh, options, volumetric, vec_frames)
     nominal = models.fit_nominal(observations, arm.dh, options)
     frames = {"dh": fitted.frames, "nominal": nominal.frames}
     others = tables.frames_columns(frames, every.target_names, every.session_names)
     kept = inputs["vec_frames"]
-    known = uncertainty.of_dh(fitted, every.target_names)
+    known = uncertainty.of_fit(fitted, every.target_names)
     told = identified.parameters(fitted, known, observations)
     return {
-        "dh_model": tables.dh_model_columns(fitted),
+        "dh_model": fitted.model.to_columns(fitted.std.ravel()),
         "frames": {
             name: np.concatenate([np.asarray(kept[name]), values])
             for name, values in others.items()

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.calibration.models import COMPARISONS
 from kinacc.calibration.observations import from_columns
-from kinacc.calibration.residuals import COMPARISONS, Errors, errors
+from kinacc.calibration.residuals import Errors, errors
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, excluded_lines, read_excluded
-from kinacc.workflow.stages.residuals import delivered_models
+from kinacc.workflow.stages.residuals import delivered_fits
 
 Columns = dict[str, np.ndarray]
 
@@ -23,8 +24,8 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
     reasons = excluded_lines(section)
     used = inputs["measurements"]
-    every = from_columns(used, arm.joint_map)
-    models = delivered_models(inputs, arm.dh, every)
+    every = from_columns(used, arm)
+    fits = delivered_fits(inputs, arm.dh, every)
     reading, _ = read_excluded(section, arm)
     rows: list[tuple] = []
     if reading is not None:
@@ -34,14 +35,14 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
             name: np.concatenate([np.asarray(used[name]), left_out[name]]) for name in left_out
         }
         joined["fold"] = np.full(len(joined["pose"]), np.nan)
-        seen = errors(models, from_columns(joined, arm.joint_map).select(slice(len(every), None)))
+        seen = errors(fits, from_columns(joined, arm).select(slice(len(every), None)))
         lines = left_out["row"].astype(int).tolist()
-        for name in COMPARISONS:
-            rows += _rows(name, left_out, lines, reasons, seen[name], count)
+        for name, found in seen.items():
+            rows += _rows(name, left_out, lines, reasons, found, count)
     told = {row[1] for row in rows}
-    for name in COMPARISONS:
+    for each in COMPARISONS:
         rows += [
-            (name, line, None, None, reasons[line], *[np.nan] * 6)
+            (each.name, line, None, None, reasons[line], *[np.nan] * 6)
             for line in sorted(set(reasons) - told)
         ]
     texts = ("comparison", "line", "target", "session", "reason")

@@ -10,18 +10,19 @@ from matplotlib.figure import Figure
 from kinacc.figures import fig2
 from kinacc.figures.columns import floats
 from kinacc.kinematics import robot, tables
+from kinacc.kinematics.dh import DHModel
 
 
 def run(inputs: Mapping, settings: Mapping) -> Figure:
     """Return the figure of the ``dh_model`` among the ``assessment_points``."""
     arm = robot.load(settings["robot"])
-    model = tables.dh_model(inputs["dh_model"], arm.dh.prismatic)
+    model = DHModel.from_columns(inputs["dh_model"], arm.dh.prismatic)
     points = inputs["assessment_points"]
     reported = np.stack([floats(points, f"q{i + 1}") for i in range(model.joints)], axis=-1)
     evaluation = settings["evaluation"]
     return fig2.draw(
         model,
-        robot.dh_angles(arm, reported),
+        arm.dh_joints(reported),
         tool_mm=_tool_mm(inputs.get("frames"), evaluation, arm),
         cylinder=evaluation["cylinder"] if evaluation["space"] == "cylinder" else None,
         dataset=settings.get("dataset"),

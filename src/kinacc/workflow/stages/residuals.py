@@ -7,19 +7,12 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from kinacc.calibration import model_comparison_columns, tables
+from kinacc.calibration.models import Fit, fit_all
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.residuals import (
-    COMPARISONS,
-    Errors,
-    FittedModels,
-    cross_validated,
-    errors,
-    fit_all,
-    statistics,
-)
+from kinacc.calibration.residuals import Errors, cross_validated, errors, statistics
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.tables import dh_model, vec_model
+from kinacc.kinematics.tables import fitted_range, models
 from kinacc.workflow import calibration_settings as shared
 
 Columns = dict[str, np.ndarray]
@@ -35,14 +28,14 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     arm = robot.load(settings["robot"])
     options = shared.options(settings["calibration"], arm)
     every, train = shared.observed(inputs, arm)
-    delivered = delivered_models(inputs, arm.dh, every)
-    joint_range = delivered.vec.q_min_rad, delivered.vec.q_max_rad
+    delivered = delivered_fits(inputs, arm.dh, every)
+    joint_range = fitted_range(fit.model for fit in delivered.values())
 
-    def refit(observations: Observations, fold: int) -> FittedModels:
+    def refit(observations: Observations, fold: int) -> dict[str, Fit]:
         if np.array_equal(every.fold != fold, train):
             return delivered
         own = shared.chosen(options, inputs["vec_orders"], fold)
-        return fit_all(observations, arm.dh, joint_range, own, delivered.vec)
+        return fit_all(observations, arm.dh, joint_range, own, delivered)
 
     folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
     counted = progress(folds, "folds") if progress else folds
@@ -55,20 +48,13 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     }
 
 
-def delivered_models(inputs: Mapping, nominal: DHModel, every: Observations) -> FittedModels:
+def delivered_fits(inputs: Mapping, nominal: DHModel, every: Observations) -> dict[str, Fit]:
     """The models of the tables ``inputs``, fitted to targets and sessions of ``every``."""
-    frames = {
-        model: tables.frames_of(inputs["frames"], model, every.target_names, every.session_names)
-        for model in ("vec", "dh", "nominal")
+    names = every.target_names, every.session_names
+    return {
+        name: Fit(model, tables.frames_of(inputs["frames"], name, *names))
+        for name, model in models(inputs, nominal).items()
     }
-    return FittedModels(
-        vec=vec_model(inputs["vec_model"], nominal.prismatic),
-        vec_frames=frames["vec"],
-        dh=dh_model(inputs["dh_model"], nominal.prismatic),
-        dh_frames=frames["dh"],
-        nominal=nominal,
-        nominal_frames=frames["nominal"],
-    )
 
 
 def _residuals(
@@ -79,7 +65,7 @@ def _residuals(
     trained: dict[int, dict[str, Errors]],
 ) -> Columns:
     rows: list[tuple] = []
-    for name in COMPARISONS:
+    for name in seen:
         rows += _statistics_rows(name, "train", np.nan, seen[name])
         for number in folds:
             rows += _statistics_rows(name, "train", number, trained[number][name])
@@ -113,7 +99,7 @@ def _pose_errors(
     any_folds: bool,
 ) -> Columns:
     parts = []
-    for name in COMPARISONS:
+    for name in seen:
         parts.append(_error_rows(measurements, name, "train", np.flatnonzero(train), seen[name]))
         if any_folds:
             rows = np.flatnonzero(np.isfinite(held_out[name].position_mm[:, 0]))

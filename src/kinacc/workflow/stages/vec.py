@@ -29,9 +29,9 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict[str
     fitted = models.fit_vec(observations, arm.dh, joint_range, options)
     gauge = models.vec_gauge(observations, fitted, options)
     frames = {"vec": fitted.frames}
-    known = uncertainty.of_vec(fitted, every.target_names)
+    known = uncertainty.of_fit(fitted, every.target_names)
     return {
-        "vec_model": tables.vec_model_columns(fitted),
+        "vec_model": fitted.model.to_columns(fitted.std),
         "vec_frames": tables.frames_columns(frames, every.target_names, every.session_names),
         "vec_fit": tables.vec_fit_columns(fitted, gauge),
         "vec_covariance": tables.covariance_columns(known),

@@ -1,0 +1,92 @@
+"""Every kind of error model keeps what the protocol promises; a new kind needs an example here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinacc.geometry import log_so3
+from kinacc.kinematics import dh, robot, vec
+from kinacc.kinematics.tables import KINDS
+
+ARM = robot.load("mh180")
+SPAN = np.full(6, 2.0)
+COUNT = 8
+
+
+def dh_example():
+    rng = np.random.default_rng(0)
+    return replace(
+        ARM.dh, d_mm=ARM.dh.d_mm + rng.normal(size=6), beta_rad=1e-3 * rng.normal(size=6)
+    )
+
+
+def vec_example():
+    empty = vec.without_errors(ARM.dh, -SPAN, SPAN, 3)
+    size = np.array([0.1] * 3 + [1e-4] * 3)[:, None]
+    rng = np.random.default_rng(1)
+    return replace(
+        empty,
+        coefficients=size * rng.normal(size=empty.coefficients.shape),
+        direction_offsets_rad=1e-4 * rng.normal(size=(6, 2)),
+    )
+
+
+EXAMPLES = {"dh": dh_example, "vec": vec_example}
+VECTORS = {"dh": dh, "vec": vec}
+
+
+@pytest.fixture(params=KINDS)
+def model(request):
+    return EXAMPLES[request.param]()
+
+
+@pytest.fixture
+def at():
+    rng = np.random.default_rng(2)
+    return rng.uniform(-1.0, 1.0, (COUNT, 6)), rng.integers(-1, 2, (COUNT, 6))
+
+
+def movement(before, after):
+    turn = log_so3(after.rotation @ np.swapaxes(before.rotation, 1, 2))
+    return np.concatenate([after.position_mm - before.position_mm, turn], axis=1)
+
+
+def test_slopes_in_the_joints_are_those_of_the_pose(model, at):
+    q, s = at
+    slopes, step = model.joint_jacobian(q, s), 1e-6
+    for joint in range(6):
+        shift = step * np.eye(6)[joint]
+        moved = movement(model.pose(q - shift, s), model.pose(q + shift, s)) / (2.0 * step)
+        np.testing.assert_allclose(slopes[:, :, joint], moved, rtol=1e-6, atol=1e-4)
+
+
+def test_every_parameter_has_a_name_a_slope_and_a_place_in_the_table(model, at):
+    q, s = at
+    names, slopes, step = model.parameter_names, model.parameter_jacobian(q, s), 1e-5
+    assert len(set(names)) == len(names)
+    assert slopes.shape == (COUNT, 6, len(names))
+    of = VECTORS[model.kind]
+    x = of.to_vector(model)
+    for direction in np.random.default_rng(3).normal(size=(3, len(names))):
+        ends = (of.with_vector(model, x + way * direction).pose(q, s) for way in (-step, step))
+        moved = movement(*ends) / (2.0 * step)
+        np.testing.assert_allclose(slopes @ direction, moved, rtol=1e-5, atol=1e-3)
+
+
+def test_a_model_comes_back_from_its_table_bit_by_bit(model, at):
+    columns = model.to_columns(np.ones(len(model.parameter_names)))
+    again = KINDS[model.kind].from_columns(columns, ARM.dh.prismatic)
+    for one, other in zip(model.pose(*at), again.pose(*at), strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(model.domain, again.domain)
+
+
+def test_a_model_that_is_a_table_of_parameters_says_so_truly(model, at):
+    q, s = at
+    if model.table is None:
+        assert np.abs(movement(model.dh.pose(q), model.pose(q, s))).max() > 1e-3
+    else:
+        assert np.abs(movement(model.table.pose(q), model.pose(q, s))).max() == 0.0
