@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.assess import ModelInvalidation
+from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.errors import InputError
 from kinacc.study.histories import (
     FALLBACKS,

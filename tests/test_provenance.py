@@ -60,6 +60,14 @@ def test_a_changed_file_changes_the_hash_of_what_uses_it_alone(tmp_path, changed
     assert (provenance.code_hash(module, root=root) != before) == reruns
 
 
+def test_a_module_that_a_registry_names_counts_where_the_registry_is_used(tmp_path):
+    files = {"listed.py": 'PLACES = {"own": "toy.own:Own"}\n', "own.py": "class Own: ...\n"}
+    root = write_package(tmp_path, files)
+    before = provenance.code_hash("toy.listed", root=root)
+    root = write_package(tmp_path, {"own.py": "class Own: ...\n\n# changed\n"})
+    assert provenance.code_hash("toy.listed", root=root) != before
+
+
 def test_a_new_robot_file_changes_what_reads_the_folder(tmp_path):
     root = write_package(tmp_path, FILES)
     before = provenance.code_hash("toy.arm", root=root)

@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from kinacc.assess import Maximum, OutlierRejection, drawn_world, measured_world
-from kinacc.assess.adaptive import Candidates, Ledger, conduct
+from kinacc.assess.adaptive import Candidates, Ledger
+from kinacc.assess.coverage import companions, hardly_missed, records
 from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
-from kinacc.assess.paper_methods import InvalidationAt, OncePerPoint
 from kinacc.assess.population import largest_size
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
-from kinacc.assess.search_and_confirm import SearchAndConfirm, companions, hardly_missed, records
+from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
+from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.sequential import Sequential
 from kinacc.assess.sequential_limits import share
+from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS
 from kinacc.assess.two_stage import TwoStage
+from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 
 BOUNDING = [SingleShot, TwoStage, Sequential, InvalidationCalibrated, SearchAndConfirm]
-LIVE = [
-    *(cls(measurements=40) for cls in ADAPTIVE.values()),
-    OncePerPoint(Maximum(40)),
-    OncePerPoint(OutlierRejection(40)),
-    InvalidationAt(0.9, 40),
-]
+LIVE = [cls(measurements=40) for cls in ADAPTIVE.values()]
 
 
 def directions(points: int, seed: int = 5) -> np.ndarray:
@@ -68,7 +66,7 @@ def test_every_assessor_keeps_its_budget_and_says_something_at_the_end(assessor,
     assert {each.target for each in said} <= set(TARGETS)
     assert said[0].value_mm > 0.0 or said[0].withheld
     assert not said[0].withheld or type(assessor) not in BOUNDING
-    assert campaign.taken()[0] <= assessor.measurements
+    assert campaign.ledger.taken <= assessor.measurements
     for each in said:
         if not each.withheld and not math.isnan(each.upper_mm):
             assert each.lower_mm <= each.upper_mm
@@ -99,7 +97,7 @@ def test_asking_for_the_next_point_or_a_statement_changes_nothing(assessor):
     asked, other = assessor.begin(candidates), assessor.begin(candidates)
     reads = np.zeros(30, int)
     while (point := other.next()) is not None:
-        if other.taken()[0] % 9 == 0:
+        if other.ledger.taken % 9 == 0:
             asked.statements()
             assert asked.next() == asked.next()
         for campaign in (asked, other):
@@ -192,27 +190,6 @@ def test_unequal_noise_is_weighted_as_least_squares_would():
     assert ledger.noise(1) == pytest.approx(total)
 
 
-def test_the_papers_assessors_say_behind_the_interface_what_they_say_without_it():
-    readings = world(25)
-    firsts = np.array([readings.reading_mm(row, 0) for row in range(25)])
-    plain = measured_world(firsts, firsts[:, None], 0.1)
-    for assessor in (Maximum(25), OutlierRejection(25)):
-        said = conduct(OncePerPoint(assessor), readings).statements()[0]
-        assert said.value_mm == assessor.assess(plain).assessed_mm
-        assert math.isnan(said.upper_mm)
-
-
-@pytest.mark.parametrize("bound_mm", [0.7, 0.95, 1.3])
-def test_model_invalidation_measures_live_what_it_measures_in_a_world(bound_mm):
-    from kinacc.assess.model_invalidation import ModelInvalidation
-
-    readings = world(40, 0.3)
-    steps = ModelInvalidation(60).history(readings, bound_mm)
-    campaign = conduct(InvalidationAt(bound_mm, 60), readings)
-    assert campaign.ledger.taken == len(steps)
-    assert campaign.ledger.count.tolist() == np.bincount([s.row for s in steps], None, 40).tolist()
-
-
 def test_looks_share_out_the_whole_error():
     assert sum(share(look) for look in range(60)) == pytest.approx(1.0)
     assert all(share(look) >= share(look + 1) > 0.0 for look in range(50))
@@ -240,8 +217,7 @@ def coverage(assessor, errors, sigma, draws, target=MEASURED):
         readings = drawn_world(errors[order], sigma, key_of(4, draw), assessor.measurements)
         campaign = conduct(assessor, readings)
         said = next(each for each in campaign.statements() if each.target == target)
-        _, visited = campaign.taken()
-        truth = size[order][visited].max() if target == MEASURED else size.max()
+        truth = size[order][campaign.ledger.visited].max() if target == MEASURED else size.max()
         if not said.withheld:
             said_any += 1
             upper += said.upper_mm >= truth
@@ -341,6 +317,45 @@ def test_the_population_shrinks_the_largest_of_many_noisy_readings():
     assert exact.quantile_mm(0.5) == pytest.approx(errors.max(), rel=0.01)
 
 
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+def test_every_measured_point_has_limits_and_no_other(assessor):
+    campaign = assessor.begin(some_candidates())
+    assert campaign.point_limits() == {}
+    readings, reads = world(seed=3), np.zeros(30, int)
+    while (point := campaign.next()) is not None:
+        campaign.record(point, readings.reading_mm(point, int(reads[point])))
+        reads[point] += 1
+        if campaign.ledger.taken % 9 == 0:
+            assert set(campaign.point_limits()) == set(campaign.ledger.visited)
+    limits = campaign.point_limits()
+    size = np.linalg.norm(field(30), axis=1)
+    assert all(0.0 <= lower < upper for lower, upper in limits.values())
+    assert all(lower <= size[row] for row, (lower, _) in limits.items())
+    assert np.mean([size[row] <= upper for row, (_, upper) in limits.items()]) > 0.8
+
+
+def test_a_suspect_of_the_second_stage_is_known_by_its_new_readings_alone():
+    campaign = TwoStage(measurements=10, repeats=4).begin(
+        Candidates.with_equal_noise(np.full(6, 0.1))
+    )
+    for row in range(6):
+        campaign.record(row, [0.1 * row, 0.0, 0.0])
+    assert campaign.next() == 5
+    campaign.record(5, [0.3, 0.0, 0.0])
+    campaign.record(5, [0.1, 0.0, 0.0])
+    assert campaign.ledger.mean_mm[5] == pytest.approx([0.2, 0.0, 0.0])
+    assert campaign.ledger.noise(5) == pytest.approx(0.1 / math.sqrt(2.0))
+    assert campaign.ledger.taken == 8
+    assert campaign.ledger.visited == [0, 1, 2, 3, 4, 5]
+
+
 def test_the_registry_names_the_recommended_assessor():
     assert RECOMMENDED in ADAPTIVE
-    assert all(cls.name == name and cls.__doc__ for name, cls in ADAPTIVE.items())
+    assert all(cls.name == name and cls.__doc__ for name, cls in ASSESSORS.items())
+
+
+def test_looking_through_the_registry_imports_no_assessor():
+    code = "import sys, kinacc.assess.registry as r; list(r.ADAPTIVE), 'kinematic' in r.ASSESSORS; "
+    code += "print([each for each in sys.modules if each.startswith(('kinacc.assess.', 'numpy'))])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['kinacc.assess.registry']"

@@ -9,18 +9,15 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from kinacc.assess import (
-    ASSESSORS,
-    Assessment,
-    Maximum,
-    ModelInvalidation,
-    OutlierRejection,
-    drawn_world,
-    every_reading,
-    measured_world,
-)
+from kinacc.assess.assessor import Assessment, Assessor, every_reading
+from kinacc.assess.maximum import Maximum
+from kinacc.assess.model_invalidation import ModelInvalidation
+from kinacc.assess.outlier_rejection import OutlierRejection
 from kinacc.assess.random_numbers import key_of
+from kinacc.assess.registry import ASSESSORS
+from kinacc.assess.world import drawn_world, measured_world
 from kinacc.errors import InputError
+from kinacc.study import monte_carlo
 
 
 def shell(points: int, size_mm: float = 1.0) -> np.ndarray:
@@ -29,16 +26,20 @@ def shell(points: int, size_mm: float = 1.0) -> np.ndarray:
     return size_mm * error / np.linalg.norm(error, axis=1)[:, None]
 
 
+PAPER = ASSESSORS.only(looks_back=True)
+
+
 def test_registry_names_each_assessor_as_its_tables_do():
-    assert list(ASSESSORS) == ["maximum", "outlier_rejection", "model_invalidation"]
-    for name, cls in ASSESSORS.items():
+    assert list(PAPER) == ["maximum", "outlier_rejection", "model_invalidation"]
+    assert list(monte_carlo.ASSESSORS.values()) == list(PAPER.values())
+    for name, cls in PAPER.items():
         assert cls.name == name
         for switch, choices in cls.switches.items():
             assert getattr(cls(), switch) in choices
 
 
 def test_readings_of_an_assessor_are_all_combinations_and_keep_its_other_settings():
-    counts = [len(list(every_reading(cls()))) for cls in ASSESSORS.values()]
+    counts = [len(list(every_reading(cls()))) for cls in PAPER.values()]
     assert counts == [1, 3, 12]
     assert len(set(every_reading(ModelInvalidation(alpha=0.3)))) == 12
     assert {each.alpha for each in every_reading(ModelInvalidation(alpha=0.3))} == {0.3}
@@ -46,10 +47,9 @@ def test_readings_of_an_assessor_are_all_combinations_and_keep_its_other_setting
 
 def test_another_assessor_needs_nothing_but_the_interface():
     @dataclass(frozen=True)
-    class Median:
+    class Median(Assessor):
         measurements: int = 200
         name: ClassVar[str] = "median"
-        switches: ClassVar[dict] = {}
 
         def assess(self, world):
             sizes = world.magnitudes_mm(self.measurements)
@@ -60,7 +60,7 @@ def test_another_assessor_needs_nothing_but_the_interface():
     assert only.assess(world).assessed_mm == pytest.approx(1, abs=0.05)
 
 
-@pytest.mark.parametrize("cls", ASSESSORS.values())
+@pytest.mark.parametrize("cls", PAPER.values())
 @pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 50), (6, 1), (6, 4), (6, 50)])
 def test_budget_and_points_of_any_size(cls, points, budget):
     world = drawn_world(shell(points), 0.1, key_of(points), budget)
@@ -71,7 +71,7 @@ def test_budget_and_points_of_any_size(cls, points, budget):
         assert found.points_visited <= found.measurements <= budget
 
 
-@pytest.mark.parametrize("cls", ASSESSORS.values())
+@pytest.mark.parametrize("cls", PAPER.values())
 def test_with_hardly_any_noise_every_assessor_finds_the_truth(cls):
     error = shell(30) * np.linspace(0.98, 1.0, 30)[:, None]
     world = drawn_world(error, 1e-7, key_of(2), 40)

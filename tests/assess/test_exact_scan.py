@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinacc.assess import ModelInvalidation, drawn_world, measured_world
 from kinacc.assess import invalidation_kernels as kernels
+from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.random_numbers import key_of
+from kinacc.assess.world import drawn_world, measured_world
 
 SWITCHES = list(product(("squared", "as_printed"), ("r", "sqrt_r")))
 

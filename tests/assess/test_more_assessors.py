@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, gamma
 
-from kinacc.assess import drawn_world
-from kinacc.assess.adaptive import Candidates, conduct
+from kinacc.assess.adaptive import Candidates
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.ellipsoid import BallDistances, mahalanobis_beyond
 from kinacc.assess.error_effects import joint_errors
@@ -18,10 +17,12 @@ from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, bounda
 from kinacc.assess.invalidation_full import ModelInvalidationFull
 from kinacc.assess.kinematic import Kinematic
 from kinacc.assess.kinematic_model import Basis, fitted_scales
-from kinacc.assess.paper_methods import InvalidationAt
+from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
+from kinacc.assess.simulate import conduct
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
+from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError
 from kinacc.kinematics import dh, robot
 
@@ -128,11 +129,20 @@ def test_distances_of_many_points_are_those_of_each():
 def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():
     readings = drawn_world(smooth_errors(joints(20)), 0.1, key_of(6), 40)
     full = conduct(ModelInvalidationFull(40), readings)
-    paper = InvalidationAt(1.0, 40).begin(Candidates.with_equal_noise(np.full(20, 0.1)))
-    for point in range(20):
-        for visit in range(int(full.ledger.count[point])):
-            paper.record(point, readings.reading_mm(point, visit))
-    assert full.statements()[0].value_mm == pytest.approx(paper.statements()[0].value_mm, rel=1e-5)
+    reads = {row: int(full.ledger.count[row]) for row in full.ledger.visited}
+    size_mm = {
+        row: np.linalg.norm(np.mean([readings.reading_mm(row, i) for i in range(count)], axis=0))
+        for row, count in reads.items()
+    }
+
+    def rejection(bound_mm: float) -> float:
+        """Eqs. 18 to 20 of the paper, as its own algorithm has them."""
+        excess = [mahalanobis_excess(size_mm[row], bound_mm, 0.1, reads[row]) for row in reads]
+        return 1.0 - math.prod(1.0 - point_probability(each) for each in excess)
+
+    said_mm = full.statements()[0].value_mm
+    assert max(reads.values()) > 1
+    assert rejection((1.0 - 1e-5) * said_mm) > 0.6 >= rejection((1.0 + 1e-5) * said_mm)
 
 
 def rejected_at_the_truth(eq21: bool) -> float:
@@ -199,7 +209,7 @@ def test_the_kinematic_process_finds_and_bounds_the_largest_of_smooth_errors():
     assert (everywhere.target, measured.target) == (CANDIDATES, MEASURED)
     assert everywhere.lower_mm <= truth <= everywhere.upper_mm
     assert everywhere.upper_mm - truth < 0.15
-    assert len(campaign.taken()[1]) < 150
+    assert len(campaign.ledger.visited) < 150
     assert "single joints" in measured.assumption
     assert everywhere.crowd > 0
 

@@ -11,10 +11,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from oracles import assessors as oracle
 
-from kinacc.assess import ModelInvalidation, drawn_world, measured_world
 from kinacc.assess.invalidation_kernels import chi2_3
-from kinacc.assess.model_invalidation import history, point_probability
+from kinacc.assess.model_invalidation import ModelInvalidation, history, point_probability
 from kinacc.assess.random_numbers import key_of
+from kinacc.assess.world import drawn_world, measured_world
 
 SWITCHES = list(itertools.product(("squared", "as_printed"), ("r", "sqrt_r")))
 DECISION = 1e-11  # a probability this close to alpha may be decided either way by round-off

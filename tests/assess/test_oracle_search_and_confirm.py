@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.stats import ncx2
 
-from kinacc.assess.adaptive import conduct
 from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.simulate import conduct
 from kinacc.assess.world import drawn_world
 
 WRONG = Fraction(1, 20)  # of the statements on either target

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.assess import drawn_world
 from kinacc.assess.random_numbers import key_of
+from kinacc.assess.world import drawn_world
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, Plan, assessor_of

@@ -11,9 +11,9 @@ from command_line import call, small_study
 
 from kinacc.artifacts import store
 from kinacc.artifacts.contract import ARTEFACTS
-from kinacc.assess import drawn_world
-from kinacc.assess.adaptive import conduct
 from kinacc.assess.random_numbers import key_of
+from kinacc.assess.simulate import conduct
+from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import prediction_check
 from kinacc.campaign.reading import Reading

@@ -7,13 +7,13 @@ import copy
 import numpy as np
 import pytest
 
-from kinacc.assess.adaptive import conduct
 from kinacc.assess.binomial import binomial_interval
+from kinacc.assess.simulate import carry_on, conduct, noisy
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign import folder
 from kinacc.campaign.forecast import draw_errors, forecast, population, why_none
 from kinacc.campaign.reading import Reading
-from kinacc.campaign.simulate import Deviates, carry_on, quantiles
+from kinacc.campaign.simulate import quantiles
 from kinacc.campaign.state import restore
 
 
@@ -79,9 +79,9 @@ def test_simulated_readings_do_not_depend_on_what_else_is_read(make_plan):
     rows = plan.visiting(frozenset())
     errors = np.zeros((len(rows), 3))
     whole = plan.assessor.begin(plan.candidates(rows))
-    carry_on(whole, errors, 0.05 * np.eye(3), Deviates(len(rows), 10, 7))
+    carry_on(whole, noisy(errors, 0.05 * np.eye(3), 10, 7))
     half = copy.deepcopy(plan.assessor.begin(plan.candidates(rows)))
-    carry_on(half, errors, 0.05 * np.eye(3), Deviates(len(rows), 10, 7), limit=20)
+    carry_on(half, noisy(errors, 0.05 * np.eye(3), 10, 7), limit=20)
     np.testing.assert_array_equal(half.ledger.mean_mm[:20], whole.ledger.mean_mm[:20])
     assert half.ledger.taken == 20
 

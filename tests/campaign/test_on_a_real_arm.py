@@ -10,11 +10,11 @@ import pytest
 from command_line import call
 
 from kinacc.artifacts import store
-from kinacc.assess import drawn_world, measured_world
-from kinacc.assess.adaptive import conduct
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
+from kinacc.assess.world import drawn_world, measured_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
 from kinacc.geometry import invert

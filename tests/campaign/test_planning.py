@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from command_line import call
 
-from kinacc.assess.adaptive import conduct
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.world import drawn_world

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.assess.adaptive import conduct
 from kinacc.assess.registry import ADAPTIVE
+from kinacc.assess.simulate import conduct
 from kinacc.assess.statement import MEASURED, Statement
 from kinacc.campaign import folder, words
 from kinacc.campaign.plan import fixed_visit, from_json, to_json
@@ -54,7 +54,7 @@ def test_a_campaign_on_disk_ends_as_in_memory(make_plan, make_world, name):
     entries = entries_of(plan, world)
     wanted = conduct(plan.assessor, world, **known(plan))
     state = restore(from_json(to_json(plan), "here"), entries)
-    assert len(state.told) == wanted.taken()[0]
+    assert len(state.told) == wanted.ledger.taken
     assert_same(state.statements(), wanted.statements())
 
 

@@ -22,6 +22,7 @@ _IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+(\.*[\w.]*)[ \t]+import[ \t]*(\([^)]*\)|[^\n#]+)|import[ \t]+([^\n#]+))",
     re.MULTILINE,
 )
+_PLACE = re.compile(r"""["']([\w.]+):\w+["']""")  # "module:Class" of a registry
 _TEXT = re.compile(r"""["']([\w./-]+)["']""")
 
 
@@ -44,9 +45,9 @@ def code_hash(*modules: str, alone: Iterable[str] = (), root: Path = PACKAGE) ->
     """Hash of all that the results of modules can depend on besides their arguments.
 
     The modules, every module of the package these import directly or indirectly (imports inside
-    functions included), the package data files these name, the versions of the libraries they
-    use, and the Python minor version. ``alone`` are modules counted without what
-    they import.
+    functions and the places of registries included), the package data files these name, the
+    versions of the libraries they use, and the Python minor version. ``alone`` are modules counted
+    without what they import.
     """
     tree = source_tree(root)
     names, libraries = set(alone), set()
@@ -105,6 +106,7 @@ def source_tree(root: Path = PACKAGE) -> SourceTree:
         text = content.decode("utf-8")
         digests[name] = hashlib.sha256(content).digest()
         imported = imported_names(text, name, is_package=path.name == "__init__.py")
+        imported |= set(_PLACE.findall(text))  # what a registry may import when asked
         own = {each for full in (name, *imported) for each in _with_parents(full)}
         runs[name] = frozenset(own & modules.keys())
         libraries[name] = frozenset(own & _installed().keys() - {root.name})

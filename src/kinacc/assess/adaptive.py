@@ -3,21 +3,22 @@
 A campaign is one run of an assessor over candidate points. It is told readings one by one, names
 the next point or says that it is done, and states at any moment what the readings so far allow.
 Equal readings in equal order lead to equal answers, so a campaign is restored by telling it its
-readings again. To add an assessor: a module with a frozen dataclass that has the members of
+readings again. To add an assessor: a module with a frozen dataclass of its settings that inherits
 :class:`AdaptiveAssessor`, and a line in :mod:`kinacc.assess.registry`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
 
+from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import Statement
-from kinacc.assess.world import World
 from kinacc.errors import InputError, Problem
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
@@ -86,9 +87,11 @@ class Campaign(Protocol):
     """One assessment under way.
 
     ``first``: rows 0 to ``first`` - 1 are visited whatever is read, each before any other point.
+    ``ledger``: the readings that count, for others to look at and not to change.
     """
 
     first: int
+    ledger: Ledger
 
     def next(self) -> int | None:
         """The row to measure next; None if no further measurement is wanted."""
@@ -108,24 +111,38 @@ class Campaign(Protocol):
         """What the readings so far allow to say, the main statement first."""
         ...
 
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings so far, and the rows read, in the order of their first readings."""
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """Lower and upper limit (mm) on the size of every measured row, as the assessor has them.
+
+        With its confidence each upper limit holds by itself, and all lower limits together.
+        """
         ...
 
 
 class AdaptiveAssessor(Protocol):
-    """A method of assessment: ``name`` in tables, ``measurements`` it may spend.
+    """A method of assessment that chooses as it goes.
 
-    ``is_slow``, where there is one, says that a campaign of 200 takes more than 50 ms;
-    ``shortfall(points, joints)``, where there is one, what the budget is too small for.
+    ``name`` in tables; ``measurements`` it may spend; ``confidence`` of its bounds and of the
+    limits on single points. ``needs``: what it has to know of the candidates beside their noise,
+    names of :class:`Candidates`. ``exchangeable``: it treats the errors of different poses as
+    exchangeable, so that errors drawn one by one can stand for them. ``is_slow``: a campaign of
+    200 takes more than 50 ms.
     """
 
     name: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]] = ()
+    exchangeable: ClassVar[bool] = True
+    is_slow: ClassVar[bool] = False
     measurements: int
+    confidence: float
 
     def begin(self, candidates: Candidates) -> Campaign:
-        """A new campaign without readings."""
+        """A new campaign without readings. InputError without what the assessor ``needs``."""
         ...
+
+    def shortfall(self, points: int, joints: int) -> str:
+        """What the budget is too small for, on an arm of so many joints; empty if nothing."""
+        return ""
 
 
 class Ledger:
@@ -142,11 +159,17 @@ class Ledger:
         self._weight = np.zeros(points)  # sum of 1 / variance where all noise was equal
         self._information: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take one reading, or raise InputError and take nothing."""
+    def record(self, point: int, reading_mm, covariance_mm2=None, afresh: bool = False) -> None:
+        """Take one reading, or raise InputError and take nothing.
+
+        ``afresh`` forgets what was read at the point before; it counts as taken all the same.
+        """
         reading, covariance, equal = self._checked(point, reading_mm, covariance_mm2)
         if not self.count[point]:
             self.visited.append(point)
+        if afresh:
+            self.count[point], self._weight[point], self.mean_mm[point] = 0, 0.0, 0.0
+            self._information.pop(point, None)
         self.count[point] += 1
         self.taken += 1
         if equal and point not in self._information:
@@ -211,11 +234,18 @@ class Ledger:
 
 
 class LedgerCampaign:
-    """What campaigns that keep all readings in one ledger have in common."""
+    """What campaigns have in common: readings in a ledger, limits from the means."""
 
     first = 0
 
-    def __init__(self, settings, candidates: Candidates) -> None:
+    def __init__(self, settings: AdaptiveAssessor, candidates: Candidates) -> None:
+        lacking = [
+            Problem(f"candidates, {name}", "not given", "joints and what their errors do at them")
+            for name in settings.needs
+            if getattr(candidates, name) is None
+        ]
+        if lacking:
+            raise InputError(lacking, f"{settings.name} needs to know the arm")
         self.settings = settings
         self.ledger = Ledger(candidates)
 
@@ -223,9 +253,19 @@ class LedgerCampaign:
         """Take a reading."""
         self.ledger.record(point, reading_mm, covariance_mm2)
 
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings, and the rows read."""
-        return self.ledger.taken, self.ledger.visited
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """Those of the mean readings alone, the lower one corrected for the number of points."""
+        allowed = 1.0 - self.settings.confidence
+        return self._mean_limits(self.ledger.visited, allowed / max(len(self.ledger.visited), 1))
+
+    def _mean_limits(self, rows: Iterable[int], lower: float) -> dict[int, tuple[float, float]]:
+        """Limits of mean readings; ``lower`` is the error allowed to a lower limit."""
+        upper, ledger = 1.0 - self.settings.confidence, self.ledger
+        found = {}
+        for row in rows:
+            mean, noise = ledger.mean_mm[row], ledger.noise(row)
+            found[row] = lower_limit_mm(mean, noise, lower), upper_limit_mm(mean, noise, upper)
+        return found
 
 
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
@@ -255,13 +295,3 @@ def check_budget(measurements: int, confidence: float = 0.95) -> list[Problem]:
     if not 0.5 <= confidence < 1.0:
         problems.append(Problem("confidence", f"{confidence!r}", "at least 0.5 and below 1"))
     return problems
-
-
-def conduct(assessor: AdaptiveAssessor, world: World, **more: np.ndarray) -> Campaign:
-    """Run a campaign to its end on the readings of a world; ``more`` as in :class:`Candidates`."""
-    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **more))
-    reads = np.zeros(world.points, dtype=np.int64)
-    while (point := campaign.next()) is not None:
-        campaign.record(point, world.reading_mm(point, int(reads[point])))
-        reads[point] += 1
-    return campaign

@@ -1,7 +1,8 @@
-"""What every assessor is: a frozen record of settings that turns a world into an assessed accuracy.
+"""Assessors that look back: frozen records of settings that turn a world into an accuracy.
 
-To add one: a module with a frozen dataclass that has the members of :class:`Assessor`, and a line
-in the registry of :mod:`kinacc.assess`.
+The paper's three. Model Invalidation replays what did not happen, so it cannot be asked live; those
+that can are :class:`kinacc.assess.adaptive.AdaptiveAssessor`. To add one: a module with a frozen
+dataclass that inherits :class:`Assessor`, and a line in :mod:`kinacc.assess.registry`.
 """
 
 from __future__ import annotations
@@ -27,14 +28,16 @@ class Assessment(NamedTuple):
 
 
 class Assessor(Protocol):
-    """A method of assessment.
+    """A method of assessment that looks back at one fixed world.
 
     ``name`` is its name in tables; ``switches`` maps each field that is a reading of the paper to
-    its choices, the default first; ``measurements`` is the budget.
+    its choices, the default first; ``measurements`` is the budget; ``is_slow``: an assessment of
+    200 measurements takes more than 50 ms.
     """
 
     name: ClassVar[str]
-    switches: ClassVar[dict[str, tuple[str, ...]]]
+    switches: ClassVar[dict[str, tuple[str, ...]]] = {}
+    is_slow: ClassVar[bool] = False
     measurements: int
 
     def assess(self, world: World) -> Assessment:

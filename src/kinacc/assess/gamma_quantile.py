@@ -8,16 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, check_budget
-from kinacc.assess.single_pass import OnceCampaign
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.statement import REGION, Statement
+from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import InputError, Problem
 
 _IMPROBABLE = 0.01  # chance of the largest reading below which the fit counts as contradicted
 
 
 @dataclass(frozen=True)
-class GammaQuantile:
+class GammaQuantile(AdaptiveAssessor):
     """Read every point once, fit a gamma distribution, state its quantile.
 
     Speaks of the region: the size that a share ``share`` of it does not exceed. A value without
@@ -31,6 +31,7 @@ class GammaQuantile:
     measurements: int = 200
     share: float = 0.99
     name: ClassVar[str] = "gamma_quantile"
+    confidence: ClassVar[float] = 0.95  # of limits on single points; its statement has none
 
     def __post_init__(self) -> None:
         problems = check_budget(self.measurements)

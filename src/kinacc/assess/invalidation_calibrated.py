@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.challenges import ChallengeCampaign, invalidation_problems
+from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.ellipsoid import largest_size
-from kinacc.assess.invalidation_full import ChallengeCampaign, invalidation_problems
 from kinacc.assess.sequential_limits import Looks
-from kinacc.assess.single_shot import about_all_if_all_measured
 from kinacc.assess.statement import MEASURED, Statement
 from kinacc.errors import InputError
 
@@ -22,7 +22,7 @@ _SIMULATED_DEVIATIONS = 2.33  # the calibrated error rate is below the wanted on
 
 
 @dataclass(frozen=True)
-class InvalidationCalibrated:
+class InvalidationCalibrated(AdaptiveAssessor):
     """Visit points, challenge the worst of them, bound the largest error with a stated error rate.
 
     Eqs. 15-24 decide what is measured and give the value. Their threshold ``alpha`` is no error

@@ -8,7 +8,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, LedgerCampaign, check_budget
+from kinacc.assess.adaptive import (
+    AdaptiveAssessor,
+    Candidates,
+    LedgerCampaign,
+    check_budget,
+)
+from kinacc.assess.coverage import MISSING_PART, companions
 from kinacc.assess.kinematic_model import (
     Basis,
     Posterior,
@@ -18,9 +24,8 @@ from kinacc.assess.kinematic_model import (
     points_needed,
     posterior,
 )
-from kinacc.assess.search_and_confirm import MISSING_PART, companions
-from kinacc.assess.sequential import first_points
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.visits import first_points
 from kinacc.errors import InputError, Problem
 
 _DRAWS = 400
@@ -32,7 +37,7 @@ _EXPLAINED = 0.5  # least share of the mean square error that joints have to exp
 
 
 @dataclass(frozen=True)
-class Kinematic:
+class Kinematic(AdaptiveAssessor):
     """Errors as what smooth errors of single joints do at the tool, learned while measuring.
 
     :mod:`kinacc.assess.kinematic_model` is fitted to the points of a first visit (``visited`` of
@@ -55,6 +60,8 @@ class Kinematic:
     visited: float = 0.6
     confidence: float = 0.95
     name: ClassVar[str] = "kinematic"
+    needs: ClassVar[tuple[str, ...]] = ("q_rad", "effects")
+    exchangeable: ClassVar[bool] = False
     is_slow: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -73,13 +80,6 @@ class Kinematic:
 
     def begin(self, candidates: Candidates) -> KinematicCampaign:
         """A new campaign. InputError without joints and effects of the candidates."""
-        missing = [
-            Problem(f"candidates, {name}", "not given", "joints and what their errors do at them")
-            for name in ("q_rad", "effects")
-            if getattr(candidates, name) is None
-        ]
-        if missing:
-            raise InputError(missing, f"{self.name} needs to know the arm")
         return KinematicCampaign(self, candidates)
 
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from kinacc.assess.assessor import Assessment, check
+from kinacc.assess.assessor import Assessment, Assessor, check
 from kinacc.assess.world import World
 
 
 @dataclass(frozen=True)
-class Maximum:
+class Maximum(Assessor):
     """Measure each point once, up to ``measurements`` points, and take the largest magnitude."""
 
     measurements: int = 200
     name: ClassVar[str] = "maximum"
-    switches: ClassVar[dict[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
         check(self)

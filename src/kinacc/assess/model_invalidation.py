@@ -16,7 +16,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment, check
+from kinacc.assess.assessor import Assessment, Assessor, check
 from kinacc.assess.world import World
 from kinacc.errors import InputError, Problem
 
@@ -47,7 +47,7 @@ class Step(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ModelInvalidation:
+class ModelInvalidation(Assessor):
     """Settings of the assessor.
 
     measurements: budget of a run; alpha: threshold on the rejection probability (eq. 22);

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment, check
+from kinacc.assess.assessor import Assessment, Assessor, check
 from kinacc.assess.world import World
 from kinacc.distributions import gamma99
 
@@ -39,7 +39,7 @@ def largest_inlier(magnitudes: np.ndarray, outlier_rule: str = "normal") -> floa
 
 
 @dataclass(frozen=True)
-class OutlierRejection:
+class OutlierRejection(Assessor):
     """Measure each point once, up to ``measurements`` points, drop outliers, take the largest."""
 
     measurements: int = 200

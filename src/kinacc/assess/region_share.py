@@ -8,16 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, check_budget
-from kinacc.assess.single_pass import OnceCampaign
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.statement import REGION, Statement
+from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import InputError, Problem
 
 _LOWER_SLIP = 0.01  # probability that noise alone lifts a reading by more than is taken off it
 
 
 @dataclass(frozen=True)
-class RegionShare:
+class RegionShare(AdaptiveAssessor):
     """Read random points once; order statistics bound the size that ``share`` does not exceed.
 
     Upper bound: a reading plus ``deviations`` standard deviations is at least the true size with

@@ -8,22 +8,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, LedgerCampaign, check_budget
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
+from kinacc.assess.coverage import MISSING_PART, at_most, companions, hardly_missed, records
 from kinacc.assess.population import LargestSize, largest_size
-from kinacc.assess.sequential import bounding_point, first_points
-from kinacc.assess.sequential_limits import Looks
+from kinacc.assess.sequential_limits import Looks, LooksCampaign
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.visits import first_points
 from kinacc.errors import InputError, Problem
 
 FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
-MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
 _ALONE = 0.1  # chance of so little company below which the assumption counts as broken
 _RESERVE = 0.04  # of the budget, kept for confirming whatever is found last
 _RECONSIDER = 0.06  # of the budget, between two estimates of the likely largest size
 
 
 @dataclass(frozen=True)
-class SearchAndConfirm:
+class SearchAndConfirm(AdaptiveAssessor):
     """Visit candidates until none can be missed, or as many as suspects allow; then confirm those.
 
     With a budget for it, so many candidates are visited that the largest error is missed with
@@ -78,7 +78,7 @@ class SearchAndConfirm:
         return SearchAndConfirmCampaign(self, candidates)
 
 
-class SearchAndConfirmCampaign(LedgerCampaign):
+class SearchAndConfirmCampaign(LooksCampaign):
     """See :class:`SearchAndConfirm`."""
 
     def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
@@ -103,12 +103,7 @@ class SearchAndConfirmCampaign(LedgerCampaign):
             return None
         if visited < self.first or (visited < self.most and self._wanted_by_suspects() < left):
             return visited
-        return bounding_point(self.looks, left)
-
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
-        super().record(point, reading_mm, covariance_mm2)
-        self.looks.update(point)
+        return self.looks.bounding_point(left)
 
     def statements(self) -> tuple[Statement, ...]:
         """On the measured points, and on all candidates."""
@@ -179,34 +174,3 @@ class SearchAndConfirmCampaign(LedgerCampaign):
         visited = self.ledger.visited
         unmeasured = self.ledger.candidates.points - len(visited)
         return largest_size(self.ledger.sizes_mm(), self.ledger.noise_mm[visited], unmeasured)
-
-
-def records(first: int, most: int) -> float:
-    """1 + expected number of points above all before them among the first+1 .. most, by chance."""
-    return 1.0 + sum(1.0 / place for place in range(first + 1, most + 1))
-
-
-def hardly_missed(points: int, error: float) -> int:
-    """Smallest number of random points that hold the largest of ``points`` but for ``error``."""
-    return next(seen for seen in range(points + 1) if points - seen <= error * points)
-
-
-def companions(points: int, seen: int, error: float) -> int:
-    """Smallest number of points of which at least one is among ``seen`` random ones of ``points``.
-
-    But for probability ``error``; the draws are without replacement.
-    """
-    count = 1
-    while at_most(0, count, points, seen) > error:
-        count += 1
-    return count
-
-
-def at_most(found: int, marked: int, points: int, seen: int) -> float:
-    """Probability that at most ``found`` of ``marked`` points are among ``seen`` of ``points``."""
-    from math import comb
-
-    if found >= min(marked, seen):
-        return 1.0
-    ways = sum(comb(marked, k) * comb(points - marked, seen - k) for k in range(found + 1))
-    return ways / comb(points, seen)

@@ -8,15 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger, LedgerCampaign, check_budget
-from kinacc.assess.sequential_limits import Looks
-from kinacc.assess.single_shot import about_all_if_all_measured
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
+from kinacc.assess.coverage import about_all_if_all_measured
+from kinacc.assess.sequential_limits import Looks, LooksCampaign
 from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.visits import first_points
 from kinacc.errors import InputError, Problem
 
 
 @dataclass(frozen=True)
-class Sequential:
+class Sequential(AdaptiveAssessor):
     """Visit a fixed number of points, then double the readings of the one with the largest limit.
 
     ``visited`` is the share of the budget spent on visiting points (all candidates where the budget
@@ -47,7 +48,7 @@ class Sequential:
         return SequentialCampaign(self, candidates)
 
 
-class SequentialCampaign(LedgerCampaign):
+class SequentialCampaign(LooksCampaign):
     """See :class:`Sequential`."""
 
     def __init__(self, settings: Sequential, candidates: Candidates) -> None:
@@ -62,12 +63,7 @@ class SequentialCampaign(LedgerCampaign):
             return self.ledger.taken
         if self.ledger.taken >= self.settings.measurements or self._is_tight():
             return None
-        return bounding_point(self.looks, self.settings.measurements - self.ledger.taken)
-
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
-        super().record(point, reading_mm, covariance_mm2)
-        self.looks.update(point)
+        return self.looks.bounding_point(self.settings.measurements - self.ledger.taken)
 
     def statements(self) -> tuple[Statement, ...]:
         """The bounds as they stand."""
@@ -89,30 +85,6 @@ class SequentialCampaign(LedgerCampaign):
             return False
         upper = float(self.looks.upper_mm[0, self.ledger.visited].max())
         return upper - float(self.looks.lower_mm.max()) <= self.settings.width_mm
-
-
-def first_points(measurements: int, points: int, share: float) -> int:
-    """How many points are visited before anything is known: all if the budget is 1.5 times them."""
-    if measurements >= 1.5 * points:
-        return points
-    return max(math.ceil(share * min(measurements, points)), 1)
-
-
-def bounding_point(looks: Looks, left: int) -> int:
-    """The visited point with the largest upper limit among those whose next look is affordable.
-
-    With ``left`` readings to go. Where no look is affordable the largest limit decides alone: its
-    readings still serve the value.
-    """
-    visited = np.array(looks.ledger.visited)
-    upper = looks.upper_mm[0, visited]
-    order = np.argsort(-upper, kind="stable")
-    best = visited[order[0]]
-    return int(best if looks.missing(best) <= left else _affordable(looks, visited[order], left))
-
-
-def _affordable(looks: Looks, order: np.ndarray, left: int) -> int:
-    return next((point for point in order if looks.missing(point) <= left), order[0])
 
 
 def corrected_largest_mm(ledger: Ledger) -> float:

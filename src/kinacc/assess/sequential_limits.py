@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from kinacc.assess.adaptive import Ledger
+from kinacc.assess.adaptive import Ledger, LedgerCampaign
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 
 _FIRST_SHARES = (0.60, 0.16, 0.10, 0.06)  # of the looks at 1, 2, 4 and 8 readings; then halving
@@ -62,3 +62,29 @@ class Looks:
     def missing(self, point: int) -> int:
         """Readings missing until the next look."""
         return self.due(point) - int(self.ledger.count[point])
+
+    def bounding_point(self, left: int) -> int:
+        """The visited point with the largest upper limit among those whose next look is affordable.
+
+        With ``left`` readings to go. Where no look is affordable the largest limit decides alone:
+        its readings still serve the value.
+        """
+        visited = np.array(self.ledger.visited)
+        order = visited[np.argsort(-self.upper_mm[0, visited], kind="stable")]
+        return int(next((point for point in order if self.missing(point) <= left), order[0]))
+
+
+class LooksCampaign(LedgerCampaign):
+    """A campaign that looks at every point as it is read: ``looks`` is the assessor's to set."""
+
+    looks: Looks
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take a reading, and look at the point where that is due."""
+        super().record(point, reading_mm, covariance_mm2)
+        self.looks.update(point)
+
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """The limits that hold at every look."""
+        lower, upper = self.looks.lower_mm, self.looks.upper_mm[0]
+        return {row: (float(lower[row]), float(upper[row])) for row in self.ledger.visited}

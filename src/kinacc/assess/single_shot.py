@@ -7,15 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
+from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.single_pass import OnceCampaign
-from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import InputError
 
 
 @dataclass(frozen=True)
-class SingleShot:
+class SingleShot(AdaptiveAssessor):
     """Measure each point once, up to ``measurements`` points.
 
     Upper bound: the smallest size such that one reading at a point of that size exceeds what was
@@ -73,14 +74,3 @@ def _outstanding(ledger: Ledger) -> list[tuple[np.ndarray, float | np.ndarray]]:
         elif noise not in largest or size > largest[noise][0]:
             largest[noise] = (size, point)
     return uneven + [(ledger.mean_mm[point], noise) for noise, (_, point) in largest.items()]
-
-
-def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statement, ...]:
-    """A statement on the measured points, and the same on all candidates where they are all."""
-    from dataclasses import replace
-
-    if len(ledger.visited) == ledger.candidates.points:
-        return said, replace(said, target=CANDIDATES)
-    unmeasured = ledger.candidates.points - len(ledger.visited)
-    withheld = f"{unmeasured} of {ledger.candidates.points} candidates are not measured"
-    return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)

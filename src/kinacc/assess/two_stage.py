@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, Ledger, check_budget
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
+from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.single_shot import about_all_if_all_measured
 from kinacc.assess.statement import MEASURED, Statement
 from kinacc.errors import InputError, Problem
 
@@ -18,7 +19,7 @@ SCREENING_PART = 0.3  # of the allowed error, spent on points that are not re-me
 
 
 @dataclass(frozen=True)
-class TwoStage:
+class TwoStage(AdaptiveAssessor):
     """Screen ``screened`` of the budget's points, spend the rest evenly on the largest readings.
 
     Every suspect is read ``repeats`` times more and judged by these readings alone, so that having
@@ -51,64 +52,63 @@ class TwoStage:
         return TwoStageCampaign(self, candidates)
 
 
-class TwoStageCampaign:
-    """See :class:`TwoStage`."""
+class TwoStageCampaign(LedgerCampaign):
+    """See :class:`TwoStage`. ``again``: the suspects that have new readings."""
+
+    settings: TwoStage
 
     def __init__(self, settings: TwoStage, candidates: Candidates) -> None:
-        self.settings = settings
-        self.screen = Ledger(candidates)
-        self.again: Ledger | None = None
+        super().__init__(settings, candidates)
         wanted = math.ceil(settings.screened * settings.measurements)
         self.first = min(wanted, settings.measurements - settings.repeats, candidates.points)
         self.suspects: list[int] = []
+        self.again: list[int] = []
 
     def next(self) -> int | None:
         """Points in order, then the suspects in turn."""
-        if self.screen.taken < self.first:
-            return self.screen.taken
-        if self.screen.taken + self.again.taken >= self._planned():
+        taken = self.ledger.taken
+        if taken < self.first:
+            return taken
+        if taken >= self._planned():
             return None
-        return self.suspects[self.again.taken % len(self.suspects)]
+        return self.suspects[(taken - self.first) % len(self.suspects)]
 
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
-        if self.again is not None:
-            self.again.record(point, reading_mm, covariance_mm2)
-            return
-        self.screen.record(point, reading_mm, covariance_mm2)
-        if self.screen.taken == self.first:
+        """Take a reading; the first new one of a suspect replaces what screening read there."""
+        is_new = bool(self.suspects) and point not in self.again
+        self.ledger.record(point, reading_mm, covariance_mm2, afresh=is_new)
+        if is_new:
+            self.again.append(point)
+        elif self.ledger.taken == self.first:
             left = self.settings.measurements - self.first
-            count = min(max(left // self.settings.repeats, 1), len(self.screen.visited))
-            order = np.argsort(-self.screen.sizes_mm(), kind="stable")
-            self.suspects = [self.screen.visited[i] for i in order[:count]]
-            self.again = Ledger(self.screen.candidates)
-
-    def taken(self) -> tuple[int, list[int]]:
-        """Number of readings of both stages, and the rows read."""
-        again = self.again.taken if self.again is not None else 0
-        return self.screen.taken + again, self.screen.visited
+            count = min(max(left // self.settings.repeats, 1), len(self.ledger.visited))
+            order = np.argsort(-self.ledger.sizes_mm(), kind="stable")
+            self.suspects = [self.ledger.visited[i] for i in order[:count]]
 
     def statements(self) -> tuple[Statement, ...]:
         """The bound once every suspect was read again; before, none."""
-        if self.again is None or len(self.again.visited) < len(self.suspects):
+        if not self.suspects or len(self.again) < len(self.suspects):
             return (Statement(MEASURED, withheld="the suspects are not all measured again yet"),)
         allowed = 1.0 - self.settings.confidence
-        passed = [p for p in self.screen.visited if p not in set(self.suspects)]
+        passed = [p for p in self.ledger.visited if p not in set(self.suspects)]
         spent = SCREENING_PART * allowed if passed else 0.0
-        upper = [self._upper(self.screen, point, spent) for point in passed]
-        upper += [self._upper(self.again, point, allowed - spent) for point in self.suspects]
+        upper = [self._limit(upper_limit_mm, point, spent) for point in passed]
+        upper += [self._limit(upper_limit_mm, point, allowed - spent) for point in self.suspects]
         each = allowed / len(self.suspects)
-        lower = [
-            lower_limit_mm(self.again.mean_mm[p], self.again.noise(p), each) for p in self.suspects
-        ]
         said = Statement(
             MEASURED,
             value_mm=self._value(),
-            lower_mm=max(lower),
+            lower_mm=max(self._limit(lower_limit_mm, point, each) for point in self.suspects),
             upper_mm=max(upper),
             confidence=self.settings.confidence,
         )
-        return about_all_if_all_measured(said, self.screen)
+        return about_all_if_all_measured(said, self.ledger)
+
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """Limits of the mean readings of a point's own stage."""
+        allowed, visited = 1.0 - self.settings.confidence, self.ledger.visited
+        screened = self._mean_limits(visited, allowed / max(len(visited), 1))
+        return screened | self._mean_limits(self.again, allowed / max(len(self.again), 1))
 
     def _planned(self) -> int:
         """Measurements of both stages: whole rounds over the suspects only."""
@@ -117,10 +117,9 @@ class TwoStageCampaign:
 
     def _value(self) -> float:
         """Largest re-read size, less what the noise adds to it on average."""
-        square = np.sum(self.again.mean_mm[self.suspects] ** 2, axis=1)
-        square -= 3.0 * self.again.noise_mm[self.suspects] ** 2
+        square = np.sum(self.ledger.mean_mm[self.suspects] ** 2, axis=1)
+        square -= 3.0 * self.ledger.noise_mm[self.suspects] ** 2
         return math.sqrt(max(float(square.max()), 0.0))
 
-    @staticmethod
-    def _upper(ledger: Ledger, point: int, error: float) -> float:
-        return upper_limit_mm(ledger.mean_mm[point], ledger.noise(point), error)
+    def _limit(self, limit_mm: Callable[..., float], point: int, error: float) -> float:
+        return limit_mm(self.ledger.mean_mm[point], self.ledger.noise(point), error)

@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.assess.adaptive import Campaign
+from kinacc.assess.adaptive import Campaign, Ledger
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
-from kinacc.assess.kinematic import Kinematic
+from kinacc.assess.simulate import carry_on, noisy
 from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.campaign import words
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.simulate import Deviates, carry_on, quantiles, width_mm
+from kinacc.campaign.reading import unplanned_mm2
+from kinacc.campaign.simulate import quantiles, width_mm
 from kinacc.campaign.state import State, sayable
 
 FEWEST_POINTS = 8
@@ -140,7 +141,7 @@ def forecast(
 
 def why_none(state: State) -> str:
     """Why no forecast can be made; empty where one can."""
-    if isinstance(state.plan.assessor, Kinematic):
+    if not state.plan.assessor.exchangeable:
         return (
             "simulated errors know nothing of each other, and this assessor rests on how errors of "
             "different poses belong together: see kinacc plan-campaign"
@@ -164,7 +165,7 @@ def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, 
             errors = draw_errors(known, mean, noise, rng)
             entropy = (2, state.plan.seed, state.taken, number)
             campaign = assessor.begin(state.plan.candidates(state.rows))
-            carry_on(campaign, errors, _root(state), Deviates(len(errors), tried, *entropy))
+            carry_on(campaign, noisy(errors, _root(state), tried, *entropy))
             missed += width_mm(_main(state.plan, campaign, found.target)) > wanted_mm
             if missed > (1.0 - ENOUGH) * simulations:
                 break
@@ -185,8 +186,7 @@ def _one_end(
         if done % pause == 0:
             looks.append((done, _main(state.plan, campaign, target)))
 
-    deviates = Deviates(len(errors_mm), left, *entropy)
-    done = carry_on(campaign, errors_mm, _root(state), deviates, look)
+    done = carry_on(campaign, noisy(errors_mm, _root(state), left, *entropy), look)
     if looks[-1][0] != done:
         looks.append((done, _main(state.plan, campaign, target)))
     return looks
@@ -205,9 +205,6 @@ def _main(plan: Plan, campaign: Campaign, target: str) -> Statement:
 
 def _by_row(state: State) -> tuple[np.ndarray, np.ndarray]:
     """Mean readings (m, 3) and their noise (m,) by the assessor's rows; infinite where unread."""
-    from kinacc.assess.adaptive import Ledger
-    from kinacc.campaign.reading import unplanned_mm2
-
     ledger = Ledger(state.plan.candidates(state.rows))
     row = {int(point): number for number, point in enumerate(state.rows)}
     for each in (*state.told, *state.in_hand):

@@ -9,7 +9,6 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
-from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import REGION
 from kinacc.campaign import consistency, words
 from kinacc.campaign.folder import Opened
@@ -35,7 +34,7 @@ def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dic
 
     def watch(campaign: Campaign, _) -> None:
         next(done, None)
-        count, visited = campaign.taken()
+        count, visited = campaign.ledger.taken, campaign.ledger.visited
         if count % pause == 0 or count == total:
             rows.extend(_said(each, count, len(visited)) for each in sayable(opened.plan, campaign))
 
@@ -122,43 +121,21 @@ def _readings(state: State) -> Columns:
 
 def means_of(state: State) -> dict[int, tuple[np.ndarray, float, int]]:
     """Mean error (3,), its noise per axis and number of readings of every point used."""
-    found = {}
-    for ledger in _ledgers(state.campaign):
-        for row in ledger.visited:
-            mean = (ledger.mean_mm[row], float(ledger.noise_mm[row]), int(ledger.count[row]))
-            found[int(state.rows[row])] = mean
-    return found
+    ledger = state.campaign.ledger
+    return {
+        int(state.rows[row]): (
+            ledger.mean_mm[row],
+            float(ledger.noise_mm[row]),
+            int(ledger.count[row]),
+        )
+        for row in ledger.visited
+    }
 
 
 def limits_of(state: State) -> dict[int, tuple[float, float]]:
-    """Lower and upper limit on every measured point's size.
-
-    Those the assessor itself works with where it has limits that hold at every look; otherwise
-    those of the mean reading alone, the lower one corrected for the number of points.
-    """
-    looks = getattr(state.campaign, "looks", None)
-    found = {}
-    if looks is not None and len(looks.upper_mm):
-        for row in looks.ledger.visited:
-            limits = float(looks.lower_mm[row]), float(looks.upper_mm[0, row])
-            found[int(state.rows[row])] = limits
-        return found
-    allowed = 1.0 - float(getattr(state.plan.assessor, "confidence", 0.95))
-    for ledger in _ledgers(state.campaign):
-        each = allowed / max(len(ledger.visited), 1)
-        for row in ledger.visited:
-            mean, noise = ledger.mean_mm[row], ledger.noise(row)
-            found[int(state.rows[row])] = (
-                lower_limit_mm(mean, noise, each),
-                upper_limit_mm(mean, noise, allowed),
-            )
-    return found
-
-
-def _ledgers(campaign: Campaign) -> list:
-    """Ledgers of a campaign; of two stages the later one comes last and counts."""
-    named = (getattr(campaign, name, None) for name in ("ledger", "screen", "again"))
-    return [each for each in named if each is not None]
+    """Lower and upper limit on every measured point's size, as the assessor has them."""
+    limits = state.campaign.point_limits()
+    return {int(state.rows[row]): each for row, each in limits.items()}
 
 
 def _columns(rows: list[dict]) -> Columns:

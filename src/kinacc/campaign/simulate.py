@@ -8,47 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
-from kinacc.assess.random_numbers import key_of
-from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
-from kinacc.assess.world import drawn_world
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.simulate import carry_on, is_broken, noisy, truth_mm
+from kinacc.assess.statement import Statement
 from kinacc.errors import InputError, Problem
-
-
-class Deviates:
-    """Standard normal deviates (3,) by point and reading: the same whatever else is read."""
-
-    def __init__(self, points: int, readings: int, *entropy: int) -> None:
-        self._world = drawn_world(np.zeros((points, 3)), 1.0, key_of(*entropy), max(readings, 1))
-
-    def at(self, point: int, reading: int) -> np.ndarray:
-        """Deviates of one reading."""
-        return self._world.reading_mm(point, reading)
-
-
-def carry_on(
-    campaign: Campaign,
-    errors_mm: np.ndarray,
-    noise_root: np.ndarray,
-    deviates: Deviates,
-    after: Callable[[int], None] | None = None,
-    limit: int | None = None,
-) -> int:
-    """Read as the campaign asks until it wants no more, or ``limit`` readings; their number.
-
-    ``errors_mm`` (m, 3) by its rows; ``noise_root`` (3, 3): its product with its transpose is the
-    covariance of a reading. ``after`` is called with the number of readings after each.
-    """
-    reads = np.zeros(len(errors_mm), dtype=int)
-    done = 0
-    while (limit is None or done < limit) and (row := campaign.next()) is not None:
-        noise = noise_root @ deviates.at(row, reads[row])
-        campaign.record(row, errors_mm[row] + noise)
-        reads[row] += 1
-        done += 1
-        if after is not None:
-            after(done)
-    return done
 
 
 @dataclass(frozen=True)
@@ -129,15 +92,11 @@ def outcomes(
         candidates = pool.candidates(rows, covariance_mm2)
         sizes = np.linalg.norm(pool.error_mm[rows], axis=1)
         most = max(each.measurements for each in assessors)
-        deviates = Deviates(points, most, seed, number, repetition)
+        reading = noisy(pool.error_mm[rows], root, most, seed, number, repetition)
         for assessor in assessors:
             campaign = assessor.begin(candidates)
-            readings = carry_on(campaign, pool.error_mm[rows], root, deviates)
-            measured = sizes[campaign.taken()[1]]
-            truth = {MEASURED: float(measured.max()), CANDIDATES: float(sizes.max())}
+            readings = carry_on(campaign, reading)
             for said in campaign.statements():
-                true_mm = truth.get(said.target, math.nan)
-                company = int(np.sum(sizes >= sizes.max() / said.isolation))
                 found.append(
                     Outcome(
                         pool.name,
@@ -145,8 +104,8 @@ def outcomes(
                         repetition,
                         readings,
                         said,
-                        true_mm,
-                        broken=company < said.crowd,
+                        truth_mm(said, sizes, campaign.ledger.visited),
+                        broken=is_broken(said, sizes),
                     )
                 )
     return found

@@ -90,7 +90,7 @@ def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
     said of points that were not measured.
     """
     said = campaign.statements()
-    left = campaign.first - len(campaign.taken()[1])
+    left = campaign.first - len(campaign.ledger.visited)
     if left <= 0 or not plan.by_travel:
         return said
     words = f"{left} points of the first visit, made in order of travel, are left"

@@ -58,8 +58,7 @@ def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
 
 def _too_few(begun: Plan) -> list[str]:
     """What the assessor says of a budget this small, if anything."""
-    shortfall = getattr(begun.assessor, "shortfall", None)
-    said = shortfall(*begun.points.joints.shape) if shortfall else ""
+    said = begun.assessor.shortfall(*begun.points.joints.shape)
     return [said] if said else []
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from kinacc.assess import ASSESSORS
-from kinacc.assess.registry import ADAPTIVE
+from kinacc.assess.registry import ASSESSORS
 from kinacc.errors import InputError
 from kinacc.study.tournament import contest, summary
 from kinacc.study.tournament.fields import FAMILIES, Field, of_measurements, of_points, synthetic
@@ -85,7 +84,7 @@ def test_errors_that_are_not_finite_are_refused():
 
 
 def test_every_assessor_is_in_every_cell(rows):
-    assert set(rows["assessor"]) == {*ASSESSORS, *ADAPTIVE}
+    assert set(rows["assessor"]) == set(ASSESSORS)
     first = rows["assessor"] == "search_and_confirm"
     first &= rows["target"] == "measured"
     assert first.sum() == 2 * 2 * 3

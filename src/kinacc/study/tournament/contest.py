@@ -7,7 +7,6 @@ budgets see that world, whatever part of the work it is simulated in.
 
 from __future__ import annotations
 
-import math
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,11 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.assess import ASSESSORS
-from kinacc.assess.adaptive import conduct
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.registry import ADAPTIVE
-from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.registry import ASSESSORS
+from kinacc.assess.simulate import Assessed, assessed, is_broken, truth_mm
+from kinacc.assess.statement import REGION, Statement
 from kinacc.assess.world import World, drawn_world
 from kinacc.errors import InputError, Problem
 from kinacc.study.tournament import summary
@@ -27,7 +25,7 @@ from kinacc.study.tournament.fields import Field
 
 Columns = dict[str, np.ndarray]
 NM_PER_MM = 1_000_000
-CONTESTANTS = (*ASSESSORS, *ADAPTIVE)
+CONTESTANTS = tuple(ASSESSORS)
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,6 @@ SIZES = {
         (0, 1),
     ),
 }
-SLOW = tuple(name for name, each in ADAPTIVE.items() if getattr(each, "is_slow", False))
 
 
 @dataclass(frozen=True)
@@ -129,7 +126,7 @@ def summed(
     parts = []
     for job in progress(work, "cells", len(work)) if progress else work:
         for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
-            own = [name for name in assessors if (name in SLOW) == is_slow]
+            own = [name for name in assessors if ASSESSORS[name].is_slow == is_slow]
             if own:
                 parts.append(summary.summed(campaigns(job, range(count), seed, own)[0]))
     if not parts:
@@ -169,9 +166,9 @@ def campaigns(
         for name in assessors:
             own = {**place, "assessor": name}
             begun = time.process_time()
-            stated = _campaign(name, world, job, chosen)
+            found = assessed(name, job.budget, world, **cell.known(chosen))
             times.append({**own, "time_ms": 1e3 * (time.process_time() - begun)})
-            rows += [{**own, **graded} for graded in stated]
+            rows += [{**own, **graded} for graded in _graded(found, world, cell.field)]
     return _columns(rows, ROW_KINDS), _columns(times, TIME_KINDS)
 
 
@@ -187,40 +184,30 @@ def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World
     return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits), chosen
 
 
-def _campaign(name: str, world: World, job: Job, chosen: np.ndarray) -> list[dict]:
+def _graded(found: Assessed, world: World, field: Field) -> list[dict]:
     """The statements of one campaign, each with its truth."""
     size = np.linalg.norm(world.error_mm, axis=1)
-    truths = {CANDIDATES: float(size.max()), MEASURED: math.nan}
-    if name in ASSESSORS:
-        found = ASSESSORS[name](measurements=job.budget).assess(world)
-        taken, visited = found.measurements, found.points_visited
-        stated = (Statement(CANDIDATES, found.assessed_mm),)
-    else:
-        campaign = conduct(ADAPTIVE[name](measurements=job.budget), world, **job.cell.known(chosen))
-        taken, rows = campaign.taken()
-        visited, stated = len(rows), campaign.statements()
-        truths[MEASURED] = float(size[rows].max())
     return [
         {
             "target": each.target,
-            "true_mm": _truth(each, truths, job.cell.field),
+            "true_mm": _truth(each, size, found.visited, field),
             "value_mm": each.value_mm,
             "lower_mm": each.lower_mm,
             "upper_mm": each.upper_mm,
             "confidence": each.confidence,
             "withheld": each.withheld or None,
             "assumption": _assumption(each, size),
-            "measurements": taken,
-            "points_visited": visited,
+            "measurements": found.measurements,
+            "points_visited": found.points_visited,
         }
-        for each in stated
+        for each in found.statements
     ]
 
 
-def _truth(said: Statement, truths: dict[str, float], field: Field) -> float:
+def _truth(said: Statement, size: np.ndarray, visited: list[int] | None, field: Field) -> float:
     """What a statement is graded against; of the region: what its share does not exceed."""
-    if said.target in truths:
-        return truths[said.target]
+    if said.target != REGION:
+        return truth_mm(said, size, visited)
     return float(np.quantile(field.size_mm, said.share, method="inverted_cdf"))
 
 
@@ -230,8 +217,7 @@ def _assumption(said: Statement, size: np.ndarray) -> str:
         return "none"
     if not said.crowd:
         return "unknown"
-    company = int(np.sum(size >= size.max() / said.isolation))
-    return "holds" if company >= said.crowd else "broken"
+    return "broken" if is_broken(said, size) else "holds"
 
 
 ROW_KINDS = {

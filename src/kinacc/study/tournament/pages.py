@@ -9,10 +9,9 @@ from textwrap import dedent
 
 import numpy as np
 
-from kinacc.assess import ASSESSORS
-from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
+from kinacc.assess.registry import ASSESSORS, RECOMMENDED
 
-NAMES = (*ASSESSORS, *ADAPTIVE)
+NAMES = tuple(ASSESSORS)
 SHOWN = (200, 200)  # candidates and budget of pictures and tables
 _YARDSTICK, _BOUND = "model_invalidation", "single_shot"
 _TAIL = """
@@ -52,7 +51,7 @@ The recommended one is `{RECOMMENDED}`. Your own robot takes part when it is in 
 
 def assessor(name: str, known: Mapping[str, Tables]) -> str:
     """docs/assessors/<name>.md: docstring, settings and how it fared."""
-    cls = ASSESSORS.get(name) or ADAPTIVE[name]
+    cls = ASSESSORS[name]
     parts = [f"# {name}", "", _prose(cls), "", "## Settings", "", _settings(cls)]
     for run, tables in known.items():
         rows = _fared(name, tables["tournament_cells"])

@@ -1,8 +1,17 @@
-"""Campaigns that read every point once, in order, up to the budget."""
+"""Which points are visited before anything is known of them: the first ones, in order."""
 
 from __future__ import annotations
 
+import math
+
 from kinacc.assess.adaptive import Candidates, LedgerCampaign
+
+
+def first_points(measurements: int, points: int, share: float) -> int:
+    """How many points are visited before anything is known: all if the budget is 1.5 times them."""
+    if measurements >= 1.5 * points:
+        return points
+    return max(math.ceil(share * min(measurements, points)), 1)
 
 
 class OnceCampaign(LedgerCampaign):

@@ -1,0 +1,90 @@
+"""Campaigns and assessments on errors that are known, and what their statements are held to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
+from kinacc.assess.random_numbers import key_of
+from kinacc.assess.registry import ADAPTIVE, ASSESSORS
+from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.world import World, drawn_world
+
+Reading = Callable[[int, int], np.ndarray]  # (row, how often it was read before): (3,), mm
+
+
+def carry_on(
+    campaign: Campaign,
+    reading_mm: Reading,
+    after: Callable[[int], None] | None = None,
+    limit: int | None = None,
+) -> int:
+    """Read as the campaign asks until it wants no more, or ``limit`` readings; their number.
+
+    ``after`` is called with the number of readings after each.
+    """
+    reads: dict[int, int] = {}
+    done = 0
+    while (limit is None or done < limit) and (row := campaign.next()) is not None:
+        visit = reads.get(row, 0)
+        campaign.record(row, reading_mm(row, visit))
+        reads[row] = visit + 1
+        done += 1
+        if after is not None:
+            after(done)
+    return done
+
+
+def conduct(assessor: AdaptiveAssessor, world: World, **known: np.ndarray) -> Campaign:
+    """Run a campaign to its end on the readings of a world; ``known`` as in :class:`Candidates`."""
+    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **known))
+    carry_on(campaign, world.reading_mm)
+    return campaign
+
+
+def noisy(errors_mm: np.ndarray, noise_root: np.ndarray, visits: int, *entropy: int) -> Reading:
+    """Readings of errors (m, 3), up to ``visits`` a row: the same whatever else is read.
+
+    ``noise_root`` (3, 3): its product with its transpose is the covariance of a reading.
+    """
+    deviates = drawn_world(np.zeros((len(errors_mm), 3)), 1.0, key_of(*entropy), max(visits, 1))
+    return lambda row, visit: errors_mm[row] + noise_root @ deviates.reading_mm(row, visit)
+
+
+class Assessed(NamedTuple):
+    """What an assessor says in the end, what it took; rows read (None: it looks back)."""
+
+    statements: tuple[Statement, ...]
+    measurements: int
+    points_visited: int
+    visited: list[int] | None
+
+
+def assessed(name: str, measurements: int, world: World, **known: np.ndarray) -> Assessed:
+    """What an assessor of the registry says of a world, whichever its interface."""
+    assessor = ASSESSORS[name](measurements=measurements)
+    if name in ADAPTIVE:
+        campaign = conduct(assessor, world, **known)
+        taken, rows = campaign.ledger.taken, campaign.ledger.visited
+        return Assessed(campaign.statements(), taken, len(rows), rows)
+    found = assessor.assess(world)
+    said = Statement(CANDIDATES, found.assessed_mm)
+    return Assessed((said,), found.measurements, found.points_visited, None)
+
+
+def truth_mm(said: Statement, size_mm: np.ndarray, visited: list[int] | None) -> float:
+    """What a statement is held to, of sizes (m,) of all candidates; NaN where these do not tell."""
+    if said.target == CANDIDATES:
+        return float(size_mm.max())
+    if said.target == MEASURED and visited:
+        return float(size_mm[visited].max())
+    return math.nan
+
+
+def is_broken(said: Statement, size_mm: np.ndarray) -> bool:
+    """Whether too few candidates of sizes (m,) keep the largest company for a statement."""
+    return int(np.sum(size_mm >= size_mm.max() / said.isolation)) < said.crowd
