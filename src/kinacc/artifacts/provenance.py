@@ -116,6 +116,13 @@ def source_tree(root: Path = PACKAGE) -> SourceTree:
     return SourceTree(digests, runs, libraries, named)
 
 
+def source(module: str, root: Path = PACKAGE) -> str | None:
+    """Text of a module of the package; None where there is no such module."""
+    path = root.joinpath(*module.split(".")[1:])
+    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return path.read_text("utf-8") if path.is_file() else None
+
+
 def imported_names(text: str, module: str, is_package: bool) -> frozenset[str]:
     """Absolute dotted names a module's source imports; `from a import b` gives a and a.b."""
     names: set[str] = set()

@@ -1,15 +1,78 @@
-"""What the tables of a campaign are marked with."""
+"""What campaigns and their tables are marked with."""
 
 from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterable, Iterator
 
 from kinacc import __version__
 from kinacc.artifacts import provenance
 from kinacc.campaign.folder import Opened
 
+# An assessor answers by these modules; kinematics and readers hand it numbers.
+_ANSWERS = ("kinacc.assess.", "kinacc.distributions")
 
-def assessor_code() -> str:
-    """Hash of the code that chooses points and makes bounds."""
-    return provenance.code_hash("kinacc.assess.registry")
+# Marks of version 0.1.0 before its modules had moved into rooms, with Python 3.11, 3.12 and 3.13 and
+# the locked libraries. They held library versions, names of modules and readers of files as well; in
+# the assessors nothing changed meanwhile but imports and docstrings.
+_BEFORE_ROOMS = frozenset(
+    {
+        "a16405ddfdb8c763",
+        "2d424c37494f0530",
+        "4ba485643600fc5a",
+        "46201217e23bd940",
+        "33cba33e6a79bd52",
+        "74751ade075534db",
+        "9e0f0a25b1a203cc",
+        "ebf908d20f5bf128",
+        "6eb6563d3bed565f",
+        "dd0931a569e98be4",
+        "90aa4f67ab47dba5",
+        "d6c7d7e4eb82b1a6",
+        "21e8ee08f4a5be68",
+        "a90280568a3132cb",
+        "58b9b272b98d6be7",
+    }
+)
+
+# By assessor the marks of code that answers alike: one joins where code was only arranged anew; a
+# change of answers begins a new set, so that campaigns begun before it are told of it.
+_ALIKE: dict[str, frozenset[str]] = {
+    "gamma_quantile": _BEFORE_ROOMS | {"ea9a47cd4976503f"},
+    "invalidation_calibrated": _BEFORE_ROOMS | {"342f7d8eb92a4336"},
+    "kinematic": _BEFORE_ROOMS | {"013c4e27f85dfbe6"},
+    "model_invalidation_full": _BEFORE_ROOMS | {"9c378ac63b7a94d6"},
+    "region_share": _BEFORE_ROOMS | {"f78096dfad5397d1"},
+    "search_and_confirm": _BEFORE_ROOMS | {"47fbae570ce61729"},
+    "sequential": _BEFORE_ROOMS | {"94960c384a0a8485"},
+    "single_shot": _BEFORE_ROOMS | {"79f6c4e7bcbed712"},
+    "two_stage": _BEFORE_ROOMS | {"aa386e4d4cbe4d9c"},
+}
+
+
+def assessor_code(assessor: object) -> str:
+    """Mark of the code that chooses an assessor's points and makes its bounds.
+
+    It holds every statement of the modules of ``kinacc.assess`` that the assessor's own runs, and
+    of the distributions: no import, comment or docstring and no module's name, so it stays where
+    modules only move.
+    """
+    waiting, seen = {type(assessor).__module__}, set()
+    statements: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        seen.add(name)
+        tree = ast.parse(provenance.source(name) or "")  # a name imported may be a function
+        waiting |= {each for each in _imported(tree) if each.startswith(_ANSWERS)} - seen
+        statements |= {_written(each) for each in _telling(tree.body)}
+    return hashlib.sha256("\n".join(sorted(statements)).encode()).hexdigest()[:16]
+
+
+def answers_alike(recorded: str | None, assessor: object) -> bool:
+    """Whether an assessor answers as it did when the mark ``recorded`` was made."""
+    now = assessor_code(assessor)
+    return recorded == now or {recorded, now} <= _ALIKE.get(assessor.name, frozenset())
 
 
 def marks_of(opened: Opened) -> dict[str, object]:
@@ -21,3 +84,35 @@ def marks_of(opened: Opened) -> dict[str, object]:
         "inputs_hash": opened.journal.last,
         "seed": opened.plan.seed,
     }
+
+
+def _imported(tree: ast.AST) -> Iterator[str]:
+    """Absolute names a module's source imports; `from a import b` gives a and a.b."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+
+
+def _telling(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
+    """Statements that do something: no import and no text that stands alone."""
+    for node in body:
+        alone = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if not alone and not isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield node
+
+
+def _written(node: object) -> str:
+    """Source as text that is the same under every Python: without places and empty fields."""
+    if isinstance(node, list):
+        return f"[{','.join(map(_written, node))}]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    parts = []
+    for name, value in ast.iter_fields(node):
+        if name == "body" and isinstance(value, list):
+            value = list(_telling(value))
+        if value not in (None, []):
+            parts.append(f"{name}={_written(value)}")
+    return f"{type(node).__name__}({','.join(parts)})"

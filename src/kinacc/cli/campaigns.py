@@ -55,7 +55,7 @@ def start(given: Mapping) -> None:
         "point": given["point"] or arm.default_point,
         "candidates": found.source,
         "kinacc_version": __version__,
-        "assessor_code": marks.assessor_code(),
+        "assessor_code": marks.assessor_code(assessor),
     }
     begun = begin.plan_of(
         arm, points, assessor, instruments, limits, given["seed"], joints_now, about,
@@ -181,7 +181,7 @@ def say_doubts(opened: folder.Opened) -> None:
 
     Other code may choose other points than were measured, and say other bounds of equal readings.
     """
-    if opened.plan.about.get("assessor_code") != marks.assessor_code():
+    if not marks.answers_alike(opened.plan.about.get("assessor_code"), opened.plan.assessor):
         begun = opened.plan.about.get("kinacc_version", "an earlier state")
         click.echo(f"begun with other code of the assessors, of kinacc {begun}", err=True)
     if opened.journal.cut_off:
