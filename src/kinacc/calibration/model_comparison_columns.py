@@ -6,18 +6,14 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import model_comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import COMPARISONS, Errors
 from kinacc.measurements import folds
 
-Columns = dict[str, np.ndarray]
 _SAME_CONFIGURATION_RAD = np.deg2rad(0.1)
-_TEXTS = {"comparison", "estimate", "target"}
-_BIAS = ("comparison", "estimate", "joint", "from_rad", "to_rad", "n", "ex_mm", "ey_mm", "ez_mm")
-_BIAS += ("std_error_x_mm", "std_error_y_mm", "std_error_z_mm", "rms_mm")
-_WORST = ("comparison", "estimate", "rank", "row", "line", "pose", "target")
-_WORST += ("ex_mm", "ey_mm", "ez_mm", "error_mm")
 
 
 def columns(
@@ -40,8 +36,8 @@ def columns(
                 worst += [(name, estimate, *each) for each in found]
     return {
         "model_selection": selection_columns(every, held_out),
-        "joint_bias": _table(_BIAS, bias),
-        "worst_rows": _table(_WORST, worst),
+        "joint_bias": columns_of("joint_bias", bias),
+        "worst_rows": columns_of("worst_rows", worst),
     }
 
 
@@ -50,19 +46,15 @@ def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Co
     same = folds.configurations(every.pose, every.q_rad, _SAME_CONFIGURATION_RAD)
     errors = held_out["dh_vs_measured"], held_out["vec_vs_measured"]
     found = model_comparison.gain(*errors, same, every.fold)
-    names = (model_comparison.DH, model_comparison.VEC)
     unknown = 0.0 if found.configurations else np.nan
-    return {
-        "model": np.array(names, dtype=object),
-        "selected": np.array([int(name == found.selected) for name in names]),
-        "held_out_rms_mm": np.array([found.rms_mm[name] for name in names]),
-        "mean_of_folds_mm": np.array([found.folds_mm[name] for name in names]),
-        "gain_mm2": np.array([unknown, found.mean_mm2]),
-        "gain_std_error_mm2": np.nan_to_num(
-            np.array([unknown, found.std_error_mm2]), nan=np.nan, posinf=np.nan
-        ),
-        "configurations": np.full(2, found.configurations),
-    }
+    error = found.std_error_mm2 if np.isfinite(found.std_error_mm2) else np.nan
+    gains = {model_comparison.DH: (unknown, unknown), model_comparison.VEC: (found.mean_mm2, error)}
+    rows = [
+        (name, name == found.selected, found.rms_mm[name], found.folds_mm[name], *own,
+         found.configurations)
+        for name, own in gains.items()
+    ]  # fmt: skip
+    return columns_of("model_selection", rows)
 
 
 def _bias_rows(errors: Errors, q_rad: np.ndarray) -> Iterator[tuple]:
@@ -77,10 +69,3 @@ def _worst_rows(errors: Errors, rows: np.ndarray, measurements: Mapping) -> Iter
         line = float(np.asarray(measurements["row"], dtype=float)[row])
         place = row, line, measurements["pose"][row], measurements["target"][row]
         yield (rank, *place, *vector, float(np.linalg.norm(vector)))
-
-
-def _table(names: tuple[str, ...], rows: list[tuple]) -> Columns:
-    return {
-        name: np.array([row[i] for row in rows], dtype=object if name in _TEXTS else float)
-        for i, name in enumerate(names)
-    }

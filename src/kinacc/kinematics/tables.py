@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.vec import ERRORS, VECModel
 
-Columns = Mapping[str, np.ndarray]
 _ROUNDING = 1e-9
 
 
