@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.artifacts import store
-from kinacc.artifacts.contract import PROVENANCE_KEYS
+from kinacc.artifacts.contract import PROVENANCE_KEYS, columns_of
 from kinacc.errors import InputError
 
 PROVENANCE = {
@@ -228,3 +228,17 @@ def test_reading_and_writing_leave_pandas_alone(tmp_path):
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("rows", [[("rank", None, None, 3, "1"), ("cost", 2, "x", None, "mm")], []])
+def test_rows_become_the_columns_that_their_file_gives_back(rows, tmp_path):
+    made = columns_of("vec_fit", rows)
+    names = ("quantity", "number", "parameter", "value", "unit")
+    by_name = columns_of("vec_fit", [dict(zip(names, row, strict=True)) for row in rows])
+    store.write(tmp_path / "vec_fit.parquet", "vec_fit", made, PROVENANCE)
+    back = store.read(tmp_path / "vec_fit.parquet")
+    assert tuple(made) == tuple(back) == names
+    for name, values in back.items():
+        assert made[name].dtype == by_name[name].dtype == values.dtype
+        np.testing.assert_array_equal(made[name], values)
+        np.testing.assert_array_equal(by_name[name], values)

@@ -5,7 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    import numpy as np
+
+Columns = dict[str, "np.ndarray"]  # a table in memory: a null number is NaN, a null text None
 JOINTS_MIN, JOINTS_MAX = 4, 7
 
 
@@ -92,6 +97,13 @@ class Artefact:
     def has_joints(self) -> bool:
         """Whether the number of columns depends on the arm."""
         return any(column.per_joint for column in self.columns)
+
+
+def texts(cells: Iterable) -> np.ndarray:
+    """Cells (n,) as objects, each as it is: None for null, and none spread over a row."""
+    import numpy as np
+
+    return np.array([*cells, None], dtype=object)[:-1]
 
 
 def joint_count(artefact: Artefact, names: Iterable[str]) -> int:

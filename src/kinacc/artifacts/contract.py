@@ -10,6 +10,8 @@ A value that does not apply is null, never zero. After a change run
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+
 from kinacc.artifacts import (
     assessment_tables,
     calibration_tables,
@@ -20,7 +22,7 @@ from kinacc.artifacts import (
     robot_table,
     tournament_tables,
 )
-from kinacc.artifacts.columns import Artefact
+from kinacc.artifacts.columns import Artefact, Columns, joint_count, texts
 
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed")
 
@@ -60,3 +62,30 @@ ARTEFACTS: dict[str, Artefact] = {
         *campaign_tables.ALL,
     )
 }
+
+
+def columns_of(artefact: str, rows: Iterable[Mapping | Sequence]) -> Columns:
+    """Rows as columns of an artefact; None in a column of numbers is NaN.
+
+    A row holds its values by column name, or one after the other as the contract has its columns.
+    Whole numbers that may be null are held as floats. Without rows the columns are empty.
+    """
+    import numpy as np
+
+    rows = list(rows)
+    contract = ARTEFACTS[artefact]
+    if rows and isinstance(rows[0], Mapping):
+        names = list(rows[0])
+        rows = [[row[name] for name in names] for row in rows]
+    else:
+        names = [column.name for column in contract.columns]
+    known = {column.name: column for column in contract.for_joints(joint_count(contract, names))}
+    kinds = {"float": np.float64, "int": np.int64, "int8": np.int8}
+    columns: Columns = {}
+    for place, name in enumerate(names):
+        kind, cells = known[name].kind, [row[place] for row in rows]
+        if kind == "text":
+            columns[name] = texts(cells)
+        else:
+            columns[name] = np.array(cells, kinds["float" if known[name].nullable else kind])
+    return columns

@@ -1,7 +1,4 @@
-"""Reading and writing the tables: cast to the contract, provenance, all or nothing.
-
-Tables in memory are plain dictionaries of columns. A null number is NaN, a null text is None.
-"""
+"""Reading and writing the tables: cast to the contract, provenance, all or nothing."""
 
 from __future__ import annotations
 
@@ -18,7 +15,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, joint_count
+from kinacc.artifacts.columns import (
+    JOINTS_MAX,
+    JOINTS_MIN,
+    Artefact,
+    Column,
+    Columns,
+    joint_count,
+    texts,
+)
 from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
 from kinacc.errors import InputError, Problem
 
@@ -141,7 +146,7 @@ def replacing(paths: Sequence[Path | str]) -> Iterator[list[Path]]:
             source.unlink(missing_ok=True)
 
 
-def read(path: Path | str) -> dict[str, np.ndarray]:
+def read(path: Path | str) -> Columns:
     """Columns of a table: float64 and whole numbers as numpy, text as object arrays.
 
     Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
@@ -193,16 +198,14 @@ def _open(path, opening):
         raise InputError(Problem(str(path), f"not a readable Parquet file: {reason}")) from None
 
 
-def _columns(table: pa.Table) -> dict[str, np.ndarray]:
+def _columns(table: pa.Table) -> Columns:
     names = zip(table.schema, table.columns, strict=True)
     return {field.name: _to_numpy(field, column) for field, column in names}
 
 
 def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
-    if pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
-        return np.array([*column.to_pylist(), None], dtype=object)[:-1]
     if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
-        return np.array([*column.to_pylist(), None], dtype=object)[:-1]
+        return texts(column.to_pylist())
     nullable = field.nullable or column.null_count > 0
     parts = [_numbers(chunk, nullable) for chunk in column.chunks]
     dtype = np.float64 if nullable else field.type.to_pandas_dtype()

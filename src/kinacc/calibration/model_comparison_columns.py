@@ -7,19 +7,15 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from kinacc.artifacts.allowed import SELECTABLE
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import model_comparison
 from kinacc.calibration.models import COMPARISONS, MEASURED, Comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
 from kinacc.measurements import folds
 
-Columns = dict[str, np.ndarray]
 _SAME_CONFIGURATION_RAD = np.deg2rad(0.1)
-_TEXTS = {"comparison", "estimate", "target"}
-_BIAS = ("comparison", "estimate", "joint", "from_rad", "to_rad", "n", "ex_mm", "ey_mm", "ez_mm")
-_BIAS += ("std_error_x_mm", "std_error_y_mm", "std_error_z_mm", "rms_mm")
-_WORST = ("comparison", "estimate", "rank", "row", "line", "pose", "target")
-_WORST += ("ex_mm", "ey_mm", "ez_mm", "error_mm")
 
 
 def columns(
@@ -42,8 +38,8 @@ def columns(
                 worst += [(name, estimate, *each) for each in found]
     return {
         "model_selection": selection_columns(every, held_out),
-        "joint_bias": _table(_BIAS, bias),
-        "worst_rows": _table(_WORST, worst),
+        "joint_bias": columns_of("joint_bias", bias),
+        "worst_rows": columns_of("worst_rows", worst),
     }
 
 
@@ -52,17 +48,19 @@ def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Co
     same = folds.configurations(every.pose, every.q_rad, _SAME_CONFIGURATION_RAD)
     errors = {name: held_out[Comparison(MEASURED, name).name] for name in SELECTABLE}
     found = model_comparison.select(errors, same, every.fold)
-    standings = found.standings.values()
-    gain_error = np.array([each.std_error_mm2 for each in standings])
-    return {
-        "model": np.array(SELECTABLE, dtype=object),
-        "selected": np.array([int(name == found.selected) for name in SELECTABLE]),
-        "held_out_rms_mm": np.array([each.rms_mm for each in standings]),
-        "mean_of_folds_mm": np.array([each.folds_mm for each in standings]),
-        "gain_mm2": np.array([each.gain_mm2 for each in standings]),
-        "gain_std_error_mm2": np.where(np.isfinite(gain_error), gain_error, np.nan),
-        "configurations": np.full(len(standings), found.configurations),
-    }
+    rows = [
+        (
+            name,
+            name == found.selected,
+            each.rms_mm,
+            each.folds_mm,
+            each.gain_mm2,
+            each.std_error_mm2 if np.isfinite(each.std_error_mm2) else np.nan,
+            found.configurations,
+        )
+        for name, each in found.standings.items()
+    ]
+    return columns_of("model_selection", rows)
 
 
 def _bias_rows(errors: Errors, q_rad: np.ndarray) -> Iterator[tuple]:
@@ -77,10 +75,3 @@ def _worst_rows(errors: Errors, rows: np.ndarray, measurements: Mapping) -> Iter
         line = float(np.asarray(measurements["row"], dtype=float)[row])
         place = row, line, measurements["pose"][row], measurements["target"][row]
         yield (rank, *place, *vector, float(np.linalg.norm(vector)))
-
-
-def _table(names: tuple[str, ...], rows: list[tuple]) -> Columns:
-    return {
-        name: np.array([row[i] for row in rows], dtype=object if name in _TEXTS else float)
-        for i, name in enumerate(names)
-    }

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.identified import IDENTIFIED, PRIOR, Parameter
@@ -15,8 +17,6 @@ from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
-
-Columns = dict[str, np.ndarray]
 
 
 def frames_columns(
@@ -30,20 +30,12 @@ def frames_columns(
         for session, at, turned in zip(
             session_names, each.bases.position_mm, each.bases.rotation, strict=True
         ):
-            rows.append((model, "base", session, at, turned))
+            rows.append((model, "base", session, *at, *quaternion_from_rotation(turned)))
         for name, at, turned in zip(
             target_names, each.targets.position_mm, each.targets.rotation, strict=True
         ):
-            rows.append((model, name, None, at, turned))
-    position = np.array([row[3] for row in rows])
-    quaternion = quaternion_from_rotation(np.array([row[4] for row in rows]))
-    return {
-        "model": np.array([row[0] for row in rows], dtype=object),
-        "frame": np.array([row[1] for row in rows], dtype=object),
-        "session": np.array([row[2] for row in rows], dtype=object),
-        **{f"{axis}_mm": position[:, i] for i, axis in enumerate("xyz")},
-        **{f"q{part}": quaternion[:, i] for i, part in enumerate("wxyz")},
-    }
+            rows.append((model, name, None, *at, *quaternion_from_rotation(turned)))
+    return columns_of("frames", rows)
 
 
 def frames_of(
@@ -69,7 +61,7 @@ def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:
             zip(names, fit.prior_std, units, strict=True), 1
         )
     ]
-    return _long(rows)
+    return columns_of("vec_fit", rows)
 
 
 def vec_orders_columns(choices: Sequence[Choice], stated: tuple[int, Prior]) -> Columns:
@@ -85,20 +77,15 @@ def vec_orders_columns(choices: Sequence[Choice], stated: tuple[int, Prior]) -> 
                 worse = trial.squared_mm2 - best.squared_mm2
                 error = worse.std(ddof=1) / np.sqrt(worse.size)
                 figures = trial.rms_mm, worse.mean(), error
-                rows.append((held_out, trial.order, trial.prior, *figures, trial is choice.chosen))
+                tried = trial.order, *_stated(trial.prior)
+                rows.append((held_out, *tried, *figures, trial is choice.chosen))
     if not rows:
-        rows = [(None, *stated, np.nan, np.nan, np.nan, True)]
-    return {
-        "fold": np.array([np.nan if row[0] is None else row[0] for row in rows], dtype=float),
-        "order": np.array([row[1] for row in rows], dtype=int),
-        "prior_std_mm": np.array([row[2].delta_mm for row in rows]),
-        "prior_std_mrad": np.array([1e3 * row[2].eps_rad for row in rows]),
-        "prior_decay": np.array([row[2].decay for row in rows]),
-        "held_out_rms_mm": np.array([row[3] for row in rows], dtype=float),
-        "excess_mm2": np.array([row[4] for row in rows], dtype=float),
-        "excess_std_error_mm2": np.array([row[5] for row in rows], dtype=float),
-        "chosen": np.array([row[6] for row in rows], dtype=int),
-    }
+        rows = [(None, stated[0], *_stated(stated[1]), None, None, None, True)]
+    return columns_of("vec_orders", rows)
+
+
+def _stated(prior: Prior) -> tuple[float, float, float]:
+    return prior.delta_mm, 1e3 * prior.eps_rad, prior.decay
 
 
 def chosen_order(columns: Mapping, fold: int | None) -> tuple[int, float, float]:
@@ -125,26 +112,19 @@ def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
             ("undetermined_direction", number, name, value, "mrad" if is_angle(name) else "mm")
             for name, value in zip(uncertainty.names, direction, strict=True)
         ]
-    return _long(rows)
+    return columns_of("dh_fit", rows)
 
 
 def identified_columns(found: Sequence[Parameter], uncertainty: Uncertainty) -> Columns:
     """``dh_identified``: status of every parameter, and in words why it is not identified."""
     variance = dict(zip(uncertainty.names, np.diag(uncertainty.covariance), strict=True))
     known = {IDENTIFIED, PRIOR}
-    return {
-        "parameter": np.array([each.name for each in found], dtype=object),
-        "status": np.array([each.status for each in found], dtype=object),
-        "std": np.array(
-            [
-                np.sqrt(max(variance[each.name], 0.0)) if each.status in known else np.nan
-                for each in found
-            ]
-        ),
-        "unit": np.array(["rad" if is_angle(each.name) else "mm" for each in found], dtype=object),
-        "undetermined_share": np.array([each.share for each in found]),
-        "statement": np.array([each.statement or None for each in found], dtype=object),
-    }
+    rows = []
+    for each in found:
+        std = np.sqrt(max(variance[each.name], 0.0)) if each.status in known else None
+        unit = "rad" if is_angle(each.name) else "mm"
+        rows.append((each.name, each.status, std, unit, each.share, each.statement or None))
+    return columns_of("dh_identified", rows)
 
 
 def covariance_columns(uncertainty: Uncertainty) -> Columns:
@@ -181,14 +161,3 @@ def _spectrum_rows(spectrum: Spectrum) -> Iterable[tuple]:
     yield ("gap", None, None, spectrum.gap if np.isfinite(spectrum.gap) else np.nan, "1")
     for number, value in enumerate(spectrum.values, 1):
         yield ("singular_value", number, None, value, "mm per mm or mrad")
-
-
-def _long(rows: Iterable[tuple]) -> Columns:
-    quantity, number, parameter, value, unit = zip(*rows, strict=True)
-    return {
-        "quantity": np.array(quantity, dtype=object),
-        "number": np.array([np.nan if n is None else n for n in number], dtype=float),
-        "parameter": np.array(parameter, dtype=object),
-        "value": np.array(value, dtype=float),
-        "unit": np.array(unit, dtype=object),
-    }

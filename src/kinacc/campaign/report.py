@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
 from kinacc.assess.statement import REGION
@@ -17,7 +19,6 @@ from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
 from kinacc.config.names import in_markdown
 
-Columns = dict[str, np.ndarray]
 _STATEMENTS = 150  # stated at so many moments of a campaign, at most
 _LARGEST = 10
 _SIZES = ("error", "lower", "upper")
@@ -46,7 +47,7 @@ def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dic
     return state, {
         "campaign_points": _points(state),
         "campaign_readings": _readings(state),
-        "campaign_bounds": _columns(rows),
+        "campaign_bounds": columns_of("campaign_bounds", rows),
     }
 
 
@@ -88,7 +89,7 @@ def _points(state: State) -> Columns:
         row |= {"error_mm": float(np.linalg.norm(mean)), "noise_mm": noise}
         row |= {"lower_mm": lower, "upper_mm": upper}
         rows.append({**row, "left_out": state.left_out.get(point)})
-    return _columns(rows)
+    return columns_of("campaign_points", rows)
 
 
 def _readings(state: State) -> Columns:
@@ -116,7 +117,7 @@ def _readings(state: State) -> Columns:
             "struck": void.get(each.number),
         }
         rows.append(row)
-    return _columns(rows)
+    return columns_of("campaign_readings", rows)
 
 
 def means_of(state: State) -> dict[int, tuple[np.ndarray, float, int]]:
@@ -136,18 +137,6 @@ def limits_of(state: State) -> dict[int, tuple[float, float]]:
     """Lower and upper limit on every measured point's size, as the assessor has them."""
     limits = state.campaign.point_limits()
     return {int(state.rows[row]): each for row, each in limits.items()}
-
-
-def _columns(rows: list[dict]) -> Columns:
-    return (
-        {name: np.array([row[name] for row in rows], dtype=_kind(rows, name)) for name in rows[0]}
-        if rows
-        else {}
-    )
-
-
-def _kind(rows: list[dict], name: str) -> type:
-    return object if any(isinstance(row[name], (str, type(None))) for row in rows) else float
 
 
 def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: str) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from kinacc.artifacts.columns import texts
 from kinacc.checks import tails
 from kinacc.geometry import rotation_from_quaternion
 
@@ -69,7 +70,7 @@ def of_columns(columns: Mapping[str, np.ndarray], joints: int) -> Cells:
         pose=np.asarray(columns["pose"]),
         repeat=np.asarray(columns["repeat"]),
         line=np.asarray(columns["row"]),
-        drawn=_tuples([(line,) for line in columns["row"].tolist()]),
+        drawn=texts([(line,) for line in columns["row"].tolist()]),
         target_names=target_names,
         session_names=session_names,
     )
@@ -99,13 +100,6 @@ def merged(cells: Cells, tolerance: float = 1e-4) -> tuple[Cells, np.ndarray]:
         if turned.size:
             rotation[number] = nearest_rotation(np.median(cells.rotation[turned], axis=0))
     return replace(one, position_mm=position, rotation=rotation, drawn=drawn), cell
-
-
-def _tuples(items: list[tuple]) -> np.ndarray:
-    """Objects (n,) of tuples, which would otherwise become rows."""
-    objects = np.empty(len(items), dtype=object)
-    objects[:] = items
-    return objects
 
 
 def _numbers(label: np.ndarray) -> np.ndarray:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kinacc.artifacts.columns import Columns
 from kinacc.figures import style
 
-Columns = Mapping[str, np.ndarray]
 _TARGETS = {
     "measured": ("measured points", style.BLUE, "-"),
     "candidates": ("all candidates", style.PURPLE, (0, (4, 1.5))),

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.vec import VECModel
 
-Columns = Mapping[str, np.ndarray]
 KINDS: dict[str, type[ErrorModel]] = {each.kind: each for each in (DHModel, VECModel)}
 NOMINAL = "nominal"  # the maker's model, which nothing was fitted for
 _ROUNDING = 1e-9

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns, texts
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
@@ -36,7 +37,7 @@ class Reading:
     ``turns`` (rows, 3 or 4) the orientations as written, in rad, NaN where there is none.
     """
 
-    columns: dict[str, np.ndarray]
+    columns: Columns
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     commanded: np.ndarray | None = None
@@ -167,7 +168,7 @@ def _stacked(table: RawTable, places: tuple[Place, ...], problems, gaps=False) -
     return np.stack(columns, axis=1)
 
 
-def _row_columns(q_rad, s, shared, order) -> dict[str, np.ndarray]:
+def _row_columns(q_rad, s, shared, order) -> Columns:
     """What the targets of a row of the file have in common."""
     columns = {"pose": shared["pose"][order]}
     columns |= {f"q{i + 1}": q_rad[order, i] for i in range(q_rad.shape[1])}
@@ -178,7 +179,7 @@ def _row_columns(q_rad, s, shared, order) -> dict[str, np.ndarray]:
     return columns
 
 
-def _target(table: RawTable, target: Target, layout: Layout, problems) -> dict[str, np.ndarray]:
+def _target(table: RawTable, target: Target, layout: Layout, problems) -> Columns:
     """Columns (n,) of one target, and ``there`` (n,): where it was measured."""
     count = len(table)
     position = _stacked(table, target.position, problems, gaps=True)
@@ -210,7 +211,7 @@ def _empty(table: RawTable, places: tuple[Place, ...], problems) -> np.ndarray:
     return cells.all(axis=1)
 
 
-def _uncertainty(table, target, turn, layout, problems) -> dict[str, np.ndarray]:
+def _uncertainty(table, target, turn, layout, problems) -> Columns:
     """Standard deviations and correlations (n,) of a target, NaN where the file has none."""
     values = np.full((9, len(table)), np.nan)
     if target.std:
@@ -258,7 +259,7 @@ def _directions(table: RawTable, found: Found, joints: int, problems) -> np.ndar
     return s
 
 
-def _numbered(table: RawTable, found: Found, problems) -> dict[str, np.ndarray]:
+def _numbered(table: RawTable, found: Found, problems) -> Columns:
     """Pose, repeat, session and temperature (n,); without poses every row is one of its own."""
     count = len(table)
     shared = {
@@ -283,7 +284,7 @@ def _numbered(table: RawTable, found: Found, problems) -> dict[str, np.ndarray]:
 
 def _labels(table: RawTable, column: str, problems) -> np.ndarray:
     cells = [None if table.is_gap(cell) else str(cell).strip() for cell in table.columns[column]]
-    labels = np.array([*cells, None], dtype=object)[:-1]
+    labels = texts(cells)
     empty = np.flatnonzero([cell is None for cell in cells])
     if empty.size:
         where = f"{table.path}: column {column}, {table.rows_in_words(empty)}"

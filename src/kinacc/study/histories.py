@@ -12,10 +12,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.assess.model_invalidation import ModelInvalidation, Step
 from kinacc.assess.world import World
 from kinacc.errors import InputError, Problem
-from kinacc.study.monte_carlo import Columns, StudySettings, checked_errors, world_of
+from kinacc.study.monte_carlo import StudySettings, checked_errors, world_of
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
 
@@ -99,13 +101,13 @@ def histories(
     numbers = np.arange(errors.shape[0]) if point is None else np.asarray(point, np.int64)
     sizes = np.sqrt(np.sum(errors**2, axis=1))
     assessor = ModelInvalidation(study.measurements, study.alpha, study.distance, study.covariance)
-    tables = []
+    found: list[dict] = []
     for example in examples(errors, settings, study, seed, progress):
         world = world_of(errors, settings.noise_mm, example.simulation, study, seed)
         steps = assessor.history(world, example.eta_mm)
         rows = world.index[[step.row for step in steps]]
-        tables.append(_table(example, steps, numbers[rows], sizes[rows], settings, study))
-    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+        found += _rows(example, steps, numbers[rows], sizes[rows], settings, study)
+    return columns_of("histories", found)
 
 
 def examples(
@@ -168,34 +170,32 @@ def examples(
     return [fig5, Example(LARGER, fig5.simulation, larger, RULES[LARGER], fig5.rule_met), fig6]
 
 
-def _table(
+def _rows(
     example: Example,
     steps: list[Step],
     point: np.ndarray,
     true_mm: np.ndarray,
     settings: HistorySettings,
     study: StudySettings,
-) -> Columns:
-    count = len(steps)
-
-    def constant(value: object, kind: type = float) -> np.ndarray:
-        return np.array([value] * count, kind)
-
-    return {
-        "example": constant(example.name, object),
-        "simulation": constant(example.simulation, np.int64),
-        "rule": constant(example.rule, object),
-        "rule_met": constant(int(example.rule_met), np.int64),
-        "noise_mm": constant(settings.noise_mm),
-        "alpha": constant(study.alpha),
-        "distance": constant(study.distance, object),
-        "covariance": constant(study.covariance, object),
-        "iteration": np.arange(1, count + 1),
-        "point": point,
-        "repeat": np.array([step.repeat for step in steps], np.int64),
-        "eta_mm": constant(example.eta_mm),
-        "measured_mm": np.array([step.measured_mm for step in steps], float),
-        "averaged_mm": np.array([step.averaged_mm for step in steps], float),
-        "true_mm": true_mm,
-        "rejection_probability": np.array([step.rejection_probability for step in steps], float),
-    }
+) -> list[dict]:
+    return [
+        {
+            "example": example.name,
+            "simulation": example.simulation,
+            "rule": example.rule,
+            "rule_met": int(example.rule_met),
+            "noise_mm": settings.noise_mm,
+            "alpha": study.alpha,
+            "distance": study.distance,
+            "covariance": study.covariance,
+            "iteration": place + 1,
+            "point": point[place],
+            "repeat": step.repeat,
+            "eta_mm": example.eta_mm,
+            "measured_mm": step.measured_mm,
+            "averaged_mm": step.averaged_mm,
+            "true_mm": true_mm[place],
+            "rejection_probability": step.rejection_probability,
+        }
+        for place, step in enumerate(steps)
+    ]

@@ -16,14 +16,14 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinacc.assess.assessor import Assessment, Assessor, every_reading
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
+from kinacc.assess.assessor import Assessor, every_reading
 from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.outlier_rejection import OutlierRejection
 from kinacc.assess.world import World, draw
 from kinacc.errors import InputError, Problem
-
-Columns = dict[str, np.ndarray]
 
 # The paper's three by class: a registry would make the study depend on whatever joins it.
 ASSESSORS: dict[str, type[Assessor]] = {
@@ -152,8 +152,8 @@ def simulate(
     rows = []
     for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
         world = world_of(errors, noise, repetition, settings, seed, memory)
-        rows += [(noise, repetition, each, each.assess(world)) for each in readings]
-    return ordered(_chunk_columns(rows))
+        rows += [_row(noise, repetition, each, world) for each in readings]
+    return ordered(columns_of("study_chunk", rows))
 
 
 def ordered(rows: Columns) -> Columns:
@@ -178,17 +178,16 @@ def default_reading(rows: Columns, settings: StudySettings) -> Columns:
 
 def summary(study: Columns, true_mm: float) -> Columns:
     """Columns of ``study_summary``: each assessor and noise against the true accuracy (mm)."""
-    table = _statistics(study, ("assessor", "noise_mm"), true_mm)
-    return _paper_order(table)
+    return columns_of("study_summary", _statistics(study, ("assessor", "noise_mm"), true_mm))
 
 
 def readings(rows: Columns, true_mm: float) -> Columns:
     """Columns of ``readings``: every reading of the assessors that have more than one."""
     keep = np.array([bool(ASSESSORS[name].switches) for name in rows["assessor"]], bool)
     kept = {name: column[keep] for name, column in rows.items()}
-    table = _statistics(kept, ("assessor", *SWITCHES, "noise_mm"), true_mm)
-    wanted = ("assessor", *SWITCHES, "noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm")
-    return _paper_order({name: table[name] for name in wanted})
+    found = _statistics(kept, ("assessor", *SWITCHES, "noise_mm"), true_mm)
+    not_told = ("rmse_mm", "repetitions")
+    return columns_of("readings", [{n: row[n] for n in row if n not in not_told} for row in found])
 
 
 def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
@@ -220,48 +219,46 @@ def _nanometres(noise_mm: float) -> int:
     return round(float(noise_mm) * NM_PER_MM)
 
 
-def _chunk_columns(rows: list[tuple[float, int, Assessor, Assessment]]) -> Columns:
-    switches = {
-        switch: np.array([getattr(each, switch, None) for _, _, each, _ in rows], object)
-        for switch in SWITCHES
-    }
+def _row(noise_mm: float, repetition: int, assessor: Assessor, world: World) -> dict:
+    """One assessment as a row of ``study_chunk``."""
+    found = assessor.assess(world)
     return {
-        "noise_mm": np.array([noise for noise, _, _, _ in rows], float),
-        "repetition": np.array([repetition for _, repetition, _, _ in rows], np.int64),
-        "assessor": np.array([each.name for _, _, each, _ in rows], object),
-        **switches,
-        "assessed_mm": np.array([found.assessed_mm for _, _, _, found in rows], float),
-        "measurements": np.array([found.measurements for _, _, _, found in rows], np.int64),
-        "points_visited": np.array([found.points_visited for _, _, _, found in rows], np.int64),
-        "lower_mm": np.array([found.lower_mm for _, _, _, found in rows], float),
-        "upper_mm": np.array([found.upper_mm for _, _, _, found in rows], float),
+        "noise_mm": noise_mm,
+        "repetition": repetition,
+        "assessor": assessor.name,
+        **{switch: getattr(assessor, switch, None) for switch in SWITCHES},
+        "assessed_mm": found.assessed_mm,
+        "measurements": found.measurements,
+        "points_visited": found.points_visited,
+        "lower_mm": found.lower_mm,
+        "upper_mm": found.upper_mm,
     }
 
 
-def _statistics(rows: Columns, keys: Sequence[str], true_mm: float) -> Columns:
-    """Statistics of ``assessed_mm`` over the rows that agree in the key columns, sorted by them."""
+def _statistics(rows: Columns, keys: Sequence[str], true_mm: float) -> list[dict]:
+    """Statistics of ``assessed_mm`` over the rows that agree in the key columns.
+
+    Sorted by assessor as in the registry, then by the other keys.
+    """
     groups: dict[tuple, list[int]] = {}
     for place, key in enumerate(zip(*(rows[name] for name in keys), strict=True)):
         groups.setdefault(key, []).append(place)
-    found = sorted(groups, key=lambda key: ["" if part is None else part for part in key])
-    samples = [rows["assessed_mm"][groups[key]] for key in found]
-    table = {
-        name: np.array([key[place] for key in found], float if name == "noise_mm" else object)
-        for place, name in enumerate(keys)
-    }
-    table["mean_mm"] = np.array([sample.mean() for sample in samples], float)
-    table["min_mm"] = np.array([sample.min() for sample in samples], float)
-    table["max_mm"] = np.array([sample.max() for sample in samples], float)
-    table["bias_mm"] = table["mean_mm"] - true_mm
-    table["rmse_mm"] = np.array(
-        [np.sqrt(np.mean((sample - true_mm) ** 2)) for sample in samples], float
-    )
-    table["repetitions"] = np.array([sample.size for sample in samples], np.int64)
-    return table
+    ranks, found = [*ASSESSORS], []
 
+    def order(key: tuple) -> list:
+        return [ranks.index(key[0]), *("" if part is None else part for part in key[1:])]
 
-def _paper_order(table: Columns) -> Columns:
-    """Rows by assessor as in the paper, otherwise as they are."""
-    ranks = {name: rank for rank, name in enumerate(ASSESSORS)}
-    order = np.argsort([ranks[name] for name in table["assessor"]], kind="stable")
-    return {name: column[order] for name, column in table.items()}
+    for key in sorted(groups, key=order):
+        sample = rows["assessed_mm"][groups[key]]
+        found.append(
+            {
+                **dict(zip(keys, key, strict=True)),
+                "mean_mm": sample.mean(),
+                "min_mm": sample.min(),
+                "max_mm": sample.max(),
+                "bias_mm": sample.mean() - true_mm,
+                "rmse_mm": np.sqrt(np.mean((sample - true_mm) ** 2)),
+                "repetitions": sample.size,
+            }
+        )
+    return found

@@ -168,10 +168,7 @@ def test_a_cell_is_summed_up_as_by_hand():
         value_mm=[1.1, 0.9, 1.1, 0.9, 1.3],
         lower_mm=[0.9, 1.1, 0.9, np.nan, 0.9],
     )
-    (cell,) = [
-        dict(zip(summary.KINDS, values, strict=True))
-        for values in zip(*summary.summed(said).values(), strict=True)
-    ]
+    (cell,) = summary.cells(said)
     assert (cell["repetitions"], cell["stated"], cell["broken"]) == (5, 4, 1)
     assert cell["sound"] == 4
     assert cell["upper_holds"] == pytest.approx(2 / 3)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.config.names import in_markdown
 from kinacc.kinematics.dh import PARAMETERS
-
-Columns = Mapping[str, np.ndarray]
 
 _SUBSETS = {"train": "training poses", "validation": "held-out poses"}
 _FIGURES = (("mean", "mean"), ("max", "max"), ("rms", "rms"), ("gamma99", "99 %"))

@@ -6,9 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
+from kinacc.artifacts.columns import Columns
 
-Columns = Mapping[str, np.ndarray]
 Tables = Mapping[str, Columns]
 
 

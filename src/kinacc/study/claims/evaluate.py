@@ -7,7 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.study.claims.claim import Claim, Columns, Finding, Tables, verdict
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
+from kinacc.study.claims.claim import Claim, Finding, Tables, verdict
 from kinacc.study.claims.history_sentences import history_claims
 from kinacc.study.claims.map_sentences import map_claims
 from kinacc.study.claims.numbers import number_claims
@@ -29,12 +31,7 @@ def evaluate(
     gives per claim how often it held over further draws of the synthetic arm.
     """
     rows = [_row(claim, tables, paper_arm, shares or {}) for claim in all_claims()]
-    columns = {name: [row[name] for row in rows] for name in rows[0]}
-    numeric = {"paper", "reproduced", "tolerance", "share"}
-    return {
-        name: np.array(values, dtype=float if name in numeric else object)
-        for name, values in columns.items()
-    }
+    return columns_of("claims", rows)
 
 
 def _row(claim: Claim, tables: Tables, paper_arm: bool, shares: Mapping[str, float]) -> dict:

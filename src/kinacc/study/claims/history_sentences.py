@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from kinacc.study.claims.claim import Claim, Columns, Finding, Tables, above
+from kinacc.artifacts.columns import Columns
+from kinacc.study.claims.claim import Claim, Finding, Tables, above
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
 

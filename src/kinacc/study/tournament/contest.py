@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ASSESSORS
 from kinacc.assess.simulate import Assessed, assessed, is_broken, truth_mm
@@ -23,9 +25,9 @@ from kinacc.errors import InputError, Problem
 from kinacc.study.tournament import summary
 from kinacc.study.tournament.fields import Field
 
-Columns = dict[str, np.ndarray]
 NM_PER_MM = 1_000_000
 CONTESTANTS = tuple(ASSESSORS)
+_TEXTS = ("field", "assessor", "target", "withheld", "assumption")
 
 
 @dataclass(frozen=True)
@@ -123,15 +125,13 @@ def summed(
 
     ``progress(iterable, what, total)`` reports. The campaigns themselves are not kept.
     """
-    parts = []
+    found: list[dict] = []
     for job in progress(work, "cells", len(work)) if progress else work:
         for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
             own = [name for name in assessors if ASSESSORS[name].is_slow == is_slow]
             if own:
-                parts.append(summary.summed(campaigns(job, range(count), seed, own)[0]))
-    if not parts:
-        return {name: np.empty(0, kind) for name, kind in summary.KINDS.items()}
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+                found += summary.cells(campaigns(job, range(count), seed, own)[0])
+    return columns_of("tournament_chunk", found)
 
 
 def times_ms(job: Job, seed: int, assessors: Sequence[str] = CONTESTANTS) -> dict[str, float]:
@@ -139,20 +139,20 @@ def times_ms(job: Job, seed: int, assessors: Sequence[str] = CONTESTANTS) -> dic
     found = {}
     for name in assessors:
         _, times = campaigns(job, range(4), seed, [name])
-        found[name] = float(np.median(times["time_ms"][1:]))
+        found[name] = float(np.median(times[1:]))
     return found
 
 
 def campaigns(
     job: Job, repetitions: Iterable[int], seed: int, assessors: Sequence[str] = CONTESTANTS
-) -> tuple[Columns, Columns]:
-    """Statements and times of the campaigns of one job.
+) -> tuple[Columns, list[float]]:
+    """Statements of the campaigns of one job, and the processor time of each campaign in ms.
 
     Statements: one row per campaign and statement, with the truth it is graded against. Times are
     kept apart, for they differ from run to run.
     """
     rows: list[dict] = []
-    times: list[dict] = []
+    times: list[float] = []
     cell = job.cell
     for repetition in repetitions:
         place = {
@@ -167,9 +167,10 @@ def campaigns(
             own = {**place, "assessor": name}
             begun = time.process_time()
             found = assessed(name, job.budget, world, **cell.known(chosen))
-            times.append({**own, "time_ms": 1e3 * (time.process_time() - begun)})
+            times.append(1e3 * (time.process_time() - begun))
             rows += [{**own, **graded} for graded in _graded(found, world, cell.field)]
-    return _columns(rows, ROW_KINDS), _columns(times, TIME_KINDS)
+    kinds = {name: object if name in _TEXTS else None for name in rows[0]} if rows else {}
+    return {name: np.array([row[name] for row in rows], kinds[name]) for name in kinds}, times
 
 
 def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World, np.ndarray]:
@@ -218,28 +219,3 @@ def _assumption(said: Statement, size: np.ndarray) -> str:
     if not said.crowd:
         return "unknown"
     return "broken" if is_broken(said, size) else "holds"
-
-
-ROW_KINDS = {
-    "field": object,
-    "candidates": np.int64,
-    "noise_mm": float,
-    "budget": np.int64,
-    "repetition": np.int64,
-    "assessor": object,
-    "target": object,
-    "true_mm": float,
-    "value_mm": float,
-    "lower_mm": float,
-    "upper_mm": float,
-    "confidence": float,
-    "withheld": object,
-    "assumption": object,
-    "measurements": np.int64,
-    "points_visited": np.int64,
-}
-TIME_KINDS = {name: ROW_KINDS[name] for name in [*ROW_KINDS][:6]} | {"time_ms": float}
-
-
-def _columns(rows: list[dict], kinds: dict[str, type]) -> Columns:
-    return {name: np.array([row[name] for row in rows], kind) for name, kind in kinds.items()}

@@ -12,6 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.assess.error_effects import joint_errors
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh, robot
@@ -218,7 +220,7 @@ def _vectors(columns: Mapping) -> np.ndarray:
     return np.stack([np.asarray(columns[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
 
 
-def described(fields: Sequence[Field]) -> dict[str, np.ndarray]:
+def described(fields: Sequence[Field]) -> Columns:
     """``tournament_fields``: name, origin and sizes of every field."""
     rows = [
         {
@@ -233,7 +235,7 @@ def described(fields: Sequence[Field]) -> dict[str, np.ndarray]:
         }
         for field in fields
     ]
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return columns_of("tournament_fields", rows)
 
 
 def of_tables(

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import bdtr
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.assess.binomial import binomial_interval
-
-Columns = dict[str, np.ndarray]
 
 CELL = ("assessor", "target", "field", "candidates", "noise_mm", "budget")
 FAMILY_ERROR = 0.01  # of all tests of one assessor together
@@ -18,6 +18,11 @@ ENOUGH = 200  # statements without which a cell cannot tell three points from ch
 
 
 def summed(rows: Mapping[str, np.ndarray]) -> Columns:
+    """The rows of ``cells`` as columns of ``tournament_cells``."""
+    return columns_of("tournament_cells", cells(rows))
+
+
+def cells(rows: Mapping[str, np.ndarray]) -> list[dict]:
     """One row per assessor, target and cell.
 
     ``upper_holds`` and ``lower_holds`` are shares of the statements made; ``upper_low`` and
@@ -26,8 +31,7 @@ def summed(rows: Mapping[str, np.ndarray]) -> Columns:
     ``broken_holds`` is their coverage alone. ``sound`` counts campaigns, with a statement or
     without, whose assumption is true.
     """
-    found = [_cell(rows, key, places) for key, places in _groups(rows).items()]
-    return {name: np.array([each[name] for each in found], kind) for name, kind in KINDS.items()}
+    return [_cell(rows, key, places) for key, places in _groups(rows).items()]
 
 
 def judged(summary: Mapping[str, np.ndarray]) -> Columns:
@@ -44,11 +48,11 @@ def judged(summary: Mapping[str, np.ndarray]) -> Columns:
         mine &= ~np.isnan(summary["confidence"]) & (summary["stated"] > summary["broken"])
         if not mine.any():
             continue
-        cells = {name: np.asarray(column)[mine] for name, column in summary.items()}
-        tried = (cells["stated"] - cells["broken"]).astype(int)
-        held = np.rint(cells["upper_holds"] * tried).astype(int)
-        chance = bdtr(held, tried, cells["confidence"])
-        least = cells["confidence"] - MOST_BELOW
+        own = {name: np.asarray(column)[mine] for name, column in summary.items()}
+        tried = (own["stated"] - own["broken"]).astype(int)
+        held = np.rint(own["upper_holds"] * tried).astype(int)
+        chance = bdtr(held, tried, own["confidence"])
+        least = own["confidence"] - MOST_BELOW
         found.append(
             {
                 "assessor": assessor,
@@ -57,25 +61,13 @@ def judged(summary: Mapping[str, np.ndarray]) -> Columns:
                 "statements": int(tried.sum()),
                 "rejected": int(holm(chance, FAMILY_ERROR).sum()),
                 "below": int(np.sum((held < least * tried) & (tried >= ENOUGH))),
-                "worst_holds": float(cells["upper_holds"].min()),
+                "worst_holds": float(own["upper_holds"].min()),
                 "mean_holds": float(held.sum() / tried.sum()),
                 "withheld": _withheld(summary, assessor, target),
                 "withheld_sound": _withheld_sound(summary, assessor, target),
             }
         )
-    kinds = {
-        "assessor": object,
-        "target": object,
-        "cells": np.int64,
-        "statements": np.int64,
-        "rejected": np.int64,
-        "below": np.int64,
-        "worst_holds": float,
-        "mean_holds": float,
-        "withheld": float,
-        "withheld_sound": float,
-    }
-    return {name: np.array([each[name] for each in found], kind) for name, kind in kinds.items()}
+    return columns_of("tournament_verdicts", found)
 
 
 def in_order(summary: Mapping[str, np.ndarray]) -> Columns:
@@ -151,30 +143,3 @@ def _cell(rows: Mapping[str, np.ndarray], key: tuple, places: list[int]) -> dict
         "measurements": own["measurements"].mean(),
         "points_visited": own["points_visited"].mean(),
     }
-
-
-KINDS = {
-    "assessor": object,
-    "target": object,
-    "field": object,
-    "candidates": np.int64,
-    "noise_mm": float,
-    "budget": np.int64,
-    "repetitions": np.int64,
-    "true_mm": float,
-    "bias_mm": float,
-    "rmse_mm": float,
-    "confidence": float,
-    "stated": np.int64,
-    "broken": np.int64,
-    "sound": np.int64,
-    "upper_holds": float,
-    "broken_holds": float,
-    "upper_low": float,
-    "upper_high": float,
-    "lower_holds": float,
-    "excess_mm": float,
-    "width_mm": float,
-    "measurements": float,
-    "points_visited": float,
-}

@@ -7,14 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.kinematics import robot
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.robot import Robot
 from kinacc.study import operating_points
 from kinacc.study.operating_points import OperatingPoints, PosesWanted
 from kinacc.workflow import evaluation as shared
-
-Columns = dict[str, np.ndarray]
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:

@@ -8,6 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.calibration.observations import from_columns
 from kinacc.checks import check
 from kinacc.checks.report import Report
@@ -20,7 +22,6 @@ from kinacc.measurements.reader import Reading, read
 from kinacc.workflow import calibration_settings as shared
 from kinacc.workflow.stages.measurements import configurations
 
-Columns = dict[str, np.ndarray]
 Progress = Callable[[Iterable, str], Iterable]
 _PER_POSE = 6  # a rigid body has no more, however many targets it carries
 
@@ -106,14 +107,18 @@ def _in_some_rows(each: Suspicion) -> bool:
 
 
 def _columns(report: Report) -> Columns:
-    found = report.findings
-    texts = {
-        "finding": [each.kind for each in found],
-        "level": [each.level for each in found],
-        "what": [each.what for each in found],
-        "lines": [each.where if each.lines else None for each in found],
-        "fix": [each.fix or None for each in found],
-        "accepted": [report.accepted.get(each.kind) for each in found],
-    }
-    columns = {name: np.array([*cells, None], dtype=object)[:-1] for name, cells in texts.items()}
-    return columns | {"rows": np.array([len(each.lines) for each in found], dtype=np.int64)}
+    return columns_of(
+        "data_check",
+        [
+            {
+                "finding": each.kind,
+                "level": each.level,
+                "what": each.what,
+                "lines": each.where if each.lines else None,
+                "fix": each.fix or None,
+                "accepted": report.accepted.get(each.kind),
+                "rows": len(each.lines),
+            }
+            for each in report.findings
+        ],
+    )

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.calibration.models import COMPARISONS
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.residuals import Errors, errors
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, excluded_lines, read_excluded
 from kinacc.workflow.stages.residuals import delivered_fits
-
-Columns = dict[str, np.ndarray]
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
@@ -45,17 +45,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
             (each.name, line, None, None, reasons[line], *[np.nan] * 6)
             for line in sorted(set(reasons) - told)
         ]
-    texts = ("comparison", "line", "target", "session", "reason")
-    numbers = ("ex_mm", "ey_mm", "ez_mm", "rx_mrad", "ry_mrad", "rz_mrad")
-    columns = {
-        name: np.array([*(row[i] for row in rows), None], dtype=object)[:-1]
-        for i, name in enumerate(texts)
-    }
-    columns["line"] = columns["line"].astype(np.int64)
-    return {
-        "excluded_rows": columns
-        | {name: np.array([row[5 + i] for row in rows], float) for i, name in enumerate(numbers)}
-    }
+    return {"excluded_rows": columns_of("excluded_rows", rows)}
 
 
 def _known(columns: Mapping, used: Mapping) -> Columns:

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.kinematics import robot
 from kinacc.measurements import folds
 from kinacc.measurements.reader import UNCERTAINTY
 
-Columns = dict[str, np.ndarray]
 TIME_BLOCK = "time_block"
 SAME_CONFIGURATION_DEG = 0.1  # joints this close are one configuration visited again
 
@@ -78,10 +79,5 @@ def _not_stated(count: int) -> Columns:
 
 
 def _robot(arm: robot.Robot) -> Columns:
-    words = {
-        "name": arm.name,
-        "source": arm.source or None,
-        "date": arm.date or None,
-        "description": robot.as_yaml(arm),
-    }
-    return {name: np.array([value], dtype=object) for name, value in words.items()}
+    row = (arm.name, arm.source or None, arm.date or None, robot.as_yaml(arm))
+    return columns_of("robot", [row])

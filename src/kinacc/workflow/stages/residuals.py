@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import model_comparison_columns, tables
 from kinacc.calibration.models import Fit, fit_all
 from kinacc.calibration.observations import Observations
@@ -15,7 +17,6 @@ from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.tables import fitted_range, models
 from kinacc.workflow import calibration_settings as shared
 
-Columns = dict[str, np.ndarray]
 _QUANTITIES = (("position", "mm", 1.0), ("orientation", "mrad", 1e3))
 
 
@@ -73,13 +74,7 @@ def _residuals(
         for number in folds:
             part = held_out[name].select(fold == number)
             rows += _statistics_rows(name, "validation", number, part)
-    names = ("comparison", "subset", "fold", "quantity", "unit")
-    figures = ("n", "mean", "max", "rms", "gamma99")
-    texts = {"comparison", "subset", "quantity", "unit"}
-    return {
-        name: np.array([row[i] for row in rows], dtype=object if name in texts else float)
-        for i, name in enumerate((*names, *figures))
-    }
+    return columns_of("residuals", rows)
 
 
 def _statistics_rows(name: str, subset: str, fold: float, found: Errors) -> Iterator[tuple]:

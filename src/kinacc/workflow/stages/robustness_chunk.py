@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.synthetic.accepted import further_draws
 from kinacc.workflow import in_memory
@@ -20,8 +22,6 @@ STAGES = (
     "study",
     "histories",
 )
-
-_COLUMNS = {"draw": int, "claim": object, "reproduced": float, "verdict": object}
 
 
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
@@ -38,13 +38,13 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     parts = [claims_on(draw, config) for draw in counted]
     return {
         "robustness_chunk": {
-            name: np.concatenate([np.empty(0, dtype), *(part[name] for part in parts)])
-            for name, dtype in _COLUMNS.items()
+            name: np.concatenate([empty, *(part[name] for part in parts)])
+            for name, empty in columns_of("robustness_chunk", []).items()
         }
     }
 
 
-def claims_on(draw: int, config: Mapping) -> dict[str, np.ndarray]:
+def claims_on(draw: int, config: Mapping) -> Columns:
     """Rows of ``robustness`` of one accepted draw under the configuration of a data set."""
     measurements = config["measurements"]
     synthetic = {**measurements["synthetic"], "draw": draw}

@@ -10,16 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts import store
-from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, joint_count
+from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, Columns, joint_count
 from kinacc.artifacts.contract import PROVENANCE_KEYS
 from kinacc.errors import InputError, Problem
 
-Columns = Mapping[str, np.ndarray]
 
-
-def check_file(
-    path: Path, artefact: Artefact
-) -> tuple[dict[str, np.ndarray] | None, list[Problem]]:
+def check_file(path: Path, artefact: Artefact) -> tuple[Columns | None, list[Problem]]:
     """Columns of a file and what is wrong with it; None for columns no rule could be held to."""
     try:
         schema = store.read_schema(path)

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.store import rows
 from kinacc.errors import Problem
 
-Columns = Mapping[str, np.ndarray]
 Tables = Mapping[str, Columns]
 Rule = Callable[[Tables], Iterator[Problem]]
 
