@@ -1,0 +1,28 @@
+"""``kinacc check-results``: a results folder held to its contract."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from kinacc.workflow.plan import planned
+from kinacc.workflow.verification import check
+
+
+@click.command("check-results")
+@click.argument("folder", type=click.Path(), default="results")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
+@click.option("--config", multiple=True, help="Configuration the results should come from.")
+def check_results(folder: str, as_json: bool, config: tuple[str, ...]) -> None:
+    """Check every artefact in FOLDER: there, as the contract says, made from one another.
+
+    With --config also that every data set of the configuration is there and was made with these
+    values. Exit code 0 if all is well, 1 if anything is not.
+
+    \b
+    Example:
+      kinacc check-results results/
+      kinacc check-results results/ --config config.yaml --config my-robot.yaml --json
+    """
+    sys.exit(check.main(folder, as_json, planned(config) if config else None, config))

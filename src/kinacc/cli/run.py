@@ -1,0 +1,125 @@
+"""``kinacc run``: one stage of the workflow by hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from kinacc.cli.choice import CONFIG
+from kinacc.cli.group import Lazy
+from kinacc.errors import InputError, Problem
+from kinacc.workflow.catalogue import STAGES, Stage, maker_of
+
+
+def _stage_command(name: str) -> click.Command:
+    """The command that runs one stage."""
+    stage = STAGES[name]
+
+    def command(
+        dataset: str | None,
+        config: tuple[str, ...],
+        results: str,
+        as_json: bool,
+        part: str | None = None,
+    ) -> None:
+        written = _run(stage, dataset, config or (CONFIG,), results, part)
+        if as_json:
+            click.echo(json.dumps({"stage": name, "written": written}, indent=1))
+            return
+        for path in written:
+            click.echo(f"written: {path}")
+
+    options = [
+        click.Option(["--dataset"], help="Data set of the configuration; needed if there are two."),
+        click.Option(
+            ["--config"], multiple=True, help=f"Configuration file; may be repeated. [{CONFIG}]"
+        ),
+        click.Option(["--results"], default="results", show_default=True, help="Results folder."),
+        click.Option(["--json", "as_json"], is_flag=True, help="Print what was written as JSON."),
+    ]
+    if stage.scattered:
+        options.append(
+            click.Option(["--part"], help="Part to compute, e.g. 1-of-2; all if left out.")
+        )
+    return click.Command(
+        name, params=options, callback=command, help=_help(stage), short_help=stage.message
+    )
+
+
+@click.group(
+    cls=Lazy,
+    sections={"Commands": {name: stage.message for name, stage in STAGES.items()}},
+    make=_stage_command,
+)
+def run() -> None:
+    """Run one stage by hand, as the workflow would.
+
+    Reads the artefacts of earlier stages in results/<dataset>/ and writes its own there. The stages
+    are listed in their order.
+
+    \b
+    Example:
+      kinacc run dh --dataset mh180
+    """
+
+
+def _help(stage: Stage) -> str:
+    reads = ", ".join((*stage.inputs, *(f"{name} (if there)" for name in stage.optional)))
+    words = stage.message[0].upper() + stage.message[1:]
+    settings = ", ".join(stage.settings) or "nothing"
+    return (
+        f"{words}.\n\nReads: {reads or 'no artefact'}.\n\nLeaves: {', '.join(stage.outputs)}."
+        f"\n\nConfiguration used: {settings}."
+        f"\n\n\b\nExample:\n  kinacc run {stage.name} --dataset mh180"
+    )
+
+
+def _run(
+    stage: Stage, dataset: str | None, config: tuple[str, ...], results: str, part: str | None
+) -> list[str]:
+    """Run one stage of one data set and say what it wrote; InputError if it cannot be run."""
+    # Here and not above: a stage says what it reads and leaves without a numerical library.
+    from kinacc.workflow.plan import planned
+    from kinacc.workflow.runner import Job, execute
+
+    plan = planned(config, results=results)
+    names = list(plan.datasets)
+    if dataset not in names and not (dataset is None and len(names) == 1):
+        what = "is not given" if dataset is None else f"{dataset!r} is not in the configuration"
+        raise InputError(Problem("--dataset", what, ", ".join(names)))
+    dataset = dataset or names[0]
+    if stage.name in plan.left_out(dataset):
+        what = f"the data set cannot go through it: {plan.left_out(dataset)[stage.name]}"
+        raise InputError(Problem(f"{dataset}, {stage.name}", what))
+    inputs = plan.inputs(stage.name, dataset)
+    absent = [
+        Problem(path, "no such file", fix=f"make it first: kinacc run {maker_of(name).name}")
+        for name, given in inputs.items()
+        for path in ([given] if isinstance(given, str) else given)
+        if not Path(path).is_file()
+    ]
+    parts = plan.part_names(stage.name, dataset)
+    if part is not None and part not in parts:
+        absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
+    if absent:
+        raise InputError(absent, f"{stage.name} cannot be run")
+    written: list[str] = []
+    for each in parts if part is None else [part]:
+        outputs = plan.outputs(stage.name, dataset, each)
+        written += outputs.values()
+        execute(
+            Job(
+                stage.module,
+                inputs,
+                outputs,
+                plan.settings(stage.name, dataset),
+                plan.seed(dataset),
+                part=each,
+                label=" ".join(filter(None, [dataset, stage.name, each])),
+                log=plan.log(stage.name, dataset, each),
+            ),
+            bar=True,
+        )
+    return written
