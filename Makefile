@@ -1,5 +1,6 @@
 # make reproduce   the paper's study, from a bare checkout to results/
 # make robustness  the claims again on further draws of the arm; their shares go into claims.parquet
+# make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
 # make lock        renew requirements/*.txt (needs uv)
 # make clean       remove results/; make distclean removes .venv as well
@@ -7,7 +8,7 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness test lock clean distclean
+.PHONY: reproduce robustness lint check test lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 PIP = $(PY) -m pip install -qq --disable-pip-version-check
@@ -28,10 +29,16 @@ reproduce: $(KINACC)
 robustness: $(KINACC)
 	@$(PY) -m snakemake --cores $(CORES) robustness
 
-test: $(KINACC) $(TOOLS)
+lint: $(KINACC) $(TOOLS)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	.venv/bin/lint-imports --no-cache --no-logo
+	$(PY) -m mypy
+
+check: lint
+	$(PY) -m pytest -n $(CORES) -m "not slow"
+
+test: lint
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PY) -m pytest -n $(CORES)

@@ -5,11 +5,73 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # Works in every pytest import mode, from tests/ and from any folder below it.
 TESTS = Path(__file__).resolve().parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "tools")]
 
+# Files and folders left out of `make check`; measured with `pytest --durations=0`.
+SLOW = (
+    "integration",
+    "integration_oracle",
+    "artifacts/test_check.py",
+    "assess/test_adaptive.py",
+    "assess/test_more_assessors.py",
+    "assess/test_oracle_invalidation.py",
+    "assess/test_size_limits.py",
+    "calibration/test_convergence.py",
+    "calibration/test_dh_fit.py",
+    "calibration/test_oracle_fits.py",
+    "calibration/test_reach.py",
+    "calibration/test_selection.py",
+    "calibration/test_vec_fit.py",
+    "campaign/test_growing_file.py",
+    "campaign/test_on_a_real_arm.py",
+    "campaign/test_report_above_its_bounds.py",
+    "checks/test_planted_faults.py",
+    "cli/test_check_data.py",
+    "cli/test_init.py",
+    "cli/test_init_readings.py",
+    "cli/test_next_commands.py",
+    "deployment/planning/test_exchange.py",
+    "deployment/test_compare.py",
+    "figures/test_figure_files.py",
+    "figures/test_figure_stages.py",
+    "figures/test_figures.py",
+    "kinematics/inverse/test_any_arm.py",
+    "measurements/test_what_files_hold.py",
+    "synthetic/test_accepted.py",
+    "test_hostile_files.py",
+    "test_inverse.py",
+    "test_inverse_oracle.py",
+    "test_models_oracle.py",
+    "test_provenance.py",
+    "workflow/test_calibration_stages.py",
+    "workflow/test_robustness.py",
+    "workflow/test_stopping.py",
+    "workflow/test_tournament_command.py",
+)
+
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
+
+
+def pytest_collection_modifyitems(items):
+    """Mark the tests of slow files, so that ``-m "not slow"`` leaves them out."""
+    slow = tuple(TESTS / name for name in SLOW)
+    for item in items:
+        if any(item.path.is_relative_to(path) for path in slow):
+            item.add_marker(pytest.mark.slow)
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Say how many tests were skipped because measured data is absent, and where it is expected."""
+    import shared_data
+
+    reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())]
+    absent = sum(shared_data.ABSENT in reason for reason in reasons)
+    if absent:
+        line = f"{absent} skipped: the measured data sets are expected in {shared_data.FOLDER}"
+        terminalreporter.write_line(line, yellow=True)

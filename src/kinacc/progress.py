@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
 from typing import TypeVar
 
@@ -31,7 +31,7 @@ class Progress:
         self, items: Iterable[Item], what: str = "", total: int | None = None
     ) -> Iterator[Item]:
         """Yield the items, counting them as ``what`` ("simulations", "slices")."""
-        total = len(items) if total is None and hasattr(items, "__len__") else total
+        total = len(items) if total is None and isinstance(items, Sized) else total
         if self.bar:
             from tqdm import tqdm
 

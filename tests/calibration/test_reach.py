@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_data
 
 from kinacc.calibration import models
 from kinacc.geometry import Pose, compose
@@ -16,10 +17,7 @@ from kinacc.workflow.stages import measurements
 
 ROOT = Path(__file__).resolve().parents[2]
 
-pytestmark = pytest.mark.skipif(
-    not (ROOT / ".." / "shared" / "data").is_dir(),
-    reason="the measured series are not beside the repository (../shared/data)",
-)
+pytestmark = shared_data.needed("")
 
 
 def held_out_errors(dataset, monkeypatch):

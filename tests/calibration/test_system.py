@@ -55,8 +55,8 @@ def flange_models() -> dict[str, tuple[FlangeModel, np.ndarray]]:
     by_dh = dh_fit.flange_model(arm.dh, free)
     at_dh = dh.to_vector(arm.dh)[free.ravel()] + rng.normal(size=by_dh.size) * 0.02
     empty = vec.without_errors(arm.dh, np.full(6, -1.4), np.full(6, 1.4), 3)
-    chosen = np.ones(vec.to_vector(empty).size, dtype=bool)
-    by_vec = vec_fit._flange_model(empty, chosen)
+    chosen, by_vec = vec_fit.flange_model(observations(rng, arm, count=60), empty)
+    assert chosen.all()
     at_vec = rng.normal(size=chosen.size) * 2e-3
     return {"dh": (by_dh, at_dh), "vec": (by_vec, at_vec)}
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_data
 from command_line import call
 
 from kinacc.artifacts import store
@@ -19,8 +19,9 @@ from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
 from kinacc.geometry import invert
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "ur10_tmac" / "series_D.csv"
-pytestmark = pytest.mark.skipif(not DATA.is_file(), reason=f"no measured series at {DATA}")
+SERIES = "ur10_tmac/series_D.csv"
+DATA = shared_data.FOLDER / SERIES
+pytestmark = shared_data.needed(SERIES)
 SIGMA_MM = 0.05
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pytest
+import shared_data
 
 from kinacc.checks import check
 from kinacc.checks.report import Report
@@ -14,7 +14,6 @@ from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
 from kinacc.workflow.contradictions import load
 
-SHARED = Path(__file__).parents[2] / ".." / "shared" / "data"
 MEASURED = {
     "ur10_a": "ur10_tmac/series_A.csv",
     "ur10_b": "ur10_tmac/series_B.csv",
@@ -69,9 +68,7 @@ class File:
 
 def measured(name: str) -> File:
     """A file of the measured ones, of which the tests are skipped where it is absent."""
-    path = SHARED / MEASURED[name]
-    if not path.is_file():
-        pytest.skip(f"{path.name} is not beside the project")
+    path = shared_data.path_of(MEASURED[name])
     with open(path, newline="") as stream:
         names, *rows = list(csv.reader(stream))
     values = np.array(rows, dtype=float).T

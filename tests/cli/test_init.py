@@ -1,28 +1,19 @@
 """init as a person calls it: two files that check-data and the workflow take at once."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_data
 from click.testing import CliRunner
 
 from kinacc.cli.group import main
 from kinacc.kinematics import robot
 from kinacc.workflow.contradictions import load
 
-SHARED = Path(__file__).parents[2] / ".." / "shared" / "data"
-
 
 def call(*words, **more):
     return CliRunner().invoke(main, [str(word) for word in words], **more)
-
-
-def measured(name):
-    path = SHARED / name
-    if not path.is_file():
-        pytest.skip(f"{path.name} is not beside the project")
-    return path
 
 
 @pytest.fixture
@@ -127,7 +118,7 @@ def test_wrong_options_are_named(foreign, tmp_path):
     ],
 )
 def test_measured_files_are_described_without_a_word(path, name, tmp_path):
-    done = call("init", measured(path), "--out", tmp_path, "--name", "cell", "--json")
+    done = call("init", shared_data.path_of(path), "--out", tmp_path, "--name", "cell", "--json")
     told = json.loads(done.stdout)
     assert told["robot"] == name
     assert told["suspicions"] == []

@@ -8,6 +8,7 @@ import textwrap
 from pathlib import Path
 
 import pytest
+import shared_data
 
 from kinacc.config.schema import defaults, settings, walk, without_execution_keys
 from kinacc.errors import InputError
@@ -16,7 +17,6 @@ from kinacc.workflow.contradictions import load
 ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "config.yaml"
 UR10 = ROOT / "examples" / "ur10.yaml"
-MEASURED = ROOT.parent / "shared" / "data" / "ur10_tmac"
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_the_readings_consistent_with_each_other_are_the_default():
     }
 
 
-@pytest.mark.skipif(not MEASURED.is_dir(), reason="no measured data beside the repository")
+@shared_data.needed("ur10_tmac")
 def test_the_ur10_example_adds_its_data_sets():
     loaded = load([PAPER, UR10], folder=ROOT)
     assert list(loaded) == ["mh180", "ur10_b", "ur10_d"]

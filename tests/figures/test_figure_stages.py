@@ -8,6 +8,7 @@ import figure_tables as tables
 import numpy as np
 import pytest
 from figure_words import CYLINDER, problems, said
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from kinacc.kinematics import robot
@@ -66,7 +67,6 @@ def test_true_accuracy_is_that_of_all_points_visited_or_not(name):
 
 
 def test_fig2_draws_to_the_fitted_tool_or_else_to_the_configured_one():
-    fig2, arm = import_module("kinacc.workflow.stages.fig2"), robot.load("mh180")
     frames = {
         "model": np.array(["vec", "dh", "dh"], dtype=object),
         "frame": np.array(["tool", "base", "tool"], dtype=object),
@@ -74,8 +74,22 @@ def test_fig2_draws_to_the_fitted_tool_or_else_to_the_configured_one():
         "y_mm": np.array([0.0, 0.0, 4.0]),
         "z_mm": np.array([0.0, 0.0, 250.0]),
     } | {name: np.full(3, float(name == "qw")) for name in ("qw", "qx", "qy", "qz")}
-    assert list(fig2._tool_mm(frames, {"tool_mm": [0, 0, 9]}, arm)) == [3.0, 4.0, 250.0]
-    assert problems(fig2.run({**INPUTS["fig2"], "frames": frames}, CYLINDER_SPACE)) == []
     none_fitted = frames | {f"{axis}_mm": np.zeros(3) for axis in "xyz"}
-    assert list(fig2._tool_mm(none_fitted, {"tool_mm": [0, 0, 9]}, arm)) == [0, 0, 9]
-    assert list(fig2._tool_mm(None, {}, arm)) == [0, 0, 0]
+    fitted, configured, bare = [3.0, 4.0, 250.0], [0.0, 0.0, 400.0], [0.0, 0.0, 0.0]
+    drawn = {str(tool): fig2_pixels(None, tool) for tool in (fitted, configured, bare)}
+    assert len(set(drawn.values())) == 3
+    assert fig2_pixels(frames, configured) == drawn[str(fitted)]
+    assert fig2_pixels(none_fitted, configured) == drawn[str(configured)]
+    assert fig2_pixels(None, None) == drawn[str(bare)]
+
+
+def fig2_pixels(frames, tool_mm) -> bytes:
+    """What the stage draws with a table of fitted frames and a configured tool."""
+    evaluation = CYLINDER_SPACE["evaluation"] | ({} if tool_mm is None else {"tool_mm": tool_mm})
+    inputs = INPUTS["fig2"] | ({} if frames is None else {"frames": frames})
+    stage = import_module("kinacc.workflow.stages.fig2")
+    figure = stage.run(inputs, CYLINDER_SPACE | {"evaluation": evaluation})
+    assert problems(figure) == []
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return bytes(canvas.buffer_rgba())

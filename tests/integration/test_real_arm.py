@@ -5,24 +5,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_data
 
 from kinacc.artifacts.store import read
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = ROOT.parent / "shared"
 REACH_RMS_MM = {"ur10_b": 0.475, "ur10_d": 0.43}
 
-pytestmark = pytest.mark.skipif(
-    not (SHARED / "data" / "ur10_tmac").is_dir(),
-    reason="no shared/data/ur10_tmac beside the project",
-)
+pytestmark = shared_data.needed("ur10_tmac")
 
 
 @pytest.fixture
 def ur10(project):
     """A project whose neighbour is the measured data, as the example expects."""
     shutil.copytree(ROOT / "examples", project.folder / "examples")
-    (project.folder.parent / "shared").symlink_to(SHARED)
+    (project.folder.parent / "shared").symlink_to(shared_data.FOLDER.parent)
     return project
 
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+import shared_data
 from oracles import small_study, tables
-
-ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT.parent / "shared" / "data" / "ur10_tmac"
 
 # An independent fit's cross-validated position rms over several random splits, upper end.
 REACH_MM = {"series_B": 0.475, "series_D": 0.43}
@@ -26,9 +22,7 @@ datasets:
 
 @pytest.fixture(scope="module", params=["series_D", "series_B"])
 def series(request, tmp_path_factory):
-    path = DATA / f"{request.param}.csv"
-    if not path.is_file():
-        pytest.skip(f"no {path.name} in ../shared/data/ur10_tmac")
+    path = shared_data.path_of(f"ur10_tmac/{request.param}.csv")
     folder = tmp_path_factory.mktemp("ur10")
     config = folder / "config.yaml"
     config.write_text(SETTINGS % path, encoding="utf-8")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_data
 from scipy.spatial.transform import Rotation
 
 from kinacc.artifacts import store
@@ -19,7 +20,6 @@ from kinacc.workflow.contradictions import load
 from kinacc.workflow.stages import measurements as stage
 
 ROOT = Path(__file__).parents[2]
-DATA = ROOT / ".." / "shared" / "data"
 ARM = robot.load("ur10")
 COUNT = 8
 MARKS = dict.fromkeys(("kinacc_version", "config_hash", "code_hash", "inputs_hash"), "x")
@@ -260,7 +260,7 @@ def example(name: str, dataset: str):
     return read(file | {"path": str(ROOT / file["path"])}, robot.load(config["robot"]))
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the measured data sets are not beside the project")
+@shared_data.needed("")
 def test_a_published_file_is_used_as_its_publisher_wrote_it():
     published = example("ur10_published.yaml", "ur10_published_d")
     plain = example("ur10.yaml", "ur10_d")
@@ -275,7 +275,7 @@ def test_a_published_file_is_used_as_its_publisher_wrote_it():
     assert np.isfinite(np.stack([published.columns[name] for name in UNCERTAINTY[:3]])).all()
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the measured data sets are not beside the project")
+@shared_data.needed("")
 def test_three_reflectors_read_ten_times():
     found = example("fanuc.yaml", "fanuc")
     assert found.unused == ()

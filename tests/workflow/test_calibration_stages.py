@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_data
 
 from kinacc.artifacts import store
 from kinacc.errors import InputError
@@ -19,7 +20,6 @@ from kinacc.workflow.plan import planned
 from kinacc.workflow.stages import assessment_points, dh, measurements, residuals, vec
 
 ROOT = Path(__file__).resolve().parents[2]
-SERIES = ROOT / ".." / "shared" / "data" / "ur10_tmac"
 POSES = 150
 MARKS = {
     "kinacc_version": "0",
@@ -365,10 +365,9 @@ def test_too_few_poses_for_the_order_is_bad_input(plan):
         vec.run({"measurements": split}, plan.settings("vec", "mh180"))
 
 
+@shared_data.needed("ur10_tmac")
 @pytest.mark.parametrize(("dataset", "reach_mm"), [("ur10_b", 0.475), ("ur10_d", 0.43)])
 def test_reach_on_the_measured_ur10(dataset, reach_mm, monkeypatch):
-    if not SERIES.is_dir():
-        pytest.skip("the measured series are not beside the repository (../shared/data)")
     monkeypatch.chdir(ROOT)
     measured = planned([ROOT / "config.yaml", ROOT / "examples" / "ur10.yaml"])
     found: dict = {}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from kinacc.artifacts import store
 from kinacc.artifacts.store import read, write
-from kinacc.cli import tournament as command
 from kinacc.cli.group import main
 from kinacc.study.tournament import contest, fields
 from kinacc.workflow.verification.check import check_results
@@ -74,7 +74,7 @@ def test_verdicts_are_told_to_machines_with_times_on_request(results):
     assert set(said["time_ms"]) == {"maximum", "single_shot"}
 
 
-def test_statements_whose_assumption_is_untrue_are_told_apart(tmp_path, capsys, monkeypatch):
+def test_statements_whose_assumption_is_untrue_are_told_apart(results, monkeypatch):
     verdict = {"assessor": "search_and_confirm", "target": "candidates", "cells": 2, "rejected": 1,
                "statements": 50, "below": 1, "worst_holds": 0.9, "mean_holds": 0.98,
                "withheld": 0.125}  # fmt: skip
@@ -85,13 +85,11 @@ def test_statements_whose_assumption_is_untrue_are_told_apart(tmp_path, capsys, 
         "broken_holds": [5 / 7, np.nan, 1.0, 1.0],
     }
     tables = {
-        "verdicts": {name: np.array([value]) for name, value in verdict.items()},
-        "cells": {name: np.array(column) for name, column in cells.items()},
+        "tournament_verdicts": {name: np.array([value]) for name, value in verdict.items()},
+        "tournament_cells": {name: np.array(column) for name, column in cells.items()},
     }
-    monkeypatch.setattr("kinacc.artifacts.store.read", tables.__getitem__)
-    paths = {"tournament_verdicts": "verdicts", "tournament_cells": "cells"}
-    command._tell(paths, {}, False)
-    head, row, *_ = capsys.readouterr().out.splitlines()
+    monkeypatch.setattr(store, "read", lambda path: tables.get(Path(path).stem) or read(path))
+    head, row, *_ = run(results, "--parts", "1").stdout.splitlines()
     assert row.split() == ["search_and_confirm", "candidates", "50", "0.980", "0.900", "1", "1",
                            "2", "12.5%", "7", "0.714"]  # fmt: skip
     assert head.endswith("rejected  below  cells  no statement  untrue  then held")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from kinacc.artifacts.columns import (
     ERROR_MM,
@@ -84,7 +85,7 @@ CAMPAIGN_BOUNDS = Artefact(
 ALL = (CAMPAIGN_POINTS, CAMPAIGN_READINGS, CAMPAIGN_BOUNDS)
 
 
-def contradictions(tables: Mapping[str, Mapping]) -> list[Problem]:
+def contradictions(tables: Mapping[str, Mapping[str, Any]]) -> list[Problem]:
     """What the three tables of one campaign say of each other that cannot be."""
     points, readings, bounds = (tables[each.name] for each in ALL)
     used = [name for name, place in zip(readings["point"], readings["used"], strict=True)

@@ -120,15 +120,35 @@ def joint_count(artefact: Artefact, names: Iterable[str]) -> int:
     return joints
 
 
-def real(name: str, unit: str, meaning: str, low=None, high=None, nullable=False) -> Column:
+def real(
+    name: str,
+    unit: str,
+    meaning: str,
+    low: float | None = None,
+    high: float | None = None,
+    nullable: bool = False,
+) -> Column:
     return Column(name, "float", unit, meaning, nullable, low, high)
 
 
-def whole(name: str, meaning: str, low=0, high=None, nullable=False, choices=()) -> Column:
+def whole(
+    name: str,
+    meaning: str,
+    low: float | None = 0,
+    high: float | None = None,
+    nullable: bool = False,
+    choices: tuple[int, ...] = (),
+) -> Column:
     return Column(name, "int", "1", meaning, nullable, low, high, choices)
 
 
-def text(name: str, meaning: str, choices=(), pattern="", nullable=False) -> Column:
+def text(
+    name: str,
+    meaning: str,
+    choices: Iterable[str] = (),
+    pattern: str = "",
+    nullable: bool = False,
+) -> Column:
     return Column(name, "text", "", meaning, nullable, None, None, tuple(choices), pattern)
 
 
@@ -137,11 +157,11 @@ def unstated(columns: Iterable[Column]) -> tuple[Column, ...]:
     return tuple(replace(column, optional=True, nullable=True) for column in columns)
 
 
-def length(name: str, meaning: str, limit: float, nullable=False) -> Column:
+def length(name: str, meaning: str, limit: float, nullable: bool = False) -> Column:
     return real(name, "mm", meaning, -limit, limit, nullable)
 
 
-def magnitude(name: str, unit: str, meaning: str, high: float, nullable=False) -> Column:
+def magnitude(name: str, unit: str, meaning: str, high: float, nullable: bool = False) -> Column:
     return real(name, unit, meaning, 0.0, high, nullable)
 
 

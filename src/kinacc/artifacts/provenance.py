@@ -50,7 +50,7 @@ def code_hash(*modules: str, alone: Iterable[str] = (), root: Path = PACKAGE) ->
     without what they import.
     """
     tree = source_tree(root)
-    names, libraries = set(alone), set()
+    names, libraries = set(alone), set[str]()
     for module in modules:
         reached, used = closure(module, root)
         names |= reached

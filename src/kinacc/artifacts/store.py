@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -34,6 +34,7 @@ _ARROW_TYPES = {
     "text": pa.string(),
 }
 _MOST_VALUES = 100_000_000
+Read = TypeVar("Read")
 
 
 class TableToWrite(NamedTuple):
@@ -41,7 +42,7 @@ class TableToWrite(NamedTuple):
 
     path: Path | str
     artefact: str
-    columns: Mapping[str, object]
+    columns: Mapping[str, Any]
     provenance: Mapping[str, object]
 
 
@@ -52,7 +53,9 @@ def artefact_named(name: str) -> Artefact:
     return ARTEFACTS[name]
 
 
-def arrow_schema(artefact: str, joints: int = 0, provenance: Mapping | None = None) -> pa.Schema:
+def arrow_schema(
+    artefact: str, joints: int = 0, provenance: Mapping[str, object] | None = None
+) -> pa.Schema:
     """Arrow schema of an artefact for an arm of ``joints`` joints, unit and meaning included."""
     fields = [
         pa.field(
@@ -67,7 +70,9 @@ def arrow_schema(artefact: str, joints: int = 0, provenance: Mapping | None = No
     return pa.schema(fields, metadata)
 
 
-def to_table(artefact: str, columns: Mapping[str, object], provenance: Mapping) -> pa.Table:
+def to_table(
+    artefact: str, columns: Mapping[str, Any], provenance: Mapping[str, object]
+) -> pa.Table:
     """Cast columns (each of shape (rows,)) to the artefact's Arrow table.
 
     NaN and None become null where the contract allows null; so do optional columns not given.
@@ -109,7 +114,12 @@ def to_table(artefact: str, columns: Mapping[str, object], provenance: Mapping) 
     return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance))
 
 
-def write(path: Path | str, artefact: str, columns: Mapping, provenance: Mapping) -> None:
+def write(
+    path: Path | str,
+    artefact: str,
+    columns: Mapping[str, Any],
+    provenance: Mapping[str, object],
+) -> None:
     """Write one table, or leave what was there untouched; see :func:`to_table` for errors."""
     write_all([TableToWrite(path, artefact, columns, provenance)])
 
@@ -187,7 +197,7 @@ def read_metadata(path: Path | str) -> dict[str, str]:
     return {key.decode(errors="replace"): raw[key].decode(errors="replace") for key in raw}
 
 
-def _open(path, opening):
+def _open(path: Path | str, opening: Callable[[pq.ParquetFile], Read]) -> Read:
     try:
         with pq.ParquetFile(path) as file:
             return opening(file)
@@ -226,7 +236,7 @@ def _numbers(chunk: pa.Array, nullable: bool) -> np.ndarray:
     return values
 
 
-def _provenance_problems(where: str, provenance: Mapping) -> list[Problem]:
+def _provenance_problems(where: str, provenance: Mapping[str, object]) -> list[Problem]:
     missing = [key for key in PROVENANCE_KEYS if key not in provenance]
     unknown = [key for key in provenance if key not in PROVENANCE_KEYS]
     allowed = "exactly " + ", ".join(PROVENANCE_KEYS)
@@ -235,7 +245,7 @@ def _provenance_problems(where: str, provenance: Mapping) -> list[Problem]:
     ]
 
 
-def _to_arrow(place: str, column: Column, values) -> tuple[pa.Array | None, list[Problem]]:
+def _to_arrow(place: str, column: Column, values: Any) -> tuple[pa.Array | None, list[Problem]]:
     if column.kind == "text":
         return _text_to_arrow(place, column, values)
     try:
@@ -284,7 +294,9 @@ def _validity(null: np.ndarray) -> pa.Buffer | None:
     return pa.py_buffer(np.packbits(~null, bitorder="little"))
 
 
-def _text_to_arrow(place: str, column: Column, values) -> tuple[pa.Array | None, list[Problem]]:
+def _text_to_arrow(
+    place: str, column: Column, values: Any
+) -> tuple[pa.Array | None, list[Problem]]:
     texts = [_as_text(value) for value in values]
     wrong = np.array([not (value is None or isinstance(value, str)) for value in texts], dtype=bool)
     null = np.array([value is None for value in texts], dtype=bool)
@@ -299,7 +311,7 @@ def _text_to_arrow(place: str, column: Column, values) -> tuple[pa.Array | None,
     return pa.Array.from_buffers(pa.string(), len(words), buffers), []
 
 
-def _as_text(value):
+def _as_text(value: Any) -> Any:
     """A text as str, None and NaN as None, anything else unchanged."""
     if value is None or isinstance(value, str):
         return None if value is None else str(value)

@@ -119,9 +119,14 @@ def _resolve(
 
 
 def _dataset(
-    name, content, shared, place, folder, contradictions
+    name: str,
+    content: Any,
+    shared: Mapping[str, Any],
+    place: Callable[[KeyPath], str],
+    folder: Path,
+    contradictions: Contradictions,
 ) -> tuple[dict[str, Any], list[Problem]]:
-    path = ("datasets", name)
+    path: KeyPath = ("datasets", name)
     problems: list[Problem] = []
     known = Section("", "", (ROBOT, *settings().entries))
     own, found = check_section(known, content, path, place)

@@ -152,7 +152,9 @@ def _is_known(subject: tuple[int | None, str | None, str | None]) -> bool:
     return subject[1] is None or subject[2] is not None or subject[1] in ("base", "tool")
 
 
-def _said(says: Any, parameter: str | None) -> tuple[bool, dict, dict, list[str]]:
+def _said(
+    says: Any, parameter: str | None
+) -> tuple[bool, dict[str, Any], dict[str, Any], list[str]]:
     """Whether free, value and standard deviation by unit, and every fault."""
     if says in (FREE, FIXED):
         return says == FREE, {}, {}, []

@@ -140,7 +140,8 @@ def unreadable(text: str, name: str) -> Problem | None:
             elif values > _MOST_VALUES:
                 what, allowed = "holds too many values", f"at most {_MOST_VALUES} in a file"
             if what:
-                return Problem(f"{name}:{event.start_mark.line + 1}", what, allowed)
+                line = event.start_mark.line + 1 if event.start_mark else 1
+                return Problem(f"{name}:{line}", what, allowed)
     except (yaml.YAMLError, ValueError) as error:
         return _yaml_problem(name, error)
     return None
@@ -177,7 +178,7 @@ class _Walk:
         self.problems: list[Problem] = []
         self.left = _MOST_VALUES
 
-    def plain(self, node, path: KeyPath) -> Any:
+    def plain(self, node: yaml.Node, path: KeyPath) -> Any:
         """Plain value of a YAML node."""
         self.left -= 1
         if self.left < 0:
@@ -199,7 +200,7 @@ class _Walk:
                 break
         return items
 
-    def _mapping(self, node, path: KeyPath) -> dict[Any, Any]:
+    def _mapping(self, node: yaml.MappingNode, path: KeyPath) -> dict[Any, Any]:
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             key, line = _scalar(key_node), key_node.start_mark.line + 1
@@ -218,10 +219,10 @@ class _Walk:
         return mapping
 
 
-def _scalar(node) -> Any:
+def _scalar(node: yaml.Node) -> Any:
     """Value of a scalar node as YAML's safe loader would give it; anything else as its text."""
     if not isinstance(node, yaml.ScalarNode):
-        return f"<{node.id}>"
+        return "<sequence>" if isinstance(node, yaml.SequenceNode) else "<mapping>"
     if not node.style and _FLOAT.fullmatch(node.value):
         return float(node.value)
     make = _MAKERS.get(node.tag)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 DATASET_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]*"  # with - first it would read as an option
-KINDS = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair", "pairs", "names")
-KINDS += ("parameters", "rows")
+KINDS: tuple[str, ...] = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair")
+KINDS += ("pairs", "names", "parameters", "rows")
 NUMERIC = {
     "int": "a whole number",
     "float": "a number",
@@ -19,8 +19,8 @@ NUMERIC = {
     "pair": "two numbers [smaller, larger]",
     "pairs": "a list of pairs [smaller, larger]",
 }
-_KEY_FIELDS = ("kind", "default", "unit", "low", "high", "open_ends", "choices", "length")
-_KEY_FIELDS += ("behind", "nullable", "execution", "about")
+_KEY_FIELDS: tuple[str, ...] = ("kind", "default", "unit", "low", "high", "open_ends")
+_KEY_FIELDS += ("choices", "length", "behind", "nullable", "execution", "about")
 
 
 @dataclass(frozen=True)
@@ -178,13 +178,15 @@ def defaults(section: Section | None = None) -> dict[str, Any]:
     }
 
 
-def without_execution_keys(values: Mapping[str, Any], section: Section | None = None) -> dict:
+def without_execution_keys(
+    values: Mapping[str, Any], section: Section | None = None
+) -> dict[str, Any]:
     """Settings without the keys that change only how a run is carried out, for hashing.
 
     ``values`` may be any part of the settings that starts at the top level (or at ``section``).
     """
     section = section or settings()
-    kept = {}
+    kept: dict[str, Any] = {}
     for name, value in values.items():
         entry = section.entry(name)
         if isinstance(entry, Section) and isinstance(value, Mapping):

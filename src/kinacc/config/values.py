@@ -13,6 +13,8 @@ from kinacc.config.schema import NUMERIC, Key, Section, walk
 from kinacc.errors import Problem
 
 Place = Callable[[KeyPath], str]
+Checked = tuple[Any, list[Problem]]  # the value in its canonical type, what is wrong with it
+Check = Callable[[Key, Any, KeyPath, Place], Checked]
 
 _LARGEST = 10**300  # a whole number beyond may have no float, and a million digits
 _ITEM = {"ints": "int", "floats": "float", "texts": "text", "pairs": "pair"}
@@ -33,7 +35,7 @@ _MOST_NAMES = 2000  # of one mapping: they are held against each other
 _UNIT_ENDINGS = ("nm", "um", "mm", "cm", "m", "deg", "rad", "mrad", "urad", "percent")
 
 
-def check(key: Key, value: Any, path: KeyPath, place: Place) -> tuple[Any, list[Problem]]:
+def check(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     """The value in its canonical type, and what is wrong with it (then INVALID)."""
     if value is None:
         if key.nullable:
@@ -88,11 +90,11 @@ def _stem(name: str) -> str:
     return head if head and ending in _UNIT_ENDINGS else name
 
 
-def _refuse(key: Key, path: KeyPath, place: Place, what: str, fix: str = ""):
+def _refuse(key: Key, path: KeyPath, place: Place, what: str, fix: str = "") -> Checked:
     return INVALID, [Problem(place(path), what, key.allowed, fix)]
 
 
-def _number(key: Key, value: Any, path: KeyPath, place: Place, whole: bool):
+def _number(key: Key, value: Any, path: KeyPath, place: Place, whole: bool) -> Checked:
     """One number within the key's limits, as int or float."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         fix = ""
@@ -145,21 +147,21 @@ def _other_unit(key: Key, value: float) -> str:
     return ""
 
 
-def _int(key, value, path, place):
+def _int(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     return _number(key, value, path, place, whole=True)
 
 
-def _float(key, value, path, place):
+def _float(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     return _number(key, value, path, place, whole=False)
 
 
-def _bool(key, value, path, place):
+def _bool(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     if isinstance(value, bool):
         return value, []
     return _refuse(key, path, place, f"{shown(value)} is neither true nor false")
 
 
-def _text(key, value, path, place):
+def _text(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     if not isinstance(value, str):
         fix = (
             "put it in quotes" if isinstance(value, (bool, int, float)) and not key.choices else ""
@@ -174,7 +176,7 @@ def _text(key, value, path, place):
     return value, []
 
 
-def _list(key, value, path, place, item):
+def _list(key: Key, value: Any, path: KeyPath, place: Place, item: Check) -> Checked:
     """A list of allowed length whose items pass ``item``."""
     if not isinstance(value, list):
         what = f"{shown(value)} is not a list"
@@ -187,7 +189,8 @@ def _list(key, value, path, place, item):
     if not fewest <= len(value) <= most:
         return _refuse(key, path, place, f"has {len(value)} items")
     single = replace(key, kind=_ITEM[key.kind], choices=key.choices if key.kind == "texts" else ())
-    items, problems = [], []
+    items: list[Any] = []
+    problems: list[Problem] = []
     for number, each in enumerate(value):
         cleaned, found = item(single, each, (*path, number), place)
         items.append(cleaned)
@@ -195,7 +198,7 @@ def _list(key, value, path, place, item):
     return (INVALID if problems else items), problems
 
 
-def _pair(key, value, path, place):
+def _pair(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     if not isinstance(value, list) or len(value) != 2:
         return _refuse(key, path, place, f"{shown(value)} is not two numbers")
     single = replace(key, kind="float")
@@ -210,8 +213,8 @@ def _pair(key, value, path, place):
     return [low, high], []
 
 
-def _distinct(item):
-    def check_list(key, value, path, place):
+def _distinct(item: Check) -> Check:
+    def check_list(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
         items, problems = _list(key, value, path, place, item)
         repeated = [] if problems else sorted({str(e) for e in items if items.count(e) > 1})
         if repeated:
@@ -221,7 +224,7 @@ def _distinct(item):
     return check_list
 
 
-def _names(key, value, path, place):
+def _names(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     if not isinstance(value, dict):
         return _refuse(key, path, place, f"{shown(value)} is not a mapping")
     if len(value) > _MOST_NAMES:
@@ -245,12 +248,13 @@ def _names(key, value, path, place):
     return (INVALID if problems else dict(value)), problems
 
 
-def _rows(key, value, path, place):
+def _rows(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     if not isinstance(value, list):
         return _refuse(key, path, place, f"{shown(value)} is not a list")
     lines = Key("lines", "ints", None, "", low=1, high=1e9, length=(1, 100_000))
     reason = Key("reason", "text", None, "")
-    items, problems = [], []
+    items: list[dict[str, Any]] = []
+    problems: list[Problem] = []
     for number, each in enumerate(value):
         here = (*path, number)
         if not isinstance(each, dict) or set(each) != {"lines", "reason"}:
@@ -273,7 +277,7 @@ def _rows(key, value, path, place):
     return items, []
 
 
-def _parameters(key, value, path, place):
+def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     from kinacc.config import parameter_rules
 
     if not isinstance(value, dict):
@@ -284,7 +288,7 @@ def _parameters(key, value, path, place):
     return (INVALID if problems else dict(value)), problems
 
 
-_CHECKS = {
+_CHECKS: dict[str, Check] = {
     "int": _int,
     "float": _float,
     "bool": _bool,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -28,7 +29,7 @@ def draw(
     q_rad: np.ndarray,
     *,
     tool_mm: np.ndarray | None = None,
-    cylinder: Mapping[str, object] | None = None,
+    cylinder: Mapping[str, Any] | None = None,
     dataset: str | None = None,
 ) -> Figure:
     """Draw the operating points and the arm at the one nearest to their middle, in mm.
@@ -92,7 +93,8 @@ def _prism(begin: np.ndarray, end: np.ndarray, radius: float, colour: str):
 
 def _shade(colour: str, normal: np.ndarray) -> tuple[float, float, float]:
     light = 0.62 + 0.38 * float(normal @ LIGHT / np.linalg.norm(LIGHT))
-    return tuple(float(c) * light for c in to_rgb(colour))
+    red, green, blue = to_rgb(colour)
+    return float(red) * light, float(green) * light, float(blue) * light
 
 
 def _arm(ax: Axes3D, model: dh.DHModel, q_rad: np.ndarray, tool_mm: np.ndarray) -> np.ndarray:
@@ -128,13 +130,14 @@ def _first_axis(ax: Axes3D, lowest_mm: float) -> None:
     ax.plot([0, 0], [0, 0], [lowest_mm, 0], color=style.MUTED, lw=0.8, ls=(0, (6, 2, 1, 2)))
 
 
-def _sector(ax: Axes3D, cylinder: Mapping[str, object]) -> np.ndarray:
+def _sector(ax: Axes3D, cylinder: Mapping[str, Any]) -> np.ndarray:
     """Draw the evaluation space, translucent with firm edges; return its corner points."""
     inner = float(cylinder["inner_radius_mm"])
     outer = inner + float(cylinder["radial_span_mm"])
     low = float(cylinder["bottom_mm"])
     high = low + float(cylinder["height_mm"])
-    turn = np.radians(np.linspace(*np.asarray(cylinder["angle_deg"], dtype=float), 31))
+    first_deg, last_deg = cylinder["angle_deg"]
+    turn = np.radians(np.linspace(float(first_deg), float(last_deg), 31))
 
     def arc(radius, height):
         return np.stack(

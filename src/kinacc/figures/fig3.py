@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,9 +29,14 @@ COLUMNS = (
 ROWS = (("position_max_mm", "Position", "mm"), ("orientation_max_mrad", "Orientation", "mrad"))
 COLOURMAP = "viridis"
 MIDDLE = "#21918c"  # of the colour map
-UNREACHED = {"facecolor": "#e2e2e2", "hatch": "//////", "edgecolor": "#9a9a9a", "linewidth": 0}
-PARTLY = {"marker": ".", "ms": 1.6, "mew": 0, "mfc": "white", "ls": ""}
-RING = {"marker": "o", "ms": 5.5, "mfc": "none", "ls": ""}
+UNREACHED: dict[str, Any] = {
+    "facecolor": "#e2e2e2",
+    "hatch": "//////",
+    "edgecolor": "#9a9a9a",
+    "linewidth": 0,
+}
+PARTLY: dict[str, Any] = {"marker": ".", "ms": 1.6, "mew": 0, "mfc": "white", "ls": ""}
+RING: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "none", "ls": ""}
 DEFAULT_CELL_MM = 25.0
 
 
@@ -209,7 +215,7 @@ def _words(
         va="center",
         fontsize=style.TEXT_PT,
     )
-    handles = [Line2D([], [], **RING, mec=style.INK, mew=0.9)]
+    handles: list[Any] = [Line2D([], [], **RING, mec=style.INK, mew=0.9)]
     names = ["largest in the slice"]
     if unreached:
         handles.append(Patch(**UNREACHED))

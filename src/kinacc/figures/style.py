@@ -11,6 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -40,7 +41,7 @@ ASSESSORS = {
 SPARE = ((PURPLE, "D"), ("#A6761D", "v"), (SKY, "P"), (INK, "X"), ("#CC79A7", "*"))
 
 # Settings a reader's own matplotlibrc must not change are all given, on top of the defaults.
-HOUSE = {
+HOUSE: dict[Any, Any] = {
     "font.family": ["DejaVu Sans"],
     "mathtext.fontset": "dejavusans",
     "font.size": TEXT_PT,

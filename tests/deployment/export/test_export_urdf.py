@@ -9,6 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.calibration.observations import full_poses
 from kinacc.deployment.export import urdf
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError
@@ -139,7 +141,8 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     before = seen_by_pinocchio(text, tip, q_rad, slides, names, "world")
     # What the calibration says of the tip, wherever the file puts base and tip on the arm.
     ends = dh.forward(base_robot.dh, q_rad)
-    base, carried = urdf._ends_in_file(arm, robot.urdf.joints_between(path, "world", tip), path)
+    start = closed_form_start(full_poses(q_rad, before), ends)
+    base, carried = start.base, start.tool
     assert_same(compose(base, compose(ends, carried)), before)
     wanted = compose(base, compose(arm.forward(q_rad), carried))
     if robot_from == "file":

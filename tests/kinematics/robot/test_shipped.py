@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+import shared_data
 from scipy.optimize import minimize
 
 from kinacc.geometry import exp_so3, rotation_y
@@ -95,12 +94,12 @@ def test_reach_is_the_makers(name):
 
 # --- measured FANUC -------------------------------------------------------------------------------
 
-POSES = Path(__file__).parents[4] / "shared" / "data" / "fanuc_r2000ic" / "poses.csv"
+POSES = "fanuc_r2000ic/poses.csv"
 
 
 def unmodelled_rms_mm(signs) -> float:
     """Rms of the three targets when only base and targets are fitted to the readings' means."""
-    rows = np.genfromtxt(POSES, delimiter=",", names=True)
+    rows = np.genfromtxt(shared_data.path_of(POSES), delimiter=",", names=True)
     chosen = [rows[rows["config"] == number] for number in np.unique(rows["config"])]
     q = np.deg2rad(
         [[part[f"q{i}_deg"].mean() for i in range(1, 7)] for part in chosen] * np.array(signs)
@@ -125,7 +124,7 @@ def unmodelled_rms_mm(signs) -> float:
     return float(np.sqrt(np.mean(np.sum(left**2, axis=-1))))
 
 
-@pytest.mark.skipif(not POSES.is_file(), reason=f"measured data not at {POSES}")
+@shared_data.needed(POSES)
 def test_fanuc_signs_are_those_of_the_measured_arm():
     signs = np.diag(robot.load("fanuc_r2000ic_165f").joint_map)
     right = unmodelled_rms_mm(signs)
