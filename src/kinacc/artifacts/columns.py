@@ -99,7 +99,7 @@ class Artefact:
         return any(column.per_joint for column in self.columns)
 
 
-def texts(cells: Iterable) -> np.ndarray:
+def texts(cells: Iterable[object]) -> np.ndarray:
     """Cells (n,) as objects, each as it is: None for null, and none spread over a row."""
     import numpy as np
 

@@ -11,6 +11,7 @@ A value that does not apply is null, never zero. After a change run
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from kinacc.artifacts import (
     assessment_tables,
@@ -64,7 +65,7 @@ ARTEFACTS: dict[str, Artefact] = {
 }
 
 
-def columns_of(artefact: str, rows: Iterable[Mapping | Sequence]) -> Columns:
+def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]]) -> Columns:
     """Rows as columns of an artefact; None in a column of numbers is NaN.
 
     A row holds its values by column name, or one after the other as the contract has its columns.
@@ -72,18 +73,18 @@ def columns_of(artefact: str, rows: Iterable[Mapping | Sequence]) -> Columns:
     """
     import numpy as np
 
-    rows = list(rows)
+    given: list[Any] = list(rows)
     contract = ARTEFACTS[artefact]
-    if rows and isinstance(rows[0], Mapping):
-        names = list(rows[0])
-        rows = [[row[name] for name in names] for row in rows]
+    if given and isinstance(given[0], Mapping):
+        names = list(given[0])
+        given = [[row[name] for name in names] for row in given]
     else:
         names = [column.name for column in contract.columns]
     known = {column.name: column for column in contract.for_joints(joint_count(contract, names))}
     kinds = {"float": np.float64, "int": np.int64, "int8": np.int8}
     columns: Columns = {}
     for place, name in enumerate(names):
-        kind, cells = known[name].kind, [row[place] for row in rows]
+        kind, cells = known[name].kind, [row[place] for row in given]
         if kind == "text":
             columns[name] = texts(cells)
         else:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 
 from kinacc import __version__
 from kinacc.artifacts import provenance
+from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.campaign.folder import Opened
 
 # An assessor answers by these modules; kinematics and readers hand it numbers.
@@ -51,7 +52,7 @@ _ALIKE: dict[str, frozenset[str]] = {
 }
 
 
-def assessor_code(assessor: object) -> str:
+def assessor_code(assessor: AdaptiveAssessor) -> str:
     """Mark of the code that chooses an assessor's points and makes its bounds.
 
     It holds every statement of the modules of ``kinacc.assess`` that the assessor's own runs, and
@@ -69,7 +70,7 @@ def assessor_code(assessor: object) -> str:
     return hashlib.sha256("\n".join(sorted(statements)).encode()).hexdigest()[:16]
 
 
-def answers_alike(recorded: str | None, assessor: object) -> bool:
+def answers_alike(recorded: str | None, assessor: AdaptiveAssessor) -> bool:
     """Whether an assessor answers as it did when the mark ``recorded`` was made."""
     now = assessor_code(assessor)
     return recorded == now or {recorded, now} <= _ALIKE.get(assessor.name, frozenset())

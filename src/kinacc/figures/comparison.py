@@ -18,13 +18,14 @@ _SYMBOLS = {
 
 def draw(found: Comparison, first: str, second: str) -> Figure:
     """Draw a comparison; ``first`` and ``second`` name the calibrations."""
-    rows = len(found.parameters.names) if found.parameters else 0
+    parameters = found.parameters
+    rows = len(parameters.names) if parameters else 0
     with style.house():
         height = max(2.6, 0.13 * rows + 0.9)
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, height)
-        if rows:
+        if parameters and rows:
             left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-            _parameters(left, found.parameters)
+            _parameters(left, parameters)
         else:
             right = figure.subplots()
         _shifts(right, found)
@@ -59,8 +60,15 @@ def _in_deviations(ax: Axes, parameters: Parameters, places: np.ndarray, known: 
     # What has no standard deviation has no place on this axis: its change is written beside it.
     for place in places[~known & (_change(parameters) != 0.0)]:
         words = f"{_change(parameters)[place]:+.3g} {_unit(parameters.names[place])}"
-        beside = {"xytext": (4, 0), "textcoords": "offset points", "va": "center"}
-        ax.annotate(words, (0.0, place), fontsize=style.SMALL_PT, color=style.MUTED, **beside)
+        ax.annotate(
+            words,
+            (0.0, place),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=style.SMALL_PT,
+            color=style.MUTED,
+        )
     ax.set_xlim(-limit, limit)
     ax.set_xlabel("Change (standard deviations)\n×: without one; the change, if any, beside it")
 
