@@ -31,7 +31,7 @@ def held_out_errors(dataset, monkeypatch):
     every, _ = calibration_settings.observed(table, arm)
     errors = np.full((len(every), 3), np.nan)
     for fold in np.unique(every.fold):
-        fit = models.fit_dh(every.select(every.fold != fold), arm.dh, options, None, None)
+        fit = models.fit_dh(every.select(every.fold != fold), arm.dh, options, None)
         out = every.select(every.fold == fold)
         targets = Pose(*(each[out.target] for each in fit.frames.targets))
         at = compose(fit.frames.base, compose(dh.forward(fit.model, out.q_rad), targets))

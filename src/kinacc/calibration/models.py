@@ -125,10 +125,11 @@ def fit_all(
     # High orders are worth it; the end is the same to a few nm, which the paper's tables keep.
     worth = options.grid is not None and start is not None and start.order == options.order
     volumetric = fit_vec(observations, nominal, joint_range_rad, options, start if worth else None)
-    best = fit_dh(observations, nominal, options, volumetric.model, volumetric.frames)
+    by_vec = Fit(volumetric.model, volumetric.frames)
+    best = fit_dh(observations, nominal, options, by_vec)
     plain = fit_nominal(observations, nominal, options)
     return {
-        VECModel.kind: Fit(volumetric.model, volumetric.frames),
+        VECModel.kind: by_vec,
         DHModel.kind: Fit(best.model, best.frames),
         NOMINAL: Fit(nominal, plain.frames),
     }
@@ -198,22 +199,21 @@ def fit_dh(
     observations: Observations,
     nominal: DHModel,
     options: Options,
-    vec_model: VECModel,
-    vec_frames: Frames,
+    followed: Fit | None,
 ) -> DHFit:
-    """DH model of the measurements or, with ``dh_to_vec``, of the VEC at their joints.
+    """DH model of the measurements or, with ``dh_to_vec``, of the model followed at their joints.
 
-    Following the VEC, base and targets are the VEC's. Raises FitError.
+    Base and targets are then those of the model ``followed``. Raises FitError.
     """
     frames, terms = _of_frames(observations, options)
     if options.dh_to_vec:
         at_target = compose(
-            vec.pose(vec_model, observations.q_rad, observations.s),
-            _rows(vec_frames.targets, observations.target),
+            followed.model.pose(observations.q_rad, observations.s),
+            _rows(followed.frames.targets, observations.target),
         )
-        followed = full_poses(observations.q_rad, at_target)
-        observations = followed.with_targets_of(observations)
-        frames, terms = Frames(IDENTITY, vec_frames.targets), None
+        poses = full_poses(observations.q_rad, at_target)
+        observations = poses.with_targets_of(observations)
+        frames, terms = Frames(IDENTITY, followed.frames.targets), None
     arm = options.arm(nominal)
     fitted = dh_fit.fit(
         observations,
@@ -226,7 +226,7 @@ def fit_dh(
         frame_terms=terms,
         loss=options.loss,
     )
-    return fitted.with_frames(vec_frames) if options.dh_to_vec else fitted
+    return fitted.with_frames(followed.frames) if options.dh_to_vec else fitted
 
 
 def fit_nominal(observations: Observations, nominal: DHModel, options: Options) -> DHFit:

@@ -31,8 +31,7 @@ def campaign() -> None:
 @campaign.command("start")
 @click.argument("folder", type=click.Path(file_okay=False))
 @click.option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
-@click.option("--model", type=click.Choice(["dh", "vec", "nominal"]),
-              help="Model to judge. [the one selected]")  # fmt: skip
+@click.option("--model", type=choice.MODEL, help="Model to judge. [the one selected]")
 @click.option("--robot", help="Robot of the results. [as the results say]")
 @click.option("--config", multiple=True, help=f"Configuration naming it. [{choice.CONFIG}]")
 @click.option("--session", help="Session whose instrument placement is meant. [the first]")

@@ -117,10 +117,6 @@ def _is_configured(given: Mapping, arm: Calibration) -> bool:
 def _covered(arm: Calibration) -> tuple[np.ndarray, np.ndarray]:
     """Range of the reported joints that the data cover, where a joint is not coupled to others."""
     robot = arm.robot
-    low, high = robot.q_min_rad.copy(), robot.q_max_rad.copy()
     if arm.fitted_range_rad is None:
-        return low, high
-    for joint in np.flatnonzero(limits.uncoupled(robot)):
-        ends = [end[joint] / robot.joint_map[joint, joint] for end in arm.fitted_range_rad]
-        low[joint], high[joint] = max(low[joint], min(ends)), min(high[joint], max(ends))
-    return low, high
+        return robot.q_min_rad, robot.q_max_rad
+    return limits.cut_to_range(robot, robot.q_min_rad, robot.q_max_rad, arm.fitted_range_rad)

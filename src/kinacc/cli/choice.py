@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kinacc.artifacts.allowed import SELECTABLE
 from kinacc.errors import InputError, Problem
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from kinacc.kinematics.robot import Robot
 
 CONFIG = "config.yaml"
+MODEL = click.Choice([*SELECTABLE, "nominal"])
 
 
 def calibration_options(command: Callable) -> Callable:
@@ -27,7 +29,7 @@ def calibration_options(command: Callable) -> Callable:
         click.option("--config", multiple=True, help="Configuration naming the robot."),
         click.option(
             "--model",
-            type=click.Choice(["dh", "vec", "nominal"]),
+            type=MODEL,
             help="Model to use. [the one selected; else the better on held-out poses]",
         ),
         click.argument("folder", type=click.Path()),

@@ -24,7 +24,7 @@ PICTURES = (".svg", ".png", ".pdf")
 @click.option("--picture", type=click.Path(), help="Draw to a .svg, .png or .pdf file.")
 @click.option(
     "--model",
-    type=click.Choice(["dh", "vec", "nominal"]),
+    type=choice.MODEL,
     default="dh",
     show_default=True,
     help="Model compared.",

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import click
 
+from kinacc.artifacts.allowed import SELECTABLE
+
 IF_THERE = ("data_check", "excluded_rows")
 TABLES = ("residuals", "model_selection", "dh_identified", "vec_model", "worst_rows")
-_MODELS = ("nominal", "dh", "vec")
+_MODELS = ("nominal", *SELECTABLE)
 _FIGURES = ("n", "rms", "mean", "max")
 _SUBSETS = ("train", "validation")
 _WORST = 5

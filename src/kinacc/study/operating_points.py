@@ -122,11 +122,7 @@ def _assessable_box(
     """A box of reported joints cut to the joint limits and, where uncoupled, the fitted range."""
     lower = np.maximum(lower_rad, robot.q_min_rad)
     upper = np.minimum(upper_rad, robot.q_max_rad)
-    for joint in np.flatnonzero(limits.uncoupled(robot)):
-        sign = robot.joint_map[joint, joint]
-        ends = [end[joint] / sign for end in models.range_rad]
-        lower[joint] = max(lower[joint], min(ends))
-        upper[joint] = min(upper[joint], max(ends))
+    lower, upper = limits.cut_to_range(robot, lower, upper, models.range_rad)
     problems = [
         Problem(
             f"joint {joint + 1}",

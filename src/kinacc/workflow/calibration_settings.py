@@ -119,9 +119,7 @@ def joint_range_rad(
     low, high = robot.q_min_rad, robot.q_max_rad
     if wanted != "limits":
         low, high = np.deg2rad(np.array(wanted, dtype=float)).T
-    centre, half = 0.5 * (low + high), 0.5 * (high - low)
-    centre, half = robot.joint_map @ centre, np.abs(robot.joint_map) @ half
-    return centre - half, centre + half
+    return robot.dh_box(low, high)
 
 
 def require_enough_rows(inputs: Mapping, robot: Robot, calibration: Mapping) -> None:

@@ -18,7 +18,6 @@ from kinacc.deployment.record import TOOL, Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, invert, rotation_y, rotation_z
 from kinacc.kinematics import dh as _dh
-from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between
 
 _M_PER_MM = 1e-3
@@ -44,7 +43,9 @@ def generated(arm: Calibration, dh_joints: bool = False) -> str:
     about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
     root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
     etree.SubElement(root, "link", name="base_link")
-    low, high = _limits(robot, senses, dh_joints)
+    low, high = robot.q_min_rad, robot.q_max_rad
+    if dh_joints:
+        low, high = robot.dh_box(low, high)
     for i, origin in enumerate(frames):
         etree.SubElement(root, "link", name=f"link_{i + 1}")
         kind = "prismatic" if dh.prismatic[i] else "revolute"
@@ -183,16 +184,6 @@ def _link_frames(chain: list[Joint]) -> list[Pose]:
         if joint.kind in MOVING:
             found.append(here)
     return found
-
-
-def _limits(robot: Robot, senses: np.ndarray, dh_joints: bool) -> tuple[np.ndarray, np.ndarray]:
-    low, high = robot.q_min_rad, robot.q_max_rad
-    if not dh_joints:
-        return low, high
-    ends = np.stack([low, high])
-    centre, half = robot.joint_map @ ends.mean(axis=0), 0.5 * (high - low)
-    reach = np.abs(robot.joint_map) @ half
-    return centre - reach, centre + reach
 
 
 def _joint(root, name: str, kind: str, parent: str, child: str, origin: Pose):

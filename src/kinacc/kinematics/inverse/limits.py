@@ -34,6 +34,20 @@ def dh_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     return lower, upper
 
 
+def cut_to_range(
+    robot: Robot,
+    low: np.ndarray,
+    high: np.ndarray,
+    range_rad: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """A box of reported joints (k,), (k,) cut to a range of DH joints where these are uncoupled."""
+    low, high = low.copy(), high.copy()
+    for joint in np.flatnonzero(uncoupled(robot)):
+        ends = [end[joint] / robot.joint_map[joint, joint] for end in range_rad]
+        low[joint], high[joint] = max(low[joint], min(ends)), min(high[joint], max(ends))
+    return low, high
+
+
 def uncoupled(robot: Robot) -> np.ndarray:
     """Whether a reported joint (k,) turns its own DH joint and no other, and is alone in that."""
     present = robot.joint_map != 0.0

@@ -41,6 +41,12 @@ class Robot:
         """DH joints (..., k) of reported joints (..., k); ``limits.reported_joints`` goes back."""
         return np.asarray(reported, dtype=float) @ self.joint_map.T
 
+    def dh_box(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ends (k,), (k,) of the DH joints over a box of reported joints (k,), (k,)."""
+        centre, half = 0.5 * (low + high), 0.5 * (high - low)
+        centre, half = self.joint_map @ centre, np.abs(self.joint_map) @ half
+        return centre - half, centre + half
+
 
 def forward(robot: Robot, q_rad: np.ndarray) -> Pose:
     """Flange poses (n, ...) in the arm's base frame at reported joints (n, k), nominal model."""

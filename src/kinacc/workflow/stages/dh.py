@@ -21,11 +21,11 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     options = shared.options(settings["calibration"], arm)
     every, train = shared.observed(inputs, arm)
     observations = every.select(train)
-    vec_frames = tables.frames_of(
-        inputs["vec_frames"], "vec", every.target_names, every.session_names
+    followed = models.Fit(
+        VECModel.from_columns(inputs["vec_model"], arm.dh.prismatic),
+        tables.frames_of(inputs["vec_frames"], "vec", every.target_names, every.session_names),
     )
-    volumetric = VECModel.from_columns(inputs["vec_model"], arm.dh.prismatic)
-    fitted = models.fit_dh(observations, arm.dh, options, volumetric, vec_frames)
+    fitted = models.fit_dh(observations, arm.dh, options, followed)
     nominal = models.fit_nominal(observations, arm.dh, options)
     frames = {"dh": fitted.frames, "nominal": nominal.frames}
     others = tables.frames_columns(frames, every.target_names, every.session_names)

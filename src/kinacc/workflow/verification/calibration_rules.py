@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinacc.artifacts.allowed import MODELS
 from kinacc.artifacts.columns import TURN_RAD
 from kinacc.errors import Problem
 from kinacc.workflow.verification.rule import TOLERANCE, Columns, Rule, Tables, mark
@@ -198,7 +199,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("vec_frames",), _unit_quaternions("vec_frames")),
     (("vec_frames", "measurements"), _frames("vec_frames", ("vec",))),
     (("frames",), _unit_quaternions("frames")),
-    (("frames", "measurements"), _frames("frames", ("vec", "dh", "nominal"))),
+    (("frames", "measurements"), _frames("frames", MODELS)),
     (("vec_frames", "frames"), _vec_frames_kept),
     (("vec_model",), _vec_model),
     (("vec_model", "measurements"), _every_joint("vec_model")),
