@@ -62,11 +62,17 @@ def test_one_value_of_the_configuration(project, change, reruns):
 @pytest.mark.parametrize(
     ("module", "reruns"),
     [
-        ("accuracy_map", {"mh180": {"accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS}),
+        (
+            "study/accuracy_map",
+            {"mh180": {"accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS},
+        ),
         ("figures/fig4", {"mh180": {"fig4"}, "own": {"fig4"}}),
         ("figures/save", {"mh180": FIGURES, "own": FIGURES - {"fig3"}}),
-        ("claims/numbers", {"mh180": {"claims"}, "own": {"claims"}}),
-        ("histories", {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")}),
+        ("study/claims/numbers", {"mh180": {"claims"}, "own": {"claims"}}),
+        (
+            "study/histories",
+            {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")},
+        ),
         ("calibration/vec_fit", None),
         ("geometry", None),
     ],
@@ -74,7 +80,7 @@ def test_one_value_of_the_configuration(project, change, reruns):
 def test_one_module_of_the_package(project, module, reruns):
     project.append(f"src/kinacc/{module}.py", "# changed")
     found = project.to_do()
-    if module == "accuracy_map":
+    if module == "study/accuracy_map":
         found = {"mh180": found["mh180"]}
     if module == "calibration/vec_fit":
         assert {"vec", "dh", "residuals"} <= found["mh180"]
@@ -111,7 +117,26 @@ def test_a_file_of_measurements_saved_again_unchanged(project):
 
 def test_a_robot_file(project):
     project.append("src/kinacc/kinematics/robots/mh180.yaml", "# changed")
-    assert project.to_do()["mh180"] >= {"measurements", "vec", "dh", "accuracy_map"}
+    reads = {"measurements", "vec", "dh", "residuals", "assessment_points", "fig2"}
+    found = project.to_do()
+    assert found["mh180"] == reads | {"accuracy_map"} | AFTER_DH
+    assert found["own"] == (reads | AFTER_DH) - WITHOUT_MAP
+
+
+def test_the_file_of_another_robot(project):
+    project.append("src/kinacc/kinematics/robots/ur10.yaml", "# changed")
+    (project.folder / "src/kinacc/kinematics/robots/new.yaml").write_text("name: new\n")
+    assert project.to_do() == {}
+
+
+def test_the_shipped_draws(project):
+    project.append("src/kinacc/synthetic/accepted_draws.csv", "# changed")
+    assert project.to_do()["mh180"] == ALL - {"fig1"}
+
+
+def test_the_schema_of_the_configuration_is_read_by_no_stage(project):
+    project.append("src/kinacc/config/schema.yaml", "# changed")
+    assert project.to_do() == {}
 
 
 def test_a_deleted_artefact_alone_is_remade(project):

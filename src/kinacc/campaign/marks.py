@@ -13,9 +13,9 @@ from kinacc.campaign.folder import Opened
 # An assessor answers by these modules; kinematics and readers hand it numbers.
 _ANSWERS = ("kinacc.assess.", "kinacc.distributions")
 
-# Marks of version 0.1.0 before its modules had moved into rooms, with Python 3.11, 3.12 and 3.13 and
-# the locked libraries. They held library versions, names of modules and readers of files as well; in
-# the assessors nothing changed meanwhile but imports and docstrings.
+# Marks of version 0.1.0 before its modules had moved into rooms, with Python 3.11, 3.12 and 3.13
+# and the locked libraries. They held library versions, names of modules and readers of files as
+# well; in the assessors nothing changed meanwhile but imports and docstrings.
 _BEFORE_ROOMS = frozenset(
     {
         "a16405ddfdb8c763",
@@ -77,10 +77,13 @@ def answers_alike(recorded: str | None, assessor: object) -> bool:
 
 def marks_of(opened: Opened) -> dict[str, object]:
     """Provenance: the plan counts as the configuration, the journal as the input."""
+    assessor = type(opened.plan.assessor).__module__
     return {
         "kinacc_version": __version__,
         "config_hash": opened.digest,
-        "code_hash": provenance.code_hash("kinacc.campaign.report", "kinacc.artifacts.store"),
+        "code_hash": provenance.code_hash(
+            "kinacc.campaign.report", assessor, "kinacc.artifacts.store"
+        ),
         "inputs_hash": opened.journal.last,
         "seed": opened.plan.seed,
     }

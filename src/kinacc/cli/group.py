@@ -286,7 +286,7 @@ def run_stage(
     from pathlib import Path
 
     from kinacc.workflow.plan import planned
-    from kinacc.workflow.runner import Job, execute
+    from kinacc.workflow.runner import execute
 
     plan = planned(config, results=results)
     names = list(plan.datasets)
@@ -311,21 +311,9 @@ def run_stage(
         raise InputError(absent, f"{stage.name} cannot be run")
     written: list[str] = []
     for each in parts if part is None else [part]:
-        outputs = plan.outputs(stage.name, dataset, each)
-        written += outputs.values()
-        execute(
-            Job(
-                stage.module,
-                inputs,
-                outputs,
-                plan.settings(stage.name, dataset),
-                plan.seed(dataset),
-                part=each,
-                label=" ".join(filter(None, [dataset, stage.name, each])),
-                log=plan.log(stage.name, dataset, each),
-            ),
-            bar=True,
-        )
+        job = plan.job(stage.name, dataset, each)
+        written += job.outputs.values()
+        execute(job, bar=True)
     return written
 
 

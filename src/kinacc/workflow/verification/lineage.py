@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 
+from kinacc.artifacts import provenance
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import STAGES, Stage
 from kinacc.workflow.plan import Plan
@@ -143,7 +144,7 @@ def _held_to_inputs(
         problems.append(Problem(where, what, expected[0]["config_hash"], _AGAIN))
     if plan is not None and own.get("seed") != str(seed):
         problems.append(Problem(where, f"seed {own.get('seed')}", str(seed), _AGAIN))
-    return problems, own.get("code_hash") == expected[0]["code_hash"]
+    return problems, own.get("code_hash") in _codes(stage, settings if plan else None)
 
 
 def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[Problem]:
@@ -164,6 +165,14 @@ def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[
 
 def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dict[str, object]:
     return stage_provenance(Job(stage.module, inputs, {}, settings, seed))
+
+
+def _codes(stage: Stage, settings: Mapping | None) -> set[str]:
+    """Hashes of the code installed; for every robot it may be where the settings are not known."""
+    from kinacc.kinematics import robot
+
+    known = [settings] if settings is not None else [{"robot": n} for n in ("", *robot.shipped())]
+    return {provenance.stage_code_hash(stage.module, stage.used(each)) for each in known}
 
 
 def _candidates(folder: Path, stage: Stage) -> list[Inputs]:
