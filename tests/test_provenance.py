@@ -3,6 +3,10 @@
 import ast
 import importlib.metadata
 import importlib.util
+import re
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -35,44 +39,61 @@ FILES = {
     "sub/data_reader.py": 'FILE = "numbers.csv"\n',
     "sub/numbers.csv": "1,2\n",
     "arms/small.yaml": "a: 1\n",
+    "arms/large.yaml": "a: 2\n",
     "arm.py": 'FOLDER = "arms"\n',
+    "registry.py": 'METHODS = {"first": "toy.methods.first:F", "other": "toy.methods.other:O"}\n',
+    "methods/__init__.py": "",
+    "methods/first.py": "from toy.methods import shared\n",
+    "methods/other.py": "import scipy\n",
+    "methods/shared.py": "",
+    "study.py": "from toy import registry\n",
 }
 
 
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    """The hash of a stage of a package that is read anew, with files replaced."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    write_package(tmp_path, FILES)
+
+    def hash_of(module: str, *uses: str, **changed: str) -> str:
+        root = write_package(tmp_path, changed.get("files", {}))
+        return provenance.code_hash(module, uses=uses, root=root)
+
+    yield hash_of
+    for name in [name for name in sys.modules if name.partition(".")[0] == "toy"]:
+        del sys.modules[name]
+
+
 @pytest.mark.parametrize(
-    ("changed", "module", "reruns"),
+    ("changed", "module", "uses", "reruns"),
     [
-        ("sub/three.py", "toy.one", True),
-        ("sub/__init__.py", "toy.one", True),
-        ("__init__.py", "toy.apart", True),
-        ("apart.py", "toy.one", False),
-        ("sub/three.py", "toy.apart", False),
-        ("sub/numbers.csv", "toy.apart", True),
-        ("sub/numbers.csv", "toy.one", False),
-        ("arms/small.yaml", "toy.arm", True),
-        ("arms/small.yaml", "toy.apart", False),
+        ("sub/three.py", "toy.one", (), True),
+        ("sub/__init__.py", "toy.one", (), True),
+        ("__init__.py", "toy.apart", (), True),
+        ("apart.py", "toy.one", (), False),
+        ("sub/three.py", "toy.apart", (), False),
+        ("sub/numbers.csv", "toy.apart", ("sub/numbers.csv",), True),
+        ("sub/numbers.csv", "toy.one", (), False),
+        ("arms/small.yaml", "toy.arm", ("arms/small.yaml",), True),
+        ("arms/large.yaml", "toy.arm", ("arms/small.yaml",), False),
+        ("methods/first.py", "toy.study", (), False),
+        ("methods/first.py", "toy.study", ("toy.registry:METHODS[first]",), True),
+        ("methods/shared.py", "toy.study", ("toy.registry:METHODS[first]",), True),
+        ("methods/other.py", "toy.study", ("toy.registry:METHODS[first]",), False),
+        ("methods/other.py", "toy.study", ("toy.registry:METHODS",), True),
+        ("registry.py", "toy.study", ("toy.registry:METHODS",), True),
     ],
 )
-def test_a_changed_file_changes_the_hash_of_what_uses_it_alone(tmp_path, changed, module, reruns):
-    root = write_package(tmp_path, FILES)
-    before = provenance.code_hash(module, root=root)
-    root = write_package(tmp_path, {changed: FILES[changed] + "\n# changed\n"})
-    assert (provenance.code_hash(module, root=root) != before) == reruns
+def test_a_changed_file_changes_the_hash_of_what_uses_it_alone(toy, changed, module, uses, reruns):
+    before = toy(module, *uses)
+    after = toy(module, *uses, files={changed: FILES[changed] + "\n# changed\n"})
+    assert (after != before) == reruns
 
 
-def test_a_module_that_a_registry_names_counts_where_the_registry_is_used(tmp_path):
-    files = {"listed.py": 'PLACES = {"own": "toy.own:Own"}\n', "own.py": "class Own: ...\n"}
-    root = write_package(tmp_path, files)
-    before = provenance.code_hash("toy.listed", root=root)
-    root = write_package(tmp_path, {"own.py": "class Own: ...\n\n# changed\n"})
-    assert provenance.code_hash("toy.listed", root=root) != before
-
-
-def test_a_new_robot_file_changes_what_reads_the_folder(tmp_path):
-    root = write_package(tmp_path, FILES)
-    before = provenance.code_hash("toy.arm", root=root)
-    root = write_package(tmp_path, {"arms/large.yaml": "a: 2\n"})
-    assert provenance.code_hash("toy.arm", root=root) != before
+def test_a_new_robot_file_changes_nothing_else(toy):
+    before = toy("toy.arm", "arms/small.yaml")
+    assert toy("toy.arm", "arms/small.yaml", files={"arms/new.yaml": "a: 3\n"}) == before
 
 
 def test_another_numpy_changes_the_hash_of_what_uses_numpy(tmp_path, monkeypatch):
@@ -106,24 +127,84 @@ def test_the_scan_finds_every_import_that_ast_finds(path):
     assert wanted <= provenance.imported_names(text, module, is_package)
 
 
-def test_every_data_file_of_the_package_is_named_by_a_module():
-    provenance.source_tree.cache_clear()
-    tree = provenance.source_tree()
-    named = frozenset().union(*tree.data.values())
+def declared(stage) -> set[str]:
+    """Package data files a stage declares, for every shipped robot."""
+    robots = [path.stem for path in (PACKAGE / "kinematics" / "robots").glob("*.yaml")]
+    return {use for name in robots for use in stage.used({"robot": name, "robots": {"": name}})}
+
+
+def test_every_data_file_of_the_package_is_declared_by_a_stage_or_is_the_schema():
     files = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*")
         if path.is_file() and path.suffix not in (".py", ".pyc", ".nbi", ".nbc")
     }
-    assert files == named
+    named = set().union(*map(declared, STAGES.values()))
+    assert files == {use for use in named if ":" not in use} | {"config/schema.yaml"}
+
+
+@pytest.mark.parametrize("stage", STAGES.values(), ids=lambda stage: stage.name)
+def test_every_setting_that_names_code_or_data_reaches_the_stage(stage):
+    keys = {key for use in stage.uses for key in re.findall(r"{(\w+)}", use)}
+    assert keys <= set(stage.settings)
+    assert (_LOADER in provenance.closure(stage.module)[0]) <= bool(keys)
+
+
+def test_settings_choose_what_a_stage_uses():
+    stage = replace(STAGES["dh"], uses=("a.csv", "{robot}.yaml", "a.b:C[{methods}]"))
+    assert stage.used({"robot": "x", "methods": ["m", "n"]}) == (
+        "a.csv", "x.yaml", "a.b:C[m]", "a.b:C[n]",
+    )  # fmt: skip
+    assert stage.used({"robot": "x", "methods": []}) == ("a.csv", "x.yaml", "a.b:C")
+    assert stage.used({"robot": {"one": "x", "two": "x"}}) == ("a.csv", "x.yaml")
+
+
+def test_stages_open_no_data_file_of_the_package_that_they_do_not_declare():
+    """What a small arm's stages really open, as the interpreter reports it."""
+    done = subprocess.run(
+        [sys.executable, "-c", _OPENED], capture_output=True, text=True, check=True
+    )
+    opened = {line.split()[0]: set(line.split()[1:]) for line in done.stdout.splitlines()}
+    assert opened["measurements"] == {
+        "kinematics/robots/mh180.yaml",
+        "synthetic/accepted_draws.csv",
+    }
+    for name, files in opened.items():
+        assert files <= set(STAGES[name].used({"robot": "mh180"})), name
+
+
+_LOADER = "kinacc.kinematics.robot.description"
+_OPENED = """
+import sys
+from pathlib import Path
+import kinacc
+from kinacc.config.schema import defaults
+from kinacc.workflow import in_memory
+package, opened = Path(kinacc.__file__).parent, set()
+def note(event, given):
+    path = Path(given[0]) if event == "open" and isinstance(given[0], str) else Path("/")
+    if path.suffix in (".yaml", ".csv") and path.is_relative_to(package):
+        opened.add(path.relative_to(package).as_posix())
+config = defaults() | {"robot": "mh180"}
+config["measurements"]["synthetic"]["poses"] = 120
+config["measurements"]["folds"] = None
+config["calibration"]["vec"]["order"] = 2
+config["evaluation"]["points"] = 12
+config["map"] |= {"slices_deg": [0], "grid_mm": 400}
+config["study"] |= {"noise_mm": [0.1], "repetitions": 1, "measurements": 20}
+config["histories"]["simulations_searched"] = 2
+sys.addaudithook(note)
+tables = {}
+for name in in_memory.RUNS:
+    opened.clear()
+    tables = in_memory.run([name], config, tables)
+    print(name, *opened)
+"""
 
 
 @pytest.mark.parametrize("stage", STAGES.values(), ids=lambda stage: stage.name)
 def test_every_module_a_stage_loads_counts_in_its_hash(stage):
     """What `import` really loads is within what the hash covers."""
-    import subprocess
-    import sys
-
     code = (
         f"import sys, {stage.module}\n"
         "print(*[name for name in sys.modules if name.partition('.')[0] == 'kinacc'])"

@@ -27,7 +27,7 @@ ON_EVERY_RUN = [
 
 @pytest.fixture
 def results(tmp_path, monkeypatch) -> SmallResults:
-    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "code")
+    monkeypatch.setattr(provenance, "stage_code_hash", lambda *_: "code")
     return SmallResults(tmp_path / "results")
 
 
@@ -352,7 +352,7 @@ def test_tables_of_two_versions_or_seeds(results, key):
 
 
 def test_other_code_than_that_installed_is_a_note(results, monkeypatch):
-    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "newer")
+    monkeypatch.setattr(provenance, "stage_code_hash", lambda *_: "newer")
     report = check.check_results(results.root)
     assert report.ok
     assert any("made with other code" in note for note in report.datasets[0].notes)
@@ -413,7 +413,7 @@ def plan():
 
 @pytest.fixture
 def planned_results(tmp_path, monkeypatch, plan):
-    monkeypatch.setattr(provenance, "stage_code_hash", lambda module: "code")
+    monkeypatch.setattr(provenance, "stage_code_hash", lambda *_: "code")
     return SmallResults(tmp_path / "results", plan)
 
 

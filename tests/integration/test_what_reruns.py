@@ -119,7 +119,26 @@ def test_a_file_of_measurements_saved_again_unchanged(project):
 
 def test_a_robot_file(project):
     project.append("src/kinacc/kinematics/robots/mh180.yaml", "# changed")
-    assert project.to_do()["mh180"] >= {"measurements", "vec", "dh", "accuracy_map"}
+    reads = {"measurements", "vec", "dh", "residuals", "assessment_points", "fig2"}
+    found = project.to_do()
+    assert found["mh180"] == reads | {"accuracy_map"} | AFTER_DH
+    assert found["own"] == (reads | AFTER_DH) - WITHOUT_MAP
+
+
+def test_the_file_of_another_robot(project):
+    project.append("src/kinacc/kinematics/robots/ur10.yaml", "# changed")
+    (project.folder / "src/kinacc/kinematics/robots/new.yaml").write_text("name: new\n")
+    assert project.to_do() == {}
+
+
+def test_the_shipped_draws(project):
+    project.append("src/kinacc/synthetic/accepted_draws.csv", "# changed")
+    assert project.to_do()["mh180"] == ALL - {"fig1"}
+
+
+def test_the_schema_of_the_configuration_is_read_by_no_stage(project):
+    project.append("src/kinacc/config/schema.yaml", "# changed")
+    assert project.to_do() == {}
 
 
 def test_a_deleted_artefact_alone_is_remade(project):

@@ -27,7 +27,7 @@ for stage in STAGES.values():
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             stage=stage.name,
-            code=plan.code(stage.name),
+            code=lambda w, name=stage.name: plan.code(name, w.dataset),
             part=part,
             contents=lambda w, name=stage.name: plan.contents(name, w.dataset),
             seed=lambda w: plan.seed(w.dataset),

@@ -7,6 +7,7 @@ stage, part = snakemake.params.stage, snakemake.params.get("part")
 execute(
     Job(
         STAGES[stage].module,
+        uses=STAGES[stage].used(snakemake.params.settings),
         inputs=dict(snakemake.input.items()),
         outputs=dict(snakemake.output.items()),
         settings=snakemake.params.settings,

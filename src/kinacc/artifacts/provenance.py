@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -22,41 +23,43 @@ _IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+(\.*[\w.]*)[ \t]+import[ \t]*(\([^)]*\)|[^\n#]+)|import[ \t]+([^\n#]+))",
     re.MULTILINE,
 )
-_PLACE = re.compile(r"""["']([\w.]+):\w+["']""")  # "module:Class" of a registry
-_TEXT = re.compile(r"""["']([\w./-]+)["']""")
+_REGISTRY = re.compile(r"([\w.]+):(\w+)(?:\[(\w+)\])?")
 
 
 @dataclass(frozen=True)
 class SourceTree:
-    """The files of one package: by file its content, by module what it runs, uses and names.
+    """The files of one package: by file its content, by module what it runs.
 
-    ``runs`` are modules of the package (an import runs the packages around a module as well),
-    ``libraries`` other packages installed under the name they are imported by, ``data`` package
-    data files.
+    ``digests`` hold modules by name and data files by their path in the package, ``runs`` modules
+    of the package (an import runs the packages around a module as well), ``libraries`` other
+    packages installed under the name they are imported by.
     """
 
     digests: Mapping[str, bytes]
     runs: Mapping[str, frozenset[str]]
     libraries: Mapping[str, frozenset[str]]
-    data: Mapping[str, frozenset[str]]
 
 
-def code_hash(*modules: str, alone: Iterable[str] = (), root: Path = PACKAGE) -> str:
+def code_hash(
+    *modules: str, uses: Iterable[str] = (), alone: Iterable[str] = (), root: Path = PACKAGE
+) -> str:
     """Hash of all that the results of modules can depend on besides their arguments.
 
     The modules, every module of the package these import directly or indirectly (imports inside
-    functions and the places of registries included), the package data files these name, the
-    versions of the libraries they use, and the Python minor version. ``alone`` are modules counted
-    without what they import.
+    functions included), what is declared in ``uses``, the versions of the libraries used, and the
+    Python minor version. ``uses`` are data files by their path in the package (one that is not
+    there does not count), or registries of modules, ``package.module:MAPPING`` for all that
+    a mapping of names to ``package.module:Object`` holds, ``package.module:MAPPING[name]`` for
+    one. ``alone`` are modules counted without what they import.
     """
     tree = source_tree(root)
-    names, libraries = set(alone), set[str]()
-    for module in modules:
+    names, libraries = set(alone), set()
+    named = [module for each in uses for module in _registered(each)]
+    for module in (*modules, *named):
         reached, used = closure(module, root)
         names |= reached
         libraries |= used
-    for name in tuple(names - set(alone)):
-        names |= tree.data[name]
+    names |= {each for each in uses if each in tree.digests}
     digest = hashlib.sha256(f"python {sys.version_info.major}.{sys.version_info.minor}\n".encode())
     for name in sorted(libraries):
         digest.update(f"{name} {_library_version(name)}\n".encode())
@@ -65,12 +68,15 @@ def code_hash(*modules: str, alone: Iterable[str] = (), root: Path = PACKAGE) ->
     return digest.hexdigest()[:16]
 
 
-def stage_code_hash(module: str) -> str:
-    """Hash of the code of a stage, of what reads and writes its files and of the runner."""
+def stage_code_hash(module: str, uses: Iterable[str] = ()) -> str:
+    """Hash of the code of a stage, of what reads and writes its files and of the runner.
+
+    ``uses`` is what the stage depends on beside what its module imports, see :func:`code_hash`.
+    """
     writers = ["kinacc.artifacts.store"]
     if "kinacc.figures" in closure(module)[0]:
         writers.append("kinacc.figures.save")
-    return code_hash(module, *writers, alone=("kinacc.workflow.runner",))
+    return code_hash(module, *writers, uses=uses, alone=("kinacc.workflow.runner",))
 
 
 @cache
@@ -95,25 +101,18 @@ def source_tree(root: Path = PACKAGE) -> SourceTree:
     files = sorted(path for path in root.rglob("*") if path.is_file() and _counts(path))
     modules = {_module_name(path, root): path for path in files if path.suffix == ".py"}
     data = {path.relative_to(root).as_posix(): path for path in files if path.suffix != ".py"}
-    packages = {path.parent for path in modules.values()}
-    labels = {
-        name: {path.name} | ({path.parent.name} if path.parent not in packages else set())
-        for name, path in data.items()
-    }
-    digests, runs, libraries, named = {}, {}, {}, {}
+    digests, runs, libraries = {}, {}, {}
     for name, path in modules.items():
         content = path.read_bytes()
-        text = content.decode("utf-8")
         digests[name] = hashlib.sha256(content).digest()
-        imported = imported_names(text, name, is_package=path.name == "__init__.py")
-        imported |= set(_PLACE.findall(text))  # what a registry may import when asked
+        text, is_package = content.decode("utf-8"), path.name == "__init__.py"
+        imported = imported_names(text, name, is_package)
         own = {each for full in (name, *imported) for each in _with_parents(full)}
         runs[name] = frozenset(own & modules.keys())
         libraries[name] = frozenset(own & _installed().keys() - {root.name})
-        named[name] = _data_named(text, labels)
     for name, path in data.items():
         digests[name] = hashlib.sha256(path.read_bytes()).digest()
-    return SourceTree(digests, runs, libraries, named)
+    return SourceTree(digests, runs, libraries)
 
 
 def source(module: str, root: Path = PACKAGE) -> str | None:
@@ -154,12 +153,14 @@ def inputs_hash(contents: Mapping[str, str]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _data_named(text: str, labels: Mapping[str, set[str]]) -> frozenset[str]:
-    """Package data files that a module mentions in a string, by name or by their own folder."""
-    quoted = _TEXT.findall(text)
-    words = {word for match in quoted for word in re.split(r"[/.]", match)}
-    words |= {match.rpartition("/")[2] for match in quoted}
-    return frozenset(name for name, own in labels.items() if own & words)
+def _registered(use: str) -> list[str]:
+    """Modules that a registry names; none where ``use`` is a data file."""
+    found = _REGISTRY.fullmatch(use)
+    if not found:
+        return []
+    module, mapping, name = found.groups()
+    registry = getattr(import_module(module), mapping)
+    return [registry[each].partition(":")[0] for each in ([name] if name else registry)]
 
 
 def _absolute(source: str, module: str, is_package: bool) -> str:

@@ -33,6 +33,11 @@ class Registry(Mapping[str, type]):
     def __len__(self) -> int:
         return len(self._entries)
 
+    @property
+    def places(self) -> dict[str, str]:
+        """``module:Class`` by name."""
+        return {name: each.place for name, each in self._entries.items()}
+
     def only(self, *, looks_back: bool) -> Registry:
         """Those of one interface."""
         kept = {name: each for name, each in self._entries.items() if each.looks_back == looks_back}
@@ -61,5 +66,6 @@ ASSESSORS = Registry(
         "search_and_confirm": Entry("kinacc.assess.search_and_confirm:SearchAndConfirm"),
     }
 )
+PLACES = ASSESSORS.places  # what code hashes go by
 ADAPTIVE = ASSESSORS.only(looks_back=False)
 RECOMMENDED = "search_and_confirm"

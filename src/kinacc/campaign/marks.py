@@ -78,10 +78,13 @@ def answers_alike(recorded: str | None, assessor: AdaptiveAssessor) -> bool:
 
 def marks_of(opened: Opened) -> dict[str, object]:
     """Provenance: the plan counts as the configuration, the journal as the input."""
+    assessor = type(opened.plan.assessor).__module__
     return {
         "kinacc_version": __version__,
         "config_hash": opened.digest,
-        "code_hash": provenance.code_hash("kinacc.campaign.report", "kinacc.artifacts.store"),
+        "code_hash": provenance.code_hash(
+            "kinacc.campaign.report", assessor, "kinacc.artifacts.store"
+        ),
         "inputs_hash": opened.journal.last,
         "seed": opened.plan.seed,
     }

@@ -82,7 +82,7 @@ def _run(
     """Run one stage of one data set and say what it wrote; InputError if it cannot be run."""
     # Here and not above: a stage says what it reads and leaves without a numerical library.
     from kinacc.workflow.plan import planned
-    from kinacc.workflow.runner import Job, execute
+    from kinacc.workflow.runner import execute
 
     plan = planned(config, results=results)
     names = list(plan.datasets)
@@ -100,6 +100,11 @@ def _run(
         for path in ([given] if isinstance(given, str) else given)
         if not Path(path).is_file()
     ]
+    absent += [
+        Problem(path, "no such file", fix=f"make it first: kinacc run {Path(path).stem}")
+        for path in plan.gates(stage.name, dataset)
+        if not Path(path).is_file()
+    ]
     parts = plan.part_names(stage.name, dataset)
     if part is not None and part not in parts:
         absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
@@ -107,19 +112,7 @@ def _run(
         raise InputError(absent, f"{stage.name} cannot be run")
     written: list[str] = []
     for each in parts if part is None else [part]:
-        outputs = plan.outputs(stage.name, dataset, each)
-        written += outputs.values()
-        execute(
-            Job(
-                stage.module,
-                inputs,
-                outputs,
-                plan.settings(stage.name, dataset),
-                plan.seed(dataset),
-                part=each,
-                label=" ".join(filter(None, [dataset, stage.name, each])),
-                log=plan.log(stage.name, dataset, each),
-            ),
-            bar=True,
-        )
+        job = plan.job(stage.name, dataset, each)
+        written += job.outputs.values()
+        execute(job, bar=True)
     return written

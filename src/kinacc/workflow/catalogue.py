@@ -6,6 +6,8 @@ costs nothing but the standard library.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 FIGURE_FOLDER = "figures"
@@ -18,6 +20,9 @@ class Stage:
     ``message`` says in words what it does. ``inputs`` and ``outputs`` are artefact names of the
     data set. ``settings`` are dotted key paths of the data set's configuration, ``files`` those
     whose values name files it reads; nothing else of the configuration reaches the stage.
+    ``uses`` are files of the package and registries of modules that its module does not import
+    (:func:`kinacc.artifacts.provenance.code_hash`); ``{robot}`` stands for the value, or each of
+    the values, of that setting.
     ``optional`` inputs are used by data sets that have them. ``after`` are artefacts that have to
     be there, where the data set has them, and are not read. ``scattered`` stages run once per
     part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
@@ -31,6 +36,7 @@ class Stage:
     outputs: tuple[str, ...]
     settings: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
     scattered: bool = False
@@ -43,12 +49,30 @@ class Stage:
         """Name of the module whose ``run`` does the work."""
         return f"kinacc.workflow.stages.{self.name}"
 
+    def used(self, settings: Mapping[str, object]) -> tuple[str, ...]:
+        """``uses`` with the values of settings put in; those of settings not given are left out.
+
+        A list of names that is empty stands for all names of a registry.
+        """
+        found: dict[str, None] = {}
+        for use in self.uses:
+            (key,) = re.findall(r"{(\w+)}", use) or ("",)
+            values = settings.get(key, ()) if key else ("",)
+            if key in settings and not values:
+                values, use = ("",), use.removesuffix(f"[{{{key}}}]")
+            values = values.values() if isinstance(values, Mapping) else values
+            values = [values] if isinstance(values, str) else values
+            found |= dict.fromkeys(use.replace(f"{{{key}}}", value) for value in values)
+        return tuple(found)
+
     @property
     def is_figure(self) -> bool:
         """Whether the stage draws a figure instead of making tables."""
         return self.name.startswith("fig")
 
 
+_ROBOT = "kinematics/robots/{robot}.yaml"
+_DRAWS = "synthetic/accepted_draws.csv"
 _MODELS = ("vec_model", "dh_model", "frames")
 
 STAGES: dict[str, Stage] = {
@@ -61,6 +85,7 @@ STAGES: dict[str, Stage] = {
             ("measurements", "robot"),
             ("seed", "robot", "measurements"),
             files=("robot", "measurements.file.path"),
+            uses=(_ROBOT, _DRAWS),
         ),
         Stage(
             "data_check",
@@ -69,6 +94,7 @@ STAGES: dict[str, Stage] = {
             ("data_check",),
             ("robot", "measurements", "calibration", "data_check"),
             files=("robot", "measurements.file.path"),
+            uses=(_ROBOT,),
             measured=True,
         ),
         Stage(
@@ -84,6 +110,7 @@ STAGES: dict[str, Stage] = {
                 "calibration.vec",
             ),
             files=("robot",),
+            uses=(_ROBOT,),
             after=("data_check",),
             shared=True,
         ),
@@ -100,6 +127,7 @@ STAGES: dict[str, Stage] = {
                 "calibration.dh",
             ),
             files=("robot",),
+            uses=(_ROBOT,),
             shared=True,
         ),
         Stage(
@@ -109,6 +137,7 @@ STAGES: dict[str, Stage] = {
             ("residuals", "pose_errors", "model_selection", "joint_bias", "worst_rows"),
             ("robot", "calibration"),
             files=("robot",),
+            uses=(_ROBOT,),
         ),
         Stage(
             "excluded_rows",
@@ -117,6 +146,7 @@ STAGES: dict[str, Stage] = {
             ("excluded_rows",),
             ("robot", "measurements"),
             files=("robot", "measurements.file.path"),
+            uses=(_ROBOT,),
             measured=True,
         ),
         Stage(
@@ -136,6 +166,7 @@ STAGES: dict[str, Stage] = {
                 "map",
             ),
             files=("robot",),
+            uses=(_ROBOT,),
         ),
         Stage(
             "assessment_points",
@@ -144,6 +175,7 @@ STAGES: dict[str, Stage] = {
             ("assessment_points",),
             ("robot", "evaluation"),
             files=("robot",),
+            uses=(_ROBOT,),
         ),
         Stage(
             "study_chunk",
@@ -197,6 +229,7 @@ STAGES: dict[str, Stage] = {
                 "evaluation.tool_mm",
             ),
             files=("robot",),
+            uses=(_ROBOT,),
         ),
         Stage(
             "fig3",
@@ -259,6 +292,7 @@ STAGES: dict[str, Stage] = {
                 "robustness",
             ),
             files=("robot",),
+            uses=(_ROBOT, _DRAWS),
             scattered=True,
             on_request=True,
             shared=True,

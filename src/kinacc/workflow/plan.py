@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, Stage, maker_of
+from kinacc.workflow.runner import Job
 
 RESULTS = "results"
 
@@ -222,9 +223,25 @@ class Plan:
             _copy({**config, "dataset": dataset}, chosen, path.split("."))
         return chosen
 
-    def code(self, name: str) -> str:
-        """Hash of all code a stage's results depend on."""
-        return stage_code_hash(STAGES[name].module)
+    def job(self, name: str, dataset: str, part: str | None = None) -> Job:
+        """One run of a stage, as a command carries it out."""
+        stage, settings = STAGES[name], self.settings(name, dataset)
+        return Job(
+            stage.module,
+            self.inputs(name, dataset),
+            self.outputs(name, dataset, part),
+            settings,
+            self.seed(dataset),
+            part,
+            label=" ".join(filter(None, [dataset, name, part])),
+            log=self.log(name, dataset, part),
+            uses=stage.used(settings),
+        )
+
+    def code(self, name: str, dataset: str) -> str:
+        """Hash of all code and package data a stage's results depend on."""
+        stage = STAGES[name]
+        return stage_code_hash(stage.module, stage.used(self.settings(name, dataset)))
 
     def seed(self, dataset: str) -> int:
         """Seed of the data set."""

@@ -31,7 +31,8 @@ class Job:
 
     ``inputs`` maps a role to a file, or to the files of a scattered artefact. ``outputs`` maps an
     artefact to its file, or a picture format to its file. ``settings`` are the configuration values
-    of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2").
+    of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2"), ``uses``
+    what its results depend on beside what its module imports.
     """
 
     module: str
@@ -42,6 +43,7 @@ class Job:
     part: str | None = None
     label: str = ""
     log: str | None = None
+    uses: tuple[str, ...] = ()
 
 
 def execute(job: Job, bar: bool = False) -> None:
@@ -86,7 +88,7 @@ def stage_provenance(job: Job) -> dict[str, object]:
     return {
         "kinacc_version": __version__,
         "config_hash": provenance.config_hash(job.settings),
-        "code_hash": provenance.stage_code_hash(job.module),
+        "code_hash": provenance.stage_code_hash(job.module, job.uses),
         "inputs_hash": provenance.inputs_hash(
             {name: _content(name, paths) for name, paths in job.inputs.items()}
         ),

@@ -105,7 +105,7 @@ class TournamentPlan:
 
     def code(self, job: Job) -> str:
         """Hash of all code the results of a job depend on."""
-        return stage_code_hash(job.module)
+        return stage_code_hash(job.module, ("kinacc.assess.registry:PLACES",))
 
     def check(self) -> None:
         """Raise InputError where a table of a data set is not there yet."""

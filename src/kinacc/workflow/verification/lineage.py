@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kinacc import __version__
+from kinacc.artifacts import provenance
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import STAGES, Stage, maker_of
 from kinacc.workflow.plan import Plan
@@ -175,7 +176,7 @@ def _held_to_inputs(folder: Path, stage: Stage, own: Mapping[str, str], plan: Pl
     if plan is not None and own.get("seed") != str(seed):
         problems.append(Problem(where, f"seed {own.get('seed')}", str(seed)))
     vouched = set(matching[0]) if matching and not problems else set()
-    is_current = own.get("code_hash") == expected[0]["code_hash"]
+    is_current = own.get("code_hash") in _codes(stage, settings if plan else None)
     return _Held(problems, vouched, set() if matching else artefacts, is_current)
 
 
@@ -197,6 +198,14 @@ def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[
 
 def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dict[str, object]:
     return stage_provenance(Job(stage.module, inputs, {}, settings, seed))
+
+
+def _codes(stage: Stage, settings: Mapping | None) -> set[str]:
+    """Hashes of the code installed; for every robot it may be where the settings are not known."""
+    from kinacc.kinematics import robot
+
+    known = [settings] if settings is not None else [{"robot": n} for n in ("", *robot.shipped())]
+    return {provenance.stage_code_hash(stage.module, stage.used(each)) for each in known}
 
 
 def _candidates(folder: Path, stage: Stage) -> list[Inputs]:
