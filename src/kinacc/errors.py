@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 
@@ -28,6 +28,16 @@ class Problem:
         return "; ".join(parts)
 
 
+def and_more(count: int) -> str:
+    """`` and 3 more``, or nothing where there is none."""
+    return f" and {count} more" if count > 0 else ""
+
+
+def first_few(items: Sequence, shown: int = 5) -> str:
+    """The first items, and how many there are beside them: ``2, 3, 5 and 4 more``."""
+    return ", ".join(map(str, items[:shown])) + and_more(len(items) - shown)
+
+
 _MOST_SHOWN = 100  # nobody reads more, and a file may hold a hundred thousand faults
 
 
@@ -48,7 +58,7 @@ class InputError(KinaccError):
         head = self.title or f"{count} problem{'s' if count != 1 else ''} in the input"
         lines = [f"  - {problem}" for problem in self.problems[:_MOST_SHOWN]]
         if count > _MOST_SHOWN:
-            lines.append(f"  - and {count - _MOST_SHOWN} more")
+            lines.append(f"  -{and_more(count - _MOST_SHOWN)}")
         return "\n".join([head, *lines])
 
 

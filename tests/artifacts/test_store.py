@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.artifacts import store
+from kinacc.artifacts.atomic import replacing
 from kinacc.artifacts.contract import PROVENANCE_KEYS, columns_of
 from kinacc.errors import InputError
 
@@ -148,7 +149,7 @@ def test_a_failure_while_writing_leaves_nothing_behind(tmp_path):
     paths = [tmp_path / "fig1.svg", tmp_path / "fig1.pdf"]
 
     def stopped_half_way():
-        with store.replacing(paths) as temporary:
+        with replacing(paths) as temporary:
             temporary[0].write_text("half")
             raise RuntimeError("power cut")
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -15,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from kinacc.artifacts.atomic import replacing
 from kinacc.artifacts.columns import (
     JOINTS_MAX,
     JOINTS_MIN,
@@ -25,7 +24,7 @@ from kinacc.artifacts.columns import (
     texts,
 )
 from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, first_few
 
 _ARROW_TYPES = {
     "float": pa.float64(),
@@ -133,27 +132,6 @@ def write_all(tables: Sequence[TableToWrite]) -> None:
     with replacing([Path(table.path) for table in tables]) as temporary:
         for each, place in zip(cast, temporary, strict=True):
             pq.write_table(each, place, compression="zstd", version="2.6")
-
-
-def unfinished(path: Path | str, process: int) -> Path:
-    """Where a process writes a file before it is whole."""
-    return Path(path).with_name(f".{Path(path).name}.{process}.partial")
-
-
-@contextmanager
-def replacing(paths: Sequence[Path | str]) -> Iterator[list[Path]]:
-    """Temporary paths beside ``paths``; renamed to them on success, removed on any failure."""
-    targets = [Path(path) for path in paths]
-    temporary = [unfinished(path, os.getpid()) for path in targets]
-    for path in targets:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        yield temporary
-        for source, target in zip(temporary, targets, strict=True):
-            os.replace(source, target)
-    finally:
-        for source in temporary:
-            source.unlink(missing_ok=True)
 
 
 def read(path: Path | str) -> Columns:
@@ -321,6 +299,4 @@ def _as_text(value: Any) -> Any:
 def rows(mask: np.ndarray) -> str:
     """The first rows (from 0) a mask marks, in words."""
     rows = np.flatnonzero(mask)
-    shown = ", ".join(str(row) for row in rows[:5])
-    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
-    return f"row{'s' if rows.size > 1 else ''} {shown}{more}"
+    return f"row{'s' if rows.size > 1 else ''} {first_few(rows)}"

@@ -14,7 +14,7 @@ from kinacc.campaign.plan import Limits, Plan, Points, candidates_of, fixed_visi
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.planning import travel
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, first_few
 from kinacc.geometry import compose, invert
 from kinacc.kinematics.inverse.limits import travel_unit
 
@@ -134,6 +134,4 @@ def _said(bad: np.ndarray, label: list[str], words: str) -> list[Problem]:
     rows = np.flatnonzero(bad)
     if not rows.size:
         return []
-    shown = ", ".join(label[i] for i in rows[:5])
-    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
-    return [Problem(f"candidates {shown}{more}", words)]
+    return [Problem(f"candidates {first_few([label[i] for i in rows])}", words)]

@@ -13,10 +13,11 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from kinacc.artifacts.atomic import synchronise, write_whole
 from kinacc.errors import InputError, Problem
 
 PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
@@ -76,7 +77,7 @@ def append(path: Path, known: Journal, entry: Mapping) -> None:
             file.flush()
             os.fsync(file.fileno())
         if fresh:
-            _sync_folder(path.parent)
+            synchronise(path.parent)
     except OSError as error:
         raise _not_written(path, error) from None
 
@@ -86,20 +87,10 @@ def create(path: Path, content: bytes) -> None:
 
     Raises InputError where the disk does not take it.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(part, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-        _sync_folder(path.parent)
+        write_whole(path, content, on_disk=True)
     except OSError as error:
         raise _not_written(path, error) from None
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -146,11 +137,3 @@ def _damaged(path: Path, number: int, what: str) -> InputError:
 def _not_written(path: Path, error: OSError) -> InputError:
     fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
     return InputError(Problem(str(path), f"cannot be written: {error.strerror}", fix=fix))
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

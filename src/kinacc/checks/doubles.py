@@ -6,6 +6,7 @@ import numpy as np
 
 from kinacc.checks.cells import Cells
 from kinacc.checks.suspicion import Suspicion, suspicion
+from kinacc.errors import first_few
 
 _CHANCE = 0.01  # expected number of coincidences above which equal readings say nothing
 
@@ -46,16 +47,15 @@ def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Suspicion]:
         return []
     first = equal[np.searchsorted(cells.line, again)] if np.all(np.diff(cells.line) >= 0) else None
     pairs = (
-        [f"line {line} repeats {of}" for line, of in zip(again[:4], first[:4], strict=True)]
+        [f"line {line} repeats {of}" for line, of in zip(again, first, strict=True)]
         if first is not None
-        else [f"line {line}" for line in again[:4]]
+        else [f"line {line}" for line in again]
     )
-    more = f" and {again.size - 4} more" if again.size > 4 else ""
     return [
         suspicion(
             "repeated_reading",
             f"{again.size} row{'s hold' if again.size > 1 else ' holds'} the reading of an earlier "
-            f"row, equal in every digit, at other joints: {', '.join(pairs)}{more}",
+            f"row, equal in every digit, at other joints: {first_few(pairs, 4)}",
             again,
             "the instrument was not read anew: measure them again, or exclude the rows",
         )

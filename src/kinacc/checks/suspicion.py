@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from kinacc.errors import and_more
+
 KINDS = {
     "outside_limits": "joints outside the robot's limits",
     "joint_units": "joints in another unit than stated",
@@ -87,5 +89,4 @@ def lines_in_words(lines: tuple[int, ...], shown: int = _RANGES_SHOWN) -> str:
     words = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
     text = ", ".join(words[:shown])
     rest = sum(len(run) for run in runs[shown:])
-    more = f" and {rest} more" if rest else ""
-    return f"line{'s' if len(lines) > 1 else ''} {text}{more}"
+    return f"line{'s' if len(lines) > 1 else ''} {text}{and_more(rest)}"

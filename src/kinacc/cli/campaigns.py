@@ -139,9 +139,10 @@ def status(given: Mapping) -> None:
 
 def write_report(given: Mapping) -> None:
     """Write tables, picture and text of a campaign."""
+    from kinacc.artifacts.atomic import write_whole
     from kinacc.artifacts.store import TableToWrite, write_all
     from kinacc.campaign import report
-    from kinacc.cli.sheet import check_output, write_whole
+    from kinacc.cli.sheet import check_output
     from kinacc.figures import campaign as drawing
     from kinacc.figures.save import write
     from kinacc.progress import reporting

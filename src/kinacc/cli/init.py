@@ -58,6 +58,7 @@ def init(measurement_file: str, **options) -> None:
       kinacc init tracker.csv --robot arm.urdf --orientation ZYX --out cell3 --yes
       kinacc init log.csv --take actual_q_0 --take X
     """
+    from kinacc.artifacts.atomic import replacing
     from kinacc.cli.init_questions import looked
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
@@ -77,9 +78,9 @@ def init(measurement_file: str, **options) -> None:
     if robot is not None:
         guess, report = _tried(guess, robots.load(robot), name)
     texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
-    folder.mkdir(parents=True, exist_ok=True)
-    for path, text in texts.items():
-        path.write_text(text, encoding="utf-8")
+    with replacing(list(texts)) as parts:
+        for part, text in zip(parts, texts.values(), strict=True):
+            part.write_text(text, encoding="utf-8")
     _tell(options["as_json"], guess, robot or own, chosen, report, list(texts), paths[0])
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.config.names import of_csv
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, first_few
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.layout import ROUNDED_MM, ROUNDED_RAD
@@ -119,14 +119,12 @@ def limit_problems(
         if bad.size:
             slides = robot.dh.prismatic[joint]
             factor, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
-            shown = ", ".join(str(each) for each in label[bad[:5]])
-            more = f" and {bad.size - 5} more" if bad.size > 5 else ""
             value = joints[bad[0], joint] * factor
             hint = ""
             if not slides and np.abs(joints[:, joint]).max() > 4.0 * np.pi:
                 hint = f"the column looks like degrees: name it q{joint + 1}_deg"
             allowed = f"{low * factor:g} to {high * factor:g} {unit} ({robot.name})"
-            place = f"{where}, q{joint + 1}, rows {shown}{more}"
+            place = f"{where}, q{joint + 1}, rows {first_few(label[bad])}"
             problems.append(Problem(place, f"{value:g} {unit}", allowed, hint))
     return problems
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.atomic import write_whole
 from kinacc.config.names import in_csv
 from kinacc.errors import InputError, Problem
 
@@ -121,18 +121,6 @@ def check_output(path: Path | str | None, force: bool, kinds: Sequence[str] = KI
         problems = [Problem(str(path), "is a folder", "a file")]
     if problems:
         raise InputError(problems, "Nothing was written")
-
-
-def write_whole(path: Path | str, content: bytes) -> None:
-    """Write a file so that it appears whole or not at all."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        part.write_bytes(content)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def number(value: float) -> str:

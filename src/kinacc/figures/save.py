@@ -6,13 +6,13 @@ Dates, versions and random identifiers are left out, fonts are embedded (PDF) or
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from kinacc.artifacts.atomic import replacing
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
 
@@ -53,16 +53,9 @@ def settle(figure: Figure) -> None:
 def write(figure: Figure, paths: Mapping[str, Path]) -> None:
     """Write one file per format; each appears whole, and none appears unless all rendered."""
     contents = render(figure, paths)
-    parts = {name: Path(path).with_name(f".{Path(path).name}.part") for name, path in paths.items()}
-    try:
-        for name, part in parts.items():
-            part.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(list(paths.values())) as parts:
+        for name, part in zip(paths, parts, strict=True):
             part.write_bytes(contents[name])
-        for name, part in parts.items():
-            os.replace(part, paths[name])
-    finally:
-        for part in parts.values():
-            part.unlink(missing_ok=True)
 
 
 def _bytes(figure: Figure, name: str) -> bytes:

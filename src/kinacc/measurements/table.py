@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, first_few
 
 _NOTHING = ("", "nan", "na", "n/a", "null", "none", "#n/a")
 _LONGEST_NOTHING = max(map(len, _NOTHING))
@@ -58,9 +58,7 @@ class RawTable:
 
     def rows_in_words(self, rows: np.ndarray) -> str:
         """Lines of the rows at indices ``rows``, the first few by number."""
-        lines = [str(self.line[row]) for row in rows[:_SHOWN]]
-        more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
-        return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
+        return f"line{'s' if len(rows) > 1 else ''} {first_few(self.line[rows], _SHOWN)}"
 
 
 def load(

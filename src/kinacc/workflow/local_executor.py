@@ -52,7 +52,7 @@ def _alone(job: Job) -> None:
 
 
 def _end(running: Iterable[tuple[Process, Job]]) -> None:
-    from kinacc.artifacts.store import unfinished
+    from kinacc.artifacts.atomic import unfinished
 
     for process, _ in running:
         process.kill()  # a compiled kernel would keep a politer signal waiting

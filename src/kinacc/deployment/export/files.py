@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts import store
+from kinacc.artifacts.atomic import replacing
 from kinacc.calibration import identified
 from kinacc.config import names
 from kinacc.deployment import folder as results
@@ -93,7 +94,7 @@ def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> l
     ]
     if there:
         raise InputError(there, "Nothing was written")
-    with store.replacing(paths) as temporary:
+    with replacing(paths) as temporary:
         for part, text in zip(temporary, made.values(), strict=True):
             part.write_text(text, encoding="utf-8")
     return [str(path) for path in paths]

@@ -1,0 +1,52 @@
+"""Files that appear whole or not at all: written under a temporary name, then renamed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+
+def unfinished(path: Path | str, process: int) -> Path:
+    """Where a process writes a file before it is whole."""
+    return Path(path).with_name(f".{Path(path).name}.{process}.partial")
+
+
+@contextmanager
+def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[list[Path]]:
+    """Temporary paths beside ``paths``; renamed to them on success, removed on any failure.
+
+    ``on_disk``: the files have reached the disk when this returns, and not only the system.
+    """
+    targets = [Path(path) for path in paths]
+    temporary = [unfinished(path, os.getpid()) for path in targets]
+    for path in targets:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        yield temporary
+        for source in temporary if on_disk else ():
+            synchronise(source)
+        for source, target in zip(temporary, targets, strict=True):
+            os.replace(source, target)
+        for folder in {target.parent for target in targets} if on_disk else ():
+            synchronise(folder)
+    finally:
+        for source in temporary:
+            with suppress(OSError):
+                source.unlink(missing_ok=True)
+
+
+def write_whole(path: Path | str, content: bytes, on_disk: bool = False) -> None:
+    """Write a file so that it appears whole or not at all; see ``replacing``."""
+    with replacing([path], on_disk) as (part,):
+        part.write_bytes(content)
+
+
+def synchronise(path: Path) -> None:
+    """Wait until what was written to a file, or named in a folder, is on disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
