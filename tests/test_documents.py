@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import click
@@ -12,7 +14,9 @@ import pytest
 from kinacc.cli.group import main
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
+PLACE = re.compile(r"`((?:src|tests|tools|workflow|docs|examples|benchmarks)/[\w./-]+)`")
+MODULE = re.compile(r"\bkinacc(?:\.[a-z_]\w*)+")
 LINK = re.compile(r"\]\(([^)#\s]+)")
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN = re.compile(r"^(?:\$ )?kinacc ([a-z][^\n]*)", re.MULTILINE)
@@ -22,6 +26,31 @@ SHOWN = re.compile(r"^(?:\$ )?kinacc ([a-z][^\n]*)", re.MULTILINE)
 def test_links_lead_to_files(page):
     inside = [link for link in LINK.findall(page.read_text()) if "://" not in link]
     assert [link for link in inside if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_that_are_named_are_there(page):
+    assert [place for place in PLACE.findall(page.read_text()) if not (ROOT / place).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_modules_that_are_named_are_there(page):
+    missing = []
+    for name in set(MODULE.findall(page.read_text())):
+        module, place = name, ROOT / "src" / Path(*name.split("."))
+        if not (place.is_dir() or place.with_suffix(".py").is_file()):
+            module, _, attribute = name.rpartition(".")
+            if not hasattr(importlib.import_module(module), attribute):
+                missing.append(name)
+    assert missing == []
+
+
+def test_the_map_of_the_house_names_every_room_in_its_order():
+    rooms = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    order = [name.strip() for layer in rooms["contracts"][0]["layers"] for name in layer.split("|")]
+    table = (ROOT / "CONTRIBUTING.md").read_text().partition("| room |")[2].partition("\n\n")[0]
+    rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    assert [name for row in rows for name in re.findall(r"`(\w+)`", row)] == order
 
 
 def shown_commands(page: Path) -> list[list[str]]:
