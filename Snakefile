@@ -1,4 +1,5 @@
 # configuration -> validate -> plan -> rules -> everything the data sets leave behind
+import os
 import re
 import shlex
 import sys
@@ -17,7 +18,9 @@ from kinacc.workflow.catalogue import STAGES
 from kinacc.workflow.plan import planned
 
 try:
-    plan = planned(workflow.configfiles or ["config.yaml"], workflow.config_settings.config)
+    # Started from a folder without a config.yaml, the study is that of this file's folder.
+    default = "config.yaml" if os.path.isfile("config.yaml") else f"{workflow.basedir}/config.yaml"
+    plan = planned(workflow.configfiles or [default], workflow.config_settings.config)
     plan.check_files()
 except InputError as error:
     raise WorkflowError(str(error)) from None

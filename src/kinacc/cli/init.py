@@ -310,7 +310,7 @@ def _dataset(
     how = _how(report).capitalize()
     note += [f"{how}: {words}." for words in guess.assumed.values()]
     note += [f"Not read: {', '.join(names)} ({why})." for names, why in guess.unused() if why]
-    check = f"kinacc check-data {shlex.quote(str(path))}"
+    check = shlex.join(["kinacc", "check-data", str(path)])
     note.append(f"Everything not given here is as in config.yaml.\n    {check}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
@@ -335,8 +335,10 @@ def _turned(guess: Guess) -> str:
 
 
 def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None:
-    file = shlex.quote(str(dataset))
-    commands = [f"kinacc check-data {file}", f"snakemake -c2 --configfile config.yaml {file}"]
+    from kinacc.workflow.verification.mending import base_config, workflow_command
+
+    workflow = workflow_command([*base_config(), str(dataset)])
+    commands = [shlex.join(["kinacc", "check-data", str(dataset)]), shlex.join(workflow)]
     if as_json:
         answer = {
             "written": [str(path) for path in written],

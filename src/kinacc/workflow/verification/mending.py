@@ -19,6 +19,8 @@ from kinacc.workflow.plan import RESULTS, Plan, planned
 
 CONFIG = "config.yaml"
 
+_PROJECT = Path(__file__).parents[3]
+
 Marks = Mapping[str, Mapping[str, str]]
 
 
@@ -63,7 +65,7 @@ def remedy(
 def workflow_command(configs: Sequence[str], folder: Path | str = ".") -> list[str]:
     """Words of the command that runs the workflow from here, with its results in ``folder``."""
     words, is_here = ["snakemake", "-c2"], os.path.samefile(folder, ".")
-    near, own = Path(folder) / "Snakefile", Path(__file__).parents[3] / "Snakefile"
+    near, own = Path(folder) / "Snakefile", _PROJECT / "Snakefile"
     if not is_here or (own.is_file() and not near.is_file()):
         words += ["-s", str(near if near.is_file() else own)]
     if not is_here:
@@ -71,6 +73,12 @@ def workflow_command(configs: Sequence[str], folder: Path | str = ".") -> list[s
     if configs and not (is_here and list(configs) == [CONFIG]):
         words += ["--configfile", *configs]
     return words
+
+
+def base_config() -> list[str]:
+    """The configuration below one's own: config.yaml here, else the project's, if there is one."""
+    found = [path for path in (Path(CONFIG), _PROJECT / CONFIG) if path.is_file()]
+    return [str(path) for path in found[:1]]
 
 
 def _snakemake(folder: Path, configs: Sequence[str], made: Sequence[str]) -> str:

@@ -1,0 +1,78 @@
+"""The workflow is started from a folder of one's own, which holds no copy of the project."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from kinacc.artifacts import store
+
+
+@pytest.fixture
+def cell(project, tmp_path) -> Path:
+    """A folder with a configuration and measurements alone; its name has a space in it."""
+    folder = tmp_path / "robot cell"
+    shutil.copytree(project.folder / "own data", folder / "own data")
+    shutil.copy(project.folder / "small.yaml", folder / "own.yaml")
+    return folder
+
+
+def started(project, folder: Path, command: list[str], ok: bool = True) -> str:
+    """Output of a command started in a folder, with the project's code."""
+    tools = Path(sys.executable).parent
+    settings = {"PATH": f"{tools}:{os.environ['PATH']}", "PYTHONPATH": str(project.folder / "src")}
+    done = subprocess.run(
+        command, cwd=folder, env=os.environ | settings, capture_output=True, text=True, check=False
+    )
+    text = done.stdout + done.stderr
+    assert (done.returncode == 0) == ok, text
+    assert "Traceback" not in text
+    return text
+
+
+def snakemake(project, *options: str) -> list[str]:
+    return ["snakemake", "-c2", "-s", str(project.folder / "Snakefile"), *options]
+
+
+def test_the_papers_study_is_the_default_from_any_folder(project, cell):
+    robot = "results/mh180/robot.parquet"
+    started(project, cell, snakemake(project, robot))
+    assert (cell / robot).is_file()
+    # A config.yaml of this folder goes before the project's.
+    (cell / "config.yaml").write_text("datasets: {here: {robot: mh180}}\n")
+    text = started(project, cell, snakemake(project, "-n", robot), ok=False)
+    assert "results/mh180/robot.parquet" in text
+    started(project, cell, snakemake(project, "-n", "results/here/robot.parquet"))
+
+
+@pytest.mark.parametrize("by", ["folder", "--directory"])
+def test_ones_own_data_are_calibrated_in_ones_own_folder(project, cell, by):
+    model = "results/own/dh_model.parquet"
+    base = str(project.folder / "config.yaml")
+    if by == "folder":
+        started(project, cell, snakemake(project, model, "--configfile", base, "own.yaml"))
+        again = started(project, cell, snakemake(project, model, "--configfile", base, "own.yaml"))
+    else:
+        command = ["snakemake", "-c2", model, "--directory", str(cell)]
+        command += ["--configfile", "config.yaml", str(cell / "own.yaml")]
+        started(project, project.folder, command)
+        again = started(project, project.folder, command)
+    assert "Nothing to be done" in again
+    found, known = (store.read(each / model)["d_mm"] for each in (cell, project.folder))
+    assert (found == known).all()
+
+
+def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
+    options = ["--robot", "mh180", "--yes", "--name", "ours", "--out", "my files"]
+    text = started(project, cell, ["kinacc", "init", "own data/poses.csv", *options])
+    check, run = (line.strip() for line in text.partition("next:")[2].strip().splitlines()[:2])
+    started(project, cell, ["sh", "-c", check])
+    assert "ours: reading" in started(project, cell, ["sh", "-c", f"{run} -n"])
+    # In the project itself the command is the plain one.
+    text = started(project, project.folder, ["kinacc", "init", "own data/poses.csv", *options[:-2]])
+    assert "  snakemake -c2 --configfile config.yaml ours.yaml" in text
