@@ -19,7 +19,7 @@ from kinacc.workflow.plan import RESULTS, Plan, planned
 
 CONFIG = "config.yaml"
 
-_PROJECT = Path(__file__).parents[3]
+_PROJECT = Path(__file__).parents[4]
 
 Marks = Mapping[str, Mapping[str, str]]
 
