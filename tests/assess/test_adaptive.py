@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from kinacc.artifacts.provenance import imported_names
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.coverage import companions, hardly_missed, records
 from kinacc.assess.error_effects import joint_errors
@@ -104,6 +106,17 @@ def test_asking_for_the_next_point_or_a_statement_changes_nothing(assessor):
             campaign.record(point, readings.reading_mm(point, int(reads[point])))
         reads[point] += 1
     assert repr(asked.statements()) == repr(other.statements())
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+def test_an_assessor_begins_with_what_it_says_it_needs_and_not_with_less(assessor):
+    sigma, arm = np.full(30, 0.1), arm_at(30)
+    needed = {name: arm[name] for name in assessor.needs}
+    assert conduct(assessor, world(), **needed).statements()
+    if needed:
+        with pytest.raises(InputError, match="needs to know the arm") as caught:
+            assessor.begin(Candidates.with_equal_noise(sigma))
+        assert len(caught.value.problems) == len(needed)
 
 
 @pytest.mark.parametrize("cls", BOUNDING)
@@ -352,6 +365,14 @@ def test_a_suspect_of_the_second_stage_is_known_by_its_new_readings_alone():
 def test_the_registry_names_the_recommended_assessor():
     assert RECOMMENDED in ADAPTIVE
     assert all(cls.name == name and cls.__doc__ for name, cls in ASSESSORS.items())
+
+
+def test_no_assessor_imports_another():
+    modules = {cls.__module__ for cls in ASSESSORS.values()}
+    assert len(modules) == len(ASSESSORS)
+    for name in modules:
+        text = Path(sys.modules[name].__file__).read_text(encoding="utf-8")
+        assert not (imported_names(text, name, is_package=False) & modules)
 
 
 def test_looking_through_the_registry_imports_no_assessor():

@@ -14,7 +14,7 @@ from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.outlier_rejection import OutlierRejection
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.registry import ASSESSORS
+from kinacc.assess.registry import ASSESSORS, LOOKING_BACK
 from kinacc.assess.world import drawn_world, measured_world
 from kinacc.errors import InputError
 from kinacc.study import monte_carlo
@@ -26,7 +26,7 @@ def shell(points: int, size_mm: float = 1.0) -> np.ndarray:
     return size_mm * error / np.linalg.norm(error, axis=1)[:, None]
 
 
-PAPER = ASSESSORS.only(looks_back=True)
+PAPER = {name: ASSESSORS[name] for name in LOOKING_BACK}
 
 
 def test_registry_names_each_assessor_as_its_tables_do():

@@ -8,12 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import (
-    AdaptiveAssessor,
-    Candidates,
-    LedgerCampaign,
-    check_budget,
-)
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
 from kinacc.assess.coverage import MISSING_PART, companions
 from kinacc.assess.kinematic_model import (
     Basis,

@@ -31,7 +31,7 @@ ASSESSORS: dict[str, type[Assessor]] = {
 }
 NM_PER_MM = 1_000_000
 VISITING_ORDERS = ("sequence", "shuffled")
-SWITCHES = ("outlier_rule", "distance", "covariance", "search")
+SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
 _SHUFFLE = 1  # keeps the key of the order apart from the key of the readings
 
 
