@@ -13,8 +13,8 @@ sys.modules.setdefault("pandas", None)
 sys.executable = shlex.quote(sys.executable)
 
 from kinacc.errors import InputError
-from kinacc.workflow.catalogue import STAGES
-from kinacc.workflow.plan import planned
+from kinacc.workflow.catalogue import STAGES, TOURNAMENT
+from kinacc.workflow.plan import label, planned
 
 try:
     plan = planned(workflow.configfiles or ["config.yaml"], workflow.config_settings.config)
@@ -40,7 +40,6 @@ rule all:
 
 
 include: "workflow/rules/stages.smk"
-include: "workflow/rules/tournament.smk"
 
 
 onsuccess:

@@ -2,29 +2,33 @@
 
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
+    folder = TOURNAMENT if stage.joint else "{dataset}"
 
     # What has to be there and is not read is `ancient`: a stage is not made anew when that is.
     rule:
         name:
             stage.name
         input:
-            ancient(lambda w, name=stage.name: plan.gates(name, w.dataset)),
-            unpack(lambda w, name=stage.name: plan.inputs(name, w.dataset)),
+            ancient(lambda w, name=stage.name: plan.gates(name, w.get("dataset", TOURNAMENT))),
+            unpack(lambda w, name=stage.name: plan.inputs(name, w.get("dataset", TOURNAMENT))),
         output:
-            **plan.outputs(stage.name, "{dataset}", part),
+            **plan.outputs(stage.name, folder, part),
         log:
-            plan.log(stage.name, "{dataset}", part),
+            plan.log(stage.name, folder, part),
         cache: stage.shared
         conda:
             "../envs/kinacc.yaml"
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             stage=stage.name,
-            code=lambda w, name=stage.name: plan.code(name, w.dataset),
+            code=lambda w, name=stage.name: plan.code(name, w.get("dataset", TOURNAMENT)),
             part=part,
-            contents=lambda w, name=stage.name: plan.contents(name, w.dataset),
-            seed=lambda w: plan.seed(w.dataset),
-            settings=lambda w, name=stage.name: plan.settings(name, w.dataset),
+            label=lambda w, name=stage.name: label(
+                name, w.get("dataset", TOURNAMENT), w.get("part")
+            ),
+            contents=lambda w, name=stage.name: plan.contents(name, w.get("dataset", TOURNAMENT)),
+            seed=lambda w: plan.seed(w.get("dataset", TOURNAMENT)),
+            settings=lambda w, name=stage.name: plan.settings(name, w.get("dataset", TOURNAMENT)),
         message:
             plan.message(stage.name)
         script:
@@ -37,3 +41,10 @@ rule robustness:
         [plan.targets(dataset, on_request=True) for dataset in plan.datasets],
     message:
         "how often each claim holds on further draws of the arm is in robustness.parquet"
+
+
+rule tournament:
+    input:
+        list(plan.outputs("tournament_tables", TOURNAMENT).values()),
+    message:
+        "the verdicts on every assessor are in tournament_verdicts.parquet"

@@ -24,7 +24,7 @@ from kinacc.cli.plan_poses import plan_poses
 from kinacc.cli.predict import predict
 from kinacc.cli.tournament import tournament
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import STAGES, Stage, maker_of
+from kinacc.workflow.catalogue import STAGES, Stage
 
 CONFIG = "config.yaml"
 SECTIONS = {
@@ -261,7 +261,8 @@ def _help(stage: Stage) -> str:
 
 
 for _stage in STAGES.values():
-    run.add_command(_stage_command(_stage))
+    if not _stage.joint:  # the tournament has a command of its own
+        run.add_command(_stage_command(_stage))
 main.add_command(init)
 main.add_command(check_data)
 main.add_command(predict)
@@ -283,10 +284,8 @@ def run_stage(
     part: str | None = None,
 ) -> list[str]:
     """Run one stage of one data set and say what it wrote; InputError if it cannot be run."""
-    from pathlib import Path
-
+    from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.plan import planned
-    from kinacc.workflow.runner import execute
 
     plan = planned(config, results=results)
     names = list(plan.datasets)
@@ -297,24 +296,14 @@ def run_stage(
     if stage.name in plan.left_out(dataset):
         what = f"the data set cannot go through it: {plan.left_out(dataset)[stage.name]}"
         raise InputError(Problem(f"{dataset}, {stage.name}", what))
-    inputs = plan.inputs(stage.name, dataset)
-    absent = [
-        Problem(path, "no such file", fix=f"make it first: kinacc run {maker_of(name).name}")
-        for name, given in inputs.items()
-        for path in ([given] if isinstance(given, str) else given)
-        if not Path(path).is_file()
-    ]
+    absent = plan.absent(stage.name, dataset)
     parts = plan.part_names(stage.name, dataset)
     if part is not None and part not in parts:
         absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
     if absent:
         raise InputError(absent, f"{stage.name} cannot be run")
-    written: list[str] = []
-    for each in parts if part is None else [part]:
-        job = plan.job(stage.name, dataset, each)
-        written += job.outputs.values()
-        execute(job, bar=True)
-    return written
+    jobs = [plan.job(stage.name, dataset, each) for each in (parts if part is None else [part])]
+    return [path for job in execute_all(jobs) for path in job.outputs.values()]
 
 
 if __name__ == "__main__":
