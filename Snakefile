@@ -14,8 +14,8 @@ sys.modules.setdefault("pandas", None)
 sys.executable = shlex.quote(sys.executable)
 
 from kinacc.errors import InputError
-from kinacc.workflow.catalogue import STAGES
-from kinacc.workflow.plan import planned
+from kinacc.workflow.catalogue import STAGES, TOURNAMENT
+from kinacc.workflow.plan import label, planned
 
 try:
     # Started from a folder without a config.yaml, the study is that of this file's folder.
@@ -43,7 +43,6 @@ rule all:
 
 
 include: "workflow/rules/stages.smk"
-include: "workflow/rules/tournament.smk"
 
 
 onsuccess:

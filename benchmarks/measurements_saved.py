@@ -17,9 +17,9 @@ import numpy as np
 from kinacc.study.tournament.contest import Cell, Job, campaigns
 from kinacc.study.tournament.fields import Field, of_tables
 from kinacc.study.tournament.summary import summed
+from kinacc.workflow.catalogue import TOURNAMENT
 from kinacc.workflow.plan import planned
 from kinacc.workflow.runner import read_inputs
-from kinacc.workflow.tournament_plan import tournament_plan
 
 CANDIDATES, SHARE, SEED, CAMPAIGNS = 200, 0.6, 1, 40
 NOISE_MM = (0.05, 0.1, 0.2, 0.3)
@@ -28,8 +28,8 @@ WHOLE, ADAPTIVE = "single_shot", ("search_and_confirm", "sequential", "two_stage
 
 def measured(configs: list[str]) -> list[Field]:
     """The error fields of all measured data sets of the configurations."""
-    contest = tournament_plan(planned(configs))
-    found = of_tables(read_inputs(contest.inputs), contest.settings["robots"], ())
+    job = planned(configs).job("tournament_chunk", TOURNAMENT, "1-of-1")
+    found = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
     return [field for field in found if field.kind == "measured"]
 
 

@@ -44,7 +44,7 @@ def artifacts_markdown() -> str:
 def _section(artefact: Artefact) -> str:
     makers = [stage for stage in STAGES.values() if artefact.name in stage.outputs]
     made = f" Made by stage `{makers[0].name}`." if makers else ""
-    if artefact.name == "tournament_chunk" or (makers and makers[0].scattered):
+    if makers and makers[0].scattered:
         made += f" One file per part, `{artefact.name}/<part>-of-<parts>.parquet`."
     if makers and makers[0].on_request:
         made += " Made on request."

@@ -108,7 +108,7 @@ def test_one_row_of_a_file_of_measurements(project):
     fields[6] = f"{float(fields[6]) + 0.01:.9f}"
     lines[7] = ",".join(fields)
     path.write_text("\n".join(lines) + "\n")
-    assert project.to_do() == {"own": ALL - WITHOUT_MAP - {"fig1"} | {"data_check"}}
+    assert project.to_do() == {"own": (ALL | {"data_check"}) - WITHOUT_MAP - {"fig1"}}
 
 
 def test_a_file_of_measurements_saved_again_unchanged(project):
@@ -122,7 +122,7 @@ def test_a_robot_file(project):
     reads = {"measurements", "vec", "dh", "residuals", "assessment_points", "fig2"}
     found = project.to_do()
     assert found["mh180"] == reads | {"accuracy_map"} | AFTER_DH
-    assert found["own"] == (reads | AFTER_DH) - WITHOUT_MAP
+    assert found["own"] == (reads | {"data_check"} | AFTER_DH) - WITHOUT_MAP
 
 
 def test_the_file_of_another_robot(project):

@@ -5,7 +5,7 @@ import pytest
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
-from kinacc.workflow.catalogue import STAGES, maker_of
+from kinacc.workflow.catalogue import STAGES, TOURNAMENT, maker_of
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.stages import histories, study, study_chunk
 
@@ -46,6 +46,8 @@ seed: 11
 def test_every_setting_a_stage_names_is_in_the_configuration():
     known = defaults() | {"dataset": "", "robot": ""}
     for stage in STAGES.values():
+        if stage.joint:
+            continue
         for path in (*stage.settings, *stage.files):
             section = known
             for key in path.split("."):
@@ -110,6 +112,39 @@ def test_no_more_parts_than_repetitions_or_draws(plan_of):
     assert plan.part_names("study_chunk", "arm") == ["1-of-2", "2-of-2"]
     assert plan.part_names("robustness_chunk", "arm") == ["1-of-1"]
     assert plan.part_names("study", "arm") == [None]
+
+
+def test_the_tournament_reads_tables_of_every_data_set_by_where_its_errors_come_from(
+    plan_of, tmp_path
+):
+    (tmp_path / "two.csv").touch()
+    plan = plan_of(f"""
+tournament: {{chunks: 2}}
+datasets:
+  two:
+    robot: mh180
+    evaluation: {{space: measured}}
+    measurements:
+      source: file
+      file: {{path: "{tmp_path}/two.csv", source: a test, orientation: {{kind: none}}}}
+""").contest(noise_mm=(0.1,))
+    inputs = plan.inputs("tournament_tables", TOURNAMENT)
+    assert inputs["tournament_chunk"] == [
+        f"results/tournament/tournament_chunk/{part}-of-2.parquet" for part in (1, 2)
+    ]
+    assert set(inputs) == {
+        "arm/assessment_points",
+        "two/pose_errors",
+        "two/measurements",
+        "tournament_chunk",
+    }
+    assert plan.settings("tournament_chunk", TOURNAMENT) == {
+        "seed": plan.seed("arm"),
+        "size": "default",
+        "assessors": [],
+        "noise_mm": [0.1],
+        "robots": {"arm": "mh180", "two": "mh180"},
+    }
 
 
 def test_other_picture_formats_for_one_data_set_are_refused(plan_of):

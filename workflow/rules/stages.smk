@@ -9,29 +9,37 @@ def further_draws():
 
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
+    folder = TOURNAMENT if stage.joint else "{dataset}"
 
     # What has to be there and is not read is `ancient`: a stage is not made anew when that is.
     rule:
         name:
             stage.name
         input:
-            ancient(lambda w, name=stage.name: plan.gates(name, w.dataset)),
-            unpack(lambda w, name=stage.name: plan.inputs(name, w.dataset, further_draws())),
+            ancient(lambda w, name=stage.name: plan.gates(name, w.get("dataset", TOURNAMENT))),
+            unpack(
+                lambda w, name=stage.name: plan.inputs(
+                    name, w.get("dataset", TOURNAMENT), further_draws()
+                )
+            ),
         output:
-            **plan.outputs(stage.name, "{dataset}", part),
+            **plan.outputs(stage.name, folder, part),
         log:
-            plan.log(stage.name, "{dataset}", part),
+            plan.log(stage.name, folder, part),
         cache: stage.shared
         conda:
             "../envs/kinacc.yaml"
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             stage=stage.name,
-            code=lambda w, name=stage.name: plan.code(name, w.dataset),
+            code=lambda w, name=stage.name: plan.code(name, w.get("dataset", TOURNAMENT)),
             part=part,
-            contents=lambda w, name=stage.name: plan.contents(name, w.dataset),
-            seed=lambda w: plan.seed(w.dataset),
-            settings=lambda w, name=stage.name: plan.settings(name, w.dataset),
+            label=lambda w, name=stage.name: label(
+                name, w.get("dataset", TOURNAMENT), w.get("part")
+            ),
+            contents=lambda w, name=stage.name: plan.contents(name, w.get("dataset", TOURNAMENT)),
+            seed=lambda w: plan.seed(w.get("dataset", TOURNAMENT)),
+            settings=lambda w, name=stage.name: plan.settings(name, w.get("dataset", TOURNAMENT)),
         message:
             plan.message(stage.name)
         script:
@@ -44,3 +52,10 @@ rule robustness:
         [plan.targets(dataset, on_request=True) for dataset in plan.datasets],
     message:
         "every table and figure is up to date, and robustness.parquet with the claims on further draws"
+
+
+rule tournament:
+    input:
+        list(plan.outputs("tournament_tables", TOURNAMENT).values()),
+    message:
+        "the verdicts on every assessor are in tournament_verdicts.parquet"

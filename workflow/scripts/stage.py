@@ -13,7 +13,7 @@ execute(
         settings=snakemake.params.settings,
         seed=snakemake.params.seed,
         part=part,
-        label=" ".join(filter(None, [snakemake.wildcards.dataset, stage, part])),
+        label=snakemake.params.label,
         log=snakemake.log[0],
     )
 )

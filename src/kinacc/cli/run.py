@@ -10,7 +10,7 @@ import click
 from kinacc.cli.choice import CONFIG
 from kinacc.cli.group import Lazy
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import STAGES, Stage, maker_of
+from kinacc.workflow.catalogue import STAGES, Stage
 
 
 def _stage_command(name: str) -> click.Command:
@@ -50,7 +50,9 @@ def _stage_command(name: str) -> click.Command:
 
 @click.group(
     cls=Lazy,
-    sections={"Commands": {name: stage.message for name, stage in STAGES.items()}},
+    sections={  # the tournament has a command of its own
+        "Commands": {n: stage.message for n, stage in STAGES.items() if not stage.joint}
+    },
     make=_stage_command,
 )
 def run() -> None:
@@ -81,8 +83,8 @@ def _run(
 ) -> list[str]:
     """Run one stage of one data set and say what it wrote; InputError if it cannot be run."""
     # Here and not above: a stage says what it reads and leaves without a numerical library.
+    from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.plan import planned
-    from kinacc.workflow.runner import execute
 
     plan = planned(config, results=results)
     names = list(plan.datasets)
@@ -93,13 +95,7 @@ def _run(
     if stage.name in plan.left_out(dataset):
         what = f"the data set cannot go through it: {plan.left_out(dataset)[stage.name]}"
         raise InputError(Problem(f"{dataset}, {stage.name}", what))
-    inputs = plan.inputs(stage.name, dataset)
-    absent = [
-        Problem(path, "no such file", fix=f"make it first: kinacc run {maker_of(name).name}")
-        for name, given in inputs.items()
-        for path in ([given] if isinstance(given, str) else given)
-        if not Path(path).is_file()
-    ]
+    absent = plan.absent(stage.name, dataset)
     absent += [
         Problem(path, "no such file", fix=f"make it first: kinacc run {Path(path).stem}")
         for path in plan.gates(stage.name, dataset)
@@ -110,9 +106,5 @@ def _run(
         absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
     if absent:
         raise InputError(absent, f"{stage.name} cannot be run")
-    written: list[str] = []
-    for each in parts if part is None else [part]:
-        job = plan.job(stage.name, dataset, each)
-        written += job.outputs.values()
-        execute(job, bar=True)
-    return written
+    jobs = [plan.job(stage.name, dataset, each) for each in (parts if part is None else [part])]
+    return [path for job in execute_all(jobs) for path in job.outputs.values()]

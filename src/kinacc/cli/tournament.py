@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import click
-
-if TYPE_CHECKING:
-    from kinacc.workflow.runner import Job
 
 
 @click.command("tournament")
@@ -45,29 +41,34 @@ def tournament(
       kinacc tournament --size full --parts 200 --part 7-of-200
     """
     from kinacc.errors import InputError, Problem
+    from kinacc.workflow.catalogue import TOURNAMENT
+    from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.plan import planned
-    from kinacc.workflow.runner import execute
-    from kinacc.workflow.tournament_plan import is_done, tournament_plan
+    from kinacc.workflow.runner import execute, is_done
 
-    chosen = planned(config or ("config.yaml",), results=results)
-    contest = tournament_plan(chosen, size, parts, assessor, noise_mm)
-    contest.check()
-    names = contest.part_names
+    plan = planned(config or ("config.yaml",), results=results)
+    plan = plan.contest(size, parts, assessor, noise_mm)
+    absent = plan.absent("tournament_chunk", TOURNAMENT)
+    if absent:
+        raise InputError(absent, "the tournament lacks tables of the data sets")
+    names = plan.part_names("tournament_chunk", TOURNAMENT)
     if part is not None and part not in names:
         raise InputError(Problem("--part", repr(part), f"{names[0]} to {names[-1]}"))
-    waiting = [contest.chunk_job(name) for name in ([part] if part else names)]
+    wanted = [part] if part else names
+    waiting = [plan.job("tournament_chunk", TOURNAMENT, name) for name in wanted]
     left = [job for job in waiting if not is_done(job)]
     if len(left) < len(waiting):
         click.echo(f"{len(waiting) - len(left)} of {len(waiting)} parts are there", err=True)
     finished = len(waiting) - len(left)
     try:
-        for job in _carried_out(left, cores):
+        for job in execute_all(left, cores):
             finished += 1
             if len(left) > 1 and cores > 1:
                 click.echo(f"{job.label}: done, {finished} of {len(waiting)}", err=True)
         if part is not None:
             return
-        execute(contest.tables_job(), bar=True)
+        gathering = plan.job("tournament_tables", TOURNAMENT)
+        execute(gathering, bar=True)
     except KeyboardInterrupt:
         click.echo(
             f"tournament: {finished} of {len(waiting)} parts are done and kept; the same command "
@@ -75,33 +76,19 @@ def tournament(
             err=True,
         )
         raise
-    _tell(contest.outputs, _times(contest) if times else {}, as_json)
+    _tell(gathering.outputs, _times(waiting[0]) if times else {}, as_json)
 
 
-def _carried_out(jobs: Sequence[Job], cores: int) -> Iterator[Job]:
-    """Run the jobs and yield each when it is done."""
-    if cores == 1 or len(jobs) < 2:
-        from kinacc.workflow.runner import execute
-
-        for job in jobs:
-            execute(job, bar=True)
-            yield job
-        return
-    from kinacc.workflow.local_executor import execute_all
-
-    yield from execute_all(jobs, cores)
-
-
-def _times(contest) -> dict[str, float]:
+def _times(job) -> dict[str, float]:
     """Milliseconds of a campaign by assessor; no table holds them, for they differ by the hour."""
     from kinacc.study.tournament.contest import CONTESTANTS, SIZES, jobs, times_ms
     from kinacc.study.tournament.fields import of_tables
     from kinacc.workflow.runner import read_inputs
 
-    fields = of_tables(read_inputs(contest.inputs), contest.settings["robots"], ())
-    work = jobs(fields, SIZES[contest.size])
-    job = next((each for each in work if each.budget == 200), work[-1])
-    return times_ms(job, contest.seed, contest.assessors or CONTESTANTS)
+    fields = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
+    work = jobs(fields, SIZES[job.settings["size"]])
+    cell = next((each for each in work if each.budget == 200), work[-1])
+    return times_ms(cell, job.seed, job.settings["assessors"] or CONTESTANTS)
 
 
 def _tell(outputs: Mapping[str, str], times: dict[str, float], as_json: bool) -> None:

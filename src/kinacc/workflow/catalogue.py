@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 FIGURE_FOLDER = "figures"
+TOURNAMENT = "tournament"  # folder of the joint stages, a name no data set can have
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class Stage:
     be there, where the data set has them, and are not read. ``scattered`` stages run once per
     part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
     part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file;
+    ``joint`` ones are about all data sets at once and have a folder of their own: they read the
+    ``inputs`` of every data set (``measured_inputs`` where it is measured) and of joint stages;
     ``shared`` ones take long enough to be kept for other folders (Snakemake's cache).
     """
 
@@ -42,6 +45,8 @@ class Stage:
     scattered: bool = False
     on_request: bool = False
     measured: bool = False
+    joint: bool = False
+    measured_inputs: tuple[str, ...] = ()
     shared: bool = False
 
     @property
@@ -73,6 +78,8 @@ class Stage:
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
 _DRAWS = "synthetic/accepted_draws.csv"
+_CONTEST = ("seed", "size", "assessors", "noise_mm", "robots")
+_FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
 _MODELS = ("vec_model", "dh_model", "frames")
 
 STAGES: dict[str, Stage] = {
@@ -303,6 +310,31 @@ STAGES: dict[str, Stage] = {
             ("robustness_chunk",),
             ("robustness",),
             on_request=True,
+        ),
+        Stage(
+            "tournament_chunk",
+            "campaigns of every assessor",
+            ("assessment_points",),
+            ("tournament_chunk",),
+            _CONTEST,
+            files=("robot",),
+            uses=(*_FIELDS, "kinacc.assess.registry:PLACES[{assessors}]"),
+            scattered=True,
+            on_request=True,
+            joint=True,
+            measured_inputs=("pose_errors", "measurements"),
+        ),
+        Stage(
+            "tournament_tables",
+            "gathering the cells and judging every assessor",
+            ("assessment_points", "tournament_chunk"),
+            ("tournament_cells", "tournament_verdicts", "tournament_fields"),
+            _CONTEST,
+            files=("robot",),
+            uses=_FIELDS,
+            on_request=True,
+            joint=True,
+            measured_inputs=("pose_errors", "measurements", "tournament_chunk"),
         ),
     )
 }

@@ -1,4 +1,4 @@
-"""Jobs in processes of their own, several at a time, none of which outlives the command."""
+"""Jobs of a command: one after another, or several at a time in processes that it outlives."""
 
 from __future__ import annotations
 
@@ -13,12 +13,18 @@ from kinacc.workflow.runner import Job, execute
 _STOPS = (signal.SIGINT, signal.SIGTERM)
 
 
-def execute_all(jobs: Sequence[Job], cores: int) -> Iterator[Job]:
+def execute_all(jobs: Sequence[Job], cores: int = 1) -> Iterator[Job]:
     """Run jobs, at most ``cores`` at a time, and yield each when it is done.
 
-    However the iteration ends, also by Ctrl-C, processes still at work are ended at once, and what
-    they had begun to write is removed. Raises SystemExit where a job fails, which it says itself.
+    On one core, and a job alone, in this process, with a bar of its progress. However the iteration
+    ends, also by Ctrl-C, processes still at work are ended at once, and what they had begun to
+    write is removed. Raises SystemExit where a job fails, which it says itself.
     """
+    if cores == 1 or len(jobs) < 2:
+        for job in jobs:
+            execute(job, bar=True)
+            yield job
+        return
     waiting = list(jobs)[::-1]
     running: dict[int, tuple[Process, Job]] = {}
     try:

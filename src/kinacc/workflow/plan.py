@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, Stage, maker_of
+from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, TOURNAMENT, Stage, maker_of
 from kinacc.workflow.runner import Job
 
 RESULTS = "results"
@@ -74,10 +74,44 @@ class Plan:
     results: str = RESULTS
     tournament: Mapping[str, object] = field(default_factory=dict)
 
+    def contest(
+        self,
+        size: str | None = None,
+        parts: int | None = None,
+        assessors: Sequence[str] = (),
+        noise_mm: Sequence[float] = (),
+    ) -> Plan:
+        """The plan with another tournament; what is not given is as configured.
+
+        ``size`` is a name of the sizes of :mod:`kinacc.study.tournament.contest`; ``parts`` has no
+        influence on the results; ``assessors`` are those that take part, all if empty; ``noise_mm``
+        is the only noise simulated, all of the size if empty. Raises InputError for an assessor
+        that does not exist.
+        """
+        if assessors:
+            from kinacc.study.tournament.contest import CONTESTANTS
+
+            allowed = ", ".join(CONTESTANTS)
+            problems = [
+                Problem(f"assessor {name}", "unknown", allowed)
+                for name in assessors
+                if name not in CONTESTANTS
+            ]
+            if problems:
+                raise InputError(problems)
+            assessors = [name for name in CONTESTANTS if name in assessors]
+        given = {"size": size, "chunks": parts, "assessors": assessors, "noise_mm": noise_mm}
+        own = {name: value for name, value in given.items() if value}
+        return replace(self, tournament={**self.tournament, **own})
+
     def stages(self, dataset: str) -> dict[str, Stage]:
-        """The stages a data set goes through, in order."""
+        """The stages a data set, or the tournament, goes through, in order."""
+        if dataset == TOURNAMENT:
+            return {name: stage for name, stage in STAGES.items() if stage.joint}
         missing = self.left_out(dataset)
-        return {name: stage for name, stage in STAGES.items() if name not in missing}
+        return {
+            name: stage for name, stage in STAGES.items() if name not in missing and not stage.joint
+        }
 
     def left_out(self, dataset: str) -> dict[str, str]:
         """Stages a data set cannot go through, each with the reason."""
@@ -115,6 +149,8 @@ class Plan:
         where ``on_request`` says that this run makes it.
         """
         stage = STAGES[name]
+        if stage.joint:
+            return self._joint_inputs(stage)
         available = {
             made
             for each in self.stages(dataset).values()
@@ -122,15 +158,17 @@ class Plan:
             if each.on_request <= on_request or os.path.exists(self._table(made, dataset))
         }
         wanted = (*stage.inputs, *(extra for extra in stage.optional if extra in available))
-        found: dict[str, str | list[str]] = {}
-        for artefact in wanted:
-            maker = maker_of(artefact)
-            paths = [
-                self._table(artefact, dataset, part)
-                for part in self.part_names(maker.name, dataset)
-            ]
-            found[artefact] = paths if maker.scattered else paths[0]
-        return found | self._files(stage, self.datasets[dataset])
+        found = {artefact: self._made(artefact, dataset) for artefact in wanted}
+        return found | self._files(stage, dataset)
+
+    def absent(self, name: str, dataset: str) -> list[Problem]:
+        """Files a stage reads that are not there."""
+        return [
+            Problem(path, "no such file", fix=_fix(role, len(self.datasets) > 1 and dataset))
+            for role, given in self.inputs(name, dataset).items()
+            for path in ([given] if isinstance(given, str) else given)
+            if not os.path.isfile(path)
+        ]
 
     def gates(self, name: str, dataset: str) -> list[str]:
         """Tables that have to be there before a stage runs, and that it does not read."""
@@ -139,10 +177,7 @@ class Plan:
 
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""
-        return {
-            role: file_hash(path)
-            for role, path in self._files(STAGES[name], self.datasets[dataset]).items()
-        }
+        return {role: file_hash(path) for role, path in self._files(STAGES[name], dataset).items()}
 
     def check_files(self) -> None:
         """Read every measured file that is newer than its table, or read by other settings.
@@ -152,7 +187,7 @@ class Plan:
         """
         problems: list[Problem] = []
         for dataset, config in self.datasets.items():
-            path = self._files(STAGES["measurements"], config).get("measurements_file")
+            path = self._files(STAGES["measurements"], dataset).get("measurements_file")
             table = self._table("measurements", dataset)
             settings = self.settings("measurements", dataset)
             if path is None or _is_current(table, path, settings):
@@ -198,19 +233,19 @@ class Plan:
         """Names of the parts a stage is computed in: 1-of-2, 2-of-2; None where it is whole."""
         if not STAGES[name].scattered:
             return [None]
-        config = self.datasets[dataset]
-        items = (
-            config["robustness"]["draws"]
-            if "robustness" in name
-            else config["study"]["repetitions"]
-        )
-        count = min(self.parts[dataset], items)
+        if STAGES[name].joint:
+            count = self.tournament["chunks"]
+        else:
+            config = self.datasets[dataset]
+            draws, repetitions = config["robustness"]["draws"], config["study"]["repetitions"]
+            count = min(self.parts[dataset], draws if "robustness" in name else repetitions)
         return [f"{number}-of-{count}" for number in range(1, count + 1)]
 
     def message(self, name: str) -> str:
         """What the stage is doing, for a Snakemake rule or with the wildcards put in."""
         part = ", part {wildcards.part}" if STAGES[name].scattered else ""
-        return f"{{wildcards.dataset}}: {STAGES[name].message}{part}"
+        whose = TOURNAMENT if STAGES[name].joint else "{wildcards.dataset}"
+        return f"{whose}: {STAGES[name].message}{part}"
 
     def log(self, name: str, dataset: str, part: str | None = None) -> str:
         """Log file of a stage."""
@@ -218,7 +253,7 @@ class Plan:
 
     def settings(self, name: str, dataset: str) -> dict[str, object]:
         """The configuration values a stage depends on, nested as in the configuration."""
-        config, chosen = self.datasets[dataset], {}
+        config, chosen = self._config(dataset), {}
         for path in STAGES[name].settings:
             _copy({**config, "dataset": dataset}, chosen, path.split("."))
         return chosen
@@ -233,7 +268,7 @@ class Plan:
             settings,
             self.seed(dataset),
             part,
-            label=" ".join(filter(None, [dataset, name, part])),
+            label=label(name, dataset, part),
             log=self.log(name, dataset, part),
             uses=stage.used(settings),
         )
@@ -244,16 +279,54 @@ class Plan:
         return stage_code_hash(stage.module, stage.used(self.settings(name, dataset)))
 
     def seed(self, dataset: str) -> int:
-        """Seed of the data set."""
-        return self.datasets[dataset]["seed"]
+        """Seed of the data set; the tournament has that of the first one."""
+        return self._config(dataset)["seed"]
+
+    def _config(self, dataset: str) -> Mapping[str, object]:
+        """Configuration of a data set, or what the tournament depends on beside tables."""
+        if dataset != TOURNAMENT:
+            return self.datasets[dataset]
+        chosen = {name: list(self.tournament.get(name, ())) for name in ("assessors", "noise_mm")}
+        return {
+            "seed": next(iter(self.datasets.values()))["seed"],
+            "size": self.tournament["size"],
+            "robots": {name: config["robot"] for name, config in self.datasets.items()},
+            **chosen,
+        }
+
+    def _joint_inputs(self, stage: Stage) -> dict[str, str | list[str]]:
+        """Tables of every data set, ``<data set>/<artefact>``, its robot files, joint tables."""
+        found: dict[str, str | list[str]] = {}
+        for dataset, config in self.datasets.items():
+            measured = config["measurements"]["source"] == "file"
+            for artefact in stage.measured_inputs if measured else stage.inputs:
+                if maker_of(artefact).joint:
+                    found[artefact] = self._made(artefact, TOURNAMENT)
+                else:
+                    found[f"{dataset}/{artefact}"] = self._made(artefact, dataset)
+        return found | self._files(stage, TOURNAMENT)
+
+    def _made(self, artefact: str, dataset: str) -> str | list[str]:
+        """File of a table, or files of the parts of one that is scattered."""
+        maker = maker_of(artefact)
+        paths = [
+            self._table(artefact, dataset, part) for part in self.part_names(maker.name, dataset)
+        ]
+        return paths if maker.scattered else paths[0]
 
     def _table(self, artefact: str, dataset: str, part: str | None = None) -> str:
         folder = f"{self.results}/{dataset}"
         return f"{folder}/{artefact}/{part}.parquet" if part else f"{folder}/{artefact}.parquet"
 
-    @staticmethod
-    def _files(stage: Stage, config: Mapping[str, object]) -> dict[str, str]:
-        found = {}
+    def _files(self, stage: Stage, dataset: str) -> dict[str, str]:
+        """Files from outside by role; for the tournament ``<data set>/<role>``."""
+        if dataset == TOURNAMENT:
+            return {
+                f"{name}/{role}": path
+                for name in self.datasets
+                for role, path in self._files(stage, name).items()
+            }
+        config, found = self.datasets[dataset], {}
         for path in stage.files:
             value: object = config
             for key in path.split("."):
@@ -268,6 +341,22 @@ class Plan:
             elif value is not None and config["measurements"]["source"] == "file":
                 found["measurements_file"] = value
         return found
+
+
+def label(name: str, dataset: str, part: str | None = None) -> str:
+    """What lines on screen about one run of a stage begin with."""
+    return " ".join(filter(None, [dataset, None if STAGES[name].joint else name, part]))
+
+
+def _fix(role: str, dataset: str | bool) -> str:
+    """What makes the file of a role, ``<artefact>`` or ``<data set>/<artefact>``."""
+    whose, _, artefact = role.rpartition("/")
+    if artefact.endswith("_file"):
+        return "check the path"
+    if artefact == "tournament_chunk":
+        return "make it first: kinacc tournament"
+    where = f" --dataset {whose or dataset}" if whose or dataset else ""
+    return f"make it first: kinacc run {maker_of(artefact).name}{where}"
 
 
 def _is_current(table: str, path: str, settings: Mapping[str, object]) -> bool:

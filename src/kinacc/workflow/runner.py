@@ -96,6 +96,22 @@ def stage_provenance(job: Job) -> dict[str, object]:
     }
 
 
+def is_done(job: Job) -> bool:
+    """Whether the files of a job are there, whole, made from the same inputs, settings and code."""
+    from kinacc.artifacts.contract import ARTEFACTS
+    from kinacc.artifacts.store import read_metadata
+    from kinacc.workflow.verification.conformity import check_file
+
+    wanted = {name: str(value) for name, value in stage_provenance(job).items()}
+    try:
+        return all(
+            read_metadata(path) == wanted and not check_file(Path(path), ARTEFACTS[name])[1]
+            for name, path in job.outputs.items()
+        )
+    except InputError:
+        return False
+
+
 def read_inputs(inputs: Paths) -> dict[str, object]:
     """Columns of every Parquet input; scattered ones joined in order; other files as paths."""
     from kinacc.artifacts.store import read
