@@ -12,7 +12,7 @@ import numpy as np
 from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
-from kinacc.kinematics.robot import Robot
+from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.layout import ROUNDED_MM, ROUNDED_RAD
 from kinacc.measurements.table import RawTable, load, numbers
 from kinacc.measurements.written_numbers import numbers_of
@@ -113,19 +113,12 @@ def limit_problems(
 ) -> list[Problem]:
     """A problem for every joint of which a row lies outside the robot's limits."""
     problems = []
-    for joint in range(joints.shape[1]):
-        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
-        bad = np.flatnonzero((joints[:, joint] < low - 1e-9) | (joints[:, joint] > high + 1e-9))
-        if bad.size:
-            slides = robot.dh.prismatic[joint]
-            factor, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
-            value = joints[bad[0], joint] * factor
-            hint = ""
-            if not slides and np.abs(joints[:, joint]).max() > 4.0 * np.pi:
-                hint = f"the column looks like degrees: name it q{joint + 1}_deg"
-            allowed = f"{low * factor:g} to {high * factor:g} {unit} ({robot.name})"
-            place = f"{where}, q{joint + 1}, rows {first_few(label[bad])}"
-            problems.append(Problem(place, f"{value:g} {unit}", allowed, hint))
+    for each in outside_limits(robot, joints, 1e-9):
+        name = f"q{each.joint}"
+        hint = f"the column looks like degrees: name it {name}_deg"
+        place = f"{where}, {name}, rows {first_few(label[each.rows])}"
+        what = f"{each.values[0]:g} {each.unit}"
+        problems.append(Problem(place, what, each.allowed, hint if each.looks_like_degrees else ""))
     return problems
 
 

@@ -4,7 +4,14 @@ A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
 """
 
 from kinacc.kinematics.robot.description import files, load, of_text, shipped
-from kinacc.kinematics.robot.record import Robot, carried, dh_angles, forward, in_own_units
+from kinacc.kinematics.robot.record import (
+    Robot,
+    carried,
+    dh_angles,
+    forward,
+    in_own_units,
+    outside_limits,
+)
 from kinacc.kinematics.robot.written import as_yaml
 
 __all__ = [
@@ -17,5 +24,6 @@ __all__ = [
     "in_own_units",
     "load",
     "of_text",
+    "outside_limits",
     "shipped",
 ]
