@@ -17,6 +17,7 @@ from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.geometry import compose, invert
 from kinacc.kinematics.inverse.limits import travel_unit
+from kinacc.kinematics.robot import outside_limits
 
 _ROUTED = 400  # points beyond which the route is built in stretches of so many
 
@@ -117,21 +118,17 @@ def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 def _outside(arm: Calibration, joints: np.ndarray, label: list[str]) -> list[Problem]:
     robot = arm.robot
-    problems = []
-    for joint in range(joints.shape[1]):
-        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
-        bad = (joints[:, joint] < low - 1e-9) | (joints[:, joint] > high + 1e-9)
-        problems += _said(bad, label, f"joint {joint + 1} outside the limits of {robot.name}")
+    problems = [
+        _said(each.rows, label, f"joint {each.joint} outside the limits of {robot.name}")
+        for each in outside_limits(robot, joints, 1e-9)
+    ]
     if arm.model.domain is not None:
         outside = arm.outside_range(robot.dh_joints(joints))
         for joint in np.flatnonzero(outside.any(axis=0)):
             words = f"joint {joint + 1} outside the range the data cover: no prediction"
-            problems += _said(outside[:, joint], label, words)
+            problems.append(_said(np.flatnonzero(outside[:, joint]), label, words))
     return problems
 
 
-def _said(bad: np.ndarray, label: list[str], words: str) -> list[Problem]:
-    rows = np.flatnonzero(bad)
-    if not rows.size:
-        return []
-    return [Problem(f"candidates {first_few([label[i] for i in rows])}", words)]
+def _said(rows: np.ndarray, label: list[str], words: str) -> Problem:
+    return Problem(f"candidates {first_few([label[i] for i in rows])}", words)

@@ -27,8 +27,8 @@ from kinacc.checks.fitting import Fitted, Jump
 from kinacc.checks.report import Report
 from kinacc.checks.suspicion import Suspicion, suspicion
 from kinacc.errors import InputError, Problem
-from kinacc.kinematics.robot import Robot
-from kinacc.measurements.faults import beyond
+from kinacc.kinematics.robot import Robot, outside_limits
+from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import Reading, read
 
@@ -301,21 +301,17 @@ def _commanded(fitted: Fitted, reading: Reading, raw: rows.Raw, first, robot: Ro
 def _outside(every: Cells, robot: Robot) -> list[Suspicion]:
     """Rows in which a joint is beyond its limits."""
     found = []
-    for joint in range(robot.dh.joints):
-        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
-        off = beyond(every.q[:, joint], low, high)
-        if off.size:
-            unit, word = (1.0, "mm") if robot.dh.prismatic[joint] else (np.pi / 180.0, "deg")
-            worst = every.q[off, joint][np.argmax(np.abs(every.q[off, joint]))]
-            found.append(
-                suspicion(
-                    "outside_limits",
-                    f"joint {joint + 1} reaches {worst / unit:.4g} {word}, its limits are "
-                    f"{low / unit:g} to {high / unit:g} {word} ({robot.name})",
-                    every.line[off],
-                    "check the rows, or the limits of the robot's description",
-                )
+    for each in outside_limits(robot, every.q, LIMIT_SLACK):
+        worst = each.values[np.argmax(np.abs(each.values))]
+        found.append(
+            suspicion(
+                "outside_limits",
+                f"joint {each.joint} reaches {worst:.4g} {each.unit}, its limits are "
+                f"{each.allowed}",
+                every.line[each.rows],
+                "check the rows, or the limits of the robot's description",
             )
+        )
     return found
 
 

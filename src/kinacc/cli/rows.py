@@ -12,13 +12,21 @@ import numpy as np
 from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
-from kinacc.kinematics.robot import Robot
-from kinacc.measurements.layout import ROUNDED_MM, ROUNDED_RAD
+from kinacc.kinematics.robot import Robot, outside_limits
+from kinacc.measurements.layout import (
+    ANGLE,
+    LENGTH,
+    PURE,
+    ROUNDED_MM,
+    ROUNDED_RAD,
+    Place,
+    columns_of_quantity,
+    listed,
+    names_of,
+)
 from kinacc.measurements.table import RawTable, load, numbers
 from kinacc.measurements.written_numbers import numbers_of
 
-ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
-LENGTH = {"mm": 1.0, "m": 1e3}
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
 _HEAD = 1_000_000  # characters of a line looked at
@@ -113,19 +121,12 @@ def limit_problems(
 ) -> list[Problem]:
     """A problem for every joint of which a row lies outside the robot's limits."""
     problems = []
-    for joint in range(joints.shape[1]):
-        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
-        bad = np.flatnonzero((joints[:, joint] < low - 1e-9) | (joints[:, joint] > high + 1e-9))
-        if bad.size:
-            slides = robot.dh.prismatic[joint]
-            factor, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
-            value = joints[bad[0], joint] * factor
-            hint = ""
-            if not slides and np.abs(joints[:, joint]).max() > 4.0 * np.pi:
-                hint = f"the column looks like degrees: name it q{joint + 1}_deg"
-            allowed = f"{low * factor:g} to {high * factor:g} {unit} ({robot.name})"
-            place = f"{where}, q{joint + 1}, rows {first_few(label[bad])}"
-            problems.append(Problem(place, f"{value:g} {unit}", allowed, hint))
+    for each in outside_limits(robot, joints, 1e-9):
+        name = f"q{each.joint}"
+        hint = f"the column looks like degrees: name it {name}_deg"
+        place = f"{where}, {name}, rows {first_few(label[each.rows])}"
+        what = f"{each.values[0]:g} {each.unit}"
+        problems.append(Problem(place, what, each.allowed, hint if each.looks_like_degrees else ""))
     return problems
 
 
@@ -143,36 +144,30 @@ class Reader:
 
     def group(self, names: list[str], units: list[dict], needed: bool) -> np.ndarray | None:
         """Columns (n, m) of quantities that come together, or None where none is there."""
-        found = [self._columns(name, own) for name, own in zip(names, units, strict=True)]
+        found = [
+            columns_of_quantity(self.table, name, own)
+            for name, own in zip(names, units, strict=True)
+        ]
         present = [bool(each) for each in found]
         if not any(present) and not needed:
             return None
         for name, own, there in zip(names, units, present, strict=True):
             if not there:
-                where = f"{self.table.path}: column {_names(name, own)}"
-                listed = "the file has " + ", ".join(self.table.columns)
-                self.problems.append(Problem(where, "is missing", fix=listed))
+                where = f"{self.table.path}: column {' or '.join(names_of(name, own))}"
+                self.problems.append(Problem(where, "is missing", fix=listed(self.table)))
         if not all(present):
             return None
         rounded = [ROUNDED_MM if own is LENGTH else ROUNDED_RAD for own in units]
         return np.stack([self._one(*each) for each in zip(names, found, rounded, strict=True)], 1)
 
-    def _columns(self, name: str, units: dict) -> dict[str, float]:
-        """Columns that hold a quantity, each with the factor of its unit."""
-        return {
-            each: factor
-            for unit, factor in units.items()
-            if (each := f"{name}_{unit}" if unit else name) in self.table.columns
-        }
-
-    def _one(self, name: str, columns: dict[str, float], rounded: float) -> np.ndarray:
+    def _one(self, name: str, places: list[Place], rounded: float) -> np.ndarray:
         """Values (n,) of a quantity; all columns it is given in have to say the same."""
-        self.used.update(columns)
         values = {
-            column: numbers(self.table, column, self.cells) * factor
-            for column, factor in columns.items()
+            each.column: numbers(self.table, each.column, self.cells) * each.factor
+            for each in places
         }
-        first, *others = columns
+        self.used.update(values)
+        first, *others = values
         value = values[first]
         for other in others:
             apart = np.flatnonzero(np.abs(value - values[other]) > rounded)
@@ -188,7 +183,7 @@ class Reader:
 
     def directions(self, joints: int) -> np.ndarray | None:
         names = [f"s{i + 1}" for i in range(joints)]
-        s = self.group(names, [{"": 1.0}] * joints, False)
+        s = self.group(names, [PURE] * joints, False)
         if s is not None and not np.isin(s, (-1, 0, 1)).all():
             where = f"{self.table.path}: columns s1 .. s{joints}"
             self.problems.append(Problem(where, "a value is no direction", "-1, 0 or 1"))
@@ -196,7 +191,7 @@ class Reader:
 
     def pose(self) -> Pose | None:
         position = self.group(["x", "y", "z"], [LENGTH] * 3, True)
-        quaternion = self.group(["qw", "qx", "qy", "qz"], [{"": 1.0}] * 4, False)
+        quaternion = self.group(["qw", "qx", "qy", "qz"], [PURE] * 4, False)
         vector = self.group(["rvx", "rvy", "rvz"], [ANGLE] * 3, False)
         euler = self.group(["rx", "ry", "rz"], [ANGLE] * 3, False)
         given = [each is not None for each in (quaternion, vector, euler)]
@@ -282,10 +277,6 @@ def _with_units(table: RawTable) -> RawTable:
         return whole if is_joint and whole not in table.columns else name
 
     return replace(table, columns={called(name): each for name, each in table.columns.items()})
-
-
-def _names(name: str, units: dict) -> str:
-    return " or ".join(f"{name}_{unit}" if unit else name for unit in units)
 
 
 def say_unused(given: Rows) -> None:

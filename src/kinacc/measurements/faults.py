@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kinacc.errors import Problem
-from kinacc.kinematics.robot import Robot, forward
+from kinacc.kinematics.robot import Robot, forward, outside_limits
 from kinacc.measurements.layout import Place
 from kinacc.measurements.table import RawTable
 
 _UNIT_QUATERNION = 1e-3  # how far from 1 a measured quaternion's length may be
+LIMIT_SLACK = 1e-6  # a joint may be beyond its limits by the last written digit
 _CORRELATION = 1.0 + 1e-6  # a correlation may exceed 1 by rounding only
 
 
@@ -69,28 +70,14 @@ def limit_problems(
 ) -> list[Problem]:
     """Joint positions (n, k) beyond the robot's limits."""
     problems = []
-    slides = robot.dh.prismatic
-    for joint, place in enumerate(places):
-        low, high = robot.q_min_rad[joint], robot.q_max_rad[joint]
-        values = q_rad[:, joint]
-        bad = beyond(values, low, high)
-        if bad.size:
-            unit = 1.0 if slides[joint] else np.pi / 180.0
-            limits = f"{low / unit:g} to {high / unit:g} {'mm' if slides[joint] else 'deg'}"
-            hint = ""
-            if place.factor == 1.0 and np.max(np.abs(values)) > 4.0 * np.pi and not slides[joint]:
-                hint = "the column looks like degrees"
-            value = f"{values[bad[0]] / place.factor:g}"
-            where = f"{table.path}: column {place.column}, {table.rows_in_words(bad)}"
-            what = f"{value} is outside the joint limits"
-            problems.append(Problem(where, what, f"{limits} ({robot.name})", hint))
+    for each in outside_limits(robot, q_rad, LIMIT_SLACK):
+        place = places[each.joint - 1]
+        in_file = q_rad[each.rows[0], each.joint - 1] / place.factor
+        hint = "the column looks like degrees" if place.factor == 1.0 else ""
+        where = f"{table.path}: column {place.column}, {table.rows_in_words(each.rows)}"
+        what = f"{in_file:g} is outside the joint limits"
+        problems.append(Problem(where, what, each.allowed, hint if each.looks_like_degrees else ""))
     return problems
-
-
-def beyond(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Indices of the joint positions beyond the limits; their last written digit may be."""
-    slack = 1e-6
-    return np.flatnonzero((values < low - slack) | (values > high + slack))
 
 
 def scale_problems(table: RawTable, columns: Mapping, robot: Robot) -> list[Problem]:

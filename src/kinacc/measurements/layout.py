@@ -181,16 +181,16 @@ class _Finder:
             foreign = self.layout.columns[name]
             # A mapped column that is not there is named once, by refuse_unknown_columns.
             return Place(foreign, units[mapped_unit]) if foreign in self.table.columns else None
-        own = {f"{name}_{unit}" if unit else name: factor for unit, factor in units.items()}
-        present = [each for each in own if each in self.table.columns]
-        if len(present) > 1 and not self._alike([(each, own[each]) for each in present], units):
-            self._problem(" or ".join(present), "is given in two units that do not say the same")
-        return Place(present[0], own[present[0]]) if present else None
+        present = columns_of_quantity(self.table, name, units)
+        if len(present) > 1 and not self._alike(present, units):
+            names = " or ".join(each.column for each in present)
+            self._problem(names, "is given in two units that do not say the same")
+        return present[0] if present else None
 
-    def _alike(self, columns: list[tuple[str, float]], units: Mapping[str, float]) -> bool:
-        """Whether columns of one quantity say the same, each with its factor, but for rounding."""
+    def _alike(self, places: list[Place], units: Mapping[str, float]) -> bool:
+        """Whether columns of one quantity say the same, but for rounding."""
         first, *others = (
-            numbers(self.table, each, [], gaps=True) * factor for each, factor in columns
+            numbers(self.table, each.column, [], gaps=True) * each.factor for each in places
         )
         rounded = ROUNDED_RAD if units is ANGLE else ROUNDED_MM if units is LENGTH else 0.0
         return all(np.allclose(first, each, 0.0, rounded, equal_nan=True) for each in others)
@@ -198,9 +198,8 @@ class _Finder:
     def required(self, name: str, units: Mapping[str, float], mapped_unit: str) -> Place | None:
         place = self.any(name, units, mapped_unit)
         if place is None and name not in self.layout.columns:
-            own = " or ".join(f"{name}_{unit}" if unit else name for unit in units)
             fix = f"or map {name} in measurements.file.columns"
-            self._problem(own, "is missing", _listed(self.table), fix)
+            self._problem(" or ".join(names_of(name, units)), "is missing", listed(self.table), fix)
         return place
 
     def group(self, names, prismatic, required: bool = False) -> tuple[Place, ...]:
@@ -308,7 +307,7 @@ class _Finder:
         places = [self.any(name, units, unit) for name in own]
         if look == self.required and not any(places) and not set(own) & set(self.layout.columns):
             self._problem(", ".join(own), "are missing: the file states no orientation",
-                          _listed(self.table), "set measurements.file.orientation.kind (none for "
+                          listed(self.table), "set measurements.file.orientation.kind (none for "
                           "positions alone), or map them in measurements.file.columns")  # fmt: skip
             return ()
         places = [look(name, units, unit) for name in own]
@@ -343,7 +342,7 @@ class _Finder:
         for name, foreign in self.layout.columns.items():
             if foreign not in self.table.columns:
                 what = f"is not there, but measurements.file.columns maps {name} to it"
-                self._problem(foreign, what, _listed(self.table))
+                self._problem(foreign, what, listed(self.table))
 
     def refuse_shared_columns(self, found: Found) -> None:
         """A column that is taken for two measured quantities, as a slip in a mapping makes it."""
@@ -384,5 +383,17 @@ def _with(names, missing, prefix: str) -> str:
     return ", ".join(f"{prefix}{name}" for name in names if f"{prefix}{name}" not in missing)
 
 
-def _listed(table: RawTable) -> str:
+def names_of(name: str, units: Mapping[str, float]) -> dict[str, float]:
+    """Names of the columns a quantity may stand in, each with the factor of its unit."""
+    return {f"{name}_{unit}" if unit else name: factor for unit, factor in units.items()}
+
+
+def columns_of_quantity(table: RawTable, name: str, units: Mapping[str, float]) -> list[Place]:
+    """The columns of a table that hold a quantity: one for every unit it is given in."""
+    found = (Place(*each) for each in names_of(name, units).items())
+    return [place for place in found if place.column in table.columns]
+
+
+def listed(table: RawTable) -> str:
+    """The columns a file has, in words."""
     return "the file has " + ", ".join(table.columns)

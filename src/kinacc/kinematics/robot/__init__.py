@@ -4,7 +4,7 @@ A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
 """
 
 from kinacc.kinematics.robot.description import files, load, of_text, shipped
-from kinacc.kinematics.robot.record import Robot, carried, forward, in_own_units
+from kinacc.kinematics.robot.record import Robot, carried, forward, in_own_units, outside_limits
 from kinacc.kinematics.robot.written import as_yaml
 
 __all__ = [
@@ -16,5 +16,6 @@ __all__ = [
     "in_own_units",
     "load",
     "of_text",
+    "outside_limits",
     "shipped",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,3 +63,31 @@ def in_own_units(robot: Robot, joints: np.ndarray) -> np.ndarray:
 def carried(robot: Robot) -> Pose:
     """Tool centre point of the description in the last DH frame: flange, then tool."""
     return compose(robot.flange, robot.tool)
+
+
+@dataclass(frozen=True)
+class OutsideLimits:
+    """Rows (m,) in which a reported joint, from 1, is beyond its limits.
+
+    ``values`` (m,) of these rows and ``allowed`` are in ``unit``, deg or mm. What turns by more
+    than two turns either way ``looks_like_degrees``.
+    """
+
+    joint: int
+    rows: np.ndarray
+    values: np.ndarray
+    unit: str
+    allowed: str
+    looks_like_degrees: bool
+
+
+def outside_limits(robot: Robot, joints: np.ndarray, slack: float) -> Iterator[OutsideLimits]:
+    """Every joint of which a row of reported joints (n, k) is beyond the limits by ``slack``."""
+    limits = zip(joints.T, robot.q_min_rad, robot.q_max_rad, robot.dh.prismatic, strict=True)
+    for joint, (values, low, high, slides) in enumerate(limits, 1):
+        rows = np.flatnonzero((values < low - slack) | (values > high + slack))
+        if rows.size:
+            size, unit = (1.0, "mm") if slides else (np.pi / 180.0, "deg")
+            allowed = f"{low / size:g} to {high / size:g} {unit} ({robot.name})"
+            far = not slides and np.max(np.abs(values)) > 4.0 * np.pi
+            yield OutsideLimits(joint, rows, values[rows] / size, unit, allowed, bool(far))
