@@ -83,6 +83,12 @@ def claims_without_units(project):
     rewrite(project, path, lambda table: table.replace_schema_metadata(None))
 
 
+def study_edited_beside_a_part_of_other_numbers(project):
+    """A part is left from a run in one part; the study itself has been edited."""
+    (project.folder / "results/mh180/study_chunk/1-of-1.parquet").write_bytes(b"PAR1")
+    rewrite(project, "results/mh180/study.parquet", with_first("assessed_mm", 0.5))
+
+
 def many(project):
     for harm in (edited, chunk_cut, figure_cut, points_edited, claims_without_units):
         harm(project)
@@ -109,7 +115,17 @@ def follow(project, command: str, folder: Path | None = None) -> str:
 
 @pytest.mark.parametrize(
     "harm",
-    [edited, cut, lost, swapped, of_an_old_backup, chunk_of_another_run, figure_cut, many],
+    [
+        edited,
+        cut,
+        lost,
+        swapped,
+        of_an_old_backup,
+        chunk_of_another_run,
+        study_edited_beside_a_part_of_other_numbers,
+        figure_cut,
+        many,
+    ],
 )
 def test_a_changed_artefact_is_remade_by_the_command_that_is_printed(project, harm):
     before = project.digests()
@@ -154,6 +170,18 @@ def test_the_printed_command_works_from_another_folder_with_spaces(project, tmp_
     follow(project, advised(done.stdout), other)
     assert project.digests() == before
     assert not (other / "results").exists()
+
+
+def test_results_left_by_hand_elsewhere_are_mended_by_hand(project):
+    before = project.digests()
+    other = project.folder / "by hand"
+    (project.folder / "results").rename(other)
+    shutil.rmtree(project.folder / "results", ignore_errors=True)
+    (other / "own" / "readings.parquet").write_bytes(b"PAR1")
+    follow(project, advised(project.kinacc("check-results", "by hand", ok=False)))
+    assert "all is well" in project.kinacc("check-results", "by hand")
+    other.rename(project.folder / "results")
+    assert project.digests() == before
 
 
 def test_without_the_configuration_a_command_is_printed_only_where_it_is_sure(project):

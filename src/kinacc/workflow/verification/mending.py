@@ -93,9 +93,10 @@ def _by_hand(
     options = [word for name in configs for word in ("--config", name)]
     commands = []
     for dataset, own in doubts.items():
-        wanted = {doubt.stage for doubt in own}
-        for name, stage in plan.stages(dataset).items():
-            if name in wanted or (wanted & _above(name) and not stage.on_request):
+        wanted = {doubt.stage for doubt in own if _is_made(doubt, dataset, plan)}
+        stages = plan.stages(dataset)
+        for name in sorted(stages, key=lambda each: len(_above(each))):
+            if name in wanted or (wanted & _above(name) and not stages[name].on_request):
                 words = ["kinacc", "run", name, "--dataset", dataset, *options]
                 commands.append(shlex.join([*words, "--results", str(folder)]))
     return commands
@@ -110,20 +111,24 @@ def _files(
     """
     made, unmade = [], []
     for dataset, own in doubts.items():
-        stages = plan.stages(dataset)
-        wanted = {doubt.stage for doubt in own}
-        for doubt in sorted(
-            own, key=lambda each: (list(STAGES).index(each.stage), each.part or "")
-        ):
-            names = plan.part_names(doubt.stage, dataset)
-            if doubt.stage not in stages or (doubt.part and doubt.part not in names):
-                paths = plan.outputs(doubt.stage, dataset, doubt.part).values()
-                here = [folder / Path(path).relative_to(plan.results) for path in paths]
-                unmade += [os.path.relpath(path) for path in here if path.exists()]
-            elif not wanted & _above(doubt.stage):
-                parts = [doubt.part] if doubt.part else names
-                made += [next(iter(plan.outputs(doubt.stage, dataset, p).values())) for p in parts]
-    return list(dict.fromkeys(made)), list(dict.fromkeys(unmade))
+        foreign = {doubt for doubt in own if not _is_made(doubt, dataset, plan)}
+        for doubt in foreign:
+            paths = plan.outputs(doubt.stage, dataset, doubt.part).values()
+            here = [folder / Path(path).relative_to(plan.results) for path in paths]
+            unmade += [os.path.relpath(path) for path in here if path.exists()]
+        wanted = {doubt.stage for doubt in set(own) - foreign}
+        for doubt in sorted(set(own) - foreign, key=_order):
+            if wanted & _above(doubt.stage):
+                continue
+            parts = [doubt.part] if doubt.part else plan.part_names(doubt.stage, dataset)
+            made += [next(iter(plan.outputs(doubt.stage, dataset, p).values())) for p in parts]
+    return list(dict.fromkeys(made)), sorted(unmade)
+
+
+def _is_made(doubt: Doubt, dataset: str, plan: Plan) -> bool:
+    """Whether a run of the plan leaves the files in doubt."""
+    parts = (None, *plan.part_names(doubt.stage, dataset))
+    return doubt.stage in plan.stages(dataset) and doubt.part in parts
 
 
 def _order(doubt: Doubt) -> tuple[int, str]:
