@@ -33,7 +33,7 @@ def and_more(count: int) -> str:
     return f" and {count} more" if count > 0 else ""
 
 
-def first_few(items: Sequence, shown: int = 5) -> str:
+def first_few(items: Sequence[object], shown: int = 5) -> str:
     """The first items, and how many there are beside them: ``2, 3, 5 and 4 more``."""
     return ", ".join(map(str, items[:shown])) + and_more(len(items) - shown)
 

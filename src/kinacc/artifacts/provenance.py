@@ -53,7 +53,7 @@ def code_hash(
     one. ``alone`` are modules counted without what they import.
     """
     tree = source_tree(root)
-    names, libraries = set(alone), set()
+    names, libraries = set(alone), set[str]()
     named = [module for each in uses for module in _registered(each)]
     for module in (*modules, *named):
         reached, used = closure(module, root)

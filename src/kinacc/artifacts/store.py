@@ -299,4 +299,4 @@ def _as_text(value: Any) -> Any:
 def rows(mask: np.ndarray) -> str:
     """The first rows (from 0) a mask marks, in words."""
     rows = np.flatnonzero(mask)
-    return f"row{'s' if rows.size > 1 else ''} {first_few(rows)}"
+    return f"row{'s' if rows.size > 1 else ''} {first_few(rows.tolist())}"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 FIGURE_FOLDER = "figures"
 TOURNAMENT = "tournament"  # folder of the joint stages, a name no data set can have
@@ -62,7 +63,7 @@ class Stage:
         found: dict[str, None] = {}
         for use in self.uses:
             (key,) = re.findall(r"{(\w+)}", use) or ("",)
-            values = settings.get(key, ()) if key else ("",)
+            values: Any = settings.get(key, ()) if key else ("",)
             if key in settings and not values:
                 values, use = ("",), use.removesuffix(f"[{{{key}}}]")
             values = values.values() if isinstance(values, Mapping) else values
