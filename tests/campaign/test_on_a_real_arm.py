@@ -36,7 +36,7 @@ def ur10_d(tmp_path_factory):
         "calibration: {base_and_tool: estimated, vec: {order: 1},"
         " dh: {fit_to: measurements, hayati_joints: [2, 3]}}\nevaluation: {space: measured}\n"
     )
-    for stage in ("measurements", "vec", "dh", "residuals"):
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals"):
         done = call("run", stage, "--config", config, "--results", base / "results")
         assert done.exit_code == 0, done.output
     results = base / "results" / "ur10_d"

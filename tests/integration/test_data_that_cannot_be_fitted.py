@@ -1,6 +1,7 @@
 """Measured data whose fit would be wrong: stopped before it, and what a person can do then."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -49,7 +50,8 @@ def test_a_slip_of_80_mm_in_one_row(project):
     project.configure(f"datasets: {{own: {{measurements: {{file: {{exclude: [{row}]}}}}}}}}")
     project.snakemake()
     assert project.digests()["own/vec_model.parquet"] != slipped
-    assert f"line 22: {reason}" in project.kinacc("fitted", "results/own", configs=())
+    said = project.kinacc("fitted", "results/own", configs=())
+    assert re.search(rf"line 22, (79|80|81)\.\d+ mm: {reason}", said), said
     text = project.kinacc("fitted", "results/own", "--json", configs=())
     answer = json.JSONDecoder().raw_decode(text)[0]  # warnings may follow
     without, including = answer["position_error_mm"], answer["position_error_with_excluded_mm"]

@@ -75,4 +75,4 @@ def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
     assert "ours: reading" in started(project, cell, ["sh", "-c", f"{run} -n"])
     # In the project itself the command is the plain one.
     text = started(project, project.folder, ["kinacc", "init", "own data/poses.csv", *options[:-2]])
-    assert "  snakemake -c2 --configfile config.yaml ours.yaml" in text
+    assert "  snakemake -c2 --configfile ours.yaml" in text

@@ -92,7 +92,7 @@ class Report:
             if each.kind in self.accepted:
                 lines.append(f"    accepted (data_check.accept): {self.accepted[each.kind]}")
             elif each.level == STOPS:
-                lines.append("    stops the workflow")
+                lines.append(f"    stops the workflow. {each.to_go_on}")
         return "\n".join(lines)
 
 

@@ -42,6 +42,8 @@ _WRONG = {
     *("joint_order", "target_moved", "base_jump", "does_not_fit", "few_poses"),
 }
 _NEVER_STOP = {"largest_rows", "thin_coverage"}
+_OF_ROWS = {"outliers", "repeated_reading", "duplicate_rows", "outside_limits", "target_swapped"}
+_LINES_SHOWN = 20
 STOPPING = tuple(kind for kind in KINDS if kind not in _NEVER_STOP)  # some of them by their size
 _RANGES_SHOWN = 6
 
@@ -65,6 +67,16 @@ class Suspicion:
     def where(self) -> str:
         """The lines in words."""
         return lines_in_words(self.lines)
+
+    @property
+    def to_go_on(self) -> str:
+        """What to write into the configuration where the file stays as it is."""
+        accept = f"data_check: {{accept: {{{self.kind}: the reason}}}}"
+        if self.kind not in _OF_ROWS or not 0 < len(self.lines) <= _LINES_SHOWN:
+            return f"To go on all the same, give {accept}"
+        lines = ", ".join(map(str, self.lines))
+        rows = f"measurements: {{file: {{exclude: [{{lines: [{lines}], reason: ..}}]}}}}"
+        return f"To go on without these rows, give {rows}; with them, {accept}"
 
     def held_to(self, gross: Iterable[int]) -> Suspicion:
         """The suspicion with its level; rows at the lines ``gross`` are too far off for any fit."""

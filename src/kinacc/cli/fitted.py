@@ -90,7 +90,7 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
         "undetermined": identified.recorded(told),
         "worst_rows": _worst(tables["worst_rows"], selected),
         "data": data_check.in_words(tables["data_check"]) if "data_check" in tables else [],
-        "excluded": None if excluded is None else _excluded(excluded),
+        "excluded": None if excluded is None else _excluded(excluded, selected),
         "position_error_with_excluded_mm": None
         if excluded is None
         else {model: _with_excluded(tables["residuals"], excluded, model) for model in _MODELS},
@@ -105,9 +105,20 @@ def _errors(table: Mapping, model: str, subset: str) -> dict | None:
     return None
 
 
-def _excluded(table: Mapping) -> list[dict]:
-    lines = dict(zip(table["line"].tolist(), table["reason"], strict=True))
-    return [{"line": line, "reason": str(reason)} for line, reason in sorted(lines.items())]
+def _excluded(table: Mapping, model: str) -> list[dict]:
+    """The rows of one model, each with its error: null where it could not be read."""
+    import numpy as np
+
+    size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
+    rows = np.flatnonzero(table["comparison"] == f"{model}_vs_measured")
+    return [
+        {
+            "line": int(table["line"][row]),
+            "reason": str(table["reason"][row]),
+            "error_mm": _plain(size[row]),
+        }
+        for row in rows[np.argsort(table["line"][rows], kind="stable")]
+    ]
 
 
 def _with_excluded(residuals: Mapping, excluded: Mapping, model: str) -> dict | None:
@@ -168,7 +179,9 @@ def in_words(name: str, answer: Mapping) -> str:
             lines.append(f"  with excluded rows {'':13}   {shown[0]:>13} {shown[1]} {shown[2]}")
     if answer["excluded"]:
         lines += ["", "rows excluded by the configuration:"]
-        lines += [f"  line {each['line']}: {each['reason']}" for each in answer["excluded"]]
+        for each in answer["excluded"]:
+            error = "" if each["error_mm"] is None else f", {each['error_mm']:.3f} mm"
+            lines.append(f"  line {each['line']}{error}: {each['reason']}")
     count = {status: len(names) for status, names in answer["parameters"].items()}
     listed = ", ".join(f"{number} {status}" for status, number in count.items())
     lines += ["", f"parameters of the DH fit: {listed}"]

@@ -335,9 +335,9 @@ def _turned(guess: Guess) -> str:
 
 
 def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None:
-    from kinacc.workflow.verification.mending import base_config, workflow_command
+    from kinacc.workflow.verification.mending import workflow_command
 
-    workflow = workflow_command([*base_config(), str(dataset)])
+    workflow = workflow_command([str(dataset)])  # with config.yaml the paper's study would run too
     commands = [shlex.join(["kinacc", "check-data", str(dataset)]), shlex.join(workflow)]
     if as_json:
         answer = {

@@ -7,6 +7,7 @@ hashes, so that either leaves the same bytes. Importing it costs nothing but the
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -197,7 +198,8 @@ class Plan:
             from kinacc.workflow.stages import measurements
 
             try:
-                made = measurements.run({}, settings)
+                with warnings.catch_warnings(action="ignore"):  # the stage says them itself
+                    made = measurements.run({}, settings)
                 calibration_settings.require_enough_rows(
                     made, robot.load(config["robot"]), config["calibration"]
                 )

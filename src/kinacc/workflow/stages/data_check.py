@@ -13,7 +13,7 @@ from kinacc.artifacts.contract import columns_of
 from kinacc.calibration.observations import from_columns
 from kinacc.checks import check
 from kinacc.checks.report import Report
-from kinacc.checks.suspicion import NOTE, STOPS, Suspicion, suspicion
+from kinacc.checks.suspicion import NOTE, Suspicion, suspicion
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot
 from kinacc.kinematics.robot import Robot
@@ -97,13 +97,7 @@ def _few_poses(reading: Reading, arm: Robot, calibration: Mapping) -> list[Suspi
 
 def _problem(path: str, each: Suspicion) -> Problem:
     where = f"{path}, {each.where}" if each.lines else path
-    go_on = f"to go on all the same, give data_check: {{accept: {{{each.kind}: the reason}}}}"
-    rows = " or exclude the rows (measurements.file.exclude)" if _in_some_rows(each) else ""
-    return Problem(where, f"{each.kind}: {each.what}", fix=f"{each.fix}{rows}; {go_on}")
-
-
-def _in_some_rows(each: Suspicion) -> bool:
-    return each.level == STOPS and each.kind in ("outliers", "repeated_reading", "duplicate_rows")
+    return Problem(where, f"{each.kind}: {each.what}", fix=f"{each.fix}. {each.to_go_on}")
 
 
 def _columns(report: Report) -> Columns:

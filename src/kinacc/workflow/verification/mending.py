@@ -48,10 +48,10 @@ def remedy(
     if plan is None:
         plan = _beside(folder, doubts, marks)
     if plan is None or not set(doubts) <= set(plan.datasets):
-        again = shlex.join(["kinacc", "check-results", str(folder), "--config", CONFIG])
+        again = shlex.join(["kinacc", "check-results", str(folder)])
         return (
-            "Give the configuration these results were made with, and the command that mends them "
-            f"is printed: {again}, and --config for each further file."
+            "Give the configuration file these results were made with (--config, once for each "
+            f"file), and the command that mends them is printed: {again} --config FILE"
         )
     made, unmade = _files(folder, doubts, plan)
     commands = [shlex.join(["rm", *unmade])] if unmade else []
@@ -73,12 +73,6 @@ def workflow_command(configs: Sequence[str], folder: Path | str = ".") -> list[s
     if configs and not (is_here and list(configs) == [CONFIG]):
         words += ["--configfile", *configs]
     return words
-
-
-def base_config() -> list[str]:
-    """The configuration below one's own: config.yaml here, else the project's, if there is one."""
-    found = [path for path in (Path(CONFIG), _PROJECT / CONFIG) if path.is_file()]
-    return [str(path) for path in found[:1]]
 
 
 def _snakemake(folder: Path, configs: Sequence[str], made: Sequence[str]) -> str:
