@@ -1,12 +1,5 @@
 # One rule for every stage of the catalogue: what it reads, leaves and depends on stands there.
 
-
-# Asked when rules are put together: the targets are not known yet when this file is read.
-def further_draws():
-    """Whether this run has to make what is made on request."""
-    return "robustness" in workflow.dag_settings.targets
-
-
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
     folder = TOURNAMENT if stage.joint else "{dataset}"
@@ -19,7 +12,10 @@ for stage in STAGES.values():
             ancient(lambda w, name=stage.name: plan.gates(name, w.get("dataset", TOURNAMENT))),
             unpack(
                 lambda w, name=stage.name: plan.inputs(
-                    name, w.get("dataset", TOURNAMENT), further_draws()
+                    name,
+                    w.get("dataset", TOURNAMENT),
+                    # Asked here: the targets are not known yet when this file is read.
+                    on_request="robustness" in workflow.dag_settings.targets,
                 )
             ),
         output:
