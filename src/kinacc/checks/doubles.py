@@ -42,15 +42,12 @@ def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Suspicion]:
 
     ``equal`` (n,) as ``earlier`` gives it; ``noise_mm`` as for ``found``.
     """
-    again = np.unique(cells.line[equal > 0])
+    there = np.flatnonzero(equal > 0)
+    again, at = np.unique(cells.line[there], return_index=True)
     if not again.size or not _unlikely(cells, noise_mm):
         return []
-    first = equal[np.searchsorted(cells.line, again)] if np.all(np.diff(cells.line) >= 0) else None
-    pairs = (
-        [f"line {line} repeats {of}" for line, of in zip(again, first, strict=True)]
-        if first is not None
-        else [f"line {line}" for line in again]
-    )
+    first = equal[there[at]]
+    pairs = [f"line {line} repeats {of}" for line, of in zip(again, first, strict=True)]
     return [
         suspicion(
             "repeated_reading",
