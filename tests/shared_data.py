@@ -1,6 +1,7 @@
-"""Measured data sets, expected beside the project. Tests that need an absent one are skipped.
+"""Measured data sets: shipped in examples/data, or expected beside the project.
 
-How many were skipped, and where the data is expected, stands at the end of pytest's report.
+Tests that need one whose licence is not stated, and which is absent, are skipped. How many were
+skipped, and where the data is expected, stands at the end of pytest's report.
 """
 
 from __future__ import annotations
@@ -9,19 +10,25 @@ from pathlib import Path
 
 import pytest
 
+SHIPPED = Path(__file__).resolve().parents[1] / "examples" / "data"
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data"
 ABSENT = "measured data absent: "
 
 
+def place(name: str) -> Path:
+    """Where a file or folder of the measured data is, or is expected."""
+    return SHIPPED / name if name and (SHIPPED / name).exists() else FOLDER / name
+
+
 def needed(name: str) -> pytest.MarkDecorator:
     """Mark for tests that need a file or folder of the measured data."""
-    path = FOLDER / name
+    path = place(name)
     return pytest.mark.skipif(not path.exists(), reason=f"{ABSENT}{path}")
 
 
 def path_of(name: str) -> Path:
     """Path of a file of the measured data; skips the test that asks where it is absent."""
-    path = FOLDER / name
+    path = place(name)
     if not path.exists():
         pytest.skip(f"{ABSENT}{path}")
     return path

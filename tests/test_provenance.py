@@ -225,6 +225,16 @@ def test_config_hash_depends_on_values_and_not_on_their_order():
     assert provenance.config_hash({"y": None, "x": {"a": [2, 1], "b": 1.0}}) != a
 
 
+def test_config_hash_does_not_depend_on_where_a_run_is_started():
+    def hashed(folder, name="poses.csv"):
+        file = {"path": f"{folder}{name}", "delimiter": ";"}
+        settings = {"robot": f"{folder}arm.yaml", "measurements": {"file": file}}
+        return provenance.config_hash(settings | {"robots": {"a": f"{folder}arm.yaml"}})
+
+    assert hashed("") == hashed("../my cell/") == hashed("/home/ours/")
+    assert hashed("", "other.csv") != hashed("")
+
+
 def test_inputs_hash_depends_on_content_and_role(tmp_path):
     (tmp_path / "a").write_bytes(b"1")
     (tmp_path / "b").write_bytes(b"1")

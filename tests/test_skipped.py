@@ -11,7 +11,7 @@ HERE = Path(__file__).parent
 NEEDY = """\
 import shared_data
 
-@shared_data.needed("ur10_tmac/series_B.csv")
+@shared_data.needed("ur10_tmac/series_A.csv")
 def test_marked():
     pass
 
@@ -41,7 +41,7 @@ def test_without_measured_data_the_number_of_skipped_tests_and_the_place_are_sai
 
 
 def test_with_measured_data_nothing_is_said_of_it(tmp_path):
-    for name in ("ur10_tmac/series_B.csv", "fanuc_r2000ic/poses.csv"):
+    for name in ("ur10_tmac/series_A.csv", "fanuc_r2000ic/poses.csv"):
         path = tmp_path / "shared" / "data" / name
         path.parent.mkdir(parents=True)
         path.touch()

@@ -20,7 +20,7 @@ from kinacc.campaign.reading import Reading
 from kinacc.geometry import invert
 
 SERIES = "ur10_tmac/series_D.csv"
-DATA = shared_data.FOLDER / SERIES
+DATA = shared_data.place(SERIES)
 pytestmark = shared_data.needed(SERIES)
 SIGMA_MM = 0.05
 

@@ -8,7 +8,6 @@ import textwrap
 from pathlib import Path
 
 import pytest
-import shared_data
 
 from kinacc.config.schema import defaults, settings, walk, without_execution_keys
 from kinacc.errors import InputError
@@ -69,7 +68,6 @@ def test_the_readings_consistent_with_each_other_are_the_default():
     }
 
 
-@shared_data.needed("ur10_tmac")
 def test_the_ur10_example_adds_its_data_sets():
     loaded = load([PAPER, UR10], folder=ROOT)
     assert list(loaded) == ["mh180", "ur10_b", "ur10_d"]
@@ -86,11 +84,55 @@ def test_the_ur10_example_adds_its_data_sets():
 
 
 def test_absent_data_says_where_it_comes_from(tmp_path):
-    found = complaints(PAPER, UR10, folder=tmp_path)
+    alone = tmp_path / "ur10.yaml"
+    alone.write_text(UR10.read_text())
+    found = complaints(PAPER, alone)
     text = the_one(found, "ur10.yaml", "datasets.ur10_b.measurements.file.path")
     assert "does not exist" in text
     assert "series_B.csv" in text
     assert "github.com/christianlandgraf/ipa-robot-accuracy" in text
+
+
+def test_paths_are_seen_from_the_file_they_stand_in(tmp_path, monkeypatch):
+    here, cell = tmp_path / "here", tmp_path / "my cell"
+    for folder in (here, cell / "data"):
+        folder.mkdir(parents=True)
+    (cell / "data" / "poses.csv").write_text("x\n")
+    (cell / "arm.yaml").write_text("name: arm\n")
+    (cell / "own.yaml").write_text(
+        "datasets: {a: {robot: arm.yaml, "
+        "measurements: {source: file, file: {path: data/poses.csv}}}}\n"
+    )
+    for start, way in ((here, "../my cell/"), (cell, ""), (tmp_path, "my cell/")):
+        monkeypatch.chdir(start)
+        own = load([f"{way}own.yaml"])["a"]
+        assert own["robot"] == f"{way}arm.yaml"
+        assert own["measurements"]["file"]["path"] == f"{way}data/poses.csv"
+
+
+def test_a_path_written_for_the_folder_a_run_started_in_says_what_to_change(tmp_path, monkeypatch):
+    (tmp_path / "conf").mkdir()
+    (tmp_path / "poses.csv").write_text("x\n")
+    (tmp_path / "conf" / "own.yaml").write_text(
+        "datasets: {a: {robot: ur10, measurements: {source: file, file: {path: poses.csv}}}}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    text = the_one(complaints("conf/own.yaml"), "conf/own.yaml:1", "file.path")
+    assert "seen from the folder of conf/own.yaml" in text
+    assert "write ../poses.csv" in text
+
+
+def test_two_files_a_path_may_mean_are_both_named(tmp_path, monkeypatch):
+    (tmp_path / "conf").mkdir()
+    for folder in (tmp_path, tmp_path / "conf"):
+        (folder / "poses.csv").write_text(f"{folder}\n")
+    (tmp_path / "conf" / "own.yaml").write_text(
+        "datasets: {a: {robot: ur10, measurements: {source: file, file: {path: poses.csv}}}}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    with pytest.warns(UserWarning, match=r"conf/poses.csv is read, .* not poses.csv of the current"):
+        own = load(["conf/own.yaml"])["a"]
+    assert own["measurements"]["file"]["path"] == "conf/poses.csv"
 
 
 def test_later_files_replace_values_and_keep_the_rest(config):

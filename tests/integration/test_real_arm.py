@@ -1,25 +1,21 @@
-"""The measured UR10 of `examples/ur10.yaml`, where its data lie beside the project."""
+"""The measured UR10 of `examples/ur10.yaml`, with its data."""
 
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-import shared_data
 
 from kinacc.artifacts.store import read
 
 ROOT = Path(__file__).resolve().parents[2]
 REACH_RMS_MM = {"ur10_b": 0.475, "ur10_d": 0.43}
 
-pytestmark = shared_data.needed("ur10_tmac")
-
 
 @pytest.fixture
 def ur10(project):
-    """A project whose neighbour is the measured data, as the example expects."""
+    """A project with the examples and their data."""
     shutil.copytree(ROOT / "examples", project.folder / "examples")
-    (project.folder.parent / "shared").symlink_to(shared_data.FOLDER.parent)
     return project
 
 

@@ -260,7 +260,6 @@ def example(name: str, dataset: str):
     return read(file | {"path": str(ROOT / file["path"])}, robot.load(config["robot"]))
 
 
-@shared_data.needed("")
 def test_a_published_file_is_used_as_its_publisher_wrote_it():
     published = example("ur10_published.yaml", "ur10_published_d")
     plain = example("ur10.yaml", "ur10_d")

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import shared_data
 
 from kinacc.artifacts import store
 from kinacc.errors import InputError
@@ -365,7 +364,6 @@ def test_too_few_poses_for_the_order_is_bad_input(plan):
         vec.run({"measurements": split}, plan.settings("vec", "mh180"))
 
 
-@shared_data.needed("ur10_tmac")
 @pytest.mark.parametrize(("dataset", "reach_mm"), [("ur10_b", 0.475), ("ur10_d", 0.43)])
 def test_reach_on_the_measured_ur10(dataset, reach_mm, monkeypatch):
     monkeypatch.chdir(ROOT)

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from pathlib import Path
+from pathlib import Path, PurePath
 
 PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -137,9 +137,23 @@ def imported_names(text: str, module: str, is_package: bool) -> frozenset[str]:
 
 
 def config_hash(settings: Mapping[str, object]) -> str:
-    """Hash of the configuration values a stage depends on (which hold no core or chunk count)."""
-    text = json.dumps(settings, sort_keys=True, ensure_ascii=True)
+    """Hash of the configuration values a stage depends on (which hold no core or chunk count).
+
+    A robot and a measured file count by the name of their file: their contents are among the
+    inputs, and where a run is started from does not change what it finds.
+    """
+    text = json.dumps(_placeless(settings), sort_keys=True, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _placeless(settings: object, files: bool = False) -> object:
+    """Settings with the folders of the files they name left out."""
+    if isinstance(settings, Mapping):
+        return {
+            key: _placeless(value, files or key in ("robot", "robots", "path"))
+            for key, value in settings.items()
+        }
+    return PurePath(settings).name if files and isinstance(settings, str) else settings
 
 
 def file_hash(path: Path | str) -> str:

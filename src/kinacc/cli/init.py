@@ -303,8 +303,9 @@ def _how(report: Report | None) -> str:
 def _dataset(
     path: Path, name: str, robot: str, guess: Guess, report: Report | None, chosen: str
 ) -> str:
-    """Text of the data set, which names files from the folder the command was called in."""
-    from kinacc.measurements.intake.write import dataset_text
+    """Text of the data set, which names files from where it stands."""
+    from kinacc.kinematics.robot import shipped
+    from kinacc.measurements.intake.write import dataset_text, seen_from
 
     note = [f"Written by kinacc init. Robot: {chosen}."]
     how = _how(report).capitalize()
@@ -313,6 +314,8 @@ def _dataset(
     check = shlex.join(["kinacc", "check-data", str(path)])
     note.append(f"Everything not given here is as in config.yaml.\n    {check}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
+    robot = robot if robot in shipped() else seen_from(path.parent, robot)
+    guess = guess.but({"path": seen_from(path.parent, guess.section["path"])})
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
 
 

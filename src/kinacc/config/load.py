@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,7 @@ from kinacc.config.reading import Document, KeyPath, dotted, read
 from kinacc.config.schema import Section, plain, settings
 from kinacc.config.validate import (
     ROBOT,
+    ROBOTS,
     check_dataset_name,
     check_robot,
     check_section,
@@ -25,6 +29,8 @@ COMMAND_LINE = "command line"
 _MOST_DATASETS = 500
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
+# Values that name files: in every data set, and of the top level.
+_FILES = (("robot",), ("measurements", "file", "path"))
 
 
 def _none(*given: Any) -> tuple[Problem, ...]:
@@ -42,17 +48,19 @@ def load(
 
     ``paths`` are merged in order as Snakemake merges its ``--configfile``: sections key by key, all
     else replaced. ``overrides`` (nested, as from ``--config``) come last. Paths of data and robots
-    are relative to ``folder``. ``contradictions`` (name, robot, full settings, place, folder)
-    yields what is wrong with settings that are each fine. Every data set has ``robot``, ``seed``
-    and all sections of schema.yaml, numbers in the units their names carry.
+    are relative to the file they stand in, those of ``overrides`` to the current ``folder``, and so
+    are those returned. ``contradictions`` (name, robot, full settings, place, folder) yields what
+    is wrong with settings that are each fine. Every data set has ``robot``, ``seed`` and all
+    sections of schema.yaml, numbers in the units their names carry.
 
     Raises InputError listing every problem in all files.
     """
     documents, problems = [], []
     for path in paths:
         document, found = read(path)
+        document, moved = _from_here(document, Path(folder))
         documents.append(document)
-        problems += found
+        problems += found + moved
     if overrides:
         documents.append(Document(COMMAND_LINE, plain(overrides)))
     if not documents:
@@ -70,6 +78,52 @@ def load(
         title = f"{count} problem{'s' if count > 1 else ''} in the configuration"
         raise InputError(problems, title)
     return resolved
+
+
+def _from_here(document: Document, folder: Path) -> tuple[Document, list[Problem]]:
+    """The document with the paths in it, which start where it stands, as seen from ``folder``."""
+    beside = Path(document.name).absolute().parent
+    if not document.data or os.path.realpath(beside) == os.path.realpath(folder):
+        return document, []
+    data, problems = document.data, []
+    datasets = data.get("datasets")
+    names = list(datasets) if isinstance(datasets, Mapping) else []
+    for start in [(), *(("datasets", name) for name in names)]:
+        for keys in _FILES:
+            path = (*start, *keys)
+            value = _value(data, path)
+            if not isinstance(value, str) or not value or os.path.isabs(value):
+                continue
+            near = os.path.relpath(beside / value, folder).replace(os.sep, "/")
+            there, here = os.path.exists(folder / near), os.path.exists(folder / value)
+            if keys == ("robot",) and ((ROBOTS / f"{value}.yaml").is_file() or not (there or here)):
+                continue  # a robot's name
+            if here and not there:
+                fix = f"write {os.path.relpath(folder / value, beside)}"
+                what = f"{shown(value)} is not there, seen from the folder of {document.name}"
+                problems.append(Problem(document.place(path), what, "a path from there", fix))
+            elif here and there and not os.path.samefile(folder / near, folder / value):
+                warnings.warn(
+                    f"{document.place(path)}: {near} is read, beside the configuration file, and "
+                    f"not {value} of the current folder",
+                    stacklevel=2,
+                )
+            data = overlay(data, _nested(path, value if here and not there else near))
+    return replace(document, data=data), problems
+
+
+def _value(data: Any, path: KeyPath) -> Any:
+    """The value at a path of keys; None where there is none."""
+    for key in path:
+        data = data.get(key) if isinstance(data, Mapping) else None
+    return data
+
+
+def _nested(path: KeyPath, value: Any) -> Any:
+    """``value`` at the end of nested sections."""
+    for key in reversed(path):
+        value = {key: value}
+    return value
 
 
 def _reading_order(names: Sequence[str]) -> Callable[[Problem], tuple[int, int]]:

@@ -226,8 +226,8 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
         origin = file["source"]
         yield Problem(
             place("measurements", "file", "path"),
-            f"{shown(file['path'])} {'is a folder' if is_folder else 'does not exist'}",
-            "an existing CSV or Parquet file, relative to the folder the run starts in",
+            f"{file['path']!r} {'is a folder' if is_folder else 'does not exist'}",
+            "an existing CSV or Parquet file, relative to the folder of the configuration file",
             f"the data comes from: {' '.join(origin.split())}"
             if origin
             else "say where the data comes from with measurements.file.source",

@@ -75,11 +75,10 @@ def shipped_text(name: str) -> str:
 
 def urdf_text(name: str, urdf: Path, folder: Path) -> str:
     """A robot file that reads a URDF file, named from where the robot file stands."""
-    path = os.path.relpath(urdf, folder)
     return (
         f"# The arm of {urdf.name}; docs/robots.md says what else may stand here.\n"
         f"name: {scalar(name)}\n"
-        f"urdf: {scalar(path)}\n"
+        f"urdf: {scalar(seen_from(folder, urdf))}\n"
         "# base_link: base       # where the chain starts, if not at the root\n"
         "# tip_link: tool0       # where it ends, if there is a choice\n"
     )
@@ -104,6 +103,12 @@ def template_text(name: str, joints: int) -> str:
             "",
         ]
     )
+
+
+def seen_from(folder: Path, path: str | Path) -> str:
+    """A path as a file in ``folder`` names it; an absolute one stays."""
+    path = Path(path)
+    return str(path) if path.is_absolute() else Path(os.path.relpath(path, folder)).as_posix()
 
 
 def scalar(value: Any) -> str:
