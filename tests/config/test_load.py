@@ -130,7 +130,9 @@ def test_two_files_a_path_may_mean_are_both_named(tmp_path, monkeypatch):
         "datasets: {a: {robot: ur10, measurements: {source: file, file: {path: poses.csv}}}}\n"
     )
     monkeypatch.chdir(tmp_path)
-    with pytest.warns(UserWarning, match=r"conf/poses.csv is read, .* not poses.csv of the current"):
+    with pytest.warns(
+        UserWarning, match=r"conf/poses.csv is read, .* not poses.csv of the current"
+    ):
         own = load(["conf/own.yaml"])["a"]
     assert own["measurements"]["file"]["path"] == "conf/poses.csv"
 

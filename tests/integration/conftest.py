@@ -20,7 +20,7 @@ from kinacc.workflow.catalogue import STAGES
 ROOT = Path(__file__).resolve().parents[2]
 STAGE_OF = {stage.message: name for name, stage in STAGES.items()}
 CONFIGS = ("config.yaml", "small.yaml")
-PARTS = ("Snakefile", "workflow", "config.yaml", "src")
+PARTS = ("Snakefile", "workflow", "profiles", "config.yaml", "src")
 
 SMALL = """\
 measurements: {folds: 2, synthetic: {poses: 120}}

@@ -72,7 +72,56 @@ def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
     text = started(project, cell, ["kinacc", "init", "own data/poses.csv", *options])
     check, run = (line.strip() for line in text.partition("next:")[2].strip().splitlines()[:2])
     started(project, cell, ["sh", "-c", check])
-    assert "ours: reading" in started(project, cell, ["sh", "-c", f"{run} -n"])
-    # In the project itself the command is the plain one.
-    text = started(project, project.folder, ["kinacc", "init", "own data/poses.csv", *options[:-2]])
-    assert "  snakemake -c2 --configfile ours.yaml" in text
+    assert "ours: reading" in started(project, cell, ["sh", "-c", f"{run} -- -n"])
+
+
+MODULE = """\
+configfile: "cell.yaml"
+
+module kinacc:
+    snakefile: {snakefile!r}
+    {prefix}config: config["kinacc"]
+
+use rule * from kinacc as kinacc_*
+
+rule ours:
+    default_target: True
+    input: "{folder}results/own/dh_model.parquet"
+    output: "ours.txt"
+    shell: "ls {{input:q}} > {{output}}"
+"""
+
+
+@pytest.mark.parametrize("prefix", ["", "arm"])
+def test_a_workflow_of_somebody_else_has_kinacc_as_a_module(project, cell, prefix):
+    text = MODULE.format(
+        snakefile=str(project.folder / "workflow" / "Snakefile"),
+        prefix=f"prefix: {prefix!r}\n    " if prefix else "",
+        folder=f"{prefix}/" if prefix else "",
+    )
+    (cell / "Snakefile").write_text(text)
+    own = "".join(f"  {line}\n" for line in (cell / "own.yaml").read_text().splitlines())
+    (cell / "cell.yaml").write_text(f"theirs: 1\nkinacc:\n{own}")
+    started(project, cell, ["snakemake", "-c2"])
+    assert (
+        cell / "ours.txt"
+    ).read_text().strip() == f"{prefix}/results/own/dh_model.parquet".strip("/")
+    again = started(project, cell, ["snakemake", "-c2"])
+    assert "Nothing to be done" in again
+
+
+def test_one_stage_of_one_data_set_has_a_short_name(project):
+    project.append("small.yaml", "seed: 7")
+    text = project.snakemake("own_dh", options=("--dry-run",))
+    assert "own: fitting the DH model" in text
+    assert "mh180:" not in text
+    text = project.snakemake("dh", options=("--dry-run",), configs=("config.yaml",))
+    assert "mh180: fitting the DH model" in text
+    assert "own:" not in text
+
+
+def test_the_report_of_a_run_has_every_figure_and_table(project):
+    project.snakemake(options=("--report", "report.html"))
+    page = (project.folder / "report.html").read_text(encoding="utf-8")
+    for name in ("fig4.svg", "claims.parquet", "dh_model.parquet"):
+        assert name in page

@@ -1,43 +1,67 @@
 # One rule for every stage of the catalogue: what it reads, leaves and depends on stands there.
 
+# With one data set its name stands in the paths, so that `snakemake -c1 dh` says which one it means.
+whose = "{dataset}" if len(plan.datasets) > 1 else next(iter(plan.datasets))
+
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
-    folder = TOURNAMENT if stage.joint else "{dataset}"
+    folder = TOURNAMENT if stage.joint else whose
 
     # What has to be there and is not read is `ancient`: a stage is not made anew when that is.
     rule:
         name:
             stage.name
         input:
-            ancient(lambda w, name=stage.name: plan.gates(name, w.get("dataset", TOURNAMENT))),
+            ancient(
+                lambda w, name=stage.name, folder=folder: plan.gates(
+                    name, w.get("dataset", folder)
+                )
+            ),
             unpack(
-                lambda w, name=stage.name: plan.inputs(
+                lambda w, name=stage.name, folder=folder: plan.inputs(
                     name,
-                    w.get("dataset", TOURNAMENT),
+                    w.get("dataset", folder),
                     # Asked here: the targets are not known yet when this file is read.
                     on_request="robustness" in workflow.dag_settings.targets,
                 )
             ),
         output:
-            **plan.outputs(stage.name, folder, part),
+            **{
+                role: (
+                    path
+                    if role in plan.formats[1:] or stage.scattered
+                    else report(
+                        path,
+                        caption="../report/made.rst",
+                        category=folder,
+                        subcategory="figures" if stage.is_figure else "tables",
+                        labels={"file": os.path.basename(path), "step": stage.message},
+                    )
+                )
+                for role, path in plan.outputs(stage.name, folder, part).items()
+            },
         log:
             plan.log(stage.name, folder, part),
-        cache: stage.shared
+        cache: stage.shared and workflow.enable_cache
         conda:
             "../envs/kinacc.yaml"
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             stage=stage.name,
-            code=lambda w, name=stage.name: plan.code(name, w.get("dataset", TOURNAMENT)),
+            code=lambda w, name=stage.name, folder=folder: plan.code(name, w.get("dataset", folder)),
             part=part,
-            label=lambda w, name=stage.name: label(
-                name, w.get("dataset", TOURNAMENT), w.get("part")
+            label=lambda w, name=stage.name, folder=folder: label(
+                name, w.get("dataset", folder), w.get("part")
             ),
-            contents=lambda w, name=stage.name: plan.contents(name, w.get("dataset", TOURNAMENT)),
-            seed=lambda w: plan.seed(w.get("dataset", TOURNAMENT)),
-            settings=lambda w, name=stage.name: plan.settings(name, w.get("dataset", TOURNAMENT)),
+            contents=lambda w, name=stage.name, folder=folder: plan.contents(
+                name, w.get("dataset", folder)
+            ),
+            seed=lambda w, folder=folder: plan.seed(w.get("dataset", folder)),
+            settings=lambda w, name=stage.name, folder=folder: plan.settings(
+                name, w.get("dataset", folder)
+            ),
         message:
-            plan.message(stage.name)
+            plan.message(stage.name, folder)
         script:
             "../scripts/stage.py"
 

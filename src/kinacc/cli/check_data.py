@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 
 import click
@@ -40,7 +41,10 @@ def check_data(
             raise
         click.echo(to_json([_unusable(", ".join(files or (CONFIG,)), "", error)]))
         sys.exit(UNUSABLE)
-    sys.exit(report_on(sections, as_json, figure))
+    code = report_on(sections, as_json, figure)
+    if not as_json and code < UNUSABLE:
+        click.echo(f"next:\n  {shlex.join(['kinacc', 'calibrate', *(files or (CONFIG,))])}")
+    sys.exit(code)
 
 
 def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = None) -> int:

@@ -128,8 +128,10 @@ SECTIONS = {
         "init": "describe a file of measurements, and its robot",
         "check-data": "look for mistakes before anything is fitted",
         "plan-poses": "choose poses for a calibration, in a short order",
+        "calibrate": "fit the models, and say what they are worth",
     },
     "The study": {
+        "study": "everything beside: maps, the assessors under noise, claims",
         "run": "run one stage of the workflow by hand",
         "check-results": "hold a results folder to its contract",
         "draw-robots": "search synthetic arms like the paper's",
@@ -159,15 +161,14 @@ SECTIONS = {
 def main() -> None:
     """How accurate is a robot's kinematic model, and how large can its error be?
 
-    `snakemake -c2` runs the whole study of config.yaml. Here are its stages one by one, what can
-    be done with a calibration it leaves, and campaigns that bound what the calibration leaves.
-    Every command has --help with an example.
+    Three commands lead from a file of measurements to an answer, in any folder. What they leave
+    serves the others. Every command has --help with an example.
 
     \b
     Example:
-      kinacc check-results results/ --config config.yaml
-      kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
-      kinacc campaign start check --calibration results/mh180 --noise-mm 0.05
+      kinacc init tracker.csv --robot ur10
+      kinacc check-data tracker.yaml
+      kinacc calibrate tracker.yaml
     """
 
 

@@ -338,10 +338,7 @@ def _turned(guess: Guess) -> str:
 
 
 def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None:
-    from kinacc.workflow.verification.mending import workflow_command
-
-    workflow = workflow_command([str(dataset)])  # with config.yaml the paper's study would run too
-    commands = [shlex.join(["kinacc", "check-data", str(dataset)]), shlex.join(workflow)]
+    commands = [shlex.join(["kinacc", name, str(dataset)]) for name in ("check-data", "calibrate")]
     if as_json:
         answer = {
             "written": [str(path) for path in written],

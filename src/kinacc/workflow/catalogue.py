@@ -340,6 +340,9 @@ STAGES: dict[str, Stage] = {
     )
 }
 
+# The stages of a calibration; maps, the study of assessors and the paper's claims go on from there.
+CALIBRATION = ("measurements", "data_check", "vec", "dh", "residuals", "excluded_rows")
+
 
 def maker_of(artefact: str) -> Stage:
     """The stage that leaves an artefact."""

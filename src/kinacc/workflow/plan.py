@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
@@ -66,7 +66,9 @@ class Plan:
     ``datasets`` maps a data set's name to its complete configuration (defaults filled in, without
     values that only say how a run is carried out); ``parts`` to the number of parts its scattered
     stages are computed in; ``formats`` are the picture formats; ``tournament`` is the
-    configuration's section of that name, which is one for all data sets.
+    configuration's section of that name, which is one for all data sets. ``files_absolute``: files
+    from outside are named in full, as a module of another workflow needs them, whose results may
+    have a folder put before them.
     """
 
     datasets: Mapping[str, Mapping[str, object]]
@@ -74,6 +76,7 @@ class Plan:
     formats: tuple[str, ...]
     results: str = RESULTS
     tournament: Mapping[str, object] = field(default_factory=dict)
+    files_absolute: bool = False
 
     def contest(
         self,
@@ -132,12 +135,17 @@ class Plan:
             reasons |= dict.fromkeys(made_here, "the measurements are synthetic")
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
-    def targets(self, dataset: str, on_request: bool = False) -> list[str]:
-        """Every file the data set leaves in a run, a plain one or with what is made on request."""
+    def targets(
+        self, dataset: str, on_request: bool = False, only: Collection[str] = STAGES
+    ) -> list[str]:
+        """Every file the data set leaves in a run, a plain one or with what is made on request.
+
+        ``only``: the stages whose files are meant.
+        """
         return [
             path
             for name, stage in self.stages(dataset).items()
-            if stage.on_request <= on_request and not stage.scattered
+            if name in only and stage.on_request <= on_request and not stage.scattered
             for path in self.outputs(name, dataset).values()
         ]
 
@@ -243,10 +251,10 @@ class Plan:
             count = min(self.parts[dataset], draws if "robustness" in name else repetitions)
         return [f"{number}-of-{count}" for number in range(1, count + 1)]
 
-    def message(self, name: str) -> str:
-        """What the stage is doing, for a Snakemake rule or with the wildcards put in."""
+    def message(self, name: str, dataset: str) -> str:
+        """What the stage is doing, for a Snakemake rule, whose wildcards may be in ``dataset``."""
         part = ", part {wildcards.part}" if STAGES[name].scattered else ""
-        whose = TOURNAMENT if STAGES[name].joint else "{wildcards.dataset}"
+        whose = dataset.replace("{dataset}", "{wildcards.dataset}")
         return f"{whose}: {STAGES[name].message}{part}"
 
     def log(self, name: str, dataset: str, part: str | None = None) -> str:
@@ -342,6 +350,8 @@ class Plan:
                     found |= {role: str(file) for role, file in read}
             elif value is not None and config["measurements"]["source"] == "file":
                 found["measurements_file"] = value
+        if self.files_absolute:
+            return {role: os.path.abspath(file) for role, file in found.items()}
         return found
 
 

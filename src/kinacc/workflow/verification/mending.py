@@ -19,7 +19,9 @@ from kinacc.workflow.plan import RESULTS, Plan, planned
 
 CONFIG = "config.yaml"
 
-_PROJECT = Path(__file__).parents[4]
+# Installed, the workflow stands in the package; in a clone beside src/.
+_INSTALLED = Path(__file__).parents[1] / "snakemake"
+SNAKEFILE = (_INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[4]) / "Snakefile"
 
 Marks = Mapping[str, Mapping[str, str]]
 
@@ -65,9 +67,9 @@ def remedy(
 def workflow_command(configs: Sequence[str], folder: Path | str = ".") -> list[str]:
     """Words of the command that runs the workflow from here, with its results in ``folder``."""
     words, is_here = ["snakemake", "-c2"], os.path.samefile(folder, ".")
-    near, own = Path(folder) / "Snakefile", _PROJECT / "Snakefile"
-    if not is_here or (own.is_file() and not near.is_file()):
-        words += ["-s", str(near if near.is_file() else own)]
+    near = Path(folder) / "Snakefile"
+    if not is_here or not near.is_file():
+        words += ["-s", str(near if near.is_file() else SNAKEFILE)]
     if not is_here:
         words += ["--directory", str(folder)]
     if configs and not (is_here and list(configs) == [CONFIG]):

@@ -1,0 +1,95 @@
+"""``kinacc calibrate``: from a data set to its models and what they are worth."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from kinacc.cli.choice import CONFIG
+
+if TYPE_CHECKING:
+    from kinacc.workflow.plan import Plan
+
+WORDS = {"ignore_unknown_options": True}
+CORES = click.option(
+    "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
+)
+TARGETS = click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml]...")
+
+
+@click.command("calibrate", context_settings=WORDS)
+@CORES
+@TARGETS
+def calibrate(words: tuple[str, ...], cores: int | None) -> None:
+    """Fit the models of the data sets of FILE.yaml, and say what they are worth.
+
+    Checks the measurements, fits the VEC and the DH model, holds poses out to judge them, and
+    leaves all tables in results/, in the folder it is called in. What is up to date is not made
+    again. Several files are merged in order. Words after -- go to Snakemake.
+
+    \b
+    Example:
+      kinacc calibrate tracker.yaml
+      kinacc calibrate tracker.yaml -- --dry-run
+    """
+    from kinacc.cli.fitted import in_words, read, summary
+
+    configs, plan = carried_out("calibration", words, cores, default=None)
+    if plan is None:
+        return
+    for dataset in plan.datasets:
+        folder = Path(plan.results) / dataset
+        click.echo(f"\n{in_words(dataset, summary(read(folder)))}")
+    first = f"{plan.results}/{next(iter(plan.datasets))}"
+    campaign = ["campaign", "start", "check", "--calibration", first, "--noise-mm", "NOISE"]
+    click.echo(
+        "\nnext:\n"
+        f"  {shlex.join(['kinacc', 'predict', first])} --help\n"
+        f"  {shlex.join(['kinacc', *campaign])}   # how large is the largest error?\n"
+        f"  {shlex.join(['kinacc', 'study', *configs])}   # maps and the study of assessors"
+    )
+
+
+def carried_out(
+    target: str, words: tuple[str, ...], cores: int | None, default: Path | None
+) -> tuple[tuple[str, ...], Plan | None]:
+    """Run the workflow up to a target: the configuration files and, after a real run, the plan.
+
+    ``words`` are configuration files and, from the first that begins with ``-``, Snakemake's;
+    without files config.yaml is meant, or the ``default`` where there is none. Leaves with
+    Snakemake's exit code where that is not 0. Raises InputError for bad configuration.
+    """
+    from kinacc.errors import InputError, Problem
+    from kinacc.workflow.plan import planned
+    from kinacc.workflow.verification.mending import SNAKEFILE
+
+    first = next((i for i, word in enumerate(words) if word.startswith("-")), len(words))
+    configs, more = words[:first], list(words[first:])
+    if not configs and Path(CONFIG).is_file():
+        configs = (CONFIG,)
+    elif not configs and default is not None:
+        configs = (str(default),)
+    elif not configs:
+        what = f"no configuration file is given, and there is no {CONFIG} here"
+        fix = "kinacc init MEASUREMENTS writes one; then: kinacc calibrate NAME.yaml"
+        raise InputError(Problem("FILE.yaml", what, fix=fix))
+    plan = planned(configs)
+    plan.check_files()
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
+    command += ["--cores", str(cores or os.cpu_count() or 1), "--configfile", *configs]
+    command += more or ["--quiet", "all"]  # stages say how far they are, and what goes wrong
+    done = subprocess.run([*command, "--", target], env=os.environ | ONE_THREAD, check=False)
+    if done.returncode:
+        raise SystemExit(done.returncode)
+    ran = not {"-n", "--dry-run", "--dryrun", "--unlock", "--lint"} & set(more)
+    return configs, plan if ran else None
+
+
+# More BLAS threads change the last bits of a sum, and jobs share the cores as they are.
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

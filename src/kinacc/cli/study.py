@@ -1,0 +1,37 @@
+"""``kinacc study``: everything the workflow makes of a data set."""
+
+from __future__ import annotations
+
+import shlex
+
+import click
+
+from kinacc.cli.calibrate import CORES, TARGETS, WORDS, carried_out
+
+
+@click.command("study", context_settings=WORDS)
+@CORES
+@TARGETS
+def study(words: tuple[str, ...], cores: int | None) -> None:
+    """Carry out the whole study of the data sets of FILE.yaml.
+
+    Beside the calibration: the map of errors, the operating points, the paper's assessors under
+    noise, figures and claims. Without a FILE.yaml the study is that of config.yaml
+    or, where there is none, of the paper. Words after -- go to Snakemake.
+
+    \b
+    Example:
+      kinacc study tracker.yaml
+      kinacc study config.yaml tracker.yaml -- --dry-run
+    """
+    from kinacc.workflow.verification.mending import SNAKEFILE
+
+    paper = SNAKEFILE.parent / "config.yaml"
+    configs, plan = carried_out("all", words, cores, default=paper)
+    if plan is None:
+        return
+    for dataset in plan.datasets:
+        click.echo(f"{dataset}: tables and figures are in {plan.results}/{dataset}")
+    options = [word for name in configs for word in ("--config", name)]
+    check = shlex.join(["kinacc", "check-results", plan.results, *options])
+    click.echo(f"next:\n  {check}")
