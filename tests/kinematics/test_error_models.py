@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinacc.artifacts.error_models import ERROR_MODELS
 from kinacc.geometry import log_so3
 from kinacc.kinematics import dh, robot, vec
-from kinacc.kinematics.tables import KINDS
+from kinacc.kinematics.tables import of_kind
 
 ARM = robot.load("mh180")
 SPAN = np.full(6, 2.0)
@@ -38,7 +39,7 @@ EXAMPLES = {"dh": dh_example, "vec": vec_example}
 VECTORS = {"dh": dh, "vec": vec}
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=ERROR_MODELS)
 def model(request):
     return EXAMPLES[request.param]()
 
@@ -78,7 +79,7 @@ def test_every_parameter_has_a_name_a_slope_and_a_place_in_the_table(model, at):
 
 def test_a_model_comes_back_from_its_table_bit_by_bit(model, at):
     columns = model.to_columns(np.ones(len(model.parameter_names)))
-    again = KINDS[model.kind].from_columns(columns, ARM.dh.prismatic)
+    again = of_kind(model.kind).from_columns(columns, ARM.dh.prismatic)
     for one, other in zip(model.pose(*at), again.pose(*at), strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(model.domain, again.domain)

@@ -8,15 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
+from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
 from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot
-from kinacc.kinematics.tables import KINDS, NOMINAL
 
-MODELS = (*KINDS, NOMINAL)
+MODELS = (*ERROR_MODELS, NOMINAL)
 FRAMES = ("base", "instrument")
 FLANGE, TOOL = "flange", "tool"
 _LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
