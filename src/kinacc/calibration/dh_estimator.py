@@ -79,7 +79,7 @@ class DHEstimator(Estimator):
         followed = others["vec"] if self.follows_vec else None
         if followed:
             at_target = compose(
-                followed.model.pose(observations.q_rad, observations.s),
+                followed.model.pose(observations.at),
                 _rows(followed.frames.targets, observations.target),
             )
             poses = full_poses(observations.q_rad, at_target)

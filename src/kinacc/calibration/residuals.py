@@ -104,7 +104,7 @@ def _seen(fit: Fit, bases: Pose, observations: Observations) -> Pose:
         fit.frames.targets.rotation[observations.target],
         fit.frames.targets.position_mm[observations.target],
     )
-    return compose(bases, compose(fit.model.pose(observations.q_rad, observations.s), targets))
+    return compose(bases, compose(fit.model.pose(observations.at), targets))
 
 
 def _bases(frames: Frames, observations: Observations) -> Pose:
