@@ -17,10 +17,10 @@ import time
 import numpy as np
 import yaml
 
+from kinacc.workflow.in_memory import RUNS
 from kinacc.workflow.plan import planned
-from kinacc.workflow.stages import dh, measurements, residuals, vec
 
-STAGES = {"measurements": measurements, "vec": vec, "dh": dh, "residuals": residuals}
+STAGES = ("measurements", "vec", "dh", "residuals")
 
 
 def main(arguments: list[str]) -> None:
@@ -38,12 +38,12 @@ def main(arguments: list[str]) -> None:
 def run(plan, dataset: str, changes: dict[str, str]) -> None:
     """Stages of one data set, with ``changes`` of settings by dotted key."""
     tables: dict = {}
-    for name, stage in STAGES.items():
+    for name in STAGES:
         settings = plan.settings(name, dataset)
         for path, value in changes.items():
             change(settings, path.split("."), yaml.safe_load(value))
         begin = time.perf_counter()
-        tables |= stage.run(tables, settings)
+        tables |= RUNS[name](tables, settings)
         print(f"{dataset:12} {name:13} {time.perf_counter() - begin:8.2f} s", flush=True)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{dataset:12} largest memory so far {peak:.0f} MiB")

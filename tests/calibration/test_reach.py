@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import shared_data
 
-from kinacc.calibration import models
+from kinacc.calibration.dh_estimator import DHEstimator
+from kinacc.calibration.observations import from_columns
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh, robot
-from kinacc.workflow import calibration_settings
 from kinacc.workflow.plan import planned
 from kinacc.workflow.stages import measurements
 
@@ -27,11 +27,11 @@ def held_out_errors(dataset, monkeypatch):
     table = measurements.run({}, plan.settings("measurements", dataset))
     config = plan.datasets[dataset]
     arm = robot.load(config["robot"])
-    options = calibration_settings.options(config["calibration"], arm)
-    every, _ = calibration_settings.observed(table, arm)
+    every = from_columns(table["measurements"], arm)
+    estimator = DHEstimator.of(config["calibration"], arm, every)
     errors = np.full((len(every), 3), np.nan)
     for fold in np.unique(every.fold):
-        fit = models.fit_dh(every.select(every.fold != fold), arm.dh, options, None)
+        fit = estimator.fit(every.select(every.fold != fold), {})
         out = every.select(every.fold == fold)
         targets = Pose(*(each[out.target] for each in fit.frames.targets))
         at = compose(fit.frames.base, compose(dh.forward(fit.model, out.q_rad), targets))

@@ -9,16 +9,16 @@ import pytest
 import simulated
 
 from kinacc.calibration import dh_fit, frames, models, residuals, tables, uncertainty
-from kinacc.calibration.models import Options
+from kinacc.calibration.dh_estimator import DHEstimator
+from kinacc.calibration.models import Common
 from kinacc.calibration.system import PoseSystem
+from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.calibration.vec_fit import Prior
 from kinacc.kinematics import robot
 
 ARM = robot.load("ur10")
 FREE = dh_fit.free_parameters(6, (2, 3))
-OPTIONS = Options(
-    500.0, True, 1, Prior(0.3, 3e-4, 0.7, 3e-4), dh_to_vec=False, hayati_joints=(2, 3)
-)
+COMMON = Common(ARM.dh, 500.0, True)
 
 
 def observed(kind, sessions, count=120, seed=0, noise_mm=0.02):
@@ -87,7 +87,9 @@ def test_every_base_keeps_its_session_in_the_tables():
 def test_errors_of_every_session_are_in_its_own_base():
     seen = observed(simulated.POSE, 3, noise_mm=1e-4)
     span = seen.q_rad.min(axis=0), seen.q_rad.max(axis=0)
-    fitted = models.fit_all(seen, ARM.dh, span, OPTIONS)
+    by_vec = VECEstimator(COMMON, span, 1, Prior(0.3, 3e-4, 0.7, 3e-4))
+    by_dh = DHEstimator(COMMON, follows_vec=False, hayati_joints=(2, 3))
+    fitted = models.fit_all(seen, [by_vec, by_dh])
     errors = residuals.errors(fitted, seen)
     assert np.abs(errors["dh_vs_measured"].position_mm).max() < 0.03
     assert np.abs(errors["dh_vs_vec"].position_mm).max() < 0.03

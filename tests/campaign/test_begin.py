@@ -15,6 +15,7 @@ from kinacc.deployment.planning.candidates import spread
 from kinacc.deployment.record import Anchor, nominal
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot
+from kinacc.kinematics.model import JointState
 
 COUPLED_AND_SLIDING = """
 name: coupled
@@ -66,6 +67,6 @@ def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
         np.zeros(6),
         {},
     )
-    seen = arm.pose(joints @ arm.robot.joint_map.T, frame="instrument").position_mm
+    seen = arm.pose(JointState(joints @ arm.robot.joint_map.T), frame="instrument").position_mm
     in_base = seen @ plan.to_base.rotation.T + plan.to_base.position_mm
     np.testing.assert_allclose(in_base, points.modelled_mm, atol=1e-9)

@@ -19,6 +19,7 @@ from kinacc.campaign import prediction_check
 from kinacc.campaign.reading import Reading
 from kinacc.cli import campaigns_answers
 from kinacc.geometry import Pose, exp_so3
+from kinacc.kinematics.model import JointState
 from kinacc.workflow.verification.conformity import check_file
 
 SIGMA_MM = 0.05
@@ -221,7 +222,7 @@ def test_a_reading_at_slightly_other_joints_is_held_to_the_model_there(begun, ca
     from kinacc.cli import choice
 
     arm = choice.calibration_of(calibration, "dh", "mh180", ())
-    there = arm.pose(joints[None] @ arm.robot.joint_map.T).position_mm[0]
+    there = arm.pose(JointState(joints[None] @ arm.robot.joint_map.T)).position_mm[0]
     assert np.linalg.norm(there - plan.points.modelled_mm[point]) > 0.5
     done = call("campaign", "record", folder,
                 "--joints-rad", ",".join(map(repr, joints.tolist())),
@@ -239,7 +240,7 @@ def test_readings_in_the_instruments_frame_say_the_same(begun, calibration):
     arm = choice.calibration_of(calibration, "dh", "mh180", ())
     point = int(plan.route[0])
     dh_joints = plan.points.joints[[point]] @ arm.robot.joint_map.T
-    seen = arm.pose(dh_joints, None, "instrument").position_mm[0] + (0.1, 0.2, -0.2)
+    seen = arm.pose(JointState(dh_joints), "instrument").position_mm[0] + (0.1, 0.2, -0.2)
     call("campaign", "record", folder, "--position-mm", ",".join(map(repr, seen.tolist())))
     (told,) = campaigns.open_(folder).state().told
     assert np.linalg.norm(told.error_mm) == pytest.approx(0.3, abs=1e-9)

@@ -12,6 +12,7 @@ from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics import robot
+from kinacc.kinematics.model import JointState
 
 
 def left(arm, q_rad, wanted, frame="base", point=None):
@@ -71,7 +72,7 @@ def test_every_kind_of_row_without_joints_says_why():
     q_rad = joints("mh180", 1)
     q_rad[0, 4] = arm.robot.q_max_rad[4] + 0.05  # joint 5 cannot get there, nor its mirror
     q_rad[0, 3] = arm.robot.q_max_rad[3] - 0.1
-    wanted = arm.pose(q_rad @ arm.robot.joint_map.T)
+    wanted = arm.pose(JointState(q_rad @ arm.robot.joint_map.T))
     found = compensate(arm, wanted, q_rad)
     assert found.status[0] in (Status.OUTSIDE_LIMITS, Status.OTHER_POSTURE)
     if found.status[0] == Status.OUTSIDE_LIMITS:
@@ -134,8 +135,8 @@ def test_a_program_and_the_base_mean_the_same_under_dh_and_vec():
     one, other = (programmed(arm, q_rad) for arm in arms)
     np.testing.assert_array_equal(other.position_mm, one.position_mm)
     np.testing.assert_array_equal(other.rotation, one.rotation)
-    own = compose(invert(arms[0].base), arms[1].pose(q_rad, None, "instrument"))
-    seen = arms[1].pose(q_rad, None, "base")
+    own = compose(invert(arms[0].base), arms[1].pose(JointState(q_rad), "instrument"))
+    seen = arms[1].pose(JointState(q_rad), "base")
     np.testing.assert_allclose(seen.position_mm, own.position_mm, rtol=0, atol=1e-9)
     std = [predict(arms[1], q_rad, None, frame).std_position_mm for frame in ("base", "instrument")]
     np.testing.assert_allclose(std[0], std[1], rtol=1e-9)

@@ -10,6 +10,7 @@ from kinacc.deployment.postures import FEW_AXES_TURN_RAD, Status
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, log_so3, rotation_x, skew
 from kinacc.kinematics import dh, robot
+from kinacc.kinematics.model import JointState
 
 SCARA = """
 dh:
@@ -53,7 +54,7 @@ def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
     wanted = programmed(plain, q)
     found = compensate(arm, wanted, q)
     assert (found.status == Status.CONVERGED).all()
-    there = arm.pose(found.q_rad)
+    there = arm.pose(JointState(found.q_rad))
     assert np.linalg.norm(there.position_mm - wanted.position_mm, axis=1).max() < 1e-6
     turn = np.linalg.norm(log_so3(there.rotation @ np.swapaxes(wanted.rotation, 1, 2)), axis=1)
     np.testing.assert_allclose(turn, found.rotation_error_rad, rtol=0, atol=1e-9)
@@ -62,13 +63,15 @@ def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
     rng = np.random.default_rng(2)
     unit = np.where(arm.robot.dh.prismatic, 1e3, 1.0)
     slopes = dh.joint_jacobian(arm.model, found.q_rad)
-    lever = (arm.forward(found.q_rad).rotation @ arm.point(None).position_mm[:, None])[..., 0]
+    lever = (
+        arm.model.pose(JointState(found.q_rad)).rotation @ arm.point(None).position_mm[:, None]
+    )[..., 0]
     moves = slopes[:, :3] - skew(lever) @ slopes[:, 3:]
     for row in range(len(q)):
         free = np.linalg.svd(moves[row] * unit)[2][3:]
         for _ in range(10):
             along = 1e-4 * rng.normal(0.0, 1.0, len(free)) @ free * unit
-            near = arm.pose(found.q_rad[row] + along)
+            near = arm.pose(JointState(found.q_rad[row] + along))
             left = log_so3(near.rotation[0] @ wanted.rotation[row].T)
             assert np.linalg.norm(left) > turn[row] - 1e-7
 
@@ -78,7 +81,7 @@ def test_without_joints_to_be_near_a_posture_is_found():
     wanted = programmed(plain, program("scara", 3))
     found = compensate(arm, wanted)
     assert (found.status == Status.CONVERGED).all()
-    there = arm.pose(found.q_rad)
+    there = arm.pose(JointState(found.q_rad))
     assert np.linalg.norm(there.position_mm - wanted.position_mm, axis=1).max() < 1e-6
 
 

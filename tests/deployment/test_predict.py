@@ -11,6 +11,7 @@ from kinacc.deployment.record import nominal
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot, vec
+from kinacc.kinematics.model import JointState
 
 
 def moved(arm, names, step):
@@ -36,13 +37,13 @@ def moved(arm, names, step):
 def test_sensitivities_are_the_finite_differences_of_the_pose(model, frame, point):
     arm = calibrated("mh180", model)
     q_rad = joints("mh180", 3, seed=8)
-    slopes = sensitivity(arm, q_rad, None, frame, point)
+    slopes = sensitivity(arm, JointState(q_rad), frame, point)
     names = arm.known.names
     for column in np.linspace(0, len(names) - 1, 30).astype(int):
         size = 1e-6 if is_angle(names[column]) else 1e-3
         step = size * np.eye(len(names))[column]
         low, high = (
-            moved(arm, names, sign * step).pose(q_rad, None, frame, point) for sign in (-1, 1)
+            moved(arm, names, sign * step).pose(JointState(q_rad), frame, point) for sign in (-1, 1)
         )
         shift = (high.position_mm - low.position_mm) / (2 * size)
         turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2)) / (2 * size)
@@ -57,10 +58,12 @@ def test_joint_jacobians_are_the_finite_differences_of_the_pose(model, frame, po
     arm, step = calibrated("mh180", model), 1e-6
     q_rad = joints("mh180", 4, seed=9)
     s = np.sign(np.random.default_rng(5).normal(size=q_rad.shape))
-    slopes = arm.joint_jacobian(q_rad, s, frame, point)
+    slopes = arm.joint_jacobian(JointState(q_rad, s), frame, point)
     for joint in range(q_rad.shape[1]):
         moved = step * np.eye(q_rad.shape[1])[joint]
-        low, high = (arm.pose(q_rad + sign * moved, s, frame, point) for sign in (-1, 1))
+        low, high = (
+            arm.pose(JointState(q_rad + sign * moved, s), frame, point) for sign in (-1, 1)
+        )
         shift = (high.position_mm - low.position_mm) / (2 * step)
         turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2)) / (2 * step)
         np.testing.assert_allclose(slopes[:, :3, joint], shift, atol=1e-5)

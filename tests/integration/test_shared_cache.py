@@ -39,7 +39,7 @@ def test_equal_work_is_taken_from_the_cache(run):
     ("file", "line", "left"),
     [
         ("src/kinacc/calibration/dh_fit.py", "# changed", set()),
-        ("src/kinacc/workflow/stages/dh.py", "# changed", {"vec_model"}),
+        ("src/kinacc/calibration/dh_estimator.py", "# changed", {"vec_model"}),
         ("src/kinacc/kinematics/robots/mh180.yaml", "# changed", set()),
         ("src/kinacc/synthetic/accepted_draws.csv", "# changed", set()),
     ],

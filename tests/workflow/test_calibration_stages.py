@@ -15,8 +15,9 @@ from kinacc.kinematics import dh as dh_kinematics
 from kinacc.kinematics import robot
 from kinacc.kinematics import vec as vec_kinematics
 from kinacc.kinematics.tables import frame, models
+from kinacc.workflow.in_memory import RUNS
 from kinacc.workflow.plan import planned
-from kinacc.workflow.stages import assessment_points, dh, measurements, residuals, vec
+from kinacc.workflow.stages import assessment_points, measurements
 
 ROOT = Path(__file__).resolve().parents[2]
 POSES = 150
@@ -73,10 +74,10 @@ def columns(base=None, tool=None):
 def chain(plan, split, **changes):
     tables = {"measurements": split}
     given = {"calibration__vec__order": 2} | changes
-    for name, stage in (("vec", vec), ("dh", dh), ("residuals", residuals)):
+    for name in ("vec", "dh", "residuals"):
         sections = plan.settings(name, "mh180")["calibration"]
         own = {path: value for path, value in given.items() if path.split("__")[1] in sections}
-        tables |= stage.run(tables, settings_of(plan, name, **own))
+        tables |= RUNS[name](tables, settings_of(plan, name, **own))
     return tables
 
 
@@ -160,7 +161,9 @@ def test_pooled_validation_covers_every_row_once(tables):
 def test_rows_of_the_validation_fold_never_reach_the_delivered_models(plan, tables):
     spoiled = {name: values.copy() for name, values in tables["measurements"].items()}
     spoiled["x_mm"][spoiled["subset"] == "validation"] += 100.0
-    again = vec.run({"measurements": spoiled}, settings_of(plan, "vec", calibration__vec__order=2))
+    again = RUNS["vec"](
+        {"measurements": spoiled}, settings_of(plan, "vec", calibration__vec__order=2)
+    )
     np.testing.assert_array_equal(
         again["vec_model"]["coefficient"], tables["vec_model"]["coefficient"]
     )
@@ -354,14 +357,14 @@ def test_order_and_prior_cannot_be_chosen_without_folds_that_hold_rows(plan):
     split = measurements.split(one, plan.settings("measurements", "mh180"))
     given = settings_of(plan, "vec", calibration__vec__order="auto")
     with pytest.raises(InputError, match="no order or prior can be tried"):
-        vec.run({"measurements": split}, given)
+        RUNS["vec"]({"measurements": split}, given)
 
 
 def test_too_few_poses_for_the_order_is_bad_input(plan):
     few = {name: values[:20] for name, values in columns().items()}
     split = measurements.split(few, plan.settings("measurements", "mh180"))
     with pytest.raises(InputError, match=r"96 residual components .* 216 free parameters"):
-        vec.run({"measurements": split}, plan.settings("vec", "mh180"))
+        RUNS["vec"]({"measurements": split}, plan.settings("vec", "mh180"))
 
 
 @pytest.mark.parametrize(("dataset", "reach_mm"), [("ur10_b", 0.475), ("ur10_d", 0.43)])
@@ -369,13 +372,8 @@ def test_reach_on_the_measured_ur10(dataset, reach_mm, monkeypatch):
     monkeypatch.chdir(ROOT)
     measured = planned([ROOT / "config.yaml", ROOT / "examples" / "ur10.yaml"])
     found: dict = {}
-    for name, stage in (
-        ("measurements", measurements),
-        ("vec", vec),
-        ("dh", dh),
-        ("residuals", residuals),
-    ):
-        found |= stage.run(found, measured.settings(name, dataset))
+    for name in ("measurements", "vec", "dh", "residuals"):
+        found |= RUNS[name](found, measured.settings(name, dataset))
     rms = {
         comparison: row(
             found["residuals"],

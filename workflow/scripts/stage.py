@@ -7,7 +7,8 @@ stage, part = snakemake.params.stage, snakemake.params.get("part")
 execute(
     Job(
         STAGES[stage].module,
-        uses=STAGES[stage].used(snakemake.params.settings),
+        uses=STAGES[stage].used(snakemake.params.settings, snakemake.input.keys()),
+        kind=STAGES[stage].fits,
         inputs=dict(snakemake.input.items()),
         outputs=dict(snakemake.output.items()),
         settings=snakemake.params.settings,

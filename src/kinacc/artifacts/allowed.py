@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-MODELS = ("vec", "dh", "nominal")
-SELECTABLE = ("dh", "vec")  # the plainest first: others have to be worth it
+from kinacc.artifacts import error_models
+
+MODELS = (*error_models.FITTED, error_models.NOMINAL)
+SELECTABLE = tuple(error_models.ERROR_MODELS)
 SUBSETS = ("train", "validation")
 QUANTITIES = ("position", "orientation")
 UNITS_OF_RESIDUALS = ("mm", "mrad")
-COMPARED = (  # reference and model
-    ("measured", "vec"),
-    ("vec", "dh"),
-    ("measured", "dh"),
-    ("measured", "nominal"),
-)
-COMPARISONS = tuple(f"{model}_vs_{reference}" for reference, model in COMPARED)
+COMPARISONS = tuple(each.name for each in error_models.COMPARISONS)
 ESTIMATES = ("train", "cross_validated")
 FINDING_LEVELS = ("stops", "warning", "note")
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")

@@ -219,11 +219,11 @@ def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
         vector[mask] = x
         return dh.with_vector(nominal, vector)
 
-    def jacobian(x: np.ndarray, q_rad: np.ndarray, s: np.ndarray) -> np.ndarray:
-        full = dh.parameter_jacobian(model(x), q_rad)
-        return full.reshape(len(full), 6, -1)[:, :, mask]
-
-    return FlangeModel(int(mask.sum()), lambda x, q, s: dh.forward(model(x), q), jacobian)
+    return FlangeModel(
+        int(mask.sum()),
+        lambda x, at: model(x).pose(at),
+        lambda x, at: model(x).parameter_jacobian(at)[:, :, mask],
+    )
 
 
 def _units(is_angle: np.ndarray) -> np.ndarray:

@@ -6,11 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kinacc.artifacts.allowed import SELECTABLE
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
+from kinacc.artifacts.error_models import COMPARISONS, ERROR_MODELS, MEASURED, Comparison
 from kinacc.calibration import model_comparison
-from kinacc.calibration.models import COMPARISONS, MEASURED, Comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
 from kinacc.measurements import folds
@@ -27,7 +26,9 @@ def columns(
 ) -> dict[str, Columns]:
     """The three tables from errors ``seen`` at the rows that ``train`` and ``held_out`` (n,)."""
     bias, worst = [], []
-    for name, reference in ((each.name, each.reference) for each in COMPARISONS):
+    for reference, name in ((each.reference, each.name) for each in COMPARISONS):
+        if name not in seen:
+            continue
         for estimate, errors, rows in (
             ("train", seen[name], np.flatnonzero(train)),
             ("cross_validated", held_out[name], np.arange(len(train))),
@@ -46,7 +47,8 @@ def columns(
 def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Columns:
     """``model_selection`` from errors ``held_out`` of every row."""
     same = folds.configurations(every.pose, every.q_rad, _SAME_CONFIGURATION_RAD)
-    errors = {name: held_out[Comparison(MEASURED, name).name] for name in SELECTABLE}
+    names = {kind: Comparison(MEASURED, kind).name for kind in ERROR_MODELS}
+    errors = {kind: held_out[name] for kind, name in names.items() if name in held_out}
     found = model_comparison.select(errors, same, every.fold)
     rows = [
         (

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from kinacc.geometry import Pose, rotation_from_quaternion
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 
 TOOL = "tool"
@@ -47,6 +48,11 @@ class Observations:
     def joints(self) -> int:
         """Number of joints k."""
         return self.q_rad.shape[1]
+
+    @property
+    def at(self) -> JointState:
+        """How the arm stood."""
+        return JointState(self.q_rad, self.s)
 
     @property
     def has_rotation(self) -> np.ndarray:

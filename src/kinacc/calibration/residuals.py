@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.artifacts.error_models import MEASURED, comparisons
 from kinacc.calibration.frames import Frames
-from kinacc.calibration.models import COMPARISONS, MEASURED, Fit
+from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations
 from kinacc.distributions import gamma99
 from kinacc.geometry import Pose, compose, log_so3
@@ -52,7 +53,7 @@ def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Err
     seen[MEASURED] = observations.measured
     return {
         each.name: _difference(seen[each.reference], seen[each.model], bases[each.model])
-        for each in COMPARISONS
+        for each in comparisons(fits)
     }
 
 
@@ -60,14 +61,15 @@ def cross_validated(
     observations: Observations,
     refit: Callable[[Observations, int], Mapping[str, Fit]],
     folds: Iterable[int],
+    models: Collection[str],
 ) -> tuple[dict[str, Errors], dict[int, dict[str, Errors]]]:
     """Errors of every row by a model that has not seen its fold, and each fold's training errors.
 
-    ``refit(train, fold)`` fits the models to the rows outside the fold. Rows without a fold
+    ``refit(train, fold)`` fits the ``models`` to the rows outside the fold. Rows without a fold
     (-1) always train and stay NaN.
     """
     count = len(observations)
-    held_out = {each.name: Errors(*np.full((2, count, 3), np.nan)) for each in COMPARISONS}
+    held_out = {each.name: Errors(*np.full((2, count, 3), np.nan)) for each in comparisons(models)}
     trained: dict[int, dict[str, Errors]] = {}
     for fold in folds:
         out = observations.fold == fold
@@ -102,7 +104,7 @@ def _seen(fit: Fit, bases: Pose, observations: Observations) -> Pose:
         fit.frames.targets.rotation[observations.target],
         fit.frames.targets.position_mm[observations.target],
     )
-    return compose(bases, compose(fit.model.pose(observations.q_rad, observations.s), targets))
+    return compose(bases, compose(fit.model.pose(observations.at), targets))
 
 
 def _bases(frames: Frames, observations: Observations) -> Pose:

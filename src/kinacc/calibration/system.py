@@ -12,6 +12,7 @@ from kinacc.calibration.frames import FrameCoordinates, inverse_left_jacobian, l
 from kinacc.calibration.observations import Observations
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, exp_so3, log_so3, skew
+from kinacc.kinematics.model import JointState
 
 BLOCK_ROWS = 1024
 
@@ -31,15 +32,15 @@ def require_enough(observations: Observations, parameters: int, name: str, fix: 
 class FlangeModel:
     """A kinematic model with P parameters, as functions of the vector and of the observations.
 
-    ``pose(x, q, s)``: flange poses (n, ...). ``jacobian(x, q, s)``: (n, 6, E), rows 0-2 mm per
+    ``pose(x, at)``: flange poses (n, ...). ``jacobian(x, at)``: (n, 6, E), rows 0-2 mm per
     parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base. Its columns are the
-    parameters, E = P, or motions that ``expansion(q, s)`` spreads over them.
+    parameters, E = P, or motions that ``expansion(at)`` spreads over them.
     """
 
     size: int
-    pose: Callable[[np.ndarray, np.ndarray, np.ndarray], Pose]
-    jacobian: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-    expansion: Callable[[np.ndarray, np.ndarray], list[Group]] | None = None
+    pose: Callable[[np.ndarray, JointState], Pose]
+    jacobian: Callable[[np.ndarray, JointState], np.ndarray]
+    expansion: Callable[[JointState], list[Group]] | None = None
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ class PoseSystem:
         if self.model.expansion is None:
             return [Group(slice(0, self.size), None)]
         groups = [Group(slice(0, frames), None)]
-        for group in self.model.expansion(part.q_rad, part.s):
+        for group in self.model.expansion(part.at):
             columns = slice(group.columns.start + frames, group.columns.stop + frames)
             groups.append(Group(columns, group.basis))
         return groups
@@ -134,7 +135,7 @@ class PoseSystem:
     def _residual(self, x, part):
         frame_x, model_x = x[: self.coordinates.size], x[self.coordinates.size :]
         targets = self.coordinates.targets(frame_x)
-        flange = self.model.pose(model_x, part.q_rad, part.s)
+        flange = self.model.pose(model_x, part.at)
         arm = np.einsum("nij,nj->ni", flange.rotation, targets.position_mm[part.target])
         turned, inverse = self._from_base(frame_x, part)
         turn = part.has_rotation
@@ -164,7 +165,7 @@ class PoseSystem:
         flange, arm, turned = seen
         frames = self.coordinates.size
         frame_x, model_x = x[:frames], x[frames:]
-        jacobian = self.model.jacobian(model_x, part.q_rad, part.s)
+        jacobian = self.model.jacobian(model_x, part.at)
         if self._arms_matter() and self.model.size:
             # A turn of the flange swings the target's arm: w x arm = -[arm] w.
             jacobian[:, :3] -= skew(arm) @ jacobian[:, 3:]

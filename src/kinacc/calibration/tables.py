@@ -13,7 +13,7 @@ from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.identified import IDENTIFIED, PRIOR, Parameter
 from kinacc.calibration.selection import Choice
 from kinacc.calibration.solve import Solution, Spectrum
-from kinacc.calibration.uncertainty import Uncertainty, is_angle
+from kinacc.calibration.uncertainty import Uncertainty, scaled_unit, unit_of
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
@@ -109,7 +109,7 @@ def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
         ]
     for number, direction in enumerate(uncertainty.undetermined, 1):
         rows += [
-            ("undetermined_direction", number, name, value, "mrad" if is_angle(name) else "mm")
+            ("undetermined_direction", number, name, value, scaled_unit(name))
             for name, value in zip(uncertainty.names, direction, strict=True)
         ]
     return columns_of("dh_fit", rows)
@@ -122,8 +122,9 @@ def identified_columns(found: Sequence[Parameter], uncertainty: Uncertainty) -> 
     rows = []
     for each in found:
         std = np.sqrt(max(variance[each.name], 0.0)) if each.status in known else None
-        unit = "rad" if is_angle(each.name) else "mm"
-        rows.append((each.name, each.status, std, unit, each.share, each.statement or None))
+        rows.append(
+            (each.name, each.status, std, unit_of(each.name), each.share, each.statement or None)
+        )
     return columns_of("dh_identified", rows)
 
 

@@ -47,9 +47,39 @@ def of_fit(fit: DHFit | VECFit, target_names: tuple[str, ...]) -> Uncertainty:
     return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
 
 
+# Unit of a parameter by the end of its name, and what of it moves a pose as much as one mm does.
+_UNITS = {
+    "_rad": ("rad", ANGLE_UNIT_RAD),
+    "_rad_per_nm": ("rad/(N m)", 1e-6),
+    "_rad_per_mm": ("rad/mm", 1e-6),
+}
+
+
+def unit_of(name: str) -> str:
+    """Unit of a named parameter: mm, rad, or what a coefficient of it is per."""
+    return _unit(name)[0]
+
+
+def scale_of(name: str) -> float:
+    """In the parameter's unit what counts as one mm: 1 mm, one mrad, 1e-6 of a coefficient."""
+    return _unit(name)[1]
+
+
+def scaled_unit(name: str) -> str:
+    """Unit of a displacement measured in ``scale_of``: mm, mrad."""
+    unit = unit_of(name)
+    return {"mm": unit, "rad": "mrad"}.get(unit, f"1e-6 {unit}")
+
+
 def is_angle(name: str) -> bool:
-    """Whether a named parameter is in rad; otherwise it is in mm."""
-    return name.endswith("_rad") or ".eps_" in name
+    """Whether a named parameter is in rad."""
+    return unit_of(name) == "rad"
+
+
+def _unit(name: str) -> tuple[str, float]:
+    if ".eps_" in name:
+        return _UNITS["_rad"]
+    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), ("mm", 1.0))
 
 
 def named_directions(
@@ -77,10 +107,10 @@ def _directions(
 ) -> np.ndarray:
     # The fit's own scale has the same units: frame coordinates are mm and rad as well.
     free = names[len(names) - (change.shape[1] - fit.coordinates.size) :]
-    angle = [*fit.coordinates.is_angle(), *(is_angle(name) for name in free)]
-    own = np.where(angle, ANGLE_UNIT_RAD, 1.0)
+    frames = np.where(fit.coordinates.is_angle(), ANGLE_UNIT_RAD, 1.0)
+    own = np.concatenate([frames, _units(free)])
     return (directions * own) @ change.T / _units(names)
 
 
 def _units(names: tuple[str, ...]) -> np.ndarray:
-    return np.where([is_angle(name) for name in names], ANGLE_UNIT_RAD, 1.0)
+    return np.array([scale_of(name) for name in names])

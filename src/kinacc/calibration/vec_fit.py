@@ -14,6 +14,7 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.kinematics import vec
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import ERRORS, VECModel
 
 VEC_FIX = "measure more poses, or lower calibration.vec.order"
@@ -192,13 +193,13 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
         vector[free] = x
         return vec.with_vector(empty, vector)
 
-    def jacobian(x: np.ndarray, q_rad: np.ndarray, s: np.ndarray) -> np.ndarray:
-        motions = vec.elementary_jacobian(model(x), q_rad, s)
+    def jacobian(x: np.ndarray, at: JointState) -> np.ndarray:
+        motions = vec.elementary_jacobian(model(x), at.q_rad, at.s)
         about_z = motions[:, :, directed, ERRORS.index("eps_z")]
         return np.concatenate([motions.reshape(len(motions), 6, -1), about_z], axis=2)
 
-    def expansion(q_rad: np.ndarray, s: np.ndarray) -> list[Group]:
-        basis, travelled = vec.chebyshev_basis(empty, q_rad), vec.direction_basis(s)
+    def expansion(at: JointState) -> list[Group]:
+        basis, travelled = vec.chebyshev_basis(empty, at.q_rad), vec.direction_basis(at.s)
         groups = [
             Group(slice(errors * joint, errors * (joint + 1)), basis[:, joint])
             for joint in range(empty.joints)
@@ -207,9 +208,7 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
             groups.append(Group(slice(number, number + 1), travelled[:, joint, seen[joint]]))
         return groups
 
-    return FlangeModel(
-        int(free.sum()), lambda x, q, s: vec.pose(model(x), q, s), jacobian, expansion
-    )
+    return FlangeModel(int(free.sum()), lambda x, at: model(x).pose(at), jacobian, expansion)
 
 
 def _is_angle(model: VECModel) -> np.ndarray:

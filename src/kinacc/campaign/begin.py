@@ -17,6 +17,7 @@ from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.geometry import compose, invert
 from kinacc.kinematics.inverse.limits import travel_unit
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import outside_limits
 
 _ROUTED = 400  # points beyond which the route is built in stretches of so many
@@ -48,9 +49,9 @@ def points_of(
         problems.append(Problem("candidates", what, "one name per point"))
     if problems:
         raise InputError(problems, "These candidates cannot be measured against the model")
-    q_dh = arm.robot.dh_joints(joints)
-    where = arm.pose(q_dh, directions, "base", point).position_mm
-    slope = arm.joint_jacobian(q_dh, directions, "base", point)[:, :3] @ arm.robot.joint_map
+    at = JointState(arm.robot.dh_joints(joints), directions)
+    where = arm.pose(at, "base", point).position_mm
+    slope = arm.joint_jacobian(at, "base", point)[:, :3] @ arm.robot.joint_map
     return Points(tuple(label), joints, directions, where, slope)
 
 

@@ -33,7 +33,7 @@ class Settings:
 
 def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:
     """The settings of a configured data set. Raises InputError."""
-    from kinacc.workflow.calibration_settings import hayati_joints
+    from kinacc.calibration.dh_estimator import hayati_joints
     from kinacc.workflow.plan import planned
 
     datasets = planned(config or (CONFIG,)).datasets

@@ -21,6 +21,7 @@ from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import JointState
 
 _MRAD = 1e-3
 _SPAN = 1e-3  # directions closer than this are one
@@ -97,7 +98,7 @@ def compare(
         parameters = _parameters(first, second)
         test = _test(first, second)
     before, after = (
-        arm.pose(arm.robot.dh_joints(q_rad), None, "base", FLANGE) for arm in (first, second)
+        arm.pose(JointState(arm.robot.dh_joints(q_rad)), "base", FLANGE) for arm in (first, second)
     )
     plain = _difference(before, after)
     slopes = _frame_slopes(before)
@@ -258,7 +259,7 @@ def _scatter(arm: Calibration, q_rad: np.ndarray) -> np.ndarray | None:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fit."""
     if arm.known is None:
         return None
-    return sensitivity(arm, arm.robot.dh_joints(q_rad), None, "base", FLANGE) @ arm.root
+    return sensitivity(arm, JointState(arm.robot.dh_joints(q_rad)), "base", FLANGE) @ arm.root
 
 
 def _without_frames(scatter: np.ndarray, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:

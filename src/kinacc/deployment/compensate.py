@@ -20,6 +20,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import limits
+from kinacc.kinematics.model import JointState
 
 
 class Compensation(NamedTuple):
@@ -65,7 +66,8 @@ def compensate(
     given = near_rad is not None
     near = np.zeros(robot.dh.joints) if near_rad is None else np.atleast_2d(near_rad)
     near = np.broadcast_to(near, (count, robot.dh.joints))
-    arm = Goals(calibration, goal, near, s, carried)
+    like = JointState(robot.dh_joints(near), None if s is None else np.asarray(s))
+    arm = Goals(calibration, goal, near, like, carried)
     best = _Best.none(count, robot.dh.joints, given)
     if given:
         every = np.arange(count)

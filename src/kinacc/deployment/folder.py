@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.record import MODELS, Anchor, Calibration, Residual
 from kinacc.errors import InputError, Problem
@@ -14,14 +15,15 @@ from kinacc.geometry import Pose
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
-from kinacc.kinematics.tables import KINDS
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 
-_NEEDED = (*(f"{kind}_model" for kind in KINDS), "frames")
+_NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 # Used where they are there.
-_WANTED = ("dh_fit", "dh_identified", "residuals", "model_selection")
-_COVARIANCE = tuple(f"{kind}_covariance" for kind in KINDS)
+_WANTED = (
+    *(f"{kind}_{what}" for kind in ERROR_MODELS for what in ("model", "fit", "covariance")),
+    *("dh_identified", "residuals", "model_selection"),
+)
 _SAME = 1e-9
 
 
@@ -37,7 +39,7 @@ def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
     ]
     if missing:
         raise InputError(missing, f"{folder} holds no calibration")
-    names = [*_NEEDED, *_WANTED, *_COVARIANCE]
+    names = dict.fromkeys((*_NEEDED, *_WANTED))
     present = [name for name in names if (folder / f"{name}.parquet").is_file()]
     return {name: store.read(folder / f"{name}.parquet") for name in present}
 
@@ -69,9 +71,10 @@ def calibration(
     Raises InputError where the robot is not the one the tables were made with.
     """
     choice = selected_model(tables) if model is None else model
-    if choice not in MODELS:
-        raise InputError(Problem("model", f"{choice!r}", ", ".join(MODELS)))
     made = model_tables.models(tables, robot.dh)
+    if choice not in made:
+        what = f"{choice!r} is none of these results"
+        raise InputError(Problem("model", what, ", ".join(made)))
     bounded = next(each for each in made.values() if each.domain is not None)
     _require_same_arm(bounded.dh, robot, name)
     frames = tables["frames"]
@@ -98,10 +101,10 @@ def _anchor(
     frames: Mapping, choice: str, targets: Sequence[str], session: str | None
 ) -> Anchor | None:
     """Base and targets of the DH model; None where the model chosen has the very same base."""
-    bases = [model_tables.frame(frames, each, "base", session) for each in ("dh", choice)]
+    bases = [model_tables.frame(frames, each, "base", session) for each in (PLAINEST, choice)]
     if all(np.array_equal(one, other) for one, other in zip(*bases, strict=True)):
         return None
-    tools = {each: model_tables.frame(frames, "dh", each) for each in targets}
+    tools = {each: model_tables.frame(frames, PLAINEST, each) for each in targets}
     return Anchor(bases[0], tools)
 
 
@@ -125,7 +128,7 @@ def selected_model(tables: Tables) -> str:
     recorded = _recorded(tables)
     if recorded:
         return recorded
-    rms = {each: residual(tables, each, "validation") for each in KINDS}
+    rms = {each: residual(tables, each, "validation") for each in ALWAYS}
     if any(each is None for each in rms.values()):
         what = "was not selected, and there are no held-out residuals to choose by"
         raise InputError(Problem("model", what, ", ".join(MODELS), "give --model"))

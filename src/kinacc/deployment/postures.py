@@ -16,6 +16,7 @@ from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import few_axes, limits, newton
 from kinacc.kinematics.inverse import solve as all_branches
 from kinacc.kinematics.inverse.onto_model import Functions, functions_of
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import points
 
 POSITION_TOLERANCE_MM = newton.POSITION_TOLERANCE_MM
@@ -49,17 +50,20 @@ class Judged(NamedTuple):
 
 
 class Goals:
-    """Wanted poses of the last DH frame, and what becomes of starts for them."""
+    """Wanted poses of the last DH frame, and what becomes of starts for them.
+
+    ``near`` (n, k): reported joints; ``like``: how the arm travels there and what it carries.
+    """
 
     def __init__(
         self,
         calibration: Calibration,
         goal: Pose,
         near: np.ndarray,
-        s: np.ndarray | None,
+        like: JointState,
         carried: Pose,
     ) -> None:
-        self.calibration, self.goal, self.near, self.s = calibration, goal, near, s
+        self.calibration, self.goal, self.near, self.like = calibration, goal, near, like
         self.has_few_axes = calibration.robot.dh.joints < few_axes.SIX
         # What is brought to the goal and verified there; an arm of few axes turns about its point.
         self.carried = carried if self.has_few_axes else IDENTITY
@@ -160,14 +164,19 @@ class Goals:
         return best
 
     def _refined(self, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        if self.s is None or self.model.table is not None:
-            return self._onto(functions_of(self.model, None), start, rows)
-        # Travel directions differ by row, and a refinement drops rows as they converge.
+        like = self.like.select(rows)
+        kinds = [np.nan_to_num(each) for each in (like.s, like.payload) if each is not None]
+        if not kinds or self.model.table is not None:
+            return self._onto(functions_of(self.model), start, rows)
+        # Directions and payloads differ by row, and a refinement drops rows as they converge.
         found = np.empty_like(start)
-        directions, group = np.unique(self.s[rows], axis=0, return_inverse=True)
-        for number, direction in enumerate(directions):
+        _, first, group = np.unique(
+            np.hstack(kinds), axis=0, return_index=True, return_inverse=True
+        )
+        for number, one in enumerate(first):
             own = np.flatnonzero(group.ravel() == number)
-            found[own] = self._onto(functions_of(self.model, direction), start[own], rows[own])
+            functions = functions_of(self.model, like.select(slice(one, one + 1)))
+            found[own] = self._onto(functions, start[own], rows[own])
         return found
 
     def _onto(self, of: Functions, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -180,7 +189,7 @@ class Goals:
 
     def _left(self, q_dh: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
-        at = self.calibration.forward(q_dh, None if self.s is None else self.s[rows])
+        at = self.model.pose(self.like.select(rows).moved(q_dh))
         at = compose(at, self.carried)
         off = np.linalg.norm(at.position_mm - self.wanted.position_mm[rows], axis=1)
         turned = at.rotation @ np.swapaxes(self.wanted.rotation[rows], 1, 2)
@@ -201,7 +210,7 @@ class Goals:
         share = points("sobol", count, robot.dh.joints)
         starts = robot.dh_joints(low + share * (high - low))
         found = np.full((len(rows), count, robot.dh.joints), np.nan)
-        functions = functions_of(self.plain, None)
+        functions = functions_of(self.plain)
         for number, start in enumerate(starts):
             q_dh = self._onto(functions, np.tile(start, (len(rows), 1)), rows)
             at = compose(dh.forward(self.plain, q_dh), self.carried)

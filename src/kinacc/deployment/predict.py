@@ -10,6 +10,7 @@ import numpy as np
 from kinacc.calibration.frames import MOTIONS
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.geometry import Pose, compose, skew
+from kinacc.kinematics.model import JointState
 
 BLOCK = 512  # poses per pass: bounds the memory of the sensitivities
 
@@ -51,8 +52,10 @@ def predict(
     ``s`` (n, k): travel directions, unknown where not given. ``point``: a target by name or
     ``flange``; the tool where not given. Raises InputError for an unknown frame or point.
     """
-    q_rad = calibration.robot.dh_joints(np.atleast_2d(q_rad))
-    count, outside = len(q_rad), calibration.outside_range(q_rad)
+    at = JointState(
+        calibration.robot.dh_joints(np.atleast_2d(q_rad)), None if s is None else np.asarray(s)
+    )
+    count, outside = len(at), calibration.outside_range(at.q_rad)
     silent = outside.any(axis=1) & (calibration.model.domain is not None)
     said = np.flatnonzero(~silent)
     pose = Pose(np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan))
@@ -63,12 +66,12 @@ def predict(
     starts = range(0, len(said), BLOCK)
     for begin in progress(starts, f"blocks of {BLOCK} poses") if progress else starts:
         rows = said[begin : begin + BLOCK]
-        part = None if s is None else np.asarray(s)[rows]
-        found = calibration.pose(q_rad[rows], part, frame, point)
+        part = at.select(rows)
+        found = calibration.pose(part, frame, point)
         pose.rotation[rows], pose.position_mm[rows] = found
         if undetermined is None:
             continue
-        slopes = sensitivity(calibration, q_rad[rows], part, frame, point)
+        slopes = sensitivity(calibration, part, frame, point)
         std[rows] = np.sqrt(np.sum((slopes @ calibration.root) ** 2, axis=2))
         unseen = (slopes @ undetermined) ** 2
         blind[rows, 0] = np.sqrt(unseen[:, :3].sum(axis=(1, 2)))
@@ -88,25 +91,21 @@ def predict(
 
 
 def sensitivity(
-    calibration: Calibration,
-    q_rad: np.ndarray,
-    s: np.ndarray | None = None,
-    frame: str = "base",
-    point: str | None = None,
+    calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
 ) -> np.ndarray:
     """Jacobian (n, 6, P) of the pose in the parameters of ``calibration.known``.
 
-    Rows: position (mm) and small turn (rad) in ``frame``; ``q_rad`` (n, k) are DH joints.
+    Rows: position (mm) and small turn (rad) in ``frame``.
     """
     name = point or calibration.default_point
     carried, origin = calibration.point(name), calibration.origin(frame)
-    end = calibration.forward(q_rad, s)
-    slopes = np.zeros((len(q_rad), 6, len(calibration.known.names)))
+    end = calibration.model.pose(at)
+    slopes = np.zeros((len(at), 6, len(calibration.known.names)))
     place = {each: number for number, each in enumerate(calibration.known.names)}
     names = enumerate(calibration.model.parameter_names)
     chosen = [(place[each], number) for number, each in names if each in place]
     columns, numbers = np.array(chosen, dtype=int).reshape(-1, 2).T
-    slopes[:, :, columns] = calibration.model.parameter_jacobian(q_rad, s)[:, :, numbers]
+    slopes[:, :, columns] = calibration.model.parameter_jacobian(at)[:, :, numbers]
     # A turn of the last frame swings the point: w x arm = -[arm] w.
     arm = (end.rotation @ carried.position_mm[:, None])[..., 0]
     slopes[:, :3] -= skew(arm) @ slopes[:, 3:]

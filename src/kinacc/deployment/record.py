@@ -8,15 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
-from kinacc.calibration.uncertainty import Uncertainty, is_angle
+from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
+from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
-from kinacc.kinematics.model import ErrorModel
+from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.robot import Robot
-from kinacc.kinematics.tables import KINDS, NOMINAL
 
-MODELS = (*KINDS, NOMINAL)
+MODELS = (*ERROR_MODELS, NOMINAL)
 FRAMES = ("base", "instrument")
 FLANGE, TOOL = "flange", "tool"
 _LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
@@ -97,31 +96,17 @@ class Calibration:
             return self.robot.base
         return compose(self.robot.base, compose(invert(self.anchor.base), self.base))
 
-    def forward(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
-        """Last DH frame in the first one, (n, ...), at DH joints (n, k)."""
-        return self.model.pose(q_rad, s)
-
-    def pose(
-        self,
-        q_rad: np.ndarray,
-        s: np.ndarray | None = None,
-        frame: str = "base",
-        point: str | None = None,
-    ) -> Pose:
-        """Poses (n, ...) of a point in ``frame`` at DH joints (n, k); travel s (n, k)."""
-        return compose(self.origin(frame), compose(self.forward(q_rad, s), self.point(point)))
+    def pose(self, at: JointState, frame: str = "base", point: str | None = None) -> Pose:
+        """Poses (n, ...) of a point in ``frame``."""
+        return compose(self.origin(frame), compose(self.model.pose(at), self.point(point)))
 
     def joint_jacobian(
-        self,
-        q_rad: np.ndarray,
-        s: np.ndarray | None = None,
-        frame: str = "base",
-        point: str | None = None,
+        self, at: JointState, frame: str = "base", point: str | None = None
     ) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the DH joints; rows as in ``dh.joint_jacobian``."""
-        slopes = self.model.joint_jacobian(q_rad, s)
+        slopes = self.model.joint_jacobian(at)
         # A turn of the last frame swings the point: w x arm = -[arm] w.
-        arm = self.forward(q_rad, s).rotation @ self.point(point).position_mm
+        arm = self.model.pose(at).rotation @ self.point(point).position_mm
         slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
         turn = self.origin(frame).rotation
         return np.concatenate([turn @ slopes[:, :3], turn @ slopes[:, 3:]], axis=1)
@@ -140,7 +125,7 @@ class Calibration:
     def units(self) -> np.ndarray:
         """Unit (P,) in which displacements of the parameters are measured: mm, and one mrad."""
         names = self.known.names if self.known else ()
-        return np.where([is_angle(name) for name in names], ANGLE_UNIT_RAD, 1.0)
+        return np.array([scale_of(name) for name in names])
 
     def outside_range(self, q_rad: np.ndarray, slack: np.ndarray | float = 1e-9) -> np.ndarray:
         """True (n, k) where a DH joint lies outside what the data cover by more than ``slack``."""

@@ -18,6 +18,7 @@ import numpy as np
 from kinacc.geometry import Pose
 from kinacc.kinematics import chain as _chain
 from kinacc.kinematics.chain import Columns
+from kinacc.kinematics.model import JointState
 
 PARAMETERS = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad")
 
@@ -67,17 +68,17 @@ class DHModel:
         """Names (5k,) ordered as ``to_vector``: j1.theta_offset_rad, ..."""
         return tuple(f"j{i}.{name}" for i in range(1, self.joints + 1) for name in PARAMETERS)
 
-    def pose(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
-        """Poses (n, ...), the same in any travel direction; see ``forward``."""
-        return forward(self, q_rad)
+    def pose(self, at: JointState) -> Pose:
+        """Poses (n, ...) by the joints alone; see ``forward``."""
+        return forward(self, at.q_rad)
 
-    def joint_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    def joint_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        return joint_jacobian(self, q_rad)
+        return joint_jacobian(self, at.q_rad)
 
-    def parameter_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    def parameter_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, 5k) of ``pose`` in the parameters."""
-        return parameter_jacobian(self, q_rad).reshape(len(q_rad), 6, -1)
+        return parameter_jacobian(self, at.q_rad).reshape(len(at), 6, -1)
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``dh_model``: parameters and their ``std`` (5k,), NaN where undetermined."""

@@ -1,8 +1,9 @@
-"""What an error model offers: all that code outside the models' own files asks of one."""
+"""What an error model is asked, and what it offers: all that code outside its own files needs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 import numpy as np
@@ -13,11 +14,44 @@ if TYPE_CHECKING:
     from kinacc.kinematics.dh import DHModel
 
 
+@dataclass(frozen=True)
+class JointState:
+    """How an arm of k joints stands, n times: all that its pose can depend on.
+
+    ``q_rad`` (n, k): DH joints, in mm where a joint slides. ``s`` (n, k): directions they travelled
+    in (-1, +1), 0 where unknown; None: all unknown. ``payload`` (n, 4): what the last DH frame
+    carries, mass in kg and centre in that frame in mm; NaN, or None for all: as the model states.
+    """
+
+    q_rad: np.ndarray
+    s: np.ndarray | None = None
+    payload: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.q_rad)
+
+    def select(self, rows: np.ndarray | slice) -> JointState:
+        """The states of ``rows`` (mask, indices or slice)."""
+        return JointState(
+            self.q_rad[rows],
+            None if self.s is None else self.s[rows],
+            None if self.payload is None else self.payload[rows],
+        )
+
+    def moved(self, q_rad: np.ndarray) -> JointState:
+        """These directions and payloads at joints (n, k); those of one state at all of them."""
+        count = len(q_rad)
+        return JointState(
+            q_rad,
+            None if self.s is None else np.broadcast_to(self.s, q_rad.shape),
+            None if self.payload is None else np.broadcast_to(self.payload, (count, 4)),
+        )
+
+
 class ErrorModel(Protocol):
     """An arm of k joints, as its maker states it or as it was fitted.
 
-    Methods take DH joints ``q_rad`` (n, k), in mm where a joint slides, and travel directions ``s``
-    (n, k), unknown where not given. Poses are of the last DH frame in the first one.
+    Poses are of the last DH frame in the first one.
     """
 
     kind: ClassVar[str]  # names its tables: ``<kind>_model``, ``<kind>_covariance``
@@ -42,13 +76,13 @@ class ErrorModel(Protocol):
     def parameter_names(self) -> tuple[str, ...]:
         """Names (P,) in the order of ``parameter_jacobian``: j1.d_mm, j1.delta_x.0 and the like."""
 
-    def pose(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+    def pose(self, at: JointState) -> Pose:
         """Poses (n, ...)."""
 
-    def joint_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    def joint_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose``, position (mm) and small turn (rad), in the joints."""
 
-    def parameter_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    def parameter_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, P) of ``pose`` in the parameters, rows as in ``joint_jacobian``."""
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The kinds of error models there are, and models and frames from their tables."""
+"""Error models and frames from their tables."""
 
 from __future__ import annotations
 
@@ -7,24 +7,28 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import MODELS, NOMINAL, loaded
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
-from kinacc.kinematics.vec import VECModel
 
-KINDS: dict[str, type[ErrorModel]] = {each.kind: each for each in (DHModel, VECModel)}
-NOMINAL = "nominal"  # the maker's model, which nothing was fitted for
 _ROUNDING = 1e-9
 
 
 def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorModel]:
     """Every model of an arm by name: those of tables ``<kind>_model``, and its ``nominal`` one."""
     made = {
-        kind: each.from_columns(tables[f"{kind}_model"], nominal.prismatic)
-        for kind, each in KINDS.items()
+        kind: of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)
+        for kind in MODELS
+        if f"{kind}_model" in tables
     }
     return {**made, NOMINAL: nominal}
+
+
+def of_kind(kind: str) -> type[ErrorModel]:
+    """The class of models of one kind."""
+    return loaded(MODELS[kind])
 
 
 def fitted_range(models: Iterable[ErrorModel]) -> tuple[np.ndarray, np.ndarray]:

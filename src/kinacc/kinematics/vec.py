@@ -18,6 +18,7 @@ from kinacc.geometry import Pose, project_so3, skew, vee
 from kinacc.kinematics import chain as _chain
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.model import JointState
 
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
 _DIRECTIONS = np.array([-1, 1])
@@ -69,17 +70,17 @@ class VECModel:
         offsets = [f"j{i}.eps_z.{direction}" for i in joints for direction in ("minus", "plus")]
         return (*coefficients, *offsets)
 
-    def pose(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+    def pose(self, at: JointState) -> Pose:
         """Poses (n, ...) with the rotation projected to SO(3)."""
-        return pose(self, q_rad, s)
+        return pose(self, at.q_rad, at.s)
 
-    def joint_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    def joint_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        return joint_jacobian(self, q_rad, s)
+        return joint_jacobian(self, at.q_rad, at.s)
 
-    def parameter_jacobian(self, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    def parameter_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, P) of ``pose`` in the coefficients."""
-        return parameter_jacobian(self, q_rad, s)
+        return parameter_jacobian(self, at.q_rad, at.s)
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``vec_model``: coefficients of both directions, then offsets that have a std.

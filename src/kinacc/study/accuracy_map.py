@@ -16,7 +16,7 @@ from kinacc.geometry import IDENTITY, Pose, compose, invert
 from kinacc.kinematics import inverse
 from kinacc.kinematics.inverse import Status
 from kinacc.kinematics.inverse.newton import pose_error
-from kinacc.kinematics.model import ErrorModel
+from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.region import Cells, Orientations, tool_poses
 from kinacc.kinematics.robot import Robot
 
@@ -35,8 +35,8 @@ class Equipped(NamedTuple):
 
     def tool_poses(self, q_rad: np.ndarray, travel: np.ndarray | None) -> Pose:
         """Tool poses (n, ...) at joints (n, k), which travel in the directions (k,)."""
-        s = None if travel is None else np.broadcast_to(travel, q_rad.shape)
-        end = compose(self.model.pose(q_rad, s), self.tool)
+        at = JointState(q_rad, None if travel is None else np.broadcast_to(travel, q_rad.shape))
+        end = compose(self.model.pose(at), self.tool)
         return end if self.base is None else compose(self.base, end)
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.calibration.observations import from_columns
+from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot, vec
 from kinacc.kinematics.robot import Robot
@@ -19,7 +21,7 @@ from kinacc.synthetic.draw import TABLE_II, Scales
 from kinacc.synthetic.response import Response, linearise
 from kinacc.synthetic.tuning import Targets, targets_of, tuned
 from kinacc.workflow import arm_acceptance as acceptance
-from kinacc.workflow import calibration_settings, in_memory
+from kinacc.workflow import in_memory
 from kinacc.workflow.stages.measurements import split
 
 _UNTUNED = AcceptedDraw(0, Scales(1.0, 1.0, 1.0, 1.0), TABLE_II)
@@ -60,19 +62,20 @@ def bench_of(config: Mapping) -> Bench:
     bench = Bench(robot.load(config["robot"]), config, None, targets)
     # Poses, folds, joint range and points are those of any arm on the geometry of Table II.
     start = {"measurements": measured(bench, _UNTUNED)}
-    made = in_memory.run(("vec", "dh", "residuals", "assessment_points"), config, start)
+    made = in_memory.run(acceptance.STAGES, config, start)
     fitted = vec.VECModel.from_columns(made["vec_model"])
     empty = vec.without_errors(TABLE_II, fitted.q_min_rad, fitted.q_max_rad, fitted.order)
     seen = made["measurements"]
-    options = calibration_settings.options(config["calibration"], bench.robot)
-    weight = options.rotation_weight_mm_per_rad
+    every = from_columns(seen, bench.robot)
+    estimator = VECEstimator.of(config["calibration"], bench.robot, every)
+    weight = estimator.common.rotation_weight_mm_per_rad
     response = linearise(
         empty,
-        options.prior.std(empty),
+        estimator.prior.std(empty),
         targets.noise_mm(weight),
         weight,
         _stacked(seen, "q"),
-        _stacked(seen, "s") * options.travel_direction,
+        _stacked(seen, "s") * estimator.travel_direction,
         np.asarray(seen["subset"]) == "train",
         _stacked(made["assessment_points"], "q"),
     )

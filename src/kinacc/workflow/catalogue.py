@@ -7,9 +7,11 @@ costs nothing but the standard library.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from kinacc.artifacts.error_models import ALWAYS, FITTED
 
 FIGURE_FOLDER = "figures"
 TOURNAMENT = "tournament"  # folder of the joint stages, a name no data set can have
@@ -24,13 +26,15 @@ class Stage:
     whose values name files it reads; nothing else of the configuration reaches the stage.
     ``uses`` are files of the package and registries of modules that its module does not import
     (:func:`kinacc.artifacts.provenance.code_hash`); ``{robot}`` stands for the value, or each of
-    the values, of that setting.
+    the values, of that setting, ``{models}`` for each kind of error model whose table it reads or
+    leaves, ``{fits}`` for the kind it fits.
     ``optional`` inputs are used by data sets that have them. ``after`` are artefacts that have to
     be there, where the data set has them, and are not read. ``scattered`` stages run once per
     part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
     part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file;
     ``joint`` ones are about all data sets at once and have a folder of their own: they read the
     ``inputs`` of every data set (``measured_inputs`` where it is measured) and of joint stages;
+    ``fits`` is the kind of error model a stage fits;
     ``shared`` ones take long enough to be kept for other folders (Snakemake's cache).
     """
 
@@ -49,18 +53,25 @@ class Stage:
     joint: bool = False
     measured_inputs: tuple[str, ...] = ()
     shared: bool = False
+    fits: str = ""
 
     @property
     def module(self) -> str:
         """Name of the module whose ``run`` does the work."""
-        return f"kinacc.workflow.stages.{self.name}"
+        return f"kinacc.workflow.stages.{'error_model' if self.fits else self.name}"
 
-    def used(self, settings: Mapping[str, object]) -> tuple[str, ...]:
+    def used(
+        self, settings: Mapping[str, object], inputs: Iterable[str] | None = None
+    ) -> tuple[str, ...]:
         """``uses`` with the values of settings put in; those of settings not given are left out.
 
-        A list of names that is empty stands for all names of a registry.
+        A list of names that is empty stands for all names of a registry. ``inputs``: artefacts it
+        reads, where optional ones are among them.
         """
         found: dict[str, None] = {}
+        there = {*(self.inputs if inputs is None else inputs), *self.outputs}
+        models = [kind for kind in FITTED if f"{kind}_model" in there]
+        settings = {**settings, "models": models, "fits": self.fits}
         for use in self.uses:
             (key,) = re.findall(r"{(\w+)}", use) or ("",)
             values: Any = settings.get(key, ()) if key else ("",)
@@ -81,7 +92,11 @@ _ROBOT = "kinematics/robots/{robot}.yaml"
 _DRAWS = "synthetic/accepted_draws.csv"
 _CONTEST = ("seed", "size", "assessors", "noise_mm", "robots")
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
-_MODELS = ("vec_model", "dh_model", "frames")
+_MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
+_FURTHER = tuple(f"{kind}_model" for kind in FITTED if kind not in ALWAYS)
+_MODEL = "kinacc.artifacts.error_models:MODELS[{models}]"
+_ESTIMATOR = "kinacc.artifacts.error_models:ESTIMATORS"
+_FITS = (_ROBOT, _MODEL, f"{_ESTIMATOR}[{{fits}}]")
 
 STAGES: dict[str, Stage] = {
     stage.name: stage
@@ -118,9 +133,10 @@ STAGES: dict[str, Stage] = {
                 "calibration.vec",
             ),
             files=("robot",),
-            uses=(_ROBOT,),
+            uses=_FITS,
             after=("data_check",),
             shared=True,
+            fits="vec",
         ),
         Stage(
             "dh",
@@ -135,8 +151,10 @@ STAGES: dict[str, Stage] = {
                 "calibration.dh",
             ),
             files=("robot",),
-            uses=(_ROBOT,),
+            uses=_FITS,
+            optional=tuple(name.replace("_model", "_frames") for name in _FURTHER),
             shared=True,
+            fits="dh",
         ),
         Stage(
             "residuals",
@@ -145,7 +163,8 @@ STAGES: dict[str, Stage] = {
             ("residuals", "pose_errors", "model_selection", "joint_bias", "worst_rows"),
             ("robot", "calibration"),
             files=("robot",),
-            uses=(_ROBOT,),
+            uses=(_ROBOT, _MODEL, f"{_ESTIMATOR}[{{models}}]"),
+            optional=_FURTHER,
         ),
         Stage(
             "excluded_rows",
@@ -154,7 +173,8 @@ STAGES: dict[str, Stage] = {
             ("excluded_rows",),
             ("robot", "measurements"),
             files=("robot", "measurements.file.path"),
-            uses=(_ROBOT,),
+            uses=(_ROBOT, _MODEL),
+            optional=_FURTHER,
             measured=True,
         ),
         Stage(
@@ -174,7 +194,7 @@ STAGES: dict[str, Stage] = {
                 "map",
             ),
             files=("robot",),
-            uses=(_ROBOT,),
+            uses=(_ROBOT, _MODEL),
         ),
         Stage(
             "assessment_points",
@@ -183,7 +203,7 @@ STAGES: dict[str, Stage] = {
             ("assessment_points",),
             ("robot", "evaluation"),
             files=("robot",),
-            uses=(_ROBOT,),
+            uses=(_ROBOT, _MODEL),
         ),
         Stage(
             "study_chunk",
@@ -300,7 +320,7 @@ STAGES: dict[str, Stage] = {
                 "robustness",
             ),
             files=("robot",),
-            uses=(_ROBOT, _DRAWS),
+            uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
             scattered=True,
             on_request=True,
             shared=True,

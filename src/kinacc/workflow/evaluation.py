@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kinacc.artifacts.error_models import PLAINEST
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import region, robot, tables
 from kinacc.kinematics.region import Cylinder
@@ -67,7 +68,7 @@ def _base(inputs: Mapping, model: str) -> Pose | None:
     """A model's base in that of the DH model; None where both were fitted to one."""
     if "frames" not in inputs:
         return None
-    own, dh = (tables.frame(inputs["frames"], name, "base") for name in (model, "dh"))
+    own, dh = (tables.frame(inputs["frames"], name, "base") for name in (model, PLAINEST))
     same = all(np.array_equal(a, b) for a, b in zip(own, dh, strict=True))
     return None if same else compose(invert(dh), own)
 

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
+from kinacc.artifacts.error_models import FITTED
 from kinacc.workflow.stages import (
     accuracy_map,
     assessment_points,
-    dh,
+    error_model,
     histories,
     measurements,
     residuals,
     study,
     study_chunk,
-    vec,
 )
 
 # Named one by one, so that whatever runs stages in memory depends on their code.
 RUNS = {
     "measurements": measurements.run,
-    "vec": vec.run,
-    "dh": dh.run,
+    **{kind: partial(error_model.run, kind=kind) for kind in FITTED},
     "residuals": residuals.run,
     "accuracy_map": accuracy_map.run,
     "assessment_points": assessment_points.run,

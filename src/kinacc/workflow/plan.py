@@ -271,22 +271,25 @@ class Plan:
     def job(self, name: str, dataset: str, part: str | None = None) -> Job:
         """One run of a stage, as a command carries it out."""
         stage, settings = STAGES[name], self.settings(name, dataset)
+        inputs = self.inputs(name, dataset)
         return Job(
             stage.module,
-            self.inputs(name, dataset),
+            inputs,
             self.outputs(name, dataset, part),
             settings,
             self.seed(dataset),
             part,
             label=label(name, dataset, part),
             log=self.log(name, dataset, part),
-            uses=stage.used(settings),
+            uses=stage.used(settings, inputs),
+            kind=stage.fits,
         )
 
     def code(self, name: str, dataset: str) -> str:
         """Hash of all code and package data a stage's results depend on."""
         stage = STAGES[name]
-        return stage_code_hash(stage.module, stage.used(self.settings(name, dataset)))
+        used = stage.used(self.settings(name, dataset), self.inputs(name, dataset))
+        return stage_code_hash(stage.module, used)
 
     def seed(self, dataset: str) -> int:
         """Seed of the data set; the tournament has that of the first one."""

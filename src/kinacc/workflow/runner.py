@@ -32,7 +32,7 @@ class Job:
     ``inputs`` maps a role to a file, or to the files of a scattered artefact. ``outputs`` maps an
     artefact to its file, or a picture format to its file. ``settings`` are the configuration values
     of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2"), ``uses``
-    what its results depend on beside what its module imports.
+    what its results depend on beside what its module imports, ``kind`` the error model it fits.
     """
 
     module: str
@@ -44,6 +44,7 @@ class Job:
     label: str = ""
     log: str | None = None
     uses: tuple[str, ...] = ()
+    kind: str = ""
 
 
 def execute(job: Job, bar: bool = False) -> None:
@@ -73,8 +74,10 @@ def perform(job: Job, progress: object = None) -> None:
     if job.part is not None:
         number, _, count = job.part.partition("-of-")
         settings["part"] = {"number": int(number), "of": int(count)}
-    wants_progress = "progress" in inspect.signature(stage.run).parameters
-    result = stage.run(tables, settings, **({"progress": progress} if wants_progress else {}))
+    more: dict[str, object] = {"kind": job.kind} if job.kind else {}
+    if "progress" in inspect.signature(stage.run).parameters:
+        more["progress"] = progress
+    result = stage.run(tables, settings, **more)
     if isinstance(result, Mapping):
         _write_tables(job, result)
     else:

@@ -16,6 +16,7 @@ from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
+from kinacc.kinematics.model import JointState
 
 TOOL_POSE = Pose(exp_so3(np.array([0.3, -0.2, 0.9])), np.array([12.0, -40.0, 180.0]))
 CLOSE_MM, CLOSE = 1e-6, 1e-9
@@ -111,7 +112,7 @@ def test_a_generated_file_moves_as_the_calibrated_arm(name):
     text = urdf.generated(arm)
     for link, point in (("tool", "tool"), ("flange", "flange")):
         theirs = seen_by_pinocchio(text, link, q_rad, arm.robot.dh.prismatic, names)
-        assert_same(arm.pose(q_rad @ arm.robot.joint_map.T, None, "base", point), theirs)
+        assert_same(arm.pose(JointState(q_rad @ arm.robot.joint_map.T), "base", point), theirs)
 
 
 def test_a_generated_file_is_read_back_as_the_same_arm(tmp_path):
@@ -120,7 +121,7 @@ def test_a_generated_file_is_read_back_as_the_same_arm(tmp_path):
     path.write_text(urdf.generated(arm))
     back = robot.load(path)
     q_rad = some_joints(arm.robot)
-    wanted = arm.pose(q_rad)
+    wanted = arm.pose(JointState(q_rad))
     assert np.abs(robot.forward(back, q_rad).position_mm - wanted.position_mm).max() < CLOSE_MM
     np.testing.assert_allclose(back.q_max_rad, arm.robot.q_max_rad)
 
@@ -144,9 +145,9 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     start = closed_form_start(full_poses(q_rad, before), ends)
     base, carried = start.base, start.tool
     assert_same(compose(base, compose(ends, carried)), before)
-    wanted = compose(base, compose(arm.forward(q_rad), carried))
+    wanted = compose(base, compose(arm.model.pose(JointState(q_rad)), carried))
     if robot_from == "file":
-        assert_same(arm.pose(q_rad, None, "base", "flange"), wanted)
+        assert_same(arm.pose(JointState(q_rad), "base", "flange"), wanted)
     end = tip if tail else f"{tip}_calibrated"
     assert_same(wanted, seen_by_pinocchio(done, end, q_rad, slides, names, "world"))
     assert "<!-- kept as it is -->" in done
@@ -183,7 +184,7 @@ def test_coupled_joints_are_refused_and_dh_joints_offered():
     names = [each.replace(" ", "_") for each in arm.robot.joint_names]
     text = urdf.generated(arm, dh_joints=True)
     theirs = seen_by_pinocchio(text, "flange", q_dh, arm.robot.dh.prismatic, names)
-    assert_same(arm.pose(q_dh, None, "base", "flange"), theirs)
+    assert_same(arm.pose(JointState(q_dh), "base", "flange"), theirs)
 
 
 @settings(max_examples=200)

@@ -14,6 +14,7 @@ from kinacc.deployment.export import description, tables
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.geometry import Pose, compose, exp_so3, rotation_from_quaternion, rotation_x, rotation_z
 from kinacc.kinematics import dh, robot
+from kinacc.kinematics.model import JointState
 
 
 def bent(name, seed=0):
@@ -62,7 +63,7 @@ def test_a_coupled_sliding_arm_with_a_base_is_read_back(tmp_path):
     np.testing.assert_array_equal(back.joint_map, coupled)
     np.testing.assert_array_equal(back.q_min_rad, own.q_min_rad)
     q = np.random.default_rng(1).uniform(-0.5, 0.5, (5, 6))
-    wanted = arm.pose(q @ coupled.T, None, "base", "flange").position_mm
+    wanted = arm.pose(JointState(q @ coupled.T), "base", "flange").position_mm
     np.testing.assert_allclose(robot.forward(back, q).position_mm, wanted, atol=1e-9)
 
 
@@ -187,5 +188,5 @@ dh:
         shift = joint["d_mm"] + (value if slides else 0.0)
         here = compose(here, Pose(rotation_z(turn), np.array([0.0, 0.0, shift])))
         here = compose(here, Pose(rotation_x(joint["alpha_rad"]), np.array([joint["a_mm"], 0, 0])))
-    wanted = arm.pose(q, None, "base", "flange")
+    wanted = arm.pose(JointState(q), "base", "flange")
     np.testing.assert_allclose(here.position_mm, wanted.position_mm[0], rtol=0, atol=1e-9)

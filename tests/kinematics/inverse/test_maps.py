@@ -11,6 +11,7 @@ from two_models import two_models
 
 from kinacc.geometry import Pose, compose, exp_so3, invert
 from kinacc.kinematics import dh, region, robot, vec
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import Cylinder
 from kinacc.study import operating_points
 from kinacc.study.accuracy_map import Models, accuracy_map, errors_at
@@ -68,7 +69,7 @@ def test_bases_fitted_apart_are_brought_together():
     moved = Pose(exp_so3(np.array([0.001, 0.0, 0.002])), np.array([1.0, 2.0, 3.0]))
     # The same arm described from a base that was fitted elsewhere.
     apart = errors_at(with_base(models, moved), q)
-    true = compose(moved, models.by_name["vec"].model.pose(q))
+    true = compose(moved, models.by_name["vec"].model.pose(JointState(q)))
     modelled = dh.forward(UR10.dh, q)
     assert np.allclose(apart[:, :3], true.position_mm - modelled.position_mm)
     back = with_base(models, compose(moved, invert(moved)))

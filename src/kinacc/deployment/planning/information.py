@@ -18,6 +18,7 @@ from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal
 from kinacc.geometry import Pose
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 
 _BLOCK = 512
@@ -79,7 +80,7 @@ def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.nd
     slopes = np.empty((len(q_dh), seen, len(arm.known.names)))
     for begin in range(0, len(q_dh), _BLOCK):
         block = slice(begin, begin + _BLOCK)
-        part = sensitivity(arm, q_dh[block], None, "instrument", TOOL)
+        part = sensitivity(arm, JointState(q_dh[block]), "instrument", TOOL)
         slopes[block] = (part * weight[:, None])[:, :seen] * arm.units
     return slopes
 

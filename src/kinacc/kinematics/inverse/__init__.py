@@ -21,7 +21,7 @@ from kinacc.kinematics.inverse import (
 )
 from kinacc.kinematics.inverse.closed_form import BRANCHES
 from kinacc.kinematics.inverse.onto_model import Functions
-from kinacc.kinematics.model import ErrorModel
+from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.robot import Robot
 
 __all__ = [
@@ -136,7 +136,8 @@ def solve(
     if unknown:
         problem = Problem(f"robot {robot.name}", f"has no branch {unknown[0]}", ", ".join(known))
         raise InputError(problem)
-    functions = onto_model.functions_of(model, travel)
+    like = None if travel is None else JointState(np.zeros((1, model.joints)), travel[None])
+    functions = onto_model.functions_of(model, like)
     form = closed_form_of(robot)
     if form is not None:
         q_rad, status = _by_closed_form(robot, form, functions, pose, names, fitted_range_rad)

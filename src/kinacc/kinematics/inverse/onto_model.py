@@ -13,7 +13,7 @@ from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse import newton
 from kinacc.kinematics.inverse.chain_rows import behind_first, rows_of, targets_of
-from kinacc.kinematics.model import ErrorModel
+from kinacc.kinematics.model import ErrorModel, JointState
 
 SAME_POSTURE_RAD = 1e-6
 _SAME_PLACE_MM = 1e-3
@@ -37,18 +37,18 @@ class Functions(NamedTuple):
     first: float | None = None
 
 
-def functions_of(model: ErrorModel, travel: np.ndarray | None) -> Functions:
-    """The functions of a model whose joints travel in the directions ``travel`` (k,)."""
+def functions_of(model: ErrorModel, like: JointState | None = None) -> Functions:
+    """The functions of a model that travels and is loaded as in one state, ``like``."""
 
-    def directions(q_rad: np.ndarray) -> np.ndarray | None:
-        return None if travel is None else np.broadcast_to(travel, q_rad.shape)
+    def at(q_rad: np.ndarray) -> JointState:
+        return JointState(q_rad) if like is None else like.moved(q_rad)
 
     # Errors of a milliradian change the slopes by a thousandth: each step still gains three
     # digits, at a fifth of the cost.
     cheap = partial(_dh.joint_jacobian, model.dh) if model.table is None else None
     return Functions(
-        lambda q: model.pose(q, directions(q)),
-        lambda q: model.joint_jacobian(q, directions(q)),
+        lambda q: model.pose(at(q)),
+        lambda q: model.joint_jacobian(at(q)),
         cheap,
         model.dh.prismatic,
         model.table,

@@ -11,6 +11,7 @@ import numpy as np
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.calibration.observations import from_columns
+from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.checks import check
 from kinacc.checks.report import Report
 from kinacc.checks.suspicion import NOTE, Suspicion, suspicion
@@ -19,7 +20,6 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import Reading, read
-from kinacc.workflow import calibration_settings as shared
 from kinacc.workflow.stages.measurements import configurations
 
 Progress = Callable[[Iterable, str], Iterable]
@@ -69,15 +69,15 @@ def _few_poses(reading: Reading, arm: Robot, calibration: Mapping) -> list[Suspi
     """Whether the VEC model has more coefficients than the poses give independent readings."""
     count = len(reading.columns["pose"])
     seen = from_columns({**reading.columns, "fold": np.full(count, np.nan)}, arm)
-    options = shared.options(calibration, arm)
+    fit = VECEstimator.of(calibration, arm, seen)
     same = configurations(reading.columns)
     # A target adds three components to a pose, an orientation three; repeats add none.
     pairs, first = np.unique(np.stack([same, seen.target]), axis=1, return_index=True)
     turned = np.zeros(same.max() + 1)
     np.maximum.at(turned, pairs[0], 3.0 * seen.has_rotation[first])
     components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
-    coefficients = 6 * arm.dh.joints * (options.order + 1)
-    frames = int(options.frames(seen).free.sum()) if options.frames_estimated else 0
+    coefficients = fit.size
+    frames = int(fit.common.terms(seen).free.sum()) if fit.common.frames_estimated else 0
     if components.sum() >= coefficients + frames:
         return []
     of_frames = f" and {frames} of base and targets" if frames else ""
@@ -85,7 +85,7 @@ def _few_poses(reading: Reading, arm: Robot, calibration: Mapping) -> list[Suspi
         suspicion(
             "few_poses",
             f"{len(components)} different poses give {components.sum():.0f} independent numbers "
-            f"for the {coefficients} coefficients of the VEC model of order {options.order}"
+            f"for the {coefficients} coefficients of the VEC model of order {fit.order}"
             f"{of_frames}: its prior decides most of them, not the measurements",
             (),
             "measure more poses, lower calibration.vec.order, or let it be chosen (order: auto)",

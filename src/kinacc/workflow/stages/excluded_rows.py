@@ -8,12 +8,12 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.calibration.models import COMPARISONS
+from kinacc.artifacts.error_models import comparisons
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.residuals import Errors, errors
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, excluded_lines, read_excluded
-from kinacc.workflow.stages.residuals import delivered_fits
+from kinacc.workflow.calibration_settings import delivered_fits
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
@@ -25,7 +25,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     reasons = excluded_lines(section)
     used = inputs["measurements"]
     every = from_columns(used, arm)
-    fits = delivered_fits(inputs, arm.dh, every)
+    fits = delivered_fits(inputs, arm, every)
     reading, _ = read_excluded(section, arm)
     rows: list[tuple] = []
     if reading is not None:
@@ -40,7 +40,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
         for name, found in seen.items():
             rows += _rows(name, left_out, lines, reasons, found, count)
     told = {row[1] for row in rows}
-    for each in COMPARISONS:
+    for each in comparisons(fits):
         rows += [
             (each.name, line, None, None, reasons[line], *[np.nan] * 6)
             for line in sorted(set(reasons) - told)

@@ -8,13 +8,11 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.calibration import model_comparison_columns, tables
-from kinacc.calibration.models import Fit, fit_all
+from kinacc.calibration import model_comparison_columns
+from kinacc.calibration.models import Fit, estimators, fit_all
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors, cross_validated, errors, statistics
 from kinacc.kinematics import robot
-from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.tables import fitted_range, models
 from kinacc.workflow import calibration_settings as shared
 
 _QUANTITIES = (("position", "mm", 1.0), ("orientation", "mrad", 1e3))
@@ -27,34 +25,28 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
     """
     arm = robot.load(settings["robot"])
-    options = shared.options(settings["calibration"], arm)
     every, train = shared.observed(inputs, arm)
-    delivered = delivered_fits(inputs, arm.dh, every)
-    joint_range = fitted_range(fit.model for fit in delivered.values())
+    delivered = shared.delivered_fits(inputs, arm, every)
+    fitted_by = {
+        kind: each
+        for kind, each in estimators(settings["calibration"], arm, every).items()
+        if kind in delivered
+    }
 
     def refit(observations: Observations, fold: int) -> dict[str, Fit]:
         if np.array_equal(every.fold != fold, train):
             return delivered
-        own = shared.chosen(options, inputs["vec_orders"], fold)
-        return fit_all(observations, arm.dh, joint_range, own, delivered)
+        own = [each.chosen(inputs, fold) for each in fitted_by.values()]
+        return fit_all(observations, own, delivered)
 
     folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
     counted = progress(folds, "folds") if progress else folds
-    held_out, trained = cross_validated(every, refit, counted)
+    held_out, trained = cross_validated(every, refit, counted, delivered)
     seen = errors(delivered, every.select(train))
     return {
         "residuals": _residuals(every.fold, folds, seen, held_out, trained),
         "pose_errors": _pose_errors(inputs["measurements"], train, seen, held_out, bool(folds)),
         **model_comparison_columns.columns(inputs["measurements"], every, train, seen, held_out),
-    }
-
-
-def delivered_fits(inputs: Mapping, nominal: DHModel, every: Observations) -> dict[str, Fit]:
-    """The models of the tables ``inputs``, fitted to targets and sessions of ``every``."""
-    names = every.target_names, every.session_names
-    return {
-        name: Fit(model, tables.frames_of(inputs["frames"], name, *names))
-        for name, model in models(inputs, nominal).items()
     }
 
 

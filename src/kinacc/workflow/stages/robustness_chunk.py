@@ -8,13 +8,13 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
+from kinacc.artifacts.error_models import ALWAYS
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.synthetic.accepted import further_draws
 from kinacc.workflow import in_memory
 
 STAGES = (
-    "vec",
-    "dh",
+    *ALWAYS,
     "residuals",
     "accuracy_map",
     "assessment_points",

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kinacc.artifacts.allowed import MODELS
 from kinacc.artifacts.columns import TURN_RAD
+from kinacc.artifacts.error_models import ALWAYS, FITTED, NOMINAL, PLAINEST, comparisons
 from kinacc.errors import Problem
 from kinacc.workflow.verification.rule import TOLERANCE, Columns, Rule, Tables, mark
 
@@ -59,21 +59,24 @@ def _frames(name: str, models: tuple[str, ...]) -> Rule:
     return rule
 
 
-def _vec_frames_kept(tables: Tables) -> Iterator[Problem]:
-    before, after = tables["vec_frames"], tables["frames"]
-    kept = {row[:2]: row[2:] for row in _frame_rows(after)}
-    for row in _frame_rows(before):
-        if kept.get(row[:2]) != row[2:]:
-            what = f"frame {row[0]} of model vec differs from vec_frames.parquet"
-            yield Problem("frames.parquet", what, "the frames of the VEC fit")
+def _frames_kept(kind: str) -> Rule:
+    def rule(tables: Tables) -> Iterator[Problem]:
+        before, after = tables[f"{kind}_frames"], tables["frames"]
+        kept = {row[:2]: row[2:] for row in _frame_rows(after, kind)}
+        for row in _frame_rows(before, kind):
+            if kept.get(row[:2]) != row[2:]:
+                what = f"frame {row[0]} of model {kind} differs from {kind}_frames.parquet"
+                yield Problem("frames.parquet", what, f"the frames of the {kind} fit")
+
+    return rule
 
 
-def _frame_rows(table: Columns) -> list[tuple]:
+def _frame_rows(table: Columns, kind: str) -> list[tuple]:
     names = [name for name in table if name not in ("model", "frame", "session")]
     sessions = table.get("session", np.full(len(table["frame"]), None))
     return [
         (table["frame"][i], sessions[i], *(float(table[name][i]) for name in names))
-        for i in np.flatnonzero(table["model"] == "vec")
+        for i in np.flatnonzero(table["model"] == kind)
     ]
 
 
@@ -119,9 +122,9 @@ def _residuals(tables: Tables) -> Iterator[Problem]:
         if count != 1:
             what = f"{count} pooled rows of {', '.join(kind)}"
             yield Problem("residuals.parquet", what, "exactly one (fold null)")
-    for wanted in ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured"):
-        if (wanted, "train", "position") not in kinds:
-            yield Problem("residuals.parquet", f"no row {wanted}, train, position")
+    for wanted in comparisons((*ALWAYS, NOMINAL)):
+        if (wanted.name, "train", "position") not in kinds:
+            yield Problem("residuals.parquet", f"no row {wanted.name}, train, position")
     right = np.where(table["quantity"] == "position", "mm", "mrad")
     yield from mark("residuals", table["unit"] != right, "unit", "position mm, orientation mrad")
     slack = 1.0 + TOLERANCE
@@ -196,14 +199,20 @@ def _slides(table: Columns) -> list[int]:
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("measurements",), _unit_quaternions("measurements")),
     (("measurements",), _measurements),
-    (("vec_frames",), _unit_quaternions("vec_frames")),
-    (("vec_frames", "measurements"), _frames("vec_frames", ("vec",))),
+    *(
+        rule
+        for kind in FITTED
+        if kind != PLAINEST
+        for rule in (
+            ((f"{kind}_frames",), _unit_quaternions(f"{kind}_frames")),
+            ((f"{kind}_frames", "measurements"), _frames(f"{kind}_frames", (kind,))),
+            ((f"{kind}_frames", "frames"), _frames_kept(kind)),
+        )
+    ),
     (("frames",), _unit_quaternions("frames")),
-    (("frames", "measurements"), _frames("frames", MODELS)),
-    (("vec_frames", "frames"), _vec_frames_kept),
+    (("frames", "measurements"), _frames("frames", (*ALWAYS, NOMINAL))),
     (("vec_model",), _vec_model),
-    (("vec_model", "measurements"), _every_joint("vec_model")),
-    (("dh_model", "measurements"), _every_joint("dh_model")),
+    *(((f"{kind}_model", "measurements"), _every_joint(f"{kind}_model")) for kind in FITTED),
     (("measurements", "robot"), _turns("measurements", ())),
     (("assessment_points", "robot"), _turns("assessment_points", ())),
     (("vec_model", "robot"), _turns("vec_model", ("q_min_rad", "q_max_rad"))),

@@ -178,7 +178,9 @@ def _held_to_inputs(folder: Path, stage: Stage, own: Mapping[str, str], plan: Pl
     if plan is not None and own.get("seed") != str(seed):
         problems.append(Problem(where, f"seed {own.get('seed')}", str(seed)))
     vouched = set(matching[0]) if matching and not problems else set()
-    is_current = own.get("code_hash") in _codes(stage, settings if plan else None)
+    is_current = own.get("code_hash") in _codes(
+        stage, settings if plan else None, matching[0] if matching else None
+    )
     return _Held(problems, vouched, set() if matching else artefacts, is_current)
 
 
@@ -202,12 +204,12 @@ def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dic
     return stage_provenance(Job(stage.module, inputs, {}, settings, seed))
 
 
-def _codes(stage: Stage, settings: Mapping | None) -> set[str]:
+def _codes(stage: Stage, settings: Mapping | None, inputs: Inputs | None) -> set[str]:
     """Hashes of the code installed; for every robot it may be where the settings are not known."""
     from kinacc.kinematics import robot
 
     known = [settings] if settings is not None else [{"robot": n} for n in ("", *robot.shipped())]
-    return {provenance.stage_code_hash(stage.module, stage.used(each)) for each in known}
+    return {provenance.stage_code_hash(stage.module, stage.used(each, inputs)) for each in known}
 
 
 def _candidates(folder: Path, stage: Stage) -> list[Inputs]:

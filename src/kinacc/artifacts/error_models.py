@@ -1,0 +1,86 @@
+"""The one list of error models: where each kind is written, and what it is compared with.
+
+A kind names its tables (``<kind>_model``, ``<kind>_covariance``), its stage and its section of the
+calibration settings. Modules are named, not imported: a data set depends on the kinds it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from importlib import import_module
+from typing import Any, NamedTuple
+
+MEASURED, NOMINAL = "measured", "nominal"  # nominal: the maker's, which nothing was fitted for
+
+
+class Kind(NamedTuple):
+    """``module:Class`` of the model and of its estimator, and the references of its errors.
+
+    ``asked_by`` is the key of ``calibration.<kind>`` that has to say something for a data set to
+    have such a model; empty where every data set has one.
+    """
+
+    model: str
+    estimator: str
+    compared_with: tuple[str, ...] = (MEASURED,)
+    asked_by: str = ""
+
+
+# The plainest first: others have to be worth it. They are fitted from the last to the first, so
+# that a plainer one may follow those after it.
+ERROR_MODELS = {
+    "dh": Kind(
+        "kinacc.kinematics.dh:DHModel",
+        "kinacc.calibration.dh_estimator:DHEstimator",
+        ("vec", MEASURED),
+    ),
+    "vec": Kind(
+        "kinacc.kinematics.vec:VECModel",
+        "kinacc.calibration.vec_estimator:VECEstimator",
+    ),
+}
+MODELS = {kind: each.model for kind, each in ERROR_MODELS.items()}
+ESTIMATORS = {kind: each.estimator for kind, each in ERROR_MODELS.items()}
+PLAINEST = next(iter(ERROR_MODELS))
+FITTED = tuple(reversed(ERROR_MODELS))  # in this order
+ALWAYS = tuple(kind for kind in FITTED if not ERROR_MODELS[kind].asked_by)
+
+
+class Comparison(NamedTuple):
+    """Whose error is meant: that of ``reference``, a model or the measurement, minus ``model``."""
+
+    reference: str
+    model: str
+
+    @property
+    def name(self) -> str:
+        """As artefacts name it."""
+        return f"{self.model}_vs_{self.reference}"
+
+
+COMPARISONS = (
+    *(Comparison(of, kind) for kind in FITTED for of in ERROR_MODELS[kind].compared_with),
+    Comparison(MEASURED, NOMINAL),
+)
+
+
+def comparisons(models: Collection[str]) -> tuple[Comparison, ...]:
+    """What is compared with what where there are these ``models``, in the order of the tables."""
+    there = {*models, MEASURED}
+    return tuple(each for each in COMPARISONS if there >= set(each))
+
+
+def loaded(place: str) -> Any:
+    """The object at ``module:name``."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
+
+
+def asked_for(calibration: Mapping[str, Any]) -> tuple[str, ...]:
+    """Kinds of models that the ``calibration`` settings ask for, in the order they are fitted."""
+    return tuple(
+        kind
+        for kind in FITTED
+        if kind in calibration
+        and (kind in ALWAYS or calibration[kind][ERROR_MODELS[kind].asked_by])
+    )

@@ -1,0 +1,121 @@
+"""How DH models are fitted: to the VEC model at the measured joints, or to the measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from kinacc.artifacts.columns import Columns
+from kinacc.calibration import dh_fit, identified, tables
+from kinacc.calibration.constraints import ArmTerms, arm_terms, free_parameters, parallel_joints
+from kinacc.calibration.dh_fit import DHFit
+from kinacc.calibration.frames import Frames
+from kinacc.calibration.models import Common, Estimator, Fit
+from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.robust import SQUARES
+from kinacc.calibration.uncertainty import Uncertainty
+from kinacc.config import parameter_rules
+from kinacc.config.parameter_rules import Rule
+from kinacc.geometry import IDENTITY, Pose, compose
+from kinacc.kinematics.robot import Robot
+
+_AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class DHEstimator(Estimator):
+    """Settings of ``calibration.dh``.
+
+    ``follows_vec``: the DH model follows the VEC at the measured joints instead of the
+    measurements. ``hayati_instead``: beta in place of d at ``hayati_joints``, else beside it.
+    ``rules``: parameters that are fixed or known beforehand.
+    """
+
+    follows_vec: bool = True
+    hayati_joints: tuple[int, ...] = ()
+    hayati_instead: bool = False
+    rules: tuple[Rule, ...] = ()
+    loss: str = SQUARES
+    threshold: float = 1e-2
+
+    kind: ClassVar[str] = "dh"
+    name: ClassVar[str] = "DH fit"
+    fix: ClassVar[str] = dh_fit.DH_FIX
+
+    @classmethod
+    def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
+        """By the ``calibration`` settings."""
+        section = calibration["dh"]
+        return cls(
+            Common.of(calibration, arm),
+            section["fit_to"] == "vec",
+            hayati_joints(section, arm),
+            section["hayati_joints"] == _AUTO,
+            tuple(parameter_rules.rules(section["parameters"], parameter_rules.JOINTS)[0]),
+            section["loss"],
+            float(section["truncation"]),
+        )
+
+    @property
+    def arm(self) -> ArmTerms:
+        """What the fit takes for granted of the arm."""
+        nominal = self.common.nominal
+        free = free_parameters(nominal.joints, self.hayati_joints, self.hayati_instead)
+        return arm_terms(nominal, free, self.rules)
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return int(self.arm.free.sum())
+
+    def fit(
+        self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
+    ) -> DHFit:
+        """The DH model; base and targets are those of the VEC model where it follows that."""
+        frames, terms = self.common.frames(observations)
+        followed = others["vec"] if self.follows_vec else None
+        if followed:
+            at_target = compose(
+                followed.model.pose(observations.at),
+                _rows(followed.frames.targets, observations.target),
+            )
+            poses = full_poses(observations.q_rad, at_target)
+            observations = poses.with_targets_of(observations)
+            frames, terms = Frames(IDENTITY, followed.frames.targets), None
+        arm = self.arm
+        fitted = dh_fit.fit(
+            observations,
+            arm.nominal,
+            free=arm.free,
+            std=arm.std,
+            rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
+            threshold=self.threshold,
+            frames=frames,
+            frame_terms=terms,
+            loss=self.loss,
+        )
+        return fitted.with_frames(followed.frames) if followed else fitted
+
+    def tables(
+        self, fitted: DHFit, known: Uncertainty, observations: Observations
+    ) -> dict[str, Columns]:
+        """How the fit went, and which parameters the observations determine."""
+        told = identified.parameters(fitted, known, observations)
+        return {
+            "dh_fit": tables.dh_fit_columns(fitted, known),
+            "dh_identified": tables.identified_columns(told, known),
+        }
+
+
+def hayati_joints(section: Mapping, arm: Robot) -> tuple[int, ...]:
+    """Joints (1-based) with a Hayati angle, by the ``calibration.dh`` settings."""
+    if section["hayati_joints"] == _AUTO:
+        return parallel_joints(arm.dh)
+    return tuple(int(joint) for joint in section["hayati_joints"])
+
+
+def _rows(targets: Pose, target: np.ndarray) -> Pose:
+    return Pose(targets.rotation[target], targets.position_mm[target])

@@ -1,0 +1,51 @@
+"""Fit an error model of one kind to the training poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import FITTED, NOMINAL, PLAINEST
+from kinacc.calibration import models, tables, uncertainty
+from kinacc.kinematics import robot
+from kinacc.workflow import calibration_settings as shared
+
+
+def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[str, Columns]:
+    """``<kind>_model``, its covariance, its frames and what else its estimator tells.
+
+    The plainest kind, which is fitted last, gathers the ``frames`` of all models.
+    """
+    arm = robot.load(settings["robot"])
+    every, train = shared.observed(inputs, arm)
+    estimator = models.estimators(settings["calibration"], arm, every)[kind]
+    choices = estimator.choices(every, progress)
+    estimator = estimator.chosen(choices, shared.held_out_fold(every, train))
+    observations = every.select(train)
+    fitted = estimator.fit(observations, shared.delivered_fits(inputs, arm, every))
+    frames = {kind: fitted.frames}
+    if kind == PLAINEST:
+        frames[NOMINAL] = models.nominal_frames(observations, estimator.common)
+    columns = tables.frames_columns(frames, every.target_names, every.session_names)
+    name = f"{kind}_frames"
+    if kind == PLAINEST:
+        name, columns = "frames", _gathered(inputs, columns)
+    known = uncertainty.of_fit(fitted, every.target_names)
+    return {
+        f"{kind}_model": fitted.model.to_columns(fitted.std.ravel()),
+        name: columns,
+        f"{kind}_covariance": tables.covariance_columns(known),
+        **estimator.tables(fitted, known, observations),
+        **choices,
+    }
+
+
+def _gathered(inputs: Mapping, own: Columns) -> Columns:
+    """Frames of the models fitted before, then ``own``."""
+    others = [inputs[f"{kind}_frames"] for kind in FITTED if f"{kind}_frames" in inputs]
+    return {
+        name: np.concatenate([*(np.asarray(each[name]) for each in others), values])
+        for name, values in own.items()
+    }
