@@ -18,7 +18,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import Statement
+from kinacc.assess.statement import Reason, Statement
 from kinacc.errors import InputError, Problem
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
@@ -140,9 +140,9 @@ class AdaptiveAssessor(Protocol):
         """A new campaign without readings. InputError without what the assessor ``needs``."""
         ...
 
-    def shortfall(self, points: int, joints: int) -> str:
-        """What the budget is too small for, on an arm of so many joints; empty if nothing."""
-        return ""
+    def shortfall(self, points: int, joints: int) -> Reason | None:
+        """What the budget is too small for, on an arm of so many joints; None if nothing."""
+        return None
 
 
 class Ledger:

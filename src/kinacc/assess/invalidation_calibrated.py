@@ -13,7 +13,7 @@ from kinacc.assess.challenges import ChallengeCampaign, invalidation_problems
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.ellipsoid import largest_size
 from kinacc.assess.sequential_limits import Looks
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.errors import InputError
 
 SIMULATIONS = 200_000
@@ -80,8 +80,8 @@ class CalibratedCampaign(ChallengeCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The calibrated bounds; the value is the smallest bound not rejected."""
         if self.ledger.taken < self.first:
-            left = self.first - self.ledger.taken
-            return (Statement(MEASURED, withheld=f"{left} points of the first visit are left"),)
+            left = Reason("first_visit", {"left": self.first - self.ledger.taken})
+            return (Statement(MEASURED, withheld=left),)
         error = 1.0 - self.settings.confidence
         width = boundary(self.number, error, self._is_even)
         visited = self.ledger.visited

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
-from kinacc.assess.statement import REGION, Statement
+from kinacc.assess.statement import REGION, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import InputError, Problem
 
@@ -69,8 +69,9 @@ class RegionShareCampaign(OnceCampaign):
         rank = largest_rank(count, met, error)
         if rank == 0:
             needed = math.ceil(math.log(error) / math.log1p(-met))
-            few = f"{count} points read; {chosen.share:.0%} of the region needs {needed}"
-            return (Statement(REGION, share=chosen.share, withheld=few),)
+            few = {"read": count, "share": chosen.share, "needed": needed}
+            withheld = Reason("few_points", few)
+            return (Statement(REGION, share=chosen.share, withheld=withheld),)
         sizes, spread = self.ledger.sizes_mm(), self._spread()
         raised = np.sort(sizes + chosen.deviations * spread)[::-1]
         lowered = np.sort(sizes - math.sqrt(float(chdtri(3, _LOWER_SLIP))) * spread)[::-1]
@@ -84,7 +85,7 @@ class RegionShareCampaign(OnceCampaign):
             upper_mm=float(raised[rank - 1]),
             confidence=chosen.confidence,
             share=chosen.share,
-            assumption="the points were drawn at random from the region",
+            assumption=Reason("drawn_at_random"),
         )
         return (said,)
 

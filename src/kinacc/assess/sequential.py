@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.sequential_limits import Looks, LooksCampaign
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
 from kinacc.errors import InputError, Problem
 
@@ -68,8 +68,8 @@ class SequentialCampaign(LooksCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The bounds as they stand."""
         if self.ledger.taken < self.first:
-            left = self.first - self.ledger.taken
-            return (Statement(MEASURED, withheld=f"{left} points of the first visit are left"),)
+            left = Reason("first_visit", {"left": self.first - self.ledger.taken})
+            return (Statement(MEASURED, withheld=left),)
         visited = self.ledger.visited
         said = Statement(
             MEASURED,

@@ -10,7 +10,7 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import InputError
 
@@ -49,7 +49,7 @@ class SingleShotCampaign(OnceCampaign):
         """The bound, with the largest reading as the value."""
         ledger = self.ledger
         if not ledger.visited:
-            return (Statement(MEASURED, withheld="nothing measured yet"),)
+            return (Statement(MEASURED, withheld=Reason("nothing_measured")),)
         error = 1.0 - self.settings.confidence
         each = error / self.first
         means = _outstanding(ledger)

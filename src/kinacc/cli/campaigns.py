@@ -108,16 +108,16 @@ def status(given: Mapping) -> None:
     wanted = given["width_mm"] or aims.width_mm
     tolerance = given["tolerance_mm"] or aims.tolerance_mm
     target = given["target"] or aims.target
-    ahead, why_none = None, ""
+    ahead, why_none = None, None
     if given["simulations"] and found.asked is not None:
-        why_none = forecast.why_none(found)
+        why_none = words.reason(forecast.why_none(found))
         with reporting("forecast", bar=True) as progress:
             ahead = forecast.forecast(
                 found, given["simulations"], wanted, tolerance, target, progress
             )
     if given["as_json"]:
         facts = answers.as_facts(found, tolerance)
-        facts |= {"forecast": answers.forecast_facts(ahead), "no_forecast": why_none or None}
+        facts |= {"forecast": answers.forecast_facts(ahead), "no_forecast": why_none}
         click.echo(json.dumps(facts, indent=1))
         return
     say_doubts(opened)
@@ -128,7 +128,7 @@ def status(given: Mapping) -> None:
             verdict = decide(said, tolerance)
             lines.append(
                 f"tolerance {tolerance:g} mm, {words.TARGETS[said.target]}: {verdict.verdict}, "
-                f"{verdict.reason}"
+                f"{words.reason(verdict.reason)}"
             )
     if ahead is not None:
         lines += forecast.in_words(ahead)
