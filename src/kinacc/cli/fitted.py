@@ -60,7 +60,7 @@ def read(folder: Path) -> dict[str, dict]:
 
 def summary(tables: Mapping[str, Mapping]) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
-    from kinacc.calibration import identified
+    from kinacc.calibration import blind_words
     from kinacc.workflow.stages import data_check
 
     excluded = tables.get("excluded_rows")
@@ -87,7 +87,7 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
             ]
             for status in dict.fromkeys(str(each) for each in told["status"])
         },
-        "undetermined": identified.recorded(told),
+        "undetermined": blind_words.listed(told),
         "worst_rows": _worst(tables["worst_rows"], selected),
         "data": data_check.in_words(tables["data_check"]) if "data_check" in tables else [],
         "excluded": None if excluded is None else _excluded(excluded, selected),

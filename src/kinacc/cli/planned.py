@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.calibration.blind_words import sentences
 from kinacc.cli import rows
 from kinacc.cli.plan_poses import MOST_CANDIDATES
 from kinacc.cli.sheet import Field, Sheet
@@ -131,7 +132,7 @@ def as_sheet(asked: Question, found: Answer) -> Sheet:
         "candidates": len(asked.joints),
         "parameters": len(found.information.names),
         "determined_directions": found.information.rank,
-        "undetermined": list(found.information.excluded),
+        "undetermined": list(sentences(found.information.left_open)),
         "travel_metric": travel.METRICS[asked.metric],
         "travel_deg": float(np.rad2deg(found.moves.sum())),
         "travel_unordered_deg": float(np.rad2deg(found.unordered)),
@@ -154,11 +155,11 @@ def in_words(asked: Question, found: Answer) -> str:
         f"{plan.path[-1]:.4g} before {plan.swaps} swaps; no single swap makes it better",
         f"{told.rank} of {len(told.names)} parameter directions are determined; the candidates "
         "leave open:",
-        *(f"  - {words}" for words in told.excluded),
+        *(f"  - {words}" for words in sentences(told.left_open)),
         f"travel {np.rad2deg(found.moves.sum()):.0f} deg, {np.rad2deg(found.unordered):.0f} deg in "
         f"the order of the candidates ({travel.METRICS[asked.metric]})",
     ]
-    if not told.excluded:
+    if not told.left_open.groups:
         lines[1] = f"all {told.rank} parameters are determined"
     return "\n".join(lines)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.atomic import replacing
-from kinacc.calibration import identified
+from kinacc.calibration import blind_words
 from kinacc.config import names
 from kinacc.deployment import folder as results
 from kinacc.deployment.export import description, tables, urdf
@@ -51,7 +51,7 @@ def contents(
     arm = results.calibration(found, robot, "dh", dataset)
     std = _deviations(found["dh_model"])
     told = found.get("dh_identified")
-    unseen = None if told is None else identified.recorded(told)
+    unseen = None if told is None else blind_words.listed(told)
     made = {}
     for each in dict.fromkeys(formats):
         if each == "yaml":

@@ -31,7 +31,8 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     others = tables.frames_columns(frames, every.target_names, every.session_names)
     kept = inputs["vec_frames"]
     known = uncertainty.of_fit(fitted, every.target_names)
-    told = identified.parameters(fitted, known, observations)
+    told = identified.parameters(fitted, known)
+    left_open = identified.left_open(fitted, known, observations)
     return {
         "dh_model": fitted.model.to_columns(fitted.std.ravel()),
         "frames": {
@@ -40,5 +41,5 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
         },
         "dh_fit": tables.dh_fit_columns(fitted, known),
         "dh_covariance": tables.covariance_columns(known),
-        "dh_identified": tables.identified_columns(told, known),
+        "dh_identified": tables.identified_columns(told, left_open, known),
     }
