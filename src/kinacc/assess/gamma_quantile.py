@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.statement import REGION, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 _FEWEST = 10  # different sizes that make a distribution
 _IMPROBABLE = 0.01  # chance of the largest reading below which the fit counts as contradicted
@@ -38,8 +38,7 @@ class GammaQuantile(AdaptiveAssessor):
         problems = check_budget(self.measurements)
         if not 0.0 < self.share < 1.0:
             problems.append(Problem("share", f"{self.share}", "above 0 and below 1"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> GammaCampaign:
         """A new campaign."""

@@ -14,7 +14,7 @@ from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.ellipsoid import largest_size
 from kinacc.assess.sequential_limits import Looks
 from kinacc.assess.statement import MEASURED, Reason, Statement
-from kinacc.errors import InputError
+from kinacc.errors import refuse
 
 SIMULATIONS = 200_000
 _SEED = 20_200  # of the calibration; it is part of the method, not of a study
@@ -48,8 +48,7 @@ class InvalidationCalibrated(AdaptiveAssessor):
     name: ClassVar[str] = "invalidation_calibrated"
 
     def __post_init__(self) -> None:
-        if problems := invalidation_problems(self):
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(invalidation_problems(self), f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> CalibratedCampaign:
         """A new campaign."""

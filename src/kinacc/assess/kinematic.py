@@ -21,7 +21,7 @@ from kinacc.assess.kinematic_model import (
 )
 from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 _DRAWS = 400
 _BATCH = 0.08  # of the budget: readings between two looks at who could be the largest
@@ -63,8 +63,7 @@ class Kinematic(AdaptiveAssessor):
         problems = check_budget(self.measurements, self.confidence)
         if not 0.0 < self.visited <= 1.0:
             problems.append(Problem("visited", f"{self.visited}", "above 0 and at most 1"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def shortfall(self, points: int, joints: int) -> Reason | None:
         """Why this budget leads to no statement on an arm of so many joints; None if it may."""

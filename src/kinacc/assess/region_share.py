@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.statement import REGION, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 _LOWER_SLIP = 0.01  # probability that noise alone lifts a reading by more than is taken off it
 
@@ -45,8 +45,7 @@ class RegionShare(AdaptiveAssessor):
             problems.append(Problem("share", f"{self.share}", "above 0 and below 1"))
         if not self.deviations >= 0.0:
             problems.append(Problem("deviations", f"{self.deviations}", "0 or more"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> RegionShareCampaign:
         """A new campaign."""

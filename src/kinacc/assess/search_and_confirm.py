@@ -14,7 +14,7 @@ from kinacc.assess.population import LargestSize, largest_size
 from kinacc.assess.sequential_limits import Looks, LooksCampaign
 from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
 _ALONE = 0.1  # chance of so little company below which the assumption counts as broken
@@ -60,8 +60,7 @@ class SearchAndConfirm(AdaptiveAssessor):
             problems.append(Problem("isolation", f"{self.isolation}", "above 1"))
         if not 0.0 < self.crowd < 1.0:
             problems.append(Problem("crowd", f"{self.crowd}", "above 0 and below 1"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def enough_for_all(self, points: int) -> int:
         """Measurements with which the statement on all ``points`` candidates assumes nothing."""

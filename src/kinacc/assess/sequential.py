@@ -13,7 +13,7 @@ from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.sequential_limits import Looks, LooksCampaign
 from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,7 @@ class Sequential(AdaptiveAssessor):
             problems.append(Problem("visited", f"{self.visited}", "above 0 and at most 1"))
         if self.width_mm is not None and not self.width_mm > 0.0:
             problems.append(Problem("width_mm", f"{self.width_mm}", "above 0, in mm"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> SequentialCampaign:
         """A new campaign."""

@@ -16,7 +16,7 @@ from kinacc.campaign import folder, marks, words
 from kinacc.campaign.plan import Limits
 from kinacc.cli import campaigns_answers as answers
 from kinacc.cli import choice
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, gathered, refuse
 
 
 def start(given: Mapping) -> None:
@@ -25,14 +25,13 @@ def start(given: Mapping) -> None:
     from kinacc.cli import campaign_candidates, campaign_options, rows
 
     problems = folder.in_the_way(given["folder"])
-    instruments = campaign_options.gathered(
-        problems, lambda: campaign_options.instruments(given), ()
-    )
-    assessor = campaign_options.gathered(problems, lambda: campaign_options.assessor(given))
+    with gathered(problems):
+        instruments = campaign_options.instruments(given)
+    with gathered(problems):
+        assessor = campaign_options.assessor(given)
     for name in ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm"):
         problems += campaign_options.not_positive(given, name)
-    if problems:
-        raise InputError(problems, "The campaign was not begun")
+    refuse(problems, "The campaign was not begun")
     arm = choice.calibration_of(
         given["calibration"], given["model"], given["robot"], given["config"], given["session"]
     )
@@ -100,8 +99,7 @@ def status(given: Mapping) -> None:
     from kinacc.progress import reporting
 
     names = ("width_mm", "tolerance_mm")
-    if problems := [each for name in names for each in not_positive(given, name)]:
-        raise InputError(problems)
+    refuse([each for name in names for each in not_positive(given, name)])
     opened = folder.open_(given["folder"])
     found = opened.state()
     aims = opened.plan.limits

@@ -43,7 +43,7 @@ def fitted(folder: str, as_json: bool) -> None:
 def read(folder: Path) -> dict[str, dict]:
     """The tables needed. Raises InputError naming all that are missing."""
     from kinacc.artifacts import store
-    from kinacc.errors import InputError, Problem
+    from kinacc.errors import Problem, refuse
 
     paths = {name: folder / f"{name}.parquet" for name in TABLES}
     missing = [
@@ -51,8 +51,7 @@ def read(folder: Path) -> dict[str, dict]:
         for path in paths.values()
         if not path.is_file()
     ]
-    if missing:
-        raise InputError(missing, f"{folder} holds no fits")
+    refuse(missing, f"{folder} holds no fits")
     more = {name: folder / f"{name}.parquet" for name in IF_THERE}
     paths |= {name: path for name, path in more.items() if path.is_file()}
     return {name: store.read(path) for name, path in paths.items()}

@@ -16,7 +16,7 @@ from kinacc.cli.spaces import Settings, inside_box, joint_ranges, ranges, settin
 from kinacc.cli.tables import joint_fields
 from kinacc.deployment.planning import candidates, exchange, observability, travel
 from kinacc.deployment.planning.information import Experiment, Information, information
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import travel_unit
@@ -78,8 +78,7 @@ def question(given: Mapping) -> Question:
     start = np.zeros(robot.dh.joints)
     if given["from_deg"] is not None:
         start = rows.of_arguments((given["from_deg"],), "deg", robot, "--from-deg")[0]
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     experiment = Experiment(
         tool,
         orientation=not given["position_only"],
@@ -91,8 +90,7 @@ def question(given: Mapping) -> Question:
     if given["candidates"] is not None:
         file = rows.read(given["candidates"], robot)
         found = rows.limit_problems(robot, file.joints, file.label, given["candidates"])
-        if found:
-            raise InputError(found, "Candidates outside the robot's limits")
+        refuse(found, "Candidates outside the robot's limits")
         if len(file.joints) > MOST_CANDIDATES:
             what = f"{len(file.joints)} candidates"
             raise InputError(Problem(given["candidates"], what, f"at most {MOST_CANDIDATES}"))

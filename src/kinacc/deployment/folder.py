@@ -9,7 +9,7 @@ import numpy as np
 
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.record import MODELS, Anchor, Calibration, Residual
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
@@ -35,8 +35,7 @@ def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
         for name in _NEEDED
         if not (folder / f"{name}.parquet").is_file()
     ]
-    if missing:
-        raise InputError(missing, f"{folder} holds no calibration")
+    refuse(missing, f"{folder} holds no calibration")
     names = [*_NEEDED, *_WANTED, *_COVARIANCE]
     present = [name for name in names if (folder / f"{name}.parquet").is_file()]
     return {name: store.read(folder / f"{name}.parquet") for name in present}
@@ -198,8 +197,7 @@ def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
         for what, there in differs.items()
         if np.any(there)
     ]
-    if problems:
-        raise InputError(problems, f"The results were made with another robot than {given.name}")
+    refuse(problems, f"The results were made with another robot than {given.name}")
 
 
 def _close(one: Pose, other: Pose) -> np.ndarray:
@@ -219,5 +217,4 @@ def _require_same_arm(nominal, robot: Robot, name: str) -> None:
             what = f"joint {joint + 1} was fitted from {each} {made[joint]:.9g}"
             allowed = f"{given[joint]:.9g}, as {robot.name} has it"
             problems.append(Problem(place, what, allowed))
-    if problems:
-        raise InputError(problems, f"The results were made with another robot than {robot.name}")
+    refuse(problems, f"The results were made with another robot than {robot.name}")
