@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 
@@ -60,6 +61,21 @@ class InputError(KinaccError):
         if count > _MOST_SHOWN:
             lines.append(f"  -{and_more(count - _MOST_SHOWN)}")
         return "\n".join([head, *lines])
+
+
+def refuse(problems: Iterable[Problem], title: str = "") -> None:
+    """Raise InputError with all ``problems``, where there is one."""
+    if found := tuple(problems):
+        raise InputError(found, title)
+
+
+@contextmanager
+def gathered(problems: list[Problem]) -> Iterator[None]:
+    """Let problems of an InputError raised inside join ``problems``, and go on."""
+    try:
+        yield
+    except InputError as error:
+        problems += error.problems
 
 
 class FitError(KinaccError):

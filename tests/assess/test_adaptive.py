@@ -23,7 +23,7 @@ from kinacc.assess.sequential import Sequential
 from kinacc.assess.sequential_limits import share
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
-from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS
+from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS, Reason
 from kinacc.assess.two_stage import TwoStage
 from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError
@@ -277,7 +277,7 @@ def test_a_visit_ended_early_says_nothing_of_the_rest_without_an_assumption():
         assert campaign.next() == row
         campaign.record(row, reading)
     about = campaign.statements()[1]
-    assert about.crowd > 1
+    assert about.assumption.numbers["crowd"] > 1
     assert about.assumption
 
 
@@ -294,7 +294,7 @@ def test_an_error_that_stands_alone_is_seen_to_break_the_assumption():
     said = conduct(SearchAndConfirm(60, crowd=0.5), drawn_world(errors, 0.05, key_of(8), 60))
     about = said.statements()[1]
     assert about.target == CANDIDATES
-    assert "more than 1.25 times all others" in about.withheld
+    assert about.withheld == Reason("stands_alone", {"isolation": 1.25})
 
 
 def test_with_a_reading_for_nearly_every_candidate_the_recommended_bound_assumes_nothing():

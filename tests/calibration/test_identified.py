@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import constraints, dh_fit, identified, tables, uncertainty
+from kinacc.calibration import blind_words, constraints, dh_fit, identified, tables, uncertainty
 from kinacc.calibration.frames import MOTIONS
 from kinacc.config import parameter_rules
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
+
+
+class Said(NamedTuple):
+    name: str
+    status: str
+    statement: str
 
 
 def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, poses=80):
@@ -35,7 +43,15 @@ def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, p
         threshold=1e-3,
     )
     told = uncertainty.of_fit(fit, data.target_names)
-    return {each.name: each for each in identified.parameters(fit, told, data)}, fit, told
+    return said_of(fit, told, data), fit, told
+
+
+def said_of(fit, told, data):
+    """Rows of ``dh_identified`` by parameter."""
+    left_open = identified.left_open(fit, told, data)
+    table = tables.identified_columns(identified.parameters(fit, told), left_open, told)
+    rows = zip(table["parameter"], table["status"], table["statement"], strict=True)
+    return {name: Said(name, status, statement or "") for name, status, statement in rows}
 
 
 def test_what_every_serial_arm_hides_is_said_in_words():
@@ -91,18 +107,21 @@ def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
     data = measure(disturbed(arm.dh, free, rng), q, POSE, rng)
     fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
     told = uncertainty.of_fit(fit, data.target_names)
-    said = [text for text, _ in identified.statements(fit, told, data)]
+    left_open = identified.left_open(fit, told, data)
+    said = blind_words.sentences(left_open)
     weak = (
         "a shift of the base along y of the robot's base cannot be told from a shift of the tool "
         "along z of the last frame (these poses show it too little, others may)"
     )
     assert weak in said
-    parameters = identified.parameters(fit, told, data)
-    recorded = identified.recorded(tables.identified_columns(parameters, told))
-    assert weak in recorded
-    assert set(recorded) <= set(said)
+    parameters = identified.parameters(fit, told)
+    table = tables.identified_columns(parameters, left_open, told)
+    assert weak in blind_words.listed(table)
+    assert set(blind_words.listed(table)) <= set(said)
     found = {each.name: each for each in parameters}
     assert found["t0.z_mm"].status == "undetermined"
+    place = told.names.index("t0.z_mm")
+    assert {each.structural for each in left_open.groups if each.members[place]} == {True, False}
 
 
 def test_where_nearly_nothing_is_determined_the_statements_stay_short():
@@ -139,9 +158,9 @@ def test_directions_in_words_move_no_pose_anywhere(kind):
     data = measure(disturbed(arm.dh, free, rng), joints(arm, 80, rng), kind, rng)
     fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
     told = uncertainty.of_fit(fit, data.target_names)
-    groups = identified.groups(fit, told, data)
-    assert sum(len(each) for each, structural in groups if structural) == 8
-    directions = np.concatenate([each for each, structural in groups if structural])
+    groups = identified.left_open(fit, told, data).groups
+    directions = np.concatenate([each.directions for each in groups if each.structural])
+    assert len(directions) == 8
     arm_part = directions[:, len(told.names) - int(free.sum()) :]
     step = np.where(np.tile([1, 0, 0, 1, 1], 6)[free.ravel()], 1e-3, 1.0) * 1e-3
     q = rng.uniform(-3, 3, (50, 6))

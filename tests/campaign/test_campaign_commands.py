@@ -17,6 +17,7 @@ from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import prediction_check
 from kinacc.campaign.reading import Reading
+from kinacc.campaign.words import reason
 from kinacc.cli import campaigns_answers
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics.model import JointState
@@ -121,7 +122,7 @@ def test_a_whole_campaign_ends_as_in_memory(begun):
     wanted = conduct(arm.plan.assessor, arm.world).statements()
     assert [each["target"] for each in said["statements"]] == [each.target for each in wanted]
     for mine, theirs in zip(said["statements"], wanted, strict=True):
-        assert mine["withheld"] == (theirs.withheld or None)
+        assert mine["withheld"] == reason(theirs.withheld)
         for name in ("value_mm", "lower_mm", "upper_mm"):
             given = np.nan if mine[name] is None else mine[name]
             np.testing.assert_allclose(given, getattr(theirs, name), atol=1e-9)

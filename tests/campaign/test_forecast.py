@@ -15,6 +15,7 @@ from kinacc.campaign.forecast import draw_errors, forecast, population, why_none
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.simulate import quantiles
 from kinacc.campaign.state import restore
+from kinacc.campaign.words import reason
 
 
 @pytest.mark.parametrize("noise_mm", [0.05, 0.2])
@@ -65,13 +66,13 @@ def test_a_forecast_contains_what_then_happens(make_plan, make_world):
 def test_there_is_no_forecast_from_nearly_nothing(make_plan):
     state = restore(make_plan(), [])
     assert forecast(state, 5) is None
-    assert why_none(state) == "0 points were read, 8 are needed"
+    assert reason(why_none(state)) == "0 points were read, 8 are needed"
 
 
 def test_there_is_no_forecast_for_an_assessor_that_errors_drawn_one_by_one_would_mislead(make_plan):
     state = restore(make_plan("kinematic"), [])
     assert forecast(state, 5) is None
-    assert "plan-campaign" in why_none(state)
+    assert "plan-campaign" in reason(why_none(state))
 
 
 def test_simulated_readings_do_not_depend_on_what_else_is_read(make_plan):

@@ -52,8 +52,8 @@ def test_the_single_shot_bound_holds_as_often_as_it_says():
     assert row.stated == 1.0
 
 
-def outcome(budget, lower, upper, repetition=0, truth=1.0, crowd=0, broken=False):
-    said = Statement(CANDIDATES, lower_mm=lower, upper_mm=upper, confidence=0.95, crowd=crowd)
+def outcome(budget, lower, upper, repetition=0, truth=1.0, broken=False):
+    said = Statement(CANDIDATES, lower_mm=lower, upper_mm=upper, confidence=0.95)
     return Outcome("x", budget, repetition, budget, said, truth, broken)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.simulate import conduct
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.campaign import folder, words
 from kinacc.campaign.plan import fixed_visit, from_json, to_json
 from kinacc.campaign.reading import Reading
@@ -79,11 +79,12 @@ def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_wo
     assert plan.by_travel
     for said in restore(plan, entries[:-1]).statements():
         assert np.isnan(said.upper_mm)
-        assert "1 points of the first visit, made in order of travel" in said.withheld
-    assert not any("travel" in said.withheld for said in restore(plan, entries).statements())
+        text = words.reason(said.withheld)
+        assert text == "1 points of the first visit, made in order of travel, are left"
+    assert not any("travel" in str(said.withheld) for said in restore(plan, entries).statements())
     at_random = replace(plan, route=plan.order[: len(plan.route)])
     begun = restore(at_random, entries_of(at_random, make_world(at_random))[:-1])
-    assert not any("travel" in said.withheld for said in begun.statements())
+    assert not any("travel" in str(said.withheld) for said in begun.statements())
 
 
 def test_the_route_reorders_the_first_visit_only(make_plan):
@@ -171,9 +172,12 @@ def test_bounds_that_contradict_each_other_are_told(make_plan):
 
 def test_an_estimate_above_its_upper_bound_is_told(make_plan):
     state = restore(make_plan(), [])
-    said = Statement(MEASURED, 1.006, 0.970, 0.989, 0.95, assumption="none is alone")
+    said = Statement(MEASURED, 1.006, 0.970, 0.989, 0.95, assumption=Reason("drawn_at_random"))
     text = words.statement(said, state)
-    assert "(estimated at 1.006 mm), if none is alone. The estimate lies above the upper" in text
+    assert (
+        "(estimated at 1.006 mm), if the points were drawn at random from the region. The" in text
+    )
+    assert "The estimate lies above the upper" in text
     assert text.endswith("wrong.")
     usual = words.statement(Statement(MEASURED, 0.98, 0.970, 0.989, 0.95), state)
     assert usual.endswith("(estimated at 0.980 mm).")

@@ -24,7 +24,7 @@ from kinacc.artifacts.columns import (
     texts,
 )
 from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import InputError, Problem, first_few, refuse
 
 _ARROW_TYPES = {
     "float": pa.float64(),
@@ -108,8 +108,7 @@ def to_table(
     lengths = {c.name: len(a) for c, a in zip(wanted, arrays, strict=False) if a is not None}
     if not problems and len(set(lengths.values())) > 1:
         problems.append(Problem(where, f"columns of different lengths: {lengths}"))
-    if problems:
-        raise InputError(problems, f"{artefact} does not fit its contract")
+    refuse(problems, f"{artefact} does not fit its contract")
     return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance))
 
 

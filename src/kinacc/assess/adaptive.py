@@ -18,8 +18,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import Statement
-from kinacc.errors import InputError, Problem
+from kinacc.assess.statement import Reason, Statement
+from kinacc.errors import InputError, Problem, refuse
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
 
@@ -55,8 +55,7 @@ class Candidates:
                 problems.append(Problem(name, f"{len(given)} rows", f"{len(covariance)} rows"))
             elif not np.all(np.isfinite(given)):
                 problems.append(Problem(name, "holds values that are not finite", "numbers"))
-        if problems:
-            raise InputError(problems, "these candidates cannot be assessed")
+        refuse(problems, "these candidates cannot be assessed")
         object.__setattr__(self, "covariance_mm2", covariance)
 
     @classmethod
@@ -140,9 +139,9 @@ class AdaptiveAssessor(Protocol):
         """A new campaign without readings. InputError without what the assessor ``needs``."""
         ...
 
-    def shortfall(self, points: int, joints: int) -> str:
-        """What the budget is too small for, on an arm of so many joints; empty if nothing."""
-        return ""
+    def shortfall(self, points: int, joints: int) -> Reason | None:
+        """What the budget is too small for, on an arm of so many joints; None if nothing."""
+        return None
 
 
 class Ledger:
@@ -215,8 +214,7 @@ class Ledger:
         if not is_vector or not all(isinstance(x, float) and math.isfinite(x) for x in reading):
             problems.append(Problem("reading", f"{reading}", "three numbers, in mm"))
         if covariance_mm2 is None:
-            if problems:
-                raise InputError(problems, "this reading cannot be recorded")
+            refuse(problems, "this reading cannot be recorded")
             chosen = self.candidates
             return reading, chosen.covariance_mm2[point], bool(chosen.is_equal_noise[point])
         covariance = np.asarray(covariance_mm2, dtype=float)
@@ -226,8 +224,7 @@ class Ledger:
             allowed = "symmetric, positive definite, in mm^2"
             faults = covariance_faults(covariance[None])
             problems += [Problem("covariance", said, allowed) for _, said in faults]
-        if problems:
-            raise InputError(problems, "this reading cannot be recorded")
+        refuse(problems, "this reading cannot be recorded")
         even = np.trace(covariance) / 3.0
         spread = np.abs(covariance - even * np.eye(3)).max()
         return reading, covariance, bool(spread <= _SYMMETRY * even)
@@ -244,8 +241,7 @@ class LedgerCampaign:
             for name in settings.needs
             if getattr(candidates, name) is None
         ]
-        if lacking:
-            raise InputError(lacking, f"{settings.name} needs to know the arm")
+        refuse(lacking, f"{settings.name} needs to know the arm")
         self.settings = settings
         self.ledger = Ledger(candidates)
 

@@ -14,7 +14,7 @@ from numbers import Integral
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from kinacc.assess.world import World
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 
 class Assessment(NamedTuple):
@@ -55,8 +55,7 @@ def check(assessor: Assessor, more: list[Problem] | None = None) -> None:
         if getattr(assessor, switch) not in choices:
             found = f"{getattr(assessor, switch)!r}"
             problems.append(Problem(switch, found, ", ".join(choices)))
-    if problems:
-        raise InputError(problems, f"{assessor.name} cannot work with these settings")
+    refuse(problems, f"{assessor.name} cannot work with these settings")
 
 
 A = TypeVar("A", bound=Assessor)

@@ -8,7 +8,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Candidates, LedgerCampaign, check_budget
 from kinacc.assess.ellipsoid import BallDistances
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
 from kinacc.errors import Problem
 
@@ -46,7 +46,7 @@ class ChallengeCampaign(LedgerCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The smallest bound the readings do not reject."""
         if not self.ledger.visited:
-            return (Statement(MEASURED, withheld="nothing measured yet"),)
+            return (Statement(MEASURED, withheld=Reason("nothing_measured")),)
         return (Statement(MEASURED, self.smallest_mm()),)
 
     def smallest_mm(self, precision: float = 1e-6) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from kinacc.assess.statement import Statement
+from kinacc.assess.statement import Reason, Statement
 from kinacc.errors import InputError, Problem
 
 ACCEPT, REJECT, UNDECIDED = "accept", "reject", "undecided"
@@ -25,7 +25,7 @@ class Decision:
     guard_band_mm: float
     acceptance_limit_mm: float
     risk: float
-    reason: str
+    reason: Reason
 
 
 def decide(said: Statement, tolerance_mm: float) -> Decision:
@@ -41,14 +41,14 @@ def decide(said: Statement, tolerance_mm: float) -> Decision:
     if not (tolerance_mm > 0.0 and math.isfinite(tolerance_mm)):
         raise InputError(Problem("tolerance", f"{tolerance_mm}", "above 0, in mm"))
     band = said.upper_mm - said.value_mm
-    verdict, reason = UNDECIDED, "the tolerance lies between lower and upper bound: measure more"
+    verdict, reason = UNDECIDED, Reason("between")
     if said.upper_mm < said.lower_mm or band < 0.0:
-        reason = "the bounds contradict each other or the value: is the noise stated too small?"
+        reason = Reason("contradict")
     elif said.upper_mm <= tolerance_mm:
-        verdict, reason = ACCEPT, "the upper bound is within the tolerance"
+        verdict, reason = ACCEPT, Reason("within")
     elif said.lower_mm > tolerance_mm:
-        verdict, reason = REJECT, "the lower bound exceeds the tolerance"
+        verdict, reason = REJECT, Reason("beyond")
     elif math.isnan(said.upper_mm):
-        reason = said.withheld or "no upper bound is stated"
+        reason = said.withheld or Reason("no_upper")
     risk = 1.0 - said.confidence
     return Decision(verdict, tolerance_mm, band, tolerance_mm - band, risk, reason)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import comb
 
 from kinacc.assess.adaptive import Ledger
-from kinacc.assess.statement import CANDIDATES, Statement
+from kinacc.assess.statement import CANDIDATES, Reason, Statement
 
 MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
 
@@ -15,8 +15,8 @@ def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statemen
     """A statement on the measured points, and the same on all candidates where they are all."""
     if len(ledger.visited) == ledger.candidates.points:
         return said, replace(said, target=CANDIDATES)
-    unmeasured = ledger.candidates.points - len(ledger.visited)
-    withheld = f"{unmeasured} of {ledger.candidates.points} candidates are not measured"
+    points = ledger.candidates.points
+    withheld = Reason("unmeasured", {"left": points - len(ledger.visited), "points": points})
     return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)
 
 

@@ -9,10 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
-from kinacc.assess.statement import REGION, Statement
+from kinacc.assess.statement import REGION, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
+_FEWEST = 10  # different sizes that make a distribution
 _IMPROBABLE = 0.01  # chance of the largest reading below which the fit counts as contradicted
 
 
@@ -37,8 +38,7 @@ class GammaQuantile(AdaptiveAssessor):
         problems = check_budget(self.measurements)
         if not 0.0 < self.share < 1.0:
             problems.append(Problem("share", f"{self.share}", "above 0 and below 1"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> GammaCampaign:
         """A new campaign."""
@@ -58,17 +58,17 @@ class GammaCampaign(OnceCampaign):
 
         visited, share = self.ledger.visited, self.settings.share
         sizes = self.ledger.sizes_mm()
-        if len(np.unique(sizes)) < 10 or sizes.min() <= 0.0:
-            few = f"{len(visited)} points read; a distribution needs at least 10, of different size"
+        if len(np.unique(sizes)) < _FEWEST or sizes.min() <= 0.0:
+            few = Reason("few_sizes", {"read": len(visited), "needed": _FEWEST})
             return (Statement(REGION, share=share, withheld=few),)
         fitted = fit(sizes)
         below = float(gammainc(fitted.shape, sizes.max() / fitted.scale))
         beyond = -math.expm1(len(sizes) * math.log(below))
         noise = 3.0 * float(np.mean(self.ledger.noise_mm[visited] ** 2) / np.mean(sizes**2))
-        withheld = ""
+        withheld = None
         if noise > 0.25:
-            withheld = f"noise makes up {noise:.0%} of the mean square of the readings"
+            withheld = Reason("much_noise", {"part": noise})
         elif beyond < _IMPROBABLE:
-            withheld = "the largest reading does not belong to a gamma distribution"
+            withheld = Reason("not_gamma")
         value = quantile(fitted, share)
         return (Statement(REGION, value, share=share, withheld=withheld),)

@@ -13,8 +13,8 @@ from kinacc.assess.challenges import ChallengeCampaign, invalidation_problems
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.ellipsoid import largest_size
 from kinacc.assess.sequential_limits import Looks
-from kinacc.assess.statement import MEASURED, Statement
-from kinacc.errors import InputError
+from kinacc.assess.statement import MEASURED, Reason, Statement
+from kinacc.errors import refuse
 
 SIMULATIONS = 200_000
 _SEED = 20_200  # of the calibration; it is part of the method, not of a study
@@ -48,8 +48,7 @@ class InvalidationCalibrated(AdaptiveAssessor):
     name: ClassVar[str] = "invalidation_calibrated"
 
     def __post_init__(self) -> None:
-        if problems := invalidation_problems(self):
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(invalidation_problems(self), f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> CalibratedCampaign:
         """A new campaign."""
@@ -80,8 +79,8 @@ class CalibratedCampaign(ChallengeCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The calibrated bounds; the value is the smallest bound not rejected."""
         if self.ledger.taken < self.first:
-            left = self.first - self.ledger.taken
-            return (Statement(MEASURED, withheld=f"{left} points of the first visit are left"),)
+            left = Reason("first_visit", {"left": self.first - self.ledger.taken})
+            return (Statement(MEASURED, withheld=left),)
         error = 1.0 - self.settings.confidence
         width = boundary(self.number, error, self._is_even)
         visited = self.ledger.visited

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.challenges import ChallengeCampaign, invalidation_problems
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,7 @@ class ModelInvalidationFull(AdaptiveAssessor):
         problems = invalidation_problems(self)
         if self.bound_mm is not None and not self.bound_mm > 0.0:
             problems.append(Problem("bound_mm", f"{self.bound_mm}", "above 0, in mm"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> ChallengeCampaign:
         """A new campaign."""

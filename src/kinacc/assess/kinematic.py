@@ -19,9 +19,9 @@ from kinacc.assess.kinematic_model import (
     points_needed,
     posterior,
 )
-from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 _DRAWS = 400
 _BATCH = 0.08  # of the budget: readings between two looks at who could be the largest
@@ -63,15 +63,14 @@ class Kinematic(AdaptiveAssessor):
         problems = check_budget(self.measurements, self.confidence)
         if not 0.0 < self.visited <= 1.0:
             problems.append(Problem("visited", f"{self.visited}", "above 0 and at most 1"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
-    def shortfall(self, points: int, joints: int) -> str:
-        """Why this budget leads to no statement on an arm of so many joints; empty if it may."""
+    def shortfall(self, points: int, joints: int) -> Reason | None:
+        """Why this budget leads to no statement on an arm of so many joints; None if it may."""
         needed = points_needed(joints)
         if first_points(self.measurements, points, self.visited) >= needed:
-            return ""
-        return f"no bound will be stated: that takes {needed} points in the first visit"
+            return None
+        return Reason("no_bound_ahead", {"needed": needed})
 
     def begin(self, candidates: Candidates) -> KinematicCampaign:
         """A new campaign. InputError without joints and effects of the candidates."""
@@ -109,7 +108,7 @@ class KinematicCampaign(LedgerCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The largest error of the measured points, and of all candidates."""
         if self.ledger.taken < self.first:
-            left = f"{self.first - self.ledger.taken} points of the first visit are left"
+            left = Reason("first_visit", {"left": self.first - self.ledger.taken})
             return Statement(CANDIDATES, withheld=left), Statement(MEASURED, withheld=left)
         known = self._posterior()
         measured, everywhere, _ = self._draws(known)
@@ -119,51 +118,43 @@ class KinematicCampaign(LedgerCampaign):
         if seen < points:
             crowd = companions(points, seen, MISSING_PART * (1.0 - self.settings.confidence))
         crowd = crowd if crowd > 1 else 0  # the largest itself was hardly missed
-        missed = ""
+        missed = None
         if crowd > _CROWD * points:
-            missed = f"{seen} of {points} candidates measured: {crowd} could have been missed"
+            missed = Reason("missed", {"seen": seen, "points": points, "crowd": crowd})
         return (
             self._said(CANDIDATES, everywhere, withheld or missed, crowd),
             self._said(MEASURED, measured, withheld),
         )
 
-    def _said(self, target: str, draws: np.ndarray, withheld: str, crowd: int = 0) -> Statement:
+    def _said(
+        self, target: str, draws: np.ndarray, withheld: Reason | None, crowd: int = 0
+    ) -> Statement:
         confidence = self.settings.confidence
         low, value, high = (float(x) for x in np.quantile(draws, [1 - confidence, 0.5, confidence]))
-        assumption = "smooth errors of single joints cause the errors, but for local ones"
+        assumption = Reason("smooth")
         if crowd:
-            assumption += f"; at least {crowd} candidates have an error above the largest divided "
-            assumption += f"by {_ISOLATION:g}"
-        resting = Statement(
-            target,
-            value,
-            low,
-            high,
-            confidence,
-            assumption=assumption,
-            crowd=crowd,
-            isolation=_ISOLATION if crowd else 1.0,
-        )
+            assumption = Reason("smooth_and_crowd", {"crowd": crowd, "isolation": _ISOLATION})
+        resting = Statement(target, value, low, high, confidence, assumption=assumption)
         if withheld:
             return replace(resting, lower_mm=math.nan, upper_mm=math.nan, withheld=withheld)
         return resting
 
-    def _contradiction(self, known: Posterior) -> str:
-        """Why the model is not believed; empty if it is."""
+    def _contradiction(self, known: Posterior) -> Reason | None:
+        """Why the model is not believed; None if it is."""
         from scipy.special import chdtrc
 
         if self.first < (needed := points_needed(self.ledger.candidates.q_rad.shape[1])):
-            return f"{self.first} points in the first visit; the model needs {needed}"
+            return Reason("few_for_model", {"first": self.first, "needed": needed})
         worst = float(known.odd.max())
         chance = -math.expm1(known.odd.size * math.log1p(-float(chdtrc(3, worst))))
         if chance < _CONTRADICTED:
-            return "a reading is farther from what joints explain than local errors are"
+            return Reason("unexplained_reading")
         visited = self.ledger.visited
         square = np.sum(self.ledger.mean_mm[visited] ** 2, axis=1)
         size = float(np.mean(square - 3.0 * self.ledger.noise_mm[visited] ** 2))
         if 3.0 * self._scales.local_mm2 > (1.0 - _EXPLAINED) * size:
-            return "smooth errors of single joints explain less than half of the errors"
-        return ""
+            return Reason("unexplained_half")
+        return None
 
     def _plan(self, count: int) -> list[int]:
         """The next ``count`` points, by how often they are the largest in draws."""

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
-from kinacc.assess.statement import REGION, Statement
+from kinacc.assess.statement import REGION, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 _LOWER_SLIP = 0.01  # probability that noise alone lifts a reading by more than is taken off it
 
@@ -45,8 +45,7 @@ class RegionShare(AdaptiveAssessor):
             problems.append(Problem("share", f"{self.share}", "above 0 and below 1"))
         if not self.deviations >= 0.0:
             problems.append(Problem("deviations", f"{self.deviations}", "0 or more"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> RegionShareCampaign:
         """A new campaign."""
@@ -69,8 +68,9 @@ class RegionShareCampaign(OnceCampaign):
         rank = largest_rank(count, met, error)
         if rank == 0:
             needed = math.ceil(math.log(error) / math.log1p(-met))
-            few = f"{count} points read; {chosen.share:.0%} of the region needs {needed}"
-            return (Statement(REGION, share=chosen.share, withheld=few),)
+            few = {"read": count, "share": chosen.share, "needed": needed}
+            withheld = Reason("few_points", few)
+            return (Statement(REGION, share=chosen.share, withheld=withheld),)
         sizes, spread = self.ledger.sizes_mm(), self._spread()
         raised = np.sort(sizes + chosen.deviations * spread)[::-1]
         lowered = np.sort(sizes - math.sqrt(float(chdtri(3, _LOWER_SLIP))) * spread)[::-1]
@@ -84,7 +84,7 @@ class RegionShareCampaign(OnceCampaign):
             upper_mm=float(raised[rank - 1]),
             confidence=chosen.confidence,
             share=chosen.share,
-            assumption="the points were drawn at random from the region",
+            assumption=Reason("drawn_at_random"),
         )
         return (said,)
 

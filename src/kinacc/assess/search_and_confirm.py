@@ -12,9 +12,9 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.coverage import MISSING_PART, at_most, companions, hardly_missed, records
 from kinacc.assess.population import LargestSize, largest_size
 from kinacc.assess.sequential_limits import Looks, LooksCampaign
-from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
 _ALONE = 0.1  # chance of so little company below which the assumption counts as broken
@@ -60,18 +60,17 @@ class SearchAndConfirm(AdaptiveAssessor):
             problems.append(Problem("isolation", f"{self.isolation}", "above 1"))
         if not 0.0 < self.crowd < 1.0:
             problems.append(Problem("crowd", f"{self.crowd}", "above 0 and below 1"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def enough_for_all(self, points: int) -> int:
         """Measurements with which the statement on all ``points`` candidates assumes nothing."""
         return hardly_missed(points, MISSING_PART * (1.0 - self.confidence))
 
-    def shortfall(self, points: int, joints: int) -> str:
-        """What a larger budget would be good for with so many candidates; empty if nothing."""
+    def shortfall(self, points: int, joints: int) -> Reason | None:
+        """What a larger budget would be good for with so many candidates; None if nothing."""
         if self.measurements >= (enough := self.enough_for_all(points)):
-            return ""
-        return f"with {enough} readings, the bound on all candidates would need no assumption"
+            return None
+        return Reason("assumption_ahead", {"enough": enough})
 
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
@@ -110,7 +109,7 @@ class SearchAndConfirmCampaign(LooksCampaign):
         ledger, looks = self.ledger, self.looks
         visited = ledger.visited
         if len(visited) < self._speaks_from:
-            left = f"{self._speaks_from - len(visited)} points of the first visit are left"
+            left = Reason("first_visit", {"left": self._speaks_from - len(visited)})
             return Statement(MEASURED, withheld=left), Statement(CANDIDATES, withheld=left)
         posterior = self._posterior()
         value_mm = posterior.quantile_mm(0.5, measured_only=True)
@@ -137,20 +136,13 @@ class SearchAndConfirmCampaign(LooksCampaign):
         if crowd == 1:
             return replace(known, upper_mm=beyond_mm)
         factor = self.settings.isolation
-        resting = replace(
-            known,
-            upper_mm=factor * beyond_mm,
-            assumption=f"at least {crowd} of the {points} candidates have an error above the "
-            f"largest divided by {factor:g}",
-            crowd=crowd,
-            isolation=factor,
-        )
-        withheld = ""
+        assumption = Reason("crowd", {"crowd": crowd, "points": points, "isolation": factor})
+        resting = replace(known, upper_mm=factor * beyond_mm, assumption=assumption)
+        withheld = None
         if crowd > self.settings.crowd * points:
-            withheld = f"{seen} of {points} candidates measured: fewer than {crowd} large errors "
-            withheld += "could all have been missed"
+            withheld = Reason("all_missed", {"seen": seen, "points": points, "crowd": crowd})
         elif self._stands_alone(crowd, said.lower_mm):
-            withheld = f"one measured error is more than {factor:g} times all others"
+            withheld = Reason("stands_alone", {"isolation": factor})
         return replace(resting, upper_mm=math.nan, withheld=withheld) if withheld else resting
 
     def _stands_alone(self, crowd: int, lower_mm: float) -> bool:

@@ -11,9 +11,9 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.sequential_limits import Looks, LooksCampaign
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,7 @@ class Sequential(AdaptiveAssessor):
             problems.append(Problem("visited", f"{self.visited}", "above 0 and at most 1"))
         if self.width_mm is not None and not self.width_mm > 0.0:
             problems.append(Problem("width_mm", f"{self.width_mm}", "above 0, in mm"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> SequentialCampaign:
         """A new campaign."""
@@ -68,8 +67,8 @@ class SequentialCampaign(LooksCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The bounds as they stand."""
         if self.ledger.taken < self.first:
-            left = self.first - self.ledger.taken
-            return (Statement(MEASURED, withheld=f"{left} points of the first visit are left"),)
+            left = Reason("first_visit", {"left": self.first - self.ledger.taken})
+            return (Statement(MEASURED, withheld=left),)
         visited = self.ledger.visited
         said = Statement(
             MEASURED,

@@ -87,4 +87,7 @@ def truth_mm(said: Statement, size_mm: np.ndarray, visited: list[int] | None) ->
 
 def is_broken(said: Statement, size_mm: np.ndarray) -> bool:
     """Whether too few candidates of sizes (m,) keep the largest company for a statement."""
-    return int(np.sum(size_mm >= size_mm.max() / said.isolation)) < said.crowd
+    if said.assumption is None or "crowd" not in said.assumption.numbers:
+        return False
+    known = said.assumption.numbers
+    return int(np.sum(size_mm >= size_mm.max() / known["isolation"])) < known["crowd"]

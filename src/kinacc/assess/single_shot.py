@@ -10,9 +10,9 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
-from kinacc.errors import InputError
+from kinacc.errors import refuse
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,10 @@ class SingleShot(AdaptiveAssessor):
     name: ClassVar[str] = "single_shot"
 
     def __post_init__(self) -> None:
-        if problems := check_budget(self.measurements, self.confidence):
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(
+            check_budget(self.measurements, self.confidence),
+            f"{self.name} cannot work with these settings",
+        )
 
     def begin(self, candidates: Candidates) -> SingleShotCampaign:
         """A new campaign."""
@@ -49,7 +51,7 @@ class SingleShotCampaign(OnceCampaign):
         """The bound, with the largest reading as the value."""
         ledger = self.ledger
         if not ledger.visited:
-            return (Statement(MEASURED, withheld="nothing measured yet"),)
+            return (Statement(MEASURED, withheld=Reason("nothing_measured")),)
         error = 1.0 - self.settings.confidence
         each = error / self.first
         means = _outstanding(ledger)

@@ -8,7 +8,8 @@ that the errors of a stated share of the region do not exceed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 MEASURED = "measured"
 CANDIDATES = "candidates"
@@ -17,14 +18,22 @@ TARGETS = (MEASURED, CANDIDATES, REGION)
 
 
 @dataclass(frozen=True)
+class Reason:
+    """Why something is said or not: a code and its numbers; ``campaign.words`` has the words."""
+
+    code: str
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Statement:
     """One statement on the size of the errors, mm; NaN where nothing is said.
 
     ``lower_mm`` and ``upper_mm`` each hold with ``confidence`` by themselves. ``share`` is the part
-    of the region the statement is about (1 for the other targets). ``assumption`` names what the
-    bounds rest on beyond normal readings of known covariance; empty if nothing. Where it is that
-    at least ``crowd`` candidates have an error above the largest divided by ``isolation``, these
-    say so in numbers. ``withheld`` says why no bound is stated; empty if one is. Where an
+    of the region the statement is about (1 for the other targets). ``assumption`` is what the
+    bounds rest on beyond normal readings of known covariance; None if nothing. Its numbers
+    ``crowd`` and ``isolation`` say that at least so many candidates have an error above the largest
+    divided by ``isolation``. ``withheld`` is why no bound is stated; None if one is. Where an
     assumption was at hand, a statement that is withheld still names it.
     """
 
@@ -34,7 +43,5 @@ class Statement:
     upper_mm: float = math.nan
     confidence: float = math.nan
     share: float = 1.0
-    assumption: str = ""
-    withheld: str = ""
-    crowd: int = 0
-    isolation: float = 1.0
+    assumption: Reason | None = None
+    withheld: Reason | None = None

@@ -12,8 +12,8 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import MEASURED, Statement
-from kinacc.errors import InputError, Problem
+from kinacc.assess.statement import MEASURED, Reason, Statement
+from kinacc.errors import Problem, refuse
 
 SCREENING_PART = 0.3  # of the allowed error, spent on points that are not re-measured
 
@@ -44,8 +44,7 @@ class TwoStage(AdaptiveAssessor):
         if not problems and self.measurements < 1 + self.repeats:
             what = f"{self.measurements} do not cover one point and its {self.repeats} repeats"
             problems.append(Problem("measurements", what, f"at least {1 + self.repeats}"))
-        if problems:
-            raise InputError(problems, f"{self.name} cannot work with these settings")
+        refuse(problems, f"{self.name} cannot work with these settings")
 
     def begin(self, candidates: Candidates) -> TwoStageCampaign:
         """A new campaign."""
@@ -88,7 +87,7 @@ class TwoStageCampaign(LedgerCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The bound once every suspect was read again; before, none."""
         if not self.suspects or len(self.again) < len(self.suspects):
-            return (Statement(MEASURED, withheld="the suspects are not all measured again yet"),)
+            return (Statement(MEASURED, withheld=Reason("suspects")),)
         allowed = 1.0 - self.settings.confidence
         passed = [p for p in self.ledger.visited if p not in set(self.suspects)]
         spent = SCREENING_PART * allowed if passed else 0.0

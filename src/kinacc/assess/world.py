@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 
 _NO_KEY = np.zeros(2, np.uint64)
 
@@ -132,8 +132,7 @@ def drawn_world(
         problems.append(
             Problem("visiting order", "does not name every point once", f"0 to {points - 1}")
         )
-    if problems:
-        raise InputError(problems, "a world cannot be drawn from this input")
+    refuse(problems, "a world cannot be drawn from this input")
     return draw(error[index], sigma[index], key, visits, index)
 
 

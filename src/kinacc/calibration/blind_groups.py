@@ -2,18 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import qr, solve_triangular
+
+from kinacc.calibration.frames import MOTIONS, Frames
 
 LEAST = 0.02  # of the largest part of a direction; less is not worth a word
 _RANK = 1e-6
 _OWN = 0.5  # part of a unit direction beside the structural ones that makes it one of its own
 
 
-def groups(
-    hidden: np.ndarray, undetermined: np.ndarray, of_arm: np.ndarray
-) -> list[tuple[np.ndarray, bool]]:
-    """Undetermined directions (m, P) by what they share, and whether no pose at all shows them.
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Parameters that cannot be told from each other: ``directions`` (m, P) that change no pose.
+
+    ``structural``: no pose at all shows them; otherwise only those measured show them too little.
+    """
+
+    directions: np.ndarray
+    structural: bool
+
+    @property
+    def members(self) -> np.ndarray:
+        """True (P,) for the parameters it is about."""
+        return (np.abs(self.directions) >= LEAST).any(axis=0)
+
+
+@dataclass(frozen=True)
+class LeftOpen:
+    """What poses leave open of the parameters ``names`` (P,), base and targets at ``frames``."""
+
+    groups: tuple[Group, ...]
+    names: tuple[str, ...]
+    frames: Frames
+
+
+def of_arm(names: Sequence[str]) -> np.ndarray:
+    """True (P,) for parameters of the arm; the others are motions of base and targets."""
+    return np.array([name.partition(".")[2] not in MOTIONS for name in names])
+
+
+def groups(hidden: np.ndarray, undetermined: np.ndarray, of_arm: np.ndarray) -> tuple[Group, ...]:
+    """Undetermined directions (m, P) by what they share.
 
     ``hidden`` (h, P) span what no pose shows, ``undetermined`` (u, P) that and what some poses
     would show; ``of_arm`` (P,) marks parameters of the arm, the others are motions of frames.
@@ -23,12 +56,11 @@ def groups(
     """
     hidden_frames, hidden_arm = _apart(hidden, of_arm)
     frames, arm = _apart(undetermined, of_arm)
-    found = [(each[None], True) for each in _simple(hidden_frames, ~of_arm)]
-    found += [(each, True) for each in _gathered(_simple(hidden_arm, of_arm), ~of_arm)]
-    weak = _simple(_beside(frames, hidden_frames, ~of_arm), ~of_arm)
-    found += [(each[None], False) for each in weak]
-    weak = _simple(_beside(arm, hidden_arm, of_arm), of_arm)
-    return found + [(each[None], False) for each in weak]
+    found = [Group(each[None], True) for each in _simple(hidden_frames, ~of_arm)]
+    found += [Group(each, True) for each in _gathered(_simple(hidden_arm, of_arm), ~of_arm)]
+    weak = [*_simple(_beside(frames, hidden_frames, ~of_arm), ~of_arm)]
+    weak += [*_simple(_beside(arm, hidden_arm, of_arm), of_arm)]
+    return (*found, *(Group(each[None], False) for each in weak))
 
 
 def _apart(rows: np.ndarray, of_arm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,18 +1,21 @@
-"""Directions of parameters that no pose shows, in sentences for a person who knows the arm."""
+"""Which parameters poses do not determine, in sentences for a person who knows the arm."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from kinacc.calibration.blind_groups import LEAST
+from kinacc.calibration.blind_groups import LEAST, LeftOpen, of_arm
 from kinacc.calibration.frames import BASE, MOTIONS, Frames
+from kinacc.calibration.identified import FIXED, PRIOR, UNDETERMINED, Parameter
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.geometry import skew
 
 WEAK = "(these poses show it too little, others may)"
 _MOST_NAMES = 4
+_MOST_SAID = 3  # sentences about one parameter
+_JOIN, _MORE = "; ", "and "  # of sentences about one parameter, none of which holds a semicolon
 _SAME = 0.02  # relative difference of parts that count as equal
 _CALLED = {
     "theta_offset_rad": "theta",
@@ -23,25 +26,46 @@ _CALLED = {
 }
 
 
-def statements(
-    groups: Sequence[tuple[np.ndarray, bool]], names: Sequence[str], frames: Frames
-) -> list[tuple[str, np.ndarray]]:
-    """Sentences about ``blind_groups.groups``, each with the mask (P,) of whom it speaks."""
-    found: list[tuple[str, np.ndarray]] = []
-    for directions, structural in groups:
-        words = sentence(directions, names, frames)
-        if any(words == text for text, _ in found):
+def sentences(open_: LeftOpen) -> dict[str, np.ndarray]:
+    """What poses leave open, each sentence with the mask (P,) of whom it speaks."""
+    found: dict[str, np.ndarray] = {}
+    for group in open_.groups:
+        words = sentence(group.directions, open_.names, open_.frames)
+        if words in found:
             continue  # parts too small for words told them apart
-        members = (np.abs(directions) >= LEAST).any(axis=0)
-        found.append((words if structural else f"{words} {WEAK}", members))
+        text = words if group.structural else f"{words} {WEAK}"
+        found[text] = found.get(text, False) | group.members
     # Joint by joint, what concerns frames alone at the end.
-    arm = of_arm(names)
-    return sorted(found, key=lambda each: [*np.flatnonzero(each[1][arm]), len(names)][0])
+    arm = of_arm(open_.names)
+    first = {text: [*np.flatnonzero(each[arm]), len(arm)][0] for text, each in found.items()}
+    return {text: found[text] for text in sorted(found, key=first.__getitem__)}
 
 
-def of_arm(names: Sequence[str]) -> np.ndarray:
-    """True (P,) for parameters of the arm; the others are motions of base and targets."""
-    return np.array([name.partition(".")[2] in _CALLED for name in names])
+def reasons(parameters: Iterable[Parameter], open_: LeftOpen) -> list[str | None]:
+    """Why each parameter is not identified, as ``dh_identified`` has it; None where it is."""
+    said, place = sentences(open_), {name: i for i, name in enumerate(open_.names)}
+    found: list[str | None] = []
+    for each in parameters:
+        if each.status == UNDETERMINED:
+            texts = [text for text, members in said.items() if members[place[each.name]]]
+            more = [f"{_MORE}{len(texts) - _MOST_SAID} more"] if len(texts) > _MOST_SAID else []
+            found.append(_JOIN.join(texts[:_MOST_SAID] + more) or None)
+        elif each.status == PRIOR:
+            unit, factor = ("mrad", 1e3) if is_angle(each.name) else ("mm", 1.0)
+            found.append(f"known beforehand to {factor * each.prior_std:g} {unit}")
+        elif each.status == FIXED:
+            found.append("fixed by calibration.frames" if each.name in place else "not fitted")
+        else:
+            found.append(None)
+    return found
+
+
+def listed(table: Mapping[str, Sequence]) -> list[str]:
+    """Every sentence of a ``dh_identified`` table on what is left open, once, to be shown as is."""
+    told = zip(table["status"], table["statement"], strict=True)
+    cells = (str(cell) for status, cell in told if status == UNDETERMINED and cell)
+    texts = dict.fromkeys(text for cell in cells for text in cell.split(_JOIN))
+    return [text for text in texts if not text.startswith(_MORE)]
 
 
 def sentence(directions: np.ndarray, names: Sequence[str], frames: Frames) -> str:

@@ -12,7 +12,7 @@ from kinacc.calibration.frames import Frames, coordinates, known
 from kinacc.calibration.observations import Observations
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot.axes import NEARLY_PARALLEL
@@ -118,5 +118,4 @@ def require_known(rules: Sequence[Rule], observations: Observations) -> None:
         Problem(f"{parameter_rules.KEYS[parameter_rules.FRAMES]}, {rule.name!r}", what, allowed)
         for rule, what, allowed in parameter_rules.strangers(rules, observations.joints, frames)
     ]
-    if problems:
-        raise InputError(problems)
+    refuse(problems)

@@ -103,10 +103,11 @@ class DHEstimator(Estimator):
         self, fitted: DHFit, known: Uncertainty, observations: Observations
     ) -> dict[str, Columns]:
         """How the fit went, and which parameters the observations determine."""
-        told = identified.parameters(fitted, known, observations)
+        told = identified.parameters(fitted, known)
+        left_open = identified.left_open(fitted, known, observations)
         return {
             "dh_fit": tables.dh_fit_columns(fitted, known),
-            "dh_identified": tables.identified_columns(told, known),
+            "dh_identified": tables.identified_columns(told, left_open, known),
         }
 
 

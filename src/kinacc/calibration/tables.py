@@ -8,6 +8,8 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
+from kinacc.calibration.blind_groups import LeftOpen
+from kinacc.calibration.blind_words import reasons
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.identified import IDENTIFIED, PRIOR, Parameter
@@ -115,16 +117,16 @@ def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
     return columns_of("dh_fit", rows)
 
 
-def identified_columns(found: Sequence[Parameter], uncertainty: Uncertainty) -> Columns:
+def identified_columns(
+    found: Sequence[Parameter], open_: LeftOpen, uncertainty: Uncertainty
+) -> Columns:
     """``dh_identified``: status of every parameter, and in words why it is not identified."""
     variance = dict(zip(uncertainty.names, np.diag(uncertainty.covariance), strict=True))
     known = {IDENTIFIED, PRIOR}
     rows = []
-    for each in found:
+    for each, why in zip(found, reasons(found, open_), strict=True):
         std = np.sqrt(max(variance[each.name], 0.0)) if each.status in known else None
-        rows.append(
-            (each.name, each.status, std, unit_of(each.name), each.share, each.statement or None)
-        )
+        rows.append((each.name, each.status, std, unit_of(each.name), each.share, why))
     return columns_of("dh_identified", rows)
 
 

@@ -14,7 +14,7 @@ from kinacc.campaign.plan import Limits, Plan, Points, candidates_of, fixed_visi
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.planning import travel
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import compose, invert
 from kinacc.kinematics.inverse.limits import travel_unit
 from kinacc.kinematics.model import JointState
@@ -47,8 +47,7 @@ def points_of(
     if doubled := sorted(each for each, count in Counter(label).items() if count > 1):
         what = f"names given to different joints: {', '.join(doubled[:5])}"
         problems.append(Problem("candidates", what, "one name per point"))
-    if problems:
-        raise InputError(problems, "These candidates cannot be measured against the model")
+    refuse(problems, "These candidates cannot be measured against the model")
     at = JointState(arm.robot.dh_joints(joints), directions)
     where = arm.pose(at, "base", point).position_mm
     slope = arm.joint_jacobian(at, "base", point)[:, :3] @ arm.robot.joint_map

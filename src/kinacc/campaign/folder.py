@@ -12,7 +12,7 @@ from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import LEAVE_OUT, READINGS, STRIKE, State
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,7 @@ def in_the_way(folder: Path | str) -> list[Problem]:
 
 def start(folder: Path | str, begun: Plan) -> None:
     """Put a new campaign on disk. Raises InputError where the folder holds one already."""
-    if there := in_the_way(folder):
-        raise InputError(there, "The campaign was not begun")
+    refuse(in_the_way(folder), "The campaign was not begun")
     journal.create(Path(folder) / journal.PLAN, plan.to_json(begun))
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from kinacc.assess.adaptive import Campaign, Ledger
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.simulate import carry_on, noisy
-from kinacc.assess.statement import CANDIDATES, Statement
+from kinacc.assess.statement import CANDIDATES, Reason, Statement
 from kinacc.campaign import words
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import unplanned_mm2
@@ -139,17 +139,14 @@ def forecast(
     return found
 
 
-def why_none(state: State) -> str:
-    """Why no forecast can be made; empty where one can."""
+def why_none(state: State) -> Reason | None:
+    """Why no forecast can be made; None where one can."""
     if not state.plan.assessor.exchangeable:
-        return (
-            "simulated errors know nothing of each other, and this assessor rests on how errors of "
-            "different poses belong together: see kinacc plan-campaign"
-        )
+        return Reason("not_exchangeable")
     read = len({each.reading.point for each in (*state.told, *state.in_hand)})
     if read < FEWEST_POINTS:
-        return f"{read} points were read, {FEWEST_POINTS} are needed"
-    return ""
+        return Reason("few_read", {"read": read, "needed": FEWEST_POINTS})
+    return None
 
 
 def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, progress):

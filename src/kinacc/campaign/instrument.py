@@ -9,7 +9,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import covariance_faults
 from kinacc.config.names import not_in_a_line
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 from kinacc.measurements.written_numbers import numbers_of
 
 BASE, INSTRUMENT = "base", "instrument"
@@ -58,8 +58,7 @@ def instruments(texts: Iterable[str], frame: str) -> tuple[Instrument, ...]:
         covariance = covariance_of(numbers, f"noise of {name}", problems)
         if covariance is not None:
             found[name] = Instrument(name, covariance, frame)
-    if problems:
-        raise InputError(problems, "These instruments cannot be used")
+    refuse(problems, "These instruments cannot be used")
     return tuple(found.values())
 
 

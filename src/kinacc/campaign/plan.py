@@ -14,7 +14,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import Instrument
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 
 FORMAT = 1
@@ -150,8 +150,7 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
         for each, value in settings.items()
         if each in known and _is_number(known[each].default) and not _is_number(value)
     ]
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     return ADAPTIVE[name](**settings)
 
 

@@ -61,8 +61,8 @@ def _said(said, count: int, visited: int) -> dict[str, object]:
         "lower_mm": said.lower_mm,
         "upper_mm": said.upper_mm,
         "confidence": said.confidence,
-        "assumption": said.assumption or None,
-        "withheld": said.withheld or None,
+        "assumption": words.reason(said.assumption),
+        "withheld": words.reason(said.withheld),
     }
 
 
@@ -169,7 +169,7 @@ def _conformity(state: State) -> list[str]:
     lines = [f"Largest error allowed: {tolerance:g} mm.", ""]
     for said in state.statements():
         found = decide(said, tolerance)
-        line = f"- {words.TARGETS[said.target]}: **{found.verdict}**; {found.reason}"
+        line = f"- {words.TARGETS[said.target]}: **{found.verdict}**; {words.reason(found.reason)}"
         if math.isfinite(found.guard_band_mm):
             line += (
                 f" (guard band {found.guard_band_mm:.3f} mm, acceptance limit "
@@ -311,4 +311,6 @@ def _grounds(state: State) -> list[str]:
     ]
     if all(each.frame == "base" for each in state.plan.instruments):
         lines.pop()
-    return lines + sorted({each.assumption for each in state.statements() if each.assumption})
+    return lines + sorted(
+        {words.reason(each.assumption) for each in state.statements() if each.assumption}
+    )

@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.simulate import carry_on, is_broken, noisy, truth_mm
 from kinacc.assess.statement import Statement
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,7 @@ def outcomes(
         for pool in pools
         if len(pool.error_mm) < points
     ]
-    if small:
-        raise InputError(small, "There are fewer errors than candidates")
+    refuse(small, "There are fewer errors than candidates")
     root = np.linalg.cholesky(covariance_mm2)
     work = [(number, each) for number in range(len(pools)) for each in range(repetitions)]
     found: list[Outcome] = []

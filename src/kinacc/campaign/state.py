@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kinacc.assess.adaptive import Campaign
-from kinacc.assess.statement import MEASURED, Statement
+from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading, error_mm, unplanned_mm2
 
@@ -93,11 +93,11 @@ def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
     left = campaign.first - len(campaign.ledger.visited)
     if left <= 0 or not plan.by_travel:
         return said
-    words = f"{left} points of the first visit, made in order of travel, are left"
+    reason = Reason("first_visit_by_travel", {"left": left})
     return tuple(
         each
         if each.target == MEASURED or each.withheld
-        else Statement(each.target, share=each.share, withheld=words)
+        else Statement(each.target, share=each.share, withheld=reason)
         for each in said
     )
 

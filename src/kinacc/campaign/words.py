@@ -1,4 +1,4 @@
-"""Statements and standing of a campaign, in words."""
+"""Statements of assessors and the standing of a campaign, in words."""
 
 from __future__ import annotations
 
@@ -6,11 +6,57 @@ import math
 
 import numpy as np
 
-from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Reason, Statement
 from kinacc.campaign import consistency
 from kinacc.campaign.state import State
 
 TARGETS = {MEASURED: "measured points", CANDIDATES: "all candidates", REGION: "share of the region"}
+
+REASONS = {
+    # assumptions
+    "drawn_at_random": "the points were drawn at random from the region",
+    "crowd": "at least {crowd} of the {points} candidates have an error above the largest divided "
+    "by {isolation:g}",
+    "smooth": "smooth errors of single joints cause the errors, but for local ones",
+    "smooth_and_crowd": "smooth errors of single joints cause the errors, but for local ones; at "
+    "least {crowd} candidates have an error above the largest divided by {isolation:g}",
+    # of statements withheld
+    "nothing_measured": "nothing measured yet",
+    "first_visit": "{left} points of the first visit are left",
+    "first_visit_by_travel": "{left} points of the first visit, made in order of travel, are left",
+    "suspects": "the suspects are not all measured again yet",
+    "unmeasured": "{left} of {points} candidates are not measured",
+    "missed": "{seen} of {points} candidates measured: {crowd} could have been missed",
+    "all_missed": "{seen} of {points} candidates measured: fewer than {crowd} large errors could "
+    "all have been missed",
+    "stands_alone": "one measured error is more than {isolation:g} times all others",
+    "few_points": "{read} points read; {share:.0%} of the region needs {needed}",
+    "few_sizes": "{read} points read; a distribution needs at least {needed}, of different size",
+    "few_for_model": "{first} points in the first visit; the model needs {needed}",
+    "much_noise": "noise makes up {part:.0%} of the mean square of the readings",
+    "not_gamma": "the largest reading does not belong to a gamma distribution",
+    "unexplained_reading": "a reading is farther from what joints explain than local errors are",
+    "unexplained_half": "smooth errors of single joints explain less than half of the errors",
+    # of budgets that are small
+    "no_bound_ahead": "no bound will be stated: that takes {needed} points in the first visit",
+    "assumption_ahead": "with {enough} readings, the bound on all candidates would need no "
+    "assumption",
+    # of forecasts that are not made
+    "few_read": "{read} points were read, {needed} are needed",
+    "not_exchangeable": "simulated errors know nothing of each other, and this assessor rests on "
+    "how errors of different poses belong together: see kinacc plan-campaign",
+    # of decisions on a tolerance
+    "between": "the tolerance lies between lower and upper bound: measure more",
+    "contradict": "the bounds contradict each other or the value: is the noise stated too small?",
+    "within": "the upper bound is within the tolerance",
+    "beyond": "the lower bound exceeds the tolerance",
+    "no_upper": "no upper bound is stated",
+}
+
+
+def reason(why: Reason | None) -> str | None:
+    """A reason in words; None where there is none."""
+    return None if why is None else REASONS[why.code].format(**why.numbers)
 
 
 def statement(said: Statement, state: State) -> str:
@@ -22,7 +68,7 @@ def statement(said: Statement, state: State) -> str:
             seen = f"; it is estimated at {said.value_mm:.3f} mm"
         if not math.isnan(said.lower_mm):
             seen += f", and at least {said.lower_mm:.3f} mm ({_sure(said)})"
-        return f"No upper bound for {about}: {said.withheld}{seen}."
+        return f"No upper bound for {about}: {reason(said.withheld)}{seen}."
     parts = [f"at most {said.upper_mm:.3f} mm"] if not math.isnan(said.upper_mm) else []
     if not math.isnan(said.lower_mm):
         parts.append(f"at least {said.lower_mm:.3f} mm")
@@ -32,7 +78,7 @@ def statement(said: Statement, state: State) -> str:
     each = "each " if len(parts) > 1 else ""
     text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
-    text += f", if {said.assumption}" if said.assumption else ""
+    text += f", if {reason(said.assumption)}" if said.assumption else ""
     return f"{text}{_doubt(said)}."
 
 

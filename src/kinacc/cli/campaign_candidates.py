@@ -12,7 +12,7 @@ from kinacc.cli import rows, spaces
 from kinacc.cli.choice import CONFIG
 from kinacc.deployment.planning.candidates import spread
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics.inverse import limits
 
 _MOST_DRAWS = 256  # joint values drawn per candidate before the region is called too wide
@@ -34,8 +34,7 @@ def candidates(given: Mapping, arm: Calibration) -> Found:
     if given["candidates"] is not None:
         file = rows.read(given["candidates"], arm.robot)
         found = rows.limit_problems(arm.robot, file.joints, file.label, given["candidates"])
-        if found:
-            raise InputError(found, "Candidates outside the robot's limits")
+        refuse(found, "Candidates outside the robot's limits")
         if len(file.joints) > _MOST_CANDIDATES:
             what = f"{len(file.joints)} candidates"
             raise InputError(Problem(given["candidates"], what, f"at most {_MOST_CANDIDATES}"))
@@ -45,8 +44,7 @@ def candidates(given: Mapping, arm: Calibration) -> Found:
     problems: list[Problem] = []
     box = spaces.joint_ranges(given["joints_deg"], arm.robot, problems)
     space = spaces.ranges("--inside-mm", given["inside_mm"], 3, problems)
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     inside, source = None, "drawn evenly from the joint ranges given"
     if box is None:
         box, inside, source = _region(given, arm)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TypeVar
 
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.campaign import instrument, plan
 from kinacc.errors import InputError, Problem
 
-Made = TypeVar("Made")
 _LARGEST_MM = 1e6
 
 
@@ -59,14 +57,3 @@ def not_positive(given: Mapping, name: str) -> list[Problem]:
     if value is None or 0.0 < value <= _LARGEST_MM:
         return []
     return [Problem(f"--{name.replace('_', '-')}", f"{value:g}", f"above 0, to {_LARGEST_MM:g}")]
-
-
-def gathered(
-    problems: list[Problem], make: Callable[[], Made], otherwise: Made | None = None
-) -> Made | None:
-    """What ``make`` makes; its problems join the others."""
-    try:
-        return make()
-    except InputError as error:
-        problems += error.problems
-        return otherwise

@@ -15,7 +15,7 @@ from kinacc.campaign.power import Aim, Row
 from kinacc.campaign.simulate import Pool
 from kinacc.cli import campaign_options, rows
 from kinacc.cli.sheet import Field, Sheet
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.table import numbers
 
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
@@ -40,9 +40,9 @@ class Question:
 def question(given: Mapping) -> Question:
     """The question of the command's options. Raises InputError listing what is wrong."""
     problems: list[Problem] = []
-    instruments = campaign_options.gathered(
-        problems, lambda: campaign_options.instruments({**given, "frame": "base"})
-    )
+    assessors, pools = [], []
+    with gathered(problems):
+        instruments = campaign_options.instruments({**given, "frame": "base"})
     for name in ("width_mm", "tolerance_mm", "largest_mm"):
         problems += campaign_options.not_positive(given, name)
     points = given["poses"]
@@ -51,18 +51,13 @@ def question(given: Mapping) -> Question:
         what = f"{points} poses with up to {max(budgets)} readings each"
         allowed = f"at most {_MOST_READINGS:g}, poses times the largest budget"
         problems.append(Problem("--poses, --budget", what, allowed))
-    assessors = [
-        campaign_options.gathered(
-            problems, lambda each=each: campaign_options.assessor({**given, "budget": each})
-        )
-        for each in sorted(set(budgets))
-    ]
-    pools = [
-        campaign_options.gathered(problems, lambda each=each: pool_of(each))
-        for each in given["errors"] or DEFAULT_ERRORS
-    ]
-    if problems:
-        raise InputError(list(dict.fromkeys(problems)), "Nothing was simulated")
+    for budget in sorted(set(budgets)):
+        with gathered(problems):
+            assessors.append(campaign_options.assessor({**given, "budget": budget}))
+    for name in given["errors"] or DEFAULT_ERRORS:
+        with gathered(problems):
+            pools.append(pool_of(name))
+    refuse(dict.fromkeys(problems), "Nothing was simulated")
     if given["largest_mm"] is not None:
         pools = [_scaled(pool, given["largest_mm"]) for pool in pools]
     aim = Aim(given["target"], given["width_mm"], given["tolerance_mm"], given["power"])
@@ -111,8 +106,7 @@ def pool_of(name: str) -> Pool:
             problems.append(Problem(where, "an error is not complete", ", ".join(names)))
         if not measured.any():
             problems.append(Problem(name, "holds no measured error", ", ".join(names)))
-        if problems:
-            raise InputError(problems)
+        refuse(problems)
         return Pool(path.stem, errors[measured])
     allowed = f"a results folder, a file, {', '.join(fields.FAMILIES)}"
     raise InputError(Problem("--errors", f"{name!r} is not there", allowed))

@@ -16,7 +16,7 @@ from kinacc.campaign import folder, marks, words
 from kinacc.campaign.plan import Limits
 from kinacc.cli import campaigns_answers as answers
 from kinacc.cli import choice
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, gathered, refuse
 
 
 def start(given: Mapping) -> None:
@@ -25,14 +25,13 @@ def start(given: Mapping) -> None:
     from kinacc.cli import campaign_candidates, campaign_options, rows
 
     problems = folder.in_the_way(given["folder"])
-    instruments = campaign_options.gathered(
-        problems, lambda: campaign_options.instruments(given), ()
-    )
-    assessor = campaign_options.gathered(problems, lambda: campaign_options.assessor(given))
+    with gathered(problems):
+        instruments = campaign_options.instruments(given)
+    with gathered(problems):
+        assessor = campaign_options.assessor(given)
     for name in ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm"):
         problems += campaign_options.not_positive(given, name)
-    if problems:
-        raise InputError(problems, "The campaign was not begun")
+    refuse(problems, "The campaign was not begun")
     arm = choice.calibration_of(
         given["calibration"], given["model"], given["robot"], given["config"], given["session"]
     )
@@ -100,24 +99,23 @@ def status(given: Mapping) -> None:
     from kinacc.progress import reporting
 
     names = ("width_mm", "tolerance_mm")
-    if problems := [each for name in names for each in not_positive(given, name)]:
-        raise InputError(problems)
+    refuse([each for name in names for each in not_positive(given, name)])
     opened = folder.open_(given["folder"])
     found = opened.state()
     aims = opened.plan.limits
     wanted = given["width_mm"] or aims.width_mm
     tolerance = given["tolerance_mm"] or aims.tolerance_mm
     target = given["target"] or aims.target
-    ahead, why_none = None, ""
+    ahead, why_none = None, None
     if given["simulations"] and found.asked is not None:
-        why_none = forecast.why_none(found)
+        why_none = words.reason(forecast.why_none(found))
         with reporting("forecast", bar=True) as progress:
             ahead = forecast.forecast(
                 found, given["simulations"], wanted, tolerance, target, progress
             )
     if given["as_json"]:
         facts = answers.as_facts(found, tolerance)
-        facts |= {"forecast": answers.forecast_facts(ahead), "no_forecast": why_none or None}
+        facts |= {"forecast": answers.forecast_facts(ahead), "no_forecast": why_none}
         click.echo(json.dumps(facts, indent=1))
         return
     say_doubts(opened)
@@ -128,7 +126,7 @@ def status(given: Mapping) -> None:
             verdict = decide(said, tolerance)
             lines.append(
                 f"tolerance {tolerance:g} mm, {words.TARGETS[said.target]}: {verdict.verdict}, "
-                f"{verdict.reason}"
+                f"{words.reason(verdict.reason)}"
             )
     if ahead is not None:
         lines += forecast.in_words(ahead)

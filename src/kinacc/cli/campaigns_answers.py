@@ -39,6 +39,7 @@ def begun_facts(folder: str, begun: Plan, unsure: Unsure | None) -> dict[str, ob
 
 def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
     """What was begun, of candidates of which ``merged`` repeated the joints of others."""
+    too_few = words.reason(begun.assessor.shortfall(*begun.points.joints.shape))
     named = ", ".join(f"{each.name} ({instrument.noise(each)})" for each in begun.instruments)
     lines = [
         f"campaign begun in {folder}",
@@ -49,17 +50,11 @@ def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
         f"instruments: {named}",
         f"{begun.assessor.name}: {begun.assessor.measurements} readings, the first at "
         f"{len(begun.route)} points whatever they say",
-        *_too_few(begun),
+        *([too_few] if too_few else []),
         f"a reading is refused {_refusals(begun)}",
         f"next: kinacc campaign next {shlex.quote(folder)}",
     ]
     return "\n".join(lines)
-
-
-def _too_few(begun: Plan) -> list[str]:
-    """What the assessor says of a budget this small, if anything."""
-    said = begun.assessor.shortfall(*begun.points.joints.shape)
-    return [said] if said else []
 
 
 def _refusals(begun: Plan) -> str:
@@ -176,8 +171,8 @@ def _statement_facts(said: Statement, found: State, tolerance: float | None) -> 
         "upper_mm": plain(said.upper_mm),
         "confidence": plain(said.confidence),
         "share": said.share,
-        "assumption": said.assumption or None,
-        "withheld": said.withheld or None,
+        "assumption": words.reason(said.assumption),
+        "withheld": words.reason(said.withheld),
         "in_words": words.statement(said, found),
     }
     if tolerance is not None:
@@ -191,7 +186,7 @@ def _decision_facts(said: Statement, tolerance: float) -> dict[str, object]:
     known = math.isfinite(found.guard_band_mm)
     return {
         "verdict": found.verdict,
-        "reason": found.reason,
+        "reason": words.reason(found.reason),
         "guard_band_mm": found.guard_band_mm if known else None,
         "acceptance_limit_mm": found.acceptance_limit_mm if known else None,
         "risk": None if math.isnan(found.risk) else found.risk,

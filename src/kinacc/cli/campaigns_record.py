@@ -20,7 +20,7 @@ from kinacc.campaign.state import State
 from kinacc.cli.campaigns import say_doubts
 from kinacc.cli.campaigns_answers import as_facts
 from kinacc.cli.rows import ANGLE, LENGTH, Reader, open_table
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.written_numbers import numbers_of
 
@@ -74,8 +74,7 @@ def leave_out(path: str, name: str, reason: str, as_json: bool) -> None:
             problems.append(Problem("--reason", "is empty", "why it cannot be measured"))
         if len(opened.plan.points) - len(before.left_out) <= 2:
             problems.append(Problem(f"point {name}", "only 2 candidates are left"))
-        if problems:
-            raise InputError(problems, "Nothing was left out")
+        refuse(problems, "Nothing was left out")
         opened.write(folder.leave_out_entry(point, reason.strip()))
         after = folder.open_(path).state()
     _say_standing(after, as_json)
@@ -94,8 +93,7 @@ def strike(path: str, number: int, reason: str, as_json: bool) -> None:
             problems.append(Problem(f"reading {number}", "is not there", allowed))
         if not reason.strip():
             problems.append(Problem("--reason", "is empty", "what went wrong"))
-        if problems:
-            raise InputError(problems, "Nothing was struck")
+        refuse(problems, "Nothing was struck")
         opened.write(folder.strike_entry(number, reason.strip()))
         after = folder.open_(path).state()
     _say_standing(after, as_json)
@@ -129,8 +127,7 @@ def _single(given: Mapping, before: State) -> Reading:
             problems.append(Problem("--point", f"{given['point']!r} is no candidate"))
     elif point is None:
         problems.append(Problem("the reading", words.standing(before)[-1], fix="give --point"))
-    if problems:
-        raise InputError(problems, "Nothing was recorded")
+    refuse(problems, "Nothing was recorded")
     found = Reading(point, position, instrument, joints, given["std_mm"])
     left_out = frozenset(before.left_out)
     problems = reading.problems_of(
@@ -138,8 +135,7 @@ def _single(given: Mapping, before: State) -> Reading:
     )
     if not given["again"]:
         problems += _repeated(found, "the reading", _recorded(before))
-    if problems:
-        raise InputError(problems, "Nothing was recorded")
+    refuse(problems, "Nothing was recorded")
     return found
 
 
@@ -269,8 +265,7 @@ def _rows(table: RawTable, instrument: str | None, before: State):
     known = {each.name for each in plan.instruments}
     if instrument is not None and instrument not in known:
         problems.append(Problem("--instrument", f"{instrument!r}", ", ".join(known)))
-    if problems:
-        raise InputError(problems, "Nothing was recorded")
+    refuse(problems, "Nothing was recorded")
     place = {name.strip(): number for number, name in enumerate(plan.points.label)}
     rows: list[Reading | Problem] = []
     for i in range(len(table)):

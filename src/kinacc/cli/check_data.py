@@ -79,7 +79,7 @@ def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = Non
 
 def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict]:
     """The data sets to check: those asked for, or all that are read from a file."""
-    from kinacc.errors import InputError, Problem
+    from kinacc.errors import Problem, refuse
     from kinacc.workflow.contradictions import load
 
     full = load(files)
@@ -97,8 +97,7 @@ def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict
     if not measured and not wanted:
         what = "no data set is read from a file: there is nothing to check"
         problems.append(Problem(", ".join(files), what, "measurements.source: file"))
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     return {name: full[name] for name in wanted or measured}
 
 

@@ -46,7 +46,7 @@ def export(
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --to exported
     """
     from kinacc.deployment.export.files import contents, note, write
-    from kinacc.errors import InputError, Problem
+    from kinacc.errors import Problem, refuse
 
     wanted = formats or FORMATS
     about_urdf = {"--base-link": base_link, "--tip-link": tip_link}
@@ -57,8 +57,7 @@ def export(
     ]
     if urdf is not None and "urdf" not in wanted:
         problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
-    if problems:
-        raise InputError(problems, "Nothing was written")
+    refuse(problems, "Nothing was written")
     made = contents(
         folder,
         choice.robot_of(folder, robot, config),

@@ -43,7 +43,7 @@ def fitted(folder: str, as_json: bool) -> None:
 def read(folder: Path) -> dict[str, dict]:
     """The tables needed. Raises InputError naming all that are missing."""
     from kinacc.artifacts import store
-    from kinacc.errors import InputError, Problem
+    from kinacc.errors import Problem, refuse
 
     paths = {name: folder / f"{name}.parquet" for name in TABLES}
     missing = [
@@ -51,8 +51,7 @@ def read(folder: Path) -> dict[str, dict]:
         for path in paths.values()
         if not path.is_file()
     ]
-    if missing:
-        raise InputError(missing, f"{folder} holds no fits")
+    refuse(missing, f"{folder} holds no fits")
     more = {name: folder / f"{name}.parquet" for name in IF_THERE}
     paths |= {name: path for name, path in more.items() if path.is_file()}
     return {name: store.read(path) for name, path in paths.items()}
@@ -60,7 +59,7 @@ def read(folder: Path) -> dict[str, dict]:
 
 def summary(tables: Mapping[str, Mapping]) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
-    from kinacc.calibration import identified
+    from kinacc.calibration import blind_words
     from kinacc.workflow.stages import data_check
 
     excluded = tables.get("excluded_rows")
@@ -87,7 +86,7 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
             ]
             for status in dict.fromkeys(str(each) for each in told["status"])
         },
-        "undetermined": identified.recorded(told),
+        "undetermined": blind_words.listed(told),
         "worst_rows": _worst(tables["worst_rows"], selected),
         "data": data_check.in_words(tables["data_check"]) if "data_check" in tables else [],
         "excluded": None if excluded is None else _excluded(excluded, selected),

@@ -103,7 +103,7 @@ def _robot_file(robot: str | None, joints: int, name: str, path: Path) -> tuple[
 
 def _stated(guess: Guess, options: dict) -> Guess:
     """The guess with what the options say, which is no assumption then."""
-    from kinacc.errors import InputError, Problem
+    from kinacc.errors import Problem, refuse
 
     problems = []
     for option in ("joint_unit", "length_unit", "angle_unit"):
@@ -115,8 +115,7 @@ def _stated(guess: Guess, options: dict) -> Guess:
                 "leave the option out, or correct the names where they are the ones that are wrong"
             )
             problems.append(Problem(where, what, "the same in both places", fix))
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     settings: dict = {}
     turn: dict = {}
     for option, setting in (("joint_unit", "joint_unit"), ("length_unit", "length_unit")):
@@ -150,7 +149,7 @@ def _orientation(word: str) -> dict:
 
 def _refuse(paths, name: str, force: bool) -> None:
     """Raise where the name is no name, or a file is there that must not be replaced."""
-    from kinacc.errors import InputError, Problem
+    from kinacc.errors import Problem, refuse
     from kinacc.measurements.intake.write import plain_name
 
     problems = []
@@ -162,8 +161,7 @@ def _refuse(paths, name: str, force: bool) -> None:
             for path in paths
             if path.exists()
         ]
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
 
 
 def _asked(guess: Guess) -> Guess:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.calibration.blind_words import sentences
 from kinacc.cli import rows
 from kinacc.cli.plan_poses import MOST_CANDIDATES
 from kinacc.cli.sheet import Field, Sheet
@@ -15,7 +16,7 @@ from kinacc.cli.spaces import Settings, inside_box, joint_ranges, ranges, settin
 from kinacc.cli.tables import joint_fields
 from kinacc.deployment.planning import candidates, exchange, observability, travel
 from kinacc.deployment.planning.information import Experiment, Information, information
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import travel_unit
@@ -77,8 +78,7 @@ def question(given: Mapping) -> Question:
     start = np.zeros(robot.dh.joints)
     if given["from_deg"] is not None:
         start = rows.of_arguments((given["from_deg"],), "deg", robot, "--from-deg")[0]
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     experiment = Experiment(
         tool,
         orientation=not given["position_only"],
@@ -90,8 +90,7 @@ def question(given: Mapping) -> Question:
     if given["candidates"] is not None:
         file = rows.read(given["candidates"], robot)
         found = rows.limit_problems(robot, file.joints, file.label, given["candidates"])
-        if found:
-            raise InputError(found, "Candidates outside the robot's limits")
+        refuse(found, "Candidates outside the robot's limits")
         if len(file.joints) > MOST_CANDIDATES:
             what = f"{len(file.joints)} candidates"
             raise InputError(Problem(given["candidates"], what, f"at most {MOST_CANDIDATES}"))
@@ -131,7 +130,7 @@ def as_sheet(asked: Question, found: Answer) -> Sheet:
         "candidates": len(asked.joints),
         "parameters": len(found.information.names),
         "determined_directions": found.information.rank,
-        "undetermined": list(found.information.excluded),
+        "undetermined": list(sentences(found.information.left_open)),
         "travel_metric": travel.METRICS[asked.metric],
         "travel_deg": float(np.rad2deg(found.moves.sum())),
         "travel_unordered_deg": float(np.rad2deg(found.unordered)),
@@ -154,11 +153,11 @@ def in_words(asked: Question, found: Answer) -> str:
         f"{plan.path[-1]:.4g} before {plan.swaps} swaps; no single swap makes it better",
         f"{told.rank} of {len(told.names)} parameter directions are determined; the candidates "
         "leave open:",
-        *(f"  - {words}" for words in told.excluded),
+        *(f"  - {words}" for words in sentences(told.left_open)),
         f"travel {np.rad2deg(found.moves.sum()):.0f} deg, {np.rad2deg(found.unordered):.0f} deg in "
         f"the order of the candidates ({travel.METRICS[asked.metric]})",
     ]
-    if not told.excluded:
+    if not told.left_open.groups:
         lines[1] = f"all {told.rank} parameters are determined"
     return "\n".join(lines)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.config.names import of_csv
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.layout import (
@@ -74,8 +74,7 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
     if "pose" in table.columns:
         reader.used.add("pose")
         label = np.array([str(cell) for cell in table.columns["pose"]], dtype=object)
-    if reader.problems:
-        raise InputError(reader.problems, f"{table.path} cannot be used")
+    refuse(reader.problems, f"{table.path} cannot be used")
     unused = tuple(name for name in table.columns if name not in reader.used)
     return Rows(len(table), label, q_rad, directions, wanted, unused)
 
@@ -111,8 +110,7 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
             allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
             problems.append(Problem(option, repr(text), allowed))
         rows.append(row)
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
 
 

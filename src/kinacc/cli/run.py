@@ -9,7 +9,7 @@ import click
 
 from kinacc.cli.choice import CONFIG
 from kinacc.cli.group import Lazy
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.workflow.catalogue import STAGES, Stage
 
 
@@ -104,7 +104,6 @@ def _run(
     parts = plan.part_names(stage.name, dataset)
     if part is not None and part not in parts:
         absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
-    if absent:
-        raise InputError(absent, f"{stage.name} cannot be run")
+    refuse(absent, f"{stage.name} cannot be run")
     jobs = [plan.job(stage.name, dataset, each) for each in (parts if part is None else [part])]
     return [path for job in execute_all(jobs) for path in job.outputs.values()]

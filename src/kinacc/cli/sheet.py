@@ -13,7 +13,7 @@ import numpy as np
 
 from kinacc.artifacts.atomic import write_whole
 from kinacc.config.names import in_csv
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 KINDS = (".csv", ".json", ".parquet")
 _SHOWN_ROWS = 24
@@ -119,8 +119,7 @@ def check_output(path: Path | str | None, force: bool, kinds: Sequence[str] = KI
         problems.append(Problem(str(path), "is there already", fix="give --force to replace it"))
     if path.is_dir():
         problems = [Problem(str(path), "is a folder", "a file")]
-    if problems:
-        raise InputError(problems, "Nothing was written")
+    refuse(problems, "Nothing was written")
 
 
 def number(value: float) -> str:

@@ -9,7 +9,7 @@ from kinacc.cli.rows import Rows
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.deployment.predict import Prediction
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.robot import Robot
 
@@ -32,8 +32,7 @@ def given_joints(
         label = np.arange(1, len(joints) + 1)
         given = Rows(len(joints), label, joints, None, None, ())
     problems = rows.limit_problems(robot, given.joints, given.label, path or "joints")
-    if problems:
-        raise InputError(problems, "Joints outside the robot's limits")
+    refuse(problems, "Joints outside the robot's limits")
     return given
 
 

@@ -13,7 +13,7 @@ from kinacc.cli.tables import facts, joint_fields, joints_in_words, pose_fields
 from kinacc.deployment.compensate import Compensation, programmed
 from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, Status
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.measurements.written_numbers import numbers_of
 
@@ -57,8 +57,7 @@ def poses(
     if given.joints is not None:
         place = program or path or "--near-deg"
         problems = rows.limit_problems(arm.robot, given.joints, given.label, place)
-        if problems:
-            raise InputError(problems, "Joints outside the robot's limits")
+        refuse(problems, "Joints outside the robot's limits")
     return given
 
 
@@ -142,7 +141,6 @@ def _of_arguments(texts: tuple[str, ...]) -> Pose:
             problems.append(Problem("--pose", repr(text), _NUMBERS))
             continue
         values.append([*row[:3], *(row[3:] / length)])
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     table = np.array(values)
     return Pose(rotation_from_quaternion(table[:, 3:]), table[:, :3])

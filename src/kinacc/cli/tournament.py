@@ -40,7 +40,7 @@ def tournament(
       kinacc tournament --config config.yaml --config examples/ur10.yaml --cores 2
       kinacc tournament --size full --parts 200 --part 7-of-200
     """
-    from kinacc.errors import InputError, Problem
+    from kinacc.errors import InputError, Problem, refuse
     from kinacc.workflow.catalogue import TOURNAMENT
     from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.plan import planned
@@ -49,8 +49,7 @@ def tournament(
     plan = planned(config or ("config.yaml",), results=results)
     plan = plan.contest(size, parts, assessor, noise_mm)
     absent = plan.absent("tournament_chunk", TOURNAMENT)
-    if absent:
-        raise InputError(absent, "the tournament lacks tables of the data sets")
+    refuse(absent, "the tournament lacks tables of the data sets")
     names = plan.part_names("tournament_chunk", TOURNAMENT)
     if part is not None and part not in names:
         raise InputError(Problem("--part", repr(part), f"{names[0]} to {names[-1]}"))

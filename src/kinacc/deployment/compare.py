@@ -16,7 +16,7 @@ from scipy.special import chdtrc
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
@@ -130,8 +130,7 @@ def require_alike(first: Calibration, second: Calibration) -> None:
         problems.append(Problem(second.name, "other joints slide", "the same kind of arm"))
     elif not np.array_equal(first.robot.joint_map, second.robot.joint_map):
         problems.append(Problem(second.name, "another joint_map", "the same reported joints"))
-    if problems:
-        raise InputError(problems, f"{first.name} and {second.name} are not the same kind of robot")
+    refuse(problems, f"{first.name} and {second.name} are not the same kind of robot")
 
 
 def _robots_apart(

@@ -10,7 +10,7 @@ import numpy as np
 from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.record import MODELS, Anchor, Calibration, Residual
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
@@ -37,8 +37,7 @@ def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
         for name in _NEEDED
         if not (folder / f"{name}.parquet").is_file()
     ]
-    if missing:
-        raise InputError(missing, f"{folder} holds no calibration")
+    refuse(missing, f"{folder} holds no calibration")
     names = dict.fromkeys((*_NEEDED, *_WANTED))
     present = [name for name in names if (folder / f"{name}.parquet").is_file()]
     return {name: store.read(folder / f"{name}.parquet") for name in present}
@@ -201,8 +200,7 @@ def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
         for what, there in differs.items()
         if np.any(there)
     ]
-    if problems:
-        raise InputError(problems, f"The results were made with another robot than {given.name}")
+    refuse(problems, f"The results were made with another robot than {given.name}")
 
 
 def _close(one: Pose, other: Pose) -> np.ndarray:
@@ -222,5 +220,4 @@ def _require_same_arm(nominal, robot: Robot, name: str) -> None:
             what = f"joint {joint + 1} was fitted from {each} {made[joint]:.9g}"
             allowed = f"{given[joint]:.9g}, as {robot.name} has it"
             problems.append(Problem(place, what, allowed))
-    if problems:
-        raise InputError(problems, f"The results were made with another robot than {robot.name}")
+    refuse(problems, f"The results were made with another robot than {robot.name}")

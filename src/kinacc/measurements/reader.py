@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.artifacts.columns import Columns, texts
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
 from kinacc.measurements.layout import STD, TOOL, Found, Layout, Place, Target, find
@@ -71,11 +71,9 @@ def read_excluded(section: Mapping, robot: Robot) -> tuple[Reading | None, list[
     table = _loaded(section)
     layout, readable, problems = Layout.of(section), [], []
     for row in np.flatnonzero(np.isin(table.line, list(excluded_lines(section)))):
-        try:
+        with gathered(problems):
             convert(table.select(np.array([row])), layout, robot, strict=False)
             readable.append(row)
-        except InputError as error:
-            problems += error.problems
     if not readable:
         return None, problems
     return convert(table.select(np.array(readable)), layout, robot, strict=False), problems
@@ -105,8 +103,7 @@ def _loaded(section: Mapping) -> RawTable:
     elif len(excluded) == len(table):
         what = f"every row of {table.path} is excluded"
         problems.append(Problem("measurements.file.exclude", what, "some of them"))
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     return table
 
 
@@ -150,8 +147,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
         problems += _doubled(table, columns, order)
     if strict and not problems:
         problems += faults.scale_problems(table, columns, robot)
-    if problems:
-        raise InputError(problems, title)
+    refuse(problems, title)
     notes = [f"nothing was measured in {table.rows_in_words(np.flatnonzero(nothing))}"]
     return Reading(
         columns,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import InputError, Problem, first_few, refuse
 
 _NOTHING = ("", "nan", "na", "n/a", "null", "none", "#n/a")
 _LONGEST_NOTHING = max(map(len, _NOTHING))
@@ -176,8 +176,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
                 "check the delimiter and the decimal mark",
             )
         )
-    if problems:
-        raise InputError(problems, f"{path} cannot be read")
+    refuse(problems, f"{path} cannot be read")
     columns = {
         name: list(cells) for name, cells in zip(header, zip(*rows, strict=True), strict=True)
     }

@@ -16,7 +16,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.assess.model_invalidation import ModelInvalidation, Step
 from kinacc.assess.world import World
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 from kinacc.study.monte_carlo import StudySettings, checked_errors, world_of
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
@@ -62,8 +62,7 @@ class HistorySettings:
             for name in (field.name for field in fields(self))
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0)
         ]
-        if found:
-            raise InputError(found, "the histories cannot be made with these settings")
+        refuse(found, "the histories cannot be made with these settings")
 
     @classmethod
     def of(cls, section: Mapping[str, object]) -> HistorySettings:

@@ -23,7 +23,7 @@ from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.outlier_rejection import OutlierRejection
 from kinacc.assess.world import World, draw
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 
 # The paper's three by class: a registry would make the study depend on whatever joins it.
 ASSESSORS: dict[str, type[Assessor]] = {
@@ -57,8 +57,7 @@ class StudySettings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise_mm", tuple(float(noise) for noise in self.noise_mm))
-        if found := list(self._problems()):
-            raise InputError(found, "the study cannot run with these settings")
+        refuse(self._problems(), "the study cannot run with these settings")
 
     @classmethod
     def of(cls, section: Mapping[str, object]) -> StudySettings:

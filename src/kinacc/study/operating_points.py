@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import compose
 from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
@@ -131,8 +131,7 @@ def _assessable_box(
         )
         for joint in np.flatnonzero(lower > upper)
     ]
-    if problems:
-        raise InputError(problems, "The joint box cannot be assessed")
+    refuse(problems, "The joint box cannot be assessed")
     return lower, upper
 
 

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, TOURNAMENT, Stage, maker_of
 from kinacc.workflow.runner import Job
 
@@ -48,8 +48,7 @@ def planned(
         for name, config in full.items()
         if config["tournament"] != tournament
     ]
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     return Plan(
         {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
         {name: config["study"]["chunks"] for name, config in full.items()},
@@ -101,8 +100,7 @@ class Plan:
                 for name in assessors
                 if name not in CONTESTANTS
             ]
-            if problems:
-                raise InputError(problems)
+            refuse(problems)
             assessors = [name for name in CONTESTANTS if name in assessors]
         given = {"size": size, "chunks": parts, "assessors": assessors, "noise_mm": noise_mm}
         own = {name: value for name, value in given.items() if value}
@@ -205,16 +203,13 @@ class Plan:
             from kinacc.workflow import calibration_settings
             from kinacc.workflow.stages import measurements
 
-            try:
+            with gathered(problems):
                 with warnings.catch_warnings(action="ignore"):  # the stage says them itself
                     made = measurements.run({}, settings)
                 calibration_settings.require_enough_rows(
                     made, robot.load(config["robot"]), config["calibration"]
                 )
-            except InputError as error:
-                problems += error.problems
-        if problems:
-            raise InputError(problems)
+        refuse(problems)
 
     def remarks(self) -> list[str]:
         """What whoever started a run should know of its data at the end, a line each."""

@@ -9,11 +9,11 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.atomic import replacing
-from kinacc.calibration import identified
+from kinacc.calibration import blind_words
 from kinacc.config import names
 from kinacc.deployment import folder as results
 from kinacc.deployment.export import description, tables, urdf
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
 
@@ -45,13 +45,12 @@ def contents(
         problems = names.not_in_a_line("the results folder", dataset)
     else:
         problems = names.not_of_a_file("--name", name)
-    if problems:
-        raise InputError(problems, "Nothing was written")
+    refuse(problems, "Nothing was written")
     found = results.read_tables(folder)
     arm = results.calibration(found, robot, "dh", dataset)
     std = _deviations(found["dh_model"])
     told = found.get("dh_identified")
-    unseen = None if told is None else identified.recorded(told)
+    unseen = None if told is None else blind_words.listed(told)
     made = {}
     for each in dict.fromkeys(formats):
         if each == "yaml":
@@ -92,8 +91,7 @@ def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> l
         for path in paths
         if path.exists() and not force
     ]
-    if there:
-        raise InputError(there, "Nothing was written")
+    refuse(there, "Nothing was written")
     with replacing(paths) as temporary:
         for part, text in zip(temporary, made.values(), strict=True):
             part.write_text(text, encoding="utf-8")

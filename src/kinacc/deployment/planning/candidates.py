@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.region import points
@@ -33,8 +33,7 @@ def spread(
         Problem(f"joint {joint + 1}", "its range lies outside the limits")
         for joint in np.flatnonzero(low >= high)
     ]
-    if problems:
-        raise InputError(problems, "There are no poses to choose from")
+    refuse(problems, "There are no poses to choose from")
     found: list[np.ndarray] = []
     first, block = 1, max(count, 1024)
     while sum(map(len, found)) < count:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.deployment.planning import observability
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 
 _REGULAR = 1e-9  # of the largest eigenvalue: makes the first few poses comparable
 _BETTER = 1e-9  # relative gain below which a swap is rounding
@@ -127,5 +127,4 @@ def _require(rows: np.ndarray, count: int, index: str) -> None:
     if count < least:
         what = f"{count} poses of {rows.shape[1]} components cannot tell {rows.shape[2]} directions"
         problems.append(Problem("poses", what, f"at least {least}"))
-    if problems:
-        raise InputError(problems, "Poses cannot be chosen")
+    refuse(problems, "Poses cannot be chosen")

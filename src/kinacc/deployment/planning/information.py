@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration import blind_groups, blind_words, frames
+from kinacc.calibration import frames
+from kinacc.calibration.blind_groups import LeftOpen, groups, of_arm
 from kinacc.calibration.dh_fit import joints_anywhere
 from kinacc.calibration.frames import BASE, MOTIONS
 from kinacc.calibration.identified import STRUCTURAL
@@ -46,16 +47,16 @@ class Experiment:
 class Information:
     """Rows (n, m, r) that n candidate poses add to the normal equations of r directions.
 
-    The r directions are those at least one candidate shows; ``excluded`` says in sentences what
-    that leaves open. ``values`` are the singular values of all candidates together, falling, of
-    ``names`` parameters (P,), and ``rank`` how many of them count.
+    The r directions are those at least one candidate shows; the others are ``left_open``.
+    ``values`` are the singular values of all candidates together, falling, of ``names`` parameters
+    (P,), and ``rank`` how many of them count.
     """
 
     rows: np.ndarray
     names: tuple[str, ...]
     values: np.ndarray
     rank: int
-    excluded: tuple[str, ...]
+    left_open: LeftOpen
 
 
 def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Information:
@@ -68,8 +69,8 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     _, values, right = np.linalg.svd(slopes.reshape(-1, count), full_matrices=False)
     rank = int(np.sum(values > experiment.threshold * values[0]))
     lost = right[rank:] if len(right) == count else _complement(right[:rank])
-    excluded = _said(arm, experiment, lost) if len(lost) else ()
-    return Information(slopes @ right[:rank].T, names, values, rank, excluded)
+    left_open = _left_open(arm, experiment, lost)
+    return Information(slopes @ right[:rank].T, names, values, rank, left_open)
 
 
 def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:
@@ -85,15 +86,15 @@ def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.nd
     return slopes
 
 
-def _said(arm: Calibration, experiment: Experiment, lost: np.ndarray) -> tuple[str, ...]:
-    """What the directions ``lost`` (u, P) leave open, in the sentences of a fit."""
-    names = arm.known.names
+def _left_open(arm: Calibration, experiment: Experiment, lost: np.ndarray) -> LeftOpen:
+    """What the directions ``lost`` (u, P) leave open."""
+    names, fitted = arm.known.names, frames.known(arm.base, experiment.tool)
+    if not len(lost):
+        return LeftOpen((), names, fitted)
     anywhere = _slopes(arm, joints_anywhere(arm.robot.dh), experiment).reshape(-1, len(names))
     _, values, right = np.linalg.svd(anywhere)
     hidden = right[int(np.sum(values > STRUCTURAL * values[0])) :]
-    groups = blind_groups.groups(hidden, lost, blind_words.of_arm(names))
-    fitted = frames.known(arm.base, experiment.tool)
-    return tuple(text for text, _ in blind_words.statements(groups, names, fitted))
+    return LeftOpen(groups(hidden, lost, of_arm(names)), names, fitted)
 
 
 def parameter_names(robot: Robot, experiment: Experiment) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinacc.config.names import not_in_a_line
 from kinacc.config.reading import Document, parsed, read
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import (
     IDENTITY,
     Pose,
@@ -93,8 +93,7 @@ def of_text(text: str, name: str) -> Robot:
 
 def _described(document: Document, problems: list[Problem], path: Path) -> Robot:
     title = f"The robot description {document.name} cannot be used"
-    if problems:
-        raise InputError(problems, title)
+    refuse(problems, title)
     reader = Reader(document)
     robot = _from_urdf(reader, path) if "urdf" in document.data else _from_table(reader)
     if reader.problems or robot is None:

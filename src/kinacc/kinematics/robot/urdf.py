@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics.robot.axes import Axes, chain_of
 from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
@@ -52,8 +52,7 @@ def load(path: str | Path, base_link: str | None = None, tip_link: str | None = 
     place = str(path)
     moving = [joint for joint in chain if joint.kind in MOVING]
     problems = list(_faults(moving, base_link, tip_link, place))
-    if problems:
-        raise InputError(problems, f"{place} cannot be used as a robot")
+    refuse(problems, f"{place} cannot be used as a robot")
     axes, flange = _axes(chain)
     prismatic = np.array([joint.kind == "prismatic" for joint in moving])
     base, dh, rest = chain_of(axes, flange, prismatic)
@@ -123,8 +122,7 @@ def _ends(
     if base is None and len(roots) != 1:
         what = f"has {len(roots)} links without a parent" if roots else "has no root link"
         problems.append(Problem(place, what, "one root, or base_link", ", ".join(roots or links)))
-    if problems:
-        raise InputError(problems, f"{place} cannot be used as a robot")
+    refuse(problems, f"{place} cannot be used as a robot")
     base = base or roots[0]
     if tip is not None:
         return base, tip
@@ -215,8 +213,7 @@ def _parse(path: Path) -> tuple[list[Joint], list[str], str]:
     place, title = str(path), f"{path} cannot be used as a robot"
     root = _root(path, title)
     problems = list(_faults_of_text(root, place))
-    if problems:
-        raise InputError(problems, title)
+    refuse(problems, title)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # on meshes it cannot find, which we do not need

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.intake import columns, text
 from kinacc.measurements.intake.columns import Columns
 from kinacc.measurements.layout import TOOL, Layout, find
@@ -121,8 +121,7 @@ def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Gue
         sizes.assumed["order"] = f"{listed} are w, x, y, z of the quaternion"
     units = {"joint_unit": joint_unit, "length_unit": length_unit}
     mapping = _mapping(str(path), found, joint_unit, length_unit, angle_unit, problems)
-    if problems:
-        raise InputError(problems, f"{path} cannot be described")
+    refuse(problems, f"{path} cannot be described")
     section: dict[str, Any] = {
         "path": str(path),
         "delimiter": written.delimiter,
@@ -169,8 +168,7 @@ def _refuse(path: str, table: RawTable, found: Columns, take: Sequence[str]) -> 
             fix += f"; --take {shlex.quote(takeable[0])} reads them all the same"
         what = f"{what} were found" + (f" ({told})" if told else "")
         problems.append(Problem(path, what, allowed, fix))
-    if problems:
-        raise InputError(problems, f"{path} cannot be described")
+    refuse(problems, f"{path} cannot be described")
 
 
 @dataclass

@@ -27,7 +27,7 @@ from kinacc.study.tournament.fields import Field
 
 NM_PER_MM = 1_000_000
 CONTESTANTS = tuple(ASSESSORS)
-_TEXTS = ("field", "assessor", "target", "withheld", "assumption")
+_TEXTS = ("field", "assessor", "target", "assumption")
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,6 @@ def _graded(found: Assessed, world: World, field: Field) -> list[dict]:
             "lower_mm": each.lower_mm,
             "upper_mm": each.upper_mm,
             "confidence": each.confidence,
-            "withheld": each.withheld or None,
             "assumption": _assumption(each, size),
             "measurements": found.measurements,
             "points_visited": found.points_visited,
@@ -214,8 +213,8 @@ def _truth(said: Statement, size: np.ndarray, visited: list[int] | None, field: 
 
 def _assumption(said: Statement, size: np.ndarray) -> str:
     """Whether what a statement rests on is true of the field: none, holds, broken or unknown."""
-    if not said.assumption:
+    if said.assumption is None:
         return "none"
-    if not said.crowd:
+    if "crowd" not in said.assumption.numbers:
         return "unknown"
     return "broken" if is_broken(said, size) else "holds"

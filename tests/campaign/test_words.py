@@ -1,0 +1,40 @@
+"""What assessors say in codes, told to people in sentences."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import kinacc
+from kinacc.assess.statement import Reason
+from kinacc.campaign import words
+
+_GIVEN = re.compile(r"Reason\(\s*\"(\w+)\"")
+
+
+def test_every_reason_that_can_be_given_has_words_and_no_words_are_left_over():
+    sources = (path.read_text() for path in Path(kinacc.__file__).parent.rglob("*.py"))
+    assert set(words.REASONS) == {code for text in sources for code in _GIVEN.findall(text)}
+
+
+@pytest.mark.parametrize(
+    ("code", "numbers", "text"),
+    [
+        ("few_points", {"read": 3, "share": 0.9, "needed": 35},
+         "3 points read; 90% of the region needs 35"),
+        ("few_for_model", {"first": 36, "needed": 84},
+         "36 points in the first visit; the model needs 84"),
+        ("much_noise", {"part": 0.317},
+         "noise makes up 32% of the mean square of the readings"),
+        ("stands_alone", {"isolation": 1.25},
+         "one measured error is more than 1.25 times all others"),
+        ("crowd", {"crowd": 7, "points": 200, "isolation": 1.25},
+         "at least 7 of the 200 candidates have an error above the largest divided by 1.25"),
+        ("all_missed", {"seen": 60, "points": 200, "crowd": 12},
+         "60 of 200 candidates measured: fewer than 12 large errors could all have been missed"),
+    ],
+)  # fmt: skip
+def test_a_reason_is_told_with_its_numbers(code, numbers, text):
+    assert words.reason(Reason(code, numbers)) == text
