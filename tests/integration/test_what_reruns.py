@@ -4,7 +4,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-FIGURES = {f"fig{number}" for number in range(1, 7)}
+from kinacc.workflow.catalogue import STAGES
+
+FIGURES = {stage.name for stage in STAGES.values() if stage.is_figure}
 AFTER_POINTS = {"study_chunk", "study", "histories", "fig2", "fig4", "fig5", "fig6", "claims"}
 AFTER_DH = {"residuals", "accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS
 ALL = {"measurements", "vec", "dh", "fig1"} | AFTER_DH
