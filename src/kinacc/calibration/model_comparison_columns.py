@@ -15,8 +15,6 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
 from kinacc.measurements import folds
 
-_SAME_CONFIGURATION_RAD = np.deg2rad(0.1)
-
 
 def columns(
     measurements: Mapping,
@@ -45,7 +43,7 @@ def columns(
 
 def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Columns:
     """``model_selection`` from errors ``held_out`` of every row."""
-    same = folds.configurations(every.pose, every.q_rad, _SAME_CONFIGURATION_RAD)
+    same = folds.configurations(every.pose, every.q_rad)
     errors = {name: held_out[Comparison(MEASURED, name).name] for name in SELECTABLE}
     found = model_comparison.select(errors, same, every.fold)
     rows = [
