@@ -15,7 +15,7 @@ import sys
 import numpy as np
 
 from kinacc.study.tournament.contest import Cell, Job, campaigns
-from kinacc.study.tournament.fields import Field, of_tables
+from kinacc.study.tournament.fields import ErrorField, of_tables
 from kinacc.study.tournament.summary import summed
 from kinacc.workflow.catalogue import TOURNAMENT
 from kinacc.workflow.plan import planned
@@ -26,14 +26,14 @@ NOISE_MM = (0.05, 0.1, 0.2, 0.3)
 WHOLE, ADAPTIVE = "single_shot", ("search_and_confirm", "sequential", "two_stage")
 
 
-def measured(configs: list[str]) -> list[Field]:
+def measured(configs: list[str]) -> list[ErrorField]:
     """The error fields of all measured data sets of the configurations."""
     job = planned(configs).job("tournament_chunk", TOURNAMENT, "1-of-1")
     found = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
     return [field for field in found if field.kind == "measured"]
 
 
-def width_mm(field: Field, noise_mm: float, name: str, budget: int) -> float:
+def width_mm(field: ErrorField, noise_mm: float, name: str, budget: int) -> float:
     """Mean width between the bounds on the measured points."""
     job = Job(Cell(field, min(CANDIDATES, field.points), noise_mm), budget)
     cells = summed(campaigns(job, range(CAMPAIGNS), SEED, [name])[0])

@@ -22,7 +22,7 @@ runs and of the artefacts it read, and the seed. There is no time stamp: equal i
 give equal bytes. A table appears under its name only when it is whole.
 
 `q*` stands for `q1`, `q2`, ... for every joint of the arm, `s*` likewise. Rows are unique in the
-columns named as key. `figures/fig1` to `fig6` are pictures (.svg, .png, .pdf).
+columns named as key. `figures/fig*` are pictures (.svg, .png, .pdf).
 
 `results/tournament/` holds the tables named `tournament_*`, about all data sets together; they are
 made on request by `kinacc tournament` or `snakemake tournament`.

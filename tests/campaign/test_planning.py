@@ -16,16 +16,17 @@ from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.world import drawn_world
 from kinacc.campaign.power import Aim, Row, repetitions_to_show, rows, smallest_budget
-from kinacc.campaign.simulate import Outcome, Pool, outcomes
+from kinacc.campaign.simulate import Outcome, outcomes
 from kinacc.errors import InputError
+from kinacc.study.tournament.fields import ErrorField
 
 
-def pool(count=100, seed=0):
-    return Pool("normal", np.random.default_rng(seed).normal(size=(count, 3)) * 0.2)
+def field(count=100, seed=0):
+    return ErrorField("normal", np.random.default_rng(seed).normal(size=(count, 3)) * 0.2)
 
 
 def test_a_simulated_campaign_is_one_run_in_memory():
-    errors, sigma = pool(), 0.05
+    errors, sigma = field(), 0.05
     budgets = (SearchAndConfirm(measurements=30), SearchAndConfirm(measurements=50))
     found = outcomes([errors], 40, sigma**2 * np.eye(3), budgets, 3, 9)
     assert len(found) == 2 * 3 * 2
@@ -46,7 +47,7 @@ def test_a_simulated_campaign_is_one_run_in_memory():
 
 def test_the_single_shot_bound_holds_as_often_as_it_says():
     noise = 0.1**2 * np.eye(3)
-    found = outcomes([pool()], 30, noise, [SingleShot(measurements=30)], 200, 4)
+    found = outcomes([field()], 30, noise, [SingleShot(measurements=30)], 200, 4)
     (row,) = rows(found, Aim(MEASURED))
     assert row.holds >= 0.95 - 3.0 * math.sqrt(0.95 * 0.05 / 200)
     assert row.stated == 1.0
@@ -104,13 +105,13 @@ def test_the_budget_named_is_enough_on_all_errors_and_beyond():
 
 def test_fewer_errors_than_poses_are_refused():
     with pytest.raises(InputError, match="only 100"):
-        outcomes([pool()], 101, np.eye(3), [SingleShot()], 1, 0)
+        outcomes([field()], 101, np.eye(3), [SingleShot()], 1, 0)
 
 
 @pytest.fixture
 def errors_file(tmp_path):
     path = tmp_path / "errors.csv"
-    np.savetxt(path, pool(60).error_mm, delimiter=",", header="ex_mm,ey_mm,ez_mm", comments="")
+    np.savetxt(path, field(60).error_mm, delimiter=",", header="ex_mm,ey_mm,ez_mm", comments="")
     return path
 
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import PARAMETERS
+from kinacc.workflow.catalogue import STAGES
 
 
 def points(q_rad: np.ndarray) -> dict[str, np.ndarray]:
@@ -55,14 +56,14 @@ CYLINDER_SPACE = {
 @pytest.mark.parametrize("space", ["cylinder", "joint_box", "measured"])
 def test_stage_returns_a_clean_figure(name, space):
     settings = {**CYLINDER_SPACE, "evaluation": {**CYLINDER_SPACE["evaluation"], "space": space}}
-    figure = import_module(f"kinacc.workflow.stages.{name}").run(INPUTS[name], settings)
+    figure = import_module(STAGES[name].module).run(INPUTS[name], settings)
     assert isinstance(figure, Figure)
     assert problems(figure) == []
 
 
 @pytest.mark.parametrize("name", ["fig4", "fig5", "fig6"])
 def test_true_accuracy_is_that_of_all_points_visited_or_not(name):
-    figure = import_module(f"kinacc.workflow.stages.{name}").run(INPUTS[name], CYLINDER_SPACE)
+    figure = import_module(STAGES[name].module).run(INPUTS[name], CYLINDER_SPACE)
     assert "1.111 mm" in said(figure)
 
 
@@ -87,7 +88,7 @@ def fig2_pixels(frames, tool_mm) -> bytes:
     """What the stage draws with a table of fitted frames and a configured tool."""
     evaluation = CYLINDER_SPACE["evaluation"] | ({} if tool_mm is None else {"tool_mm": tool_mm})
     inputs = INPUTS["fig2"] | ({} if frames is None else {"frames": frames})
-    stage = import_module("kinacc.workflow.stages.fig2")
+    stage = import_module(STAGES["fig2"].module)
     figure = stage.run(inputs, CYLINDER_SPACE | {"evaluation": evaluation})
     assert problems(figure) == []
     canvas = FigureCanvasAgg(figure)

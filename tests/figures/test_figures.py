@@ -9,7 +9,7 @@ from figure_words import CYLINDER, boxes, figures, problems, said, words
 from scipy.special import gammainc
 
 from kinacc.errors import InputError
-from kinacc.figures import fig1, fig2, fig3, fig4, fig5, history, style, truth
+from kinacc.figures import fig1, fig2, fig3, fig4, history, style, truth
 from kinacc.kinematics import robot
 
 LONG_NAME = "laser tracker campaign of the second machining cell, spring, warm machine, series B "
@@ -178,7 +178,7 @@ def test_fig4_takes_the_truth_from_the_summary_where_it_is_not_given():
 
 
 def test_fig4_says_that_a_measured_truth_contains_noise():
-    figure = fig4.draw(tables.study_summary(), true_mm=1.2, noisy_truth=True)
+    figure = fig4.draw(tables.study_summary(), true_accuracy_mm=1.2, noisy_truth=True)
     assert "instrument's noise" in said(figure)
     assert "“True” accuracy*" in said(figure)
     assert problems(figure) == []
@@ -280,26 +280,29 @@ def test_history_draws_few_iterations(count):
 
 def test_history_without_the_example_says_which_there_are():
     with pytest.raises(InputError, match="found: rejected"):
-        fig5.draw(tables.history(), example="elsewhere")
+        history.draw(tables.history(), example="elsewhere")
 
 
 def draw(table, **settings):
-    return fig5.draw(table, example="rejected", **settings)
+    return history.draw(table, example="rejected", **settings)
 
 
 # The truth
 
 
 def test_true_accuracy_is_the_largest_true_error():
-    assert truth.accuracy_mm({"true_error_mm": np.array([0.2, np.nan, 0.7])}) == 0.7
-    assert truth.accuracy_mm(None) is None
-    assert truth.accuracy_mm({"true_error_mm": np.array([])}) is None
+    def known(**inputs):
+        return truth.known(inputs, {})["true_accuracy_mm"]
+
+    assert known(assessment_points={"true_error_mm": np.array([0.2, np.nan, 0.7])}) == 0.7
+    assert known() is None
+    assert known(assessment_points={"true_error_mm": np.array([])}) is None
 
 
 def test_only_measured_configurations_have_a_noisy_truth():
-    assert truth.is_noisy({"evaluation": {"space": "measured"}})
-    assert not truth.is_noisy({"evaluation": {"space": "cylinder"}})
-    assert not truth.is_noisy({})
+    assert truth.known({}, {"evaluation": {"space": "measured"}})["noisy_truth"]
+    assert not truth.known({}, {"evaluation": {"space": "cylinder"}})["noisy_truth"]
+    assert not truth.known({}, {})["noisy_truth"]
 
 
 def test_boxes_see_an_overlap():

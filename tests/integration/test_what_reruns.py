@@ -4,8 +4,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-FIGURES = {f"fig{number}" for number in range(1, 7)}
-AFTER_POINTS = {"study_chunk", "study", "histories", "fig2", "fig4", "fig5", "fig6", "claims"}
+from kinacc.workflow.catalogue import STAGES
+
+FIGURES = {stage.name for stage in STAGES.values() if stage.is_figure}
+AFTER_POINTS = {"study_chunk", "study", "histories", "claims"} | (FIGURES - {"fig1", "fig3"})
 AFTER_DH = {"residuals", "accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS
 ALL = {"measurements", "vec", "dh", "fig1"} | AFTER_DH
 WITHOUT_MAP = {"accuracy_map", "fig3"}

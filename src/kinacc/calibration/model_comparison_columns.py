@@ -14,8 +14,6 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
 from kinacc.measurements import folds
 
-_SAME_CONFIGURATION_RAD = np.deg2rad(0.1)
-
 
 def columns(
     measurements: Mapping,
@@ -46,7 +44,7 @@ def columns(
 
 def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Columns:
     """``model_selection`` from errors ``held_out`` of every row."""
-    same = folds.configurations(every.pose, every.q_rad, _SAME_CONFIGURATION_RAD)
+    same = folds.configurations(every.pose, every.q_rad)
     names = {kind: Comparison(MEASURED, kind).name for kind in ERROR_MODELS}
     errors = {kind: held_out[name] for kind, name in names.items() if name in held_out}
     found = model_comparison.select(errors, same, every.fold)

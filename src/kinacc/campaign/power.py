@@ -79,7 +79,7 @@ def rows(found: Sequence[Outcome], aim: Aim) -> list[Row]:
     groups: dict[tuple[str, int], list[Outcome]] = {}
     for each in found:
         if each.said.target == aim.target:
-            groups.setdefault((each.pool, each.budget), []).append(each)
+            groups.setdefault((each.field, each.budget), []).append(each)
     return [_row(errors, budget, group, aim) for (errors, budget), group in groups.items()]
 
 

@@ -12,26 +12,7 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.simulate import carry_on, is_broken, noisy, truth_mm
 from kinacc.assess.statement import Statement
 from kinacc.errors import Problem, refuse
-
-
-@dataclass(frozen=True)
-class Pool:
-    """Errors (n, 3) that candidates are drawn from; ``q_rad`` (n, k) and ``effects`` for those
-    assessors that use them."""
-
-    name: str
-    error_mm: np.ndarray
-    q_rad: np.ndarray | None = None
-    effects: np.ndarray | None = None
-
-    def candidates(self, rows: np.ndarray, covariance_mm2: np.ndarray) -> Candidates:
-        """Candidates of rows with equal covariances (3, 3)."""
-        known = {
-            name: getattr(self, name)[rows]
-            for name in ("q_rad", "effects")
-            if getattr(self, name) is not None
-        }
-        return Candidates(np.tile(covariance_mm2, (len(rows), 1, 1)), **known)
+from kinacc.study.tournament.fields import ErrorField
 
 
 @dataclass(frozen=True)
@@ -41,7 +22,7 @@ class Outcome:
     ``broken``: what the statement rests on is not true of these errors.
     """
 
-    pool: str
+    field: str
     budget: int
     repetition: int
     readings: int
@@ -62,7 +43,7 @@ def width_mm(said: Statement) -> float:
 
 
 def outcomes(
-    pools: Sequence[Pool],
+    fields: Sequence[ErrorField],
     points: int,
     covariance_mm2: np.ndarray,
     assessors: Sequence[AdaptiveAssessor],
@@ -70,35 +51,36 @@ def outcomes(
     seed: int,
     progress: Callable | None = None,
 ) -> list[Outcome]:
-    """Campaigns of every assessor (one per budget) over ``points`` candidates of every pool.
+    """Campaigns of every assessor (one per budget) over ``points`` candidates of every field.
 
     One repetition is one drawing of candidates and their readings, the same for every budget.
-    Raises InputError where a pool holds fewer errors than candidates are wanted.
+    Raises InputError where a field holds fewer errors than candidates are wanted.
     """
     small = [
-        Problem(f"errors {pool.name}", f"only {len(pool.error_mm)}", f"at least {points}")
-        for pool in pools
-        if len(pool.error_mm) < points
+        Problem(f"errors {field.name}", f"only {field.points}", f"at least {points}")
+        for field in fields
+        if field.points < points
     ]
     refuse(small, "There are fewer errors than candidates")
     root = np.linalg.cholesky(covariance_mm2)
-    work = [(number, each) for number in range(len(pools)) for each in range(repetitions)]
+    work = [(number, each) for number in range(len(fields)) for each in range(repetitions)]
     found: list[Outcome] = []
     for number, repetition in progress(work, "simulated worlds") if progress else work:
-        pool = pools[number]
+        field = fields[number]
         rng = np.random.default_rng([seed, number, repetition])
-        rows = rng.permutation(len(pool.error_mm))[:points]
-        candidates = pool.candidates(rows, covariance_mm2)
-        sizes = np.linalg.norm(pool.error_mm[rows], axis=1)
+        rows = rng.permutation(field.points)[:points]
+        covariances = np.tile(covariance_mm2, (points, 1, 1))
+        candidates = Candidates(covariances, **field.known(rows))
+        sizes = np.linalg.norm(field.error_mm[rows], axis=1)
         most = max(each.measurements for each in assessors)
-        reading = noisy(pool.error_mm[rows], root, most, seed, number, repetition)
+        reading = noisy(field.error_mm[rows], root, most, seed, number, repetition)
         for assessor in assessors:
             campaign = assessor.begin(candidates)
             readings = carry_on(campaign, reading)
             for said in campaign.statements():
                 found.append(
                     Outcome(
-                        pool.name,
+                        field.name,
                         assessor.measurements,
                         repetition,
                         readings,

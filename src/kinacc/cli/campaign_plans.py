@@ -12,11 +12,12 @@ from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.binomial import binomial_interval
 from kinacc.campaign import power, simulate
 from kinacc.campaign.power import Aim, Row
-from kinacc.campaign.simulate import Pool
 from kinacc.cli import campaign_options, rows
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.table import numbers
+from kinacc.study.tournament import fields
+from kinacc.study.tournament.fields import ErrorField
 
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 _SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
@@ -28,7 +29,7 @@ _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be the one that is read 
 class Question:
     """What is simulated, and what for."""
 
-    pools: tuple[Pool, ...]
+    fields: tuple[ErrorField, ...]
     points: int
     covariance_mm2: np.ndarray
     assessors: tuple[AdaptiveAssessor, ...]
@@ -40,7 +41,7 @@ class Question:
 def question(given: Mapping) -> Question:
     """The question of the command's options. Raises InputError listing what is wrong."""
     problems: list[Problem] = []
-    assessors, pools = [], []
+    assessors, chosen = [], []
     with gathered(problems):
         instruments = campaign_options.instruments({**given, "frame": "base"})
     for name in ("width_mm", "tolerance_mm", "largest_mm"):
@@ -56,13 +57,13 @@ def question(given: Mapping) -> Question:
             assessors.append(campaign_options.assessor({**given, "budget": budget}))
     for name in given["errors"] or DEFAULT_ERRORS:
         with gathered(problems):
-            pools.append(pool_of(name))
+            chosen.append(field_of(name))
     refuse(dict.fromkeys(problems), "Nothing was simulated")
     if given["largest_mm"] is not None:
-        pools = [_scaled(pool, given["largest_mm"]) for pool in pools]
+        chosen = [_scaled(each, given["largest_mm"]) for each in chosen]
     aim = Aim(given["target"], given["width_mm"], given["tolerance_mm"], given["power"])
     return Question(
-        tuple(pools),
+        tuple(chosen),
         points,
         instruments[0].covariance_mm2,
         tuple(assessors),
@@ -75,20 +76,17 @@ def question(given: Mapping) -> Question:
 def answer(asked: Question, progress: Callable | None = None) -> list[Row]:
     """Simulate."""
     found = simulate.outcomes(
-        asked.pools, asked.points, asked.covariance_mm2, asked.assessors, asked.repetitions,
+        asked.fields, asked.points, asked.covariance_mm2, asked.assessors, asked.repetitions,
         asked.seed, progress,
     )  # fmt: skip
     return power.rows(found, asked.aim)
 
 
-def pool_of(name: str) -> Pool:
+def field_of(name: str) -> ErrorField:
     """Errors by the name of a family, a results folder or a file."""
-    from kinacc.study.tournament import fields
-
     path = Path(name)
     if name in fields.FAMILIES:
-        made = fields.synthetic(name, _DRAW)
-        return Pool(name, made.error_mm, made.q_rad, made.effects)
+        return replace(fields.synthetic(name, _DRAW), name=name)
     if path.is_dir():
         return _of_folder(path)
     if path.is_file():
@@ -107,34 +105,29 @@ def pool_of(name: str) -> Pool:
         if not measured.any():
             problems.append(Problem(name, "holds no measured error", ", ".join(names)))
         refuse(problems)
-        return Pool(path.stem, errors[measured])
+        return ErrorField(path.stem, errors[measured])
     allowed = f"a results folder, a file, {', '.join(fields.FAMILIES)}"
     raise InputError(Problem("--errors", f"{name!r} is not there", allowed))
 
 
-def _of_folder(path: Path) -> Pool:
+def _of_folder(path: Path) -> ErrorField:
     from kinacc.artifacts import store
-    from kinacc.assess.error_effects import joint_errors
     from kinacc.deployment.folder import recorded_robot
-    from kinacc.study.tournament import fields
 
     name, robot = path.resolve().name, recorded_robot(path)
     needed = ("pose_errors", "measurements")
     if all((path / f"{each}.parquet").is_file() for each in needed):
         errors, seen = (store.read(path / f"{each}.parquet") for each in needed)
-        found = fields.of_measurements(name, "", errors, seen)
-    elif (path / "assessment_points.parquet").is_file():
-        found = fields.of_points(name, "", store.read(path / "assessment_points.parquet"))
-    else:
-        what = "holds neither pose_errors with measurements nor assessment_points"
-        raise InputError(Problem(str(path), what, "a results folder", "run the workflow first"))
-    effects = None if robot is None else joint_errors(robot, found.q_rad)
-    return Pool(name, found.error_mm, found.q_rad, effects)
+        return fields.of_measurements(name, robot, errors, seen)
+    if (path / "assessment_points.parquet").is_file():
+        return fields.of_points(name, robot, store.read(path / "assessment_points.parquet"))
+    what = "holds neither pose_errors with measurements nor assessment_points"
+    raise InputError(Problem(str(path), what, "a results folder", "run the workflow first"))
 
 
-def _scaled(pool: Pool, largest_mm: float) -> Pool:
-    largest = float(np.linalg.norm(pool.error_mm, axis=1).max())
-    return replace(pool, error_mm=pool.error_mm * (largest_mm / largest))
+def _scaled(field: ErrorField, largest_mm: float) -> ErrorField:
+    largest = float(np.linalg.norm(field.error_mm, axis=1).max())
+    return replace(field, error_mm=field.error_mm * (largest_mm / largest))
 
 
 def as_sheet(asked: Question, found: list[Row]) -> Sheet:

@@ -16,12 +16,42 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
-from kinacc.kinematics import dh
+from kinacc.figures.columns import floats
+from kinacc.kinematics import dh, tables
+from kinacc.kinematics import robot as robots
 
 SIDES = 16  # of the prisms that stand for links and joints
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
 LINK, JOINT = "#f2a93b", "#5b6470"
 LIGHT = np.array([0.3, -0.6, 0.74])
+
+
+def run(inputs: Mapping, settings: Mapping) -> Figure:
+    """Return the figure of the ``dh_model`` among the ``assessment_points``."""
+    robot = robots.load(settings["robot"])
+    model = dh.DHModel.from_columns(inputs["dh_model"], robot.dh.prismatic)
+    points = inputs["assessment_points"]
+    reported = np.stack([floats(points, f"q{i + 1}") for i in range(model.joints)], axis=-1)
+    evaluation = settings["evaluation"]
+    return draw(
+        model,
+        robot.dh_joints(reported),
+        tool_mm=_tool_mm(inputs.get("frames"), evaluation, robot),
+        cylinder=evaluation["cylinder"] if evaluation["space"] == "cylinder" else None,
+        dataset=settings.get("dataset"),
+    )
+
+
+def _tool_mm(
+    frames: dict[str, np.ndarray] | None, evaluation: Mapping, robot: robots.Robot
+) -> np.ndarray:
+    """Return the tool centre point in the last DH frame: the fitted one, or the configured one."""
+    own = robots.carried(robot)
+    fitted = tables.fitted_tool(frames, "dh", own)
+    if fitted is not None:
+        return fitted.position_mm
+    offset = np.asarray(evaluation.get("tool_mm", (0.0, 0.0, 0.0)), dtype=float)
+    return own.position_mm + own.rotation @ offset
 
 
 def draw(

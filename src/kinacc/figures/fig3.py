@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,6 +75,11 @@ class Layout:
         y = self.foot + (1 - row) * (self.panel_h + self.between)
         w = self.panel_w if column < self.columns else 0.09
         return x / self.width, y / self.height, w / self.width, self.panel_h / self.height
+
+
+def run(inputs: Mapping, settings: Mapping) -> Figure:
+    """Return the figure of the ``accuracy_map``."""
+    return draw(inputs["accuracy_map"], dataset=settings.get("dataset"))
 
 
 def draw(accuracy_map: Table, *, dataset: str | None = None) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from textwrap import fill
 
 import numpy as np
@@ -15,25 +16,30 @@ COLUMNS = ("assessor", "noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm", "re
 UM_PER_MM = 1000.0
 
 
+def run(inputs: Mapping, settings: Mapping) -> Figure:
+    """Return the figure of the ``study_summary``, with the truth of ``assessment_points``."""
+    return draw(inputs["study_summary"], **truth.known(inputs, settings))
+
+
 def draw(
     summary: Table,
     *,
-    true_mm: float | None = None,
+    true_accuracy_mm: float | None = None,
     noisy_truth: bool = False,
     dataset: str | None = None,
 ) -> Figure:
     """Draw ``study_summary``: means joined by lines, bars from the smallest to the largest.
 
-    ``true_mm`` is the true accuracy; without it, it is taken from ``mean_mm - bias_mm``.
+    ``true_accuracy_mm`` is the true accuracy; without it, it is taken from ``mean_mm - bias_mm``.
     ``noisy_truth`` says that the truth contains the instrument's noise.
     Raises InputError where a column is missing.
     """
     require(summary, COLUMNS, "study_summary")
     names = texts(summary, "assessor")
     noise_um = floats(summary, "noise_mm") * UM_PER_MM
-    if true_mm is None:
+    if true_accuracy_mm is None:
         implied = floats(summary, "mean_mm") - floats(summary, "bias_mm")
-        true_mm = float(np.nanmedian(implied)) if np.isfinite(implied).any() else None
+        true_accuracy_mm = float(np.nanmedian(implied)) if np.isfinite(implied).any() else None
     looks = style.assessor_style(list(names))
     levels = np.unique(noise_um[np.isfinite(noise_um)])
     step = float(np.diff(levels).min()) if levels.size > 1 else 50.0
@@ -48,10 +54,10 @@ def draw(
             last = _assessor(ax, summary, mine, noise_um[mine] + shift, colour, marker)
             if last is not None:
                 labels.append((last, fill(words, 13), colour))
-        if true_mm is not None:
-            ax.axhline(true_mm, color=style.INK, lw=1, ls=(0, (4, 2)), zorder=1)
+        if true_accuracy_mm is not None:
+            ax.axhline(true_accuracy_mm, color=style.INK, lw=1, ls=(0, (4, 2)), zorder=1)
             words = "“True” accuracy*" if noisy_truth else "True accuracy"
-            labels.append((true_mm, f"{words}\n{true_mm:.3f} mm", style.INK))
+            labels.append((true_accuracy_mm, f"{words}\n{true_accuracy_mm:.3f} mm", style.INK))
         ax.set(xlabel=r"Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
         ax.set_xticks(levels if levels.size <= 8 else levels[:: -(-levels.size // 8)])
         margin = 0.55 * step

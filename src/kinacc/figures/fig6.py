@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
-from kinacc.figures.history import draw
+from functools import partial
 
-__all__ = ["draw"]
+from kinacc.figures import history
+
+run = partial(history.run, example="not_rejected")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from textwrap import fill
 
 import numpy as np
@@ -25,6 +26,11 @@ COLUMNS = (
     "rejection_probability",
 )
 LINE_IN = 0.15  # of text beside the panels
+
+
+def run(inputs: Mapping, settings: Mapping, example: str) -> Figure:
+    """Return the figure of an example of the ``histories``, with the truth of all points."""
+    return draw(inputs["histories"], example=example, **truth.known(inputs, settings))
 
 
 def draw(

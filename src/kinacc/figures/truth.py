@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from kinacc.figures.columns import Table, floats
+from kinacc.figures.columns import floats
 
 FOOTNOTE = "* measured minus modelled: contains the instrument's noise"
 
 
-def accuracy_mm(points: Table | None) -> float | None:
-    """Return the largest true error of ``assessment_points`` (eq. 7), None without any."""
-    if points is None:
-        return None
-    errors = floats(points, "true_error_mm")
+def known(inputs: Mapping, settings: Mapping) -> dict[str, Any]:
+    """Return what a figure is told of the truth and of the data set, as arguments of ``draw``.
+
+    The true accuracy (eq. 7) is the largest true error of ``assessment_points``, None without any;
+    it is noisy where the true errors are measured ones.
+    """
+    errors = floats(inputs.get("assessment_points", {"true_error_mm": ()}), "true_error_mm")
     errors = errors[np.isfinite(errors)]
-    return float(errors.max()) if errors.size else None
-
-
-def is_noisy(settings: Mapping) -> bool:
-    """Say whether the true errors are measured ones, which contain the instrument's noise."""
-    return settings.get("evaluation", {}).get("space") == "measured"
+    return {
+        "true_accuracy_mm": float(errors.max()) if errors.size else None,
+        "noisy_truth": settings.get("evaluation", {}).get("space") == "measured",
+        "dataset": settings.get("dataset"),
+    }

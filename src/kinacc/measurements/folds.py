@@ -8,9 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 LEAST_ROWS = 3  # that place a base or a target
+SAME_CONFIGURATION_RAD = np.deg2rad(0.1)  # joints this close are one configuration visited again
 
 
-def configurations(pose: np.ndarray, q_rad: np.ndarray, tolerance_rad: float) -> np.ndarray:
+def configurations_of(columns: Mapping) -> np.ndarray:
+    """Number (n,) of every measured row's configuration, see :func:`configurations`."""
+    names = [name for name in columns if name[:1] == "q" and name[1:].isdigit()]
+    q_rad = np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
+    return configurations(np.asarray(columns["pose"]), q_rad)
+
+
+def configurations(
+    pose: np.ndarray, q_rad: np.ndarray, tolerance_rad: float = SAME_CONFIGURATION_RAD
+) -> np.ndarray:
     """Configuration number (n,) of every row, counted in order of first appearance.
 
     Rows of one ``pose`` (n,) share a configuration (its targets and repeats), and so do poses whose

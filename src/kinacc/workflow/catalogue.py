@@ -35,7 +35,8 @@ class Stage:
     ``joint`` ones are about all data sets at once and have a folder of their own: they read the
     ``inputs`` of every data set (``measured_inputs`` where it is measured) and of joint stages;
     ``fits`` is the kind of error model a stage fits;
-    ``shared`` ones take long enough to be kept for other folders (Snakemake's cache).
+    ``shared`` ones take long enough to be kept for other folders (Snakemake's cache);
+    ``is_figure`` ones draw instead of making tables, see :func:`_figure`.
     """
 
     name: str
@@ -54,10 +55,13 @@ class Stage:
     measured_inputs: tuple[str, ...] = ()
     shared: bool = False
     fits: str = ""
+    is_figure: bool = False
 
     @property
     def module(self) -> str:
         """Name of the module whose ``run`` does the work."""
+        if self.is_figure:
+            return f"kinacc.figures.{self.name}"
         return f"kinacc.workflow.stages.{'error_model' if self.fits else self.name}"
 
     def used(
@@ -82,10 +86,17 @@ class Stage:
             found |= dict.fromkeys(use.replace(f"{{{key}}}", value) for value in values)
         return tuple(found)
 
-    @property
-    def is_figure(self) -> bool:
-        """Whether the stage draws a figure instead of making tables."""
-        return self.name.startswith("fig")
+
+def _figure(
+    name: str,
+    message: str,
+    inputs: tuple[str, ...] = (),
+    settings: tuple[str, ...] = (),
+    files: tuple[str, ...] = (),
+    uses: tuple[str, ...] = (),
+) -> Stage:
+    """The stage that draws ``figures/<name>`` by the ``run`` of ``kinacc.figures.<name>``."""
+    return Stage(name, message, inputs, (name,), settings, files, uses, is_figure=True)
 
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
@@ -243,12 +254,11 @@ STAGES: dict[str, Stage] = {
                 "histories",
             ),
         ),
-        Stage("fig1", "drawing Fig. 1, the one-dimensional example", (), ("fig1",)),
-        Stage(
+        _figure("fig1", "drawing Fig. 1, the one-dimensional example"),
+        _figure(
             "fig2",
             "drawing Fig. 2, the arm over its evaluation space",
             ("dh_model", "frames", "assessment_points"),
-            ("fig2",),
             (
                 "dataset",
                 "robot",
@@ -259,32 +269,23 @@ STAGES: dict[str, Stage] = {
             files=("robot",),
             uses=(_ROBOT,),
         ),
-        Stage(
-            "fig3",
-            "drawing Fig. 3, the accuracy maps",
-            ("accuracy_map",),
-            ("fig3",),
-            ("dataset",),
-        ),
-        Stage(
+        _figure("fig3", "drawing Fig. 3, the accuracy maps", ("accuracy_map",), ("dataset",)),
+        _figure(
             "fig4",
             "drawing Fig. 4, assessed accuracy against noise",
             ("study_summary", "assessment_points"),
-            ("fig4",),
             ("dataset", "evaluation.space"),
         ),
-        Stage(
+        _figure(
             "fig5",
             "drawing Fig. 5, a model that is invalidated",
             ("histories", "assessment_points"),
-            ("fig5",),
             ("dataset", "evaluation.space"),
         ),
-        Stage(
+        _figure(
             "fig6",
             "drawing Fig. 6, a model that cannot be invalidated",
             ("histories", "assessment_points"),
-            ("fig6",),
             ("dataset", "evaluation.space"),
         ),
         Stage(

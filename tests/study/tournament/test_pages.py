@@ -10,7 +10,7 @@ from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
 from kinacc.errors import InputError
 from kinacc.figures import save, tournament
 from kinacc.study.tournament import contest, pages, summary
-from kinacc.study.tournament.fields import Field, described
+from kinacc.study.tournament.fields import ErrorField, described
 
 SIZE = contest.Size((0.1, 0.3), {200: (200,)}, 2, 2, (0,))
 NAMES = ("model_invalidation", "single_shot", RECOMMENDED, "region_share")
@@ -21,7 +21,7 @@ def tables() -> dict:
     """A small tournament over two made-up fields, one of them smaller than asked for."""
     rng = np.random.default_rng(1)
     made = [
-        Field(name, "synthetic", "mh180", np.zeros((n, 6)), 0.4 * rng.normal(size=(n, 3)), "chance")
+        ErrorField(name, 0.4 * rng.normal(size=(n, 3)), kind="synthetic", meaning="chance")
         for name, n in (("first_0", 220), ("small", 60))
     ]
     cells = summary.in_order(contest.summed(contest.jobs(made, SIZE), SIZE, 5, NAMES))

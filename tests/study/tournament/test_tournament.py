@@ -8,20 +8,30 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.registry import ASSESSORS
 from kinacc.errors import InputError
+from kinacc.kinematics import robot
 from kinacc.study.tournament import contest, summary
-from kinacc.study.tournament.fields import FAMILIES, Field, of_measurements, of_points, synthetic
+from kinacc.study.tournament.fields import (
+    FAMILIES,
+    ErrorField,
+    of_measurements,
+    of_points,
+    synthetic,
+)
 
 SMALL = contest.Size((0.1, 0.3), {20: (10, 40)}, 3, 2, (0,))
 
 
 @pytest.fixture(scope="module")
-def field() -> Field:
+def field() -> ErrorField:
     """Thirty errors in random directions."""
     rng = np.random.default_rng(1)
     q_rad = rng.uniform(-0.5, 0.5, (30, 6))
-    return Field("made_up", "synthetic", "mh180", q_rad, 0.4 * rng.normal(size=(30, 3)))
+    error_mm = 0.4 * rng.normal(size=(30, 3))
+    effects = joint_errors(robot.load("mh180"), q_rad)
+    return ErrorField("made_up", error_mm, q_rad, effects, "synthetic")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +71,7 @@ def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_f
         "ez_mm": np.zeros(5),
     }
     measurements = {"pose": np.array([9, 8, 7, 7]), "q1": np.array([0.9, 0.8, 0.7, 0.71])}
-    made = of_measurements("arm", "ur10", errors, measurements)
+    made = of_measurements("arm", None, errors, measurements)
     assert made.error_mm[:, 0].tolist() == [2.0, 5.0]
     assert made.q_rad[:, 0].tolist() == [0.7, 0.8]
 
@@ -69,18 +79,18 @@ def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_f
 def test_a_field_without_cross_validated_errors_says_what_to_do():
     columns = {name: np.array(["train"], object) for name in ("comparison", "estimate")}
     with pytest.raises(InputError, match=r"measurements\.folds"):
-        of_measurements("arm", "ur10", columns, {})
+        of_measurements("arm", None, columns, {})
 
 
 def test_points_of_the_paper_become_its_field():
     points = {f"q{i}": np.arange(3.0) for i in range(1, 7)}
     points |= {f"e{axis}_mm": np.arange(3.0) for axis in "xyz"} | {"true_error_mm": np.zeros(3)}
-    assert of_points("mh180", "mh180", points).error_mm.shape == (3, 3)
+    assert of_points("mh180", robot.load("mh180"), points).error_mm.shape == (3, 3)
 
 
 def test_errors_that_are_not_finite_are_refused():
     with pytest.raises(InputError, match="not finite"):
-        Field("bad", "measured", "ur10", np.zeros((2, 6)), np.full((2, 3), np.nan))
+        ErrorField("bad", np.full((2, 3), np.nan), np.zeros((2, 6)))
 
 
 def test_every_assessor_is_in_every_cell(rows):

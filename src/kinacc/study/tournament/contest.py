@@ -23,7 +23,7 @@ from kinacc.assess.statement import REGION, Statement
 from kinacc.assess.world import World, drawn_world
 from kinacc.errors import InputError, Problem
 from kinacc.study.tournament import summary
-from kinacc.study.tournament.fields import Field
+from kinacc.study.tournament.fields import ErrorField
 
 NM_PER_MM = 1_000_000
 CONTESTANTS = tuple(ASSESSORS)
@@ -72,16 +72,12 @@ SIZES = {
 class Cell:
     """One field at one candidate count and noise: what a world belongs to."""
 
-    field: Field
+    field: ErrorField
     candidates: int
     noise_mm: float
 
-    def known(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
-        """What an assessor may know of the candidates beside the noise: joints and effects."""
-        return {"q_rad": self.field.q_rad[chosen], "effects": self.field.effects[chosen]}
 
-
-def cells(fields: Sequence[Field], size: Size) -> Iterator[Cell]:
+def cells(fields: Sequence[ErrorField], size: Size) -> Iterator[Cell]:
     """Every cell that the fields are large enough for; a small field counts as it is."""
     for field in fields:
         for count in sorted({min(each, field.points) for each in size.budgets}):
@@ -102,7 +98,7 @@ class Job:
     budget: int
 
 
-def jobs(fields: Sequence[Field], size: Size) -> list[Job]:
+def jobs(fields: Sequence[ErrorField], size: Size) -> list[Job]:
     """Every job of a tournament, in a fixed order."""
     return [
         Job(cell, budget)
@@ -166,7 +162,7 @@ def campaigns(
         for name in assessors:
             own = {**place, "assessor": name}
             begun = time.process_time()
-            found = assessed(name, job.budget, world, **cell.known(chosen))
+            found = assessed(name, job.budget, world, **cell.field.known(chosen))
             times.append(1e3 * (time.process_time() - begun))
             rows += [{**own, **graded} for graded in _graded(found, world, cell.field)]
     kinds = {name: object if name in _TEXTS else None for name in rows[0]} if rows else {}
@@ -185,7 +181,7 @@ def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World
     return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits), chosen
 
 
-def _graded(found: Assessed, world: World, field: Field) -> list[dict]:
+def _graded(found: Assessed, world: World, field: ErrorField) -> list[dict]:
     """The statements of one campaign, each with its truth."""
     size = np.linalg.norm(world.error_mm, axis=1)
     return [
@@ -204,7 +200,9 @@ def _graded(found: Assessed, world: World, field: Field) -> list[dict]:
     ]
 
 
-def _truth(said: Statement, size: np.ndarray, visited: list[int] | None, field: Field) -> float:
+def _truth(
+    said: Statement, size: np.ndarray, visited: list[int] | None, field: ErrorField
+) -> float:
     """What a statement is graded against; of the region: what its share does not exceed."""
     if said.target != REGION:
         return truth_mm(said, size, visited)

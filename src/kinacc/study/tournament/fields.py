@@ -1,7 +1,7 @@
-"""Error fields of the tournament: true errors of many poses, synthetic and measured.
+"""Error fields: true errors of many poses, synthetic and measured.
 
-A field is a pool of configurations with the deterministic error of the model at each. Campaigns
-draw their candidates from the pool at random.
+A field holds configurations with the deterministic error of the model at each. Simulated campaigns,
+of the tournament and of a plan, draw their candidates from it at random.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.assess.error_effects import joint_errors
 from kinacc.errors import InputError, Problem
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import dh
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import Robot
 from kinacc.study.operating_points import readings_of
 from kinacc.synthetic import plan
 from kinacc.synthetic.accepted import accepted_draw
@@ -24,7 +26,7 @@ from kinacc.synthetic.draw import physical_robot
 from kinacc.synthetic.physical import PhysicalRobot, Visits, pose
 
 CALIBRATION_POSES = 400
-POOL = 1000
+POINTS = 1000
 _TRUNCATION = 1e-6  # DH directions that the calibration poses do not see are left alone
 _DEFECT_SHARE = 0.02
 _DEFECT_RAD = 6e-4  # jump of joint 2 where its teeth are worn: about 1 mm at the flange
@@ -32,25 +34,28 @@ _RARE_SHARE, _RARE_MM = 0.01, (1.2, 1.9)
 
 
 @dataclass(frozen=True)
-class Field:
-    """``q_rad`` (n, k) reported joints and true errors ``error_mm`` (n, 3), robot base frame.
+class ErrorField:
+    """True errors ``error_mm`` (n, 3) of a model, robot base frame.
 
-    ``kind`` is ``paper``, ``synthetic`` or ``measured``; ``robot`` the arm's name or file.
+    Where the joints are known: ``q_rad`` (n, k) as reported; where the robot is: ``effects``
+    (n, 3, 6 k) of errors of each joint at the tool, see :func:`joint_errors`. ``kind`` is
+    ``paper``, ``synthetic`` or ``measured``, empty for errors of a file.
     """
 
     name: str
-    kind: str
-    robot: str
-    q_rad: np.ndarray
     error_mm: np.ndarray
+    q_rad: np.ndarray | None = None
+    effects: np.ndarray | None = None
+    kind: str = ""
     meaning: str = ""
 
     def __post_init__(self) -> None:
-        shapes = self.q_rad.shape[:1] + self.error_mm.shape
-        if self.error_mm.ndim != 2 or shapes[2] != 3 or shapes[0] != shapes[1] or not shapes[0]:
-            found = f"joints {self.q_rad.shape}, errors {self.error_mm.shape}"
+        count = len(self.error_mm)
+        joints = self.q_rad is None or (self.q_rad.ndim == 2 and len(self.q_rad) == count)
+        if self.error_mm.shape != (count, 3) or not count or not joints:
+            shapes = f"errors {self.error_mm.shape}, joints {np.shape(self.q_rad)}"
             raise InputError(
-                Problem(f"field {self.name}", found, "(n, k) and (n, 3), n at least 1")
+                Problem(f"field {self.name}", shapes, "(n, 3) and (n, k), n at least 1")
             )
         if not np.all(np.isfinite(self.error_mm)):
             what = "holds errors that are not finite"
@@ -58,7 +63,7 @@ class Field:
 
     @property
     def points(self) -> int:
-        """Number of configurations in the pool."""
+        """Number of configurations."""
         return len(self.error_mm)
 
     @cached_property
@@ -66,23 +71,26 @@ class Field:
         """Sizes of the errors (n,)."""
         return np.linalg.norm(self.error_mm, axis=1)
 
-    @cached_property
-    def effects(self) -> np.ndarray:
-        """What an error of each joint does at the tool (n, 3, 6 k), see :mod:`causes`."""
-        return joint_errors(robot.load(self.robot), self.q_rad)
+    def known(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """What an assessor may know of candidates beside the noise: joints and effects."""
+        known = {"q_rad": self.q_rad, "effects": self.effects}
+        return {name: values[rows] for name, values in known.items() if values is not None}
 
     def candidates(self, count: int, entropy: tuple[int, ...]) -> np.ndarray:
         """Rows of ``count`` configurations drawn without replacement, in random order."""
         return np.random.default_rng([*entropy, 0]).permutation(self.points)[:count]
 
 
-def of_points(name: str, robot_name: str, points: Mapping) -> Field:
+def of_points(name: str, robot: Robot | None, points: Mapping) -> ErrorField:
     """The paper's field: ``assessment_points`` of a modelled space."""
     meaning = "errors of the DH model at the operating points of the study"
-    return Field(name, "paper", robot_name, _stacked(points, "q"), _vectors(points), meaning)
+    q_rad = _stacked(points, "q")
+    return ErrorField(name, _vectors(points), q_rad, _effects(robot, q_rad), "paper", meaning)
 
 
-def of_measurements(name: str, robot_name: str, errors: Mapping, measurements: Mapping) -> Field:
+def of_measurements(
+    name: str, robot: Robot | None, errors: Mapping, measurements: Mapping
+) -> ErrorField:
     """Cross-validated errors of the DH model at measured configurations, readings averaged.
 
     errors: ``pose_errors``; measurements: ``measurements``. The errors hold the noise of the
@@ -101,10 +109,11 @@ def of_measurements(name: str, robot_name: str, errors: Mapping, measurements: M
     first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
     means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
     meaning = "held-out errors of the DH model at measured configurations"
-    return Field(name, "measured", robot_name, q_rad[first], means, meaning)
+    q_rad = q_rad[first]
+    return ErrorField(name, means, q_rad, _effects(robot, q_rad), "measured", meaning)
 
 
-def synthetic(name: str, draw: int) -> Field:
+def synthetic(name: str, draw: int) -> ErrorField:
     """Physical arm of an accepted draw less the DH model calibrated to it, at other poses.
 
     ``name`` is one of :data:`FAMILIES`. The calibration sees no noise, so all that is left is
@@ -113,7 +122,8 @@ def synthetic(name: str, draw: int) -> Field:
     made = accepted_draw(draw)
     arm = physical_robot(made.seed, made.scales, made.geometry)
     change = FAMILIES[name]
-    q_rad = plan.configurations(robot.load("mh180"), CALIBRATION_POSES + POOL)
+    nominal = robots.load("mh180")
+    q_rad = plan.configurations(nominal, CALIBRATION_POSES + POINTS)
     arm = change.arm(arm)
     true_mm = pose(arm, _quiet_visits(q_rad)).position_mm
     error_mm = true_mm - dh.forward(arm.dh, q_rad).position_mm
@@ -121,14 +131,9 @@ def synthetic(name: str, draw: int) -> Field:
     error_mm = change.after(error_mm, q_rad, arm, rng)
     fitted = slice(None, CALIBRATION_POSES)
     left_mm = _beyond_dh(arm, q_rad, error_mm, fitted)
-    return Field(
-        f"{name}_{draw}",
-        "synthetic",
-        "mh180",
-        q_rad[CALIBRATION_POSES:],
-        left_mm[CALIBRATION_POSES:],
-        change.meaning,
-    )
+    q_rad, left_mm = q_rad[CALIBRATION_POSES:], left_mm[CALIBRATION_POSES:]
+    effects = joint_errors(nominal, q_rad)
+    return ErrorField(f"{name}_{draw}", left_mm, q_rad, effects, "synthetic", change.meaning)
 
 
 @dataclass(frozen=True)
@@ -211,6 +216,10 @@ def _beyond_dh(arm: PhysicalRobot, q_rad, error_mm, fitted: slice) -> np.ndarray
     return error_mm - matrix @ solved
 
 
+def _effects(robot: Robot | None, q_rad: np.ndarray) -> np.ndarray | None:
+    return None if robot is None else joint_errors(robot, q_rad)
+
+
 def _stacked(columns: Mapping, letter: str) -> np.ndarray:
     names = [name for name in columns if name[:1] == letter and name[1:].isdigit()]
     return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
@@ -220,7 +229,7 @@ def _vectors(columns: Mapping) -> np.ndarray:
     return np.stack([np.asarray(columns[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
 
 
-def described(fields: Sequence[Field]) -> Columns:
+def described(fields: Sequence[ErrorField]) -> Columns:
     """``tournament_fields``: name, origin and sizes of every field."""
     rows = [
         {
@@ -239,18 +248,19 @@ def described(fields: Sequence[Field]) -> Columns:
 
 
 def of_tables(
-    tables: Mapping[str, Mapping], robots: Mapping[str, str], draws: Sequence[int]
-) -> list[Field]:
+    tables: Mapping[str, Mapping], robot_names: Mapping[str, str], draws: Sequence[int]
+) -> list[ErrorField]:
     """Every field: of the data sets, then the synthetic families.
 
-    tables: ``<data set>/<artefact>`` to columns; robots: by data set; draws: accepted draws of
+    tables: ``<data set>/<artefact>`` to columns; robot_names: by data set; draws: accepted draws of
     which every family is made. A data set with ``pose_errors`` is measured.
     """
     found = []
-    for name, arm in robots.items():
+    for name, which in robot_names.items():
+        robot = robots.load(which)
         if f"{name}/pose_errors" in tables:
             errors, seen = (tables[f"{name}/{which}"] for which in ("pose_errors", "measurements"))
-            found.append(of_measurements(name, arm, errors, seen))
+            found.append(of_measurements(name, robot, errors, seen))
         else:
-            found.append(of_points(name, arm, tables[f"{name}/assessment_points"]))
+            found.append(of_points(name, robot, tables[f"{name}/assessment_points"]))
     return found + [synthetic(family, draw) for family in FAMILIES for draw in draws]

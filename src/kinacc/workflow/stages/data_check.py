@@ -6,24 +6,17 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.calibration.observations import from_columns
-from kinacc.calibration.vec_estimator import VECEstimator
-from kinacc.checks import check
+from kinacc.checks import check, few_poses
 from kinacc.checks.report import Report
-from kinacc.checks.suspicion import NOTE, Suspicion, suspicion
+from kinacc.checks.suspicion import NOTE, Suspicion
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot
-from kinacc.kinematics.robot import Robot
 from kinacc.measurements.layout import Layout
-from kinacc.measurements.reader import Reading, read
-from kinacc.workflow.stages.measurements import configurations
+from kinacc.measurements.reader import read
 
 Progress = Callable[[Iterable, str], Iterable]
-_PER_POSE = 6  # a rigid body has no more, however many targets it carries
 
 
 def run(inputs: Mapping, settings: Mapping, progress: Progress | None = None) -> dict[str, Columns]:
@@ -49,7 +42,7 @@ def examined(settings: Mapping, dataset: str, progress: Progress) -> Report:
     arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
     reading = read(section, arm, strict=False)
     report = check.check(reading, Layout.of(section), arm, dataset, section["path"], progress)
-    few = _few_poses(reading, arm, settings["calibration"])
+    few = few_poses.found(reading.columns, arm, settings["calibration"])
     accepted = settings["data_check"]["accept"]
     return replace(report, suspicions=(*report.suspicions, *few), accepted=dict(accepted))
 
@@ -62,36 +55,6 @@ def in_words(table: Mapping) -> list[str]:
         + (f" ({table['lines'][i]})" if table["lines"][i] else "")
         + (f"; accepted: {table['accepted'][i]}" if table["accepted"][i] else "")
         for i in order
-    ]
-
-
-def _few_poses(reading: Reading, arm: Robot, calibration: Mapping) -> list[Suspicion]:
-    """Whether the VEC model has more coefficients than the poses give independent readings."""
-    count = len(reading.columns["pose"])
-    seen = from_columns({**reading.columns, "fold": np.full(count, np.nan)}, arm)
-    fit = VECEstimator.of(calibration, arm, seen)
-    same = configurations(reading.columns)
-    # A target adds three components to a pose, an orientation three; repeats add none.
-    pairs, first = np.unique(np.stack([same, seen.target]), axis=1, return_index=True)
-    turned = np.zeros(same.max() + 1)
-    np.maximum.at(turned, pairs[0], 3.0 * seen.has_rotation[first])
-    components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
-    coefficients = fit.size
-    frames = int(fit.common.terms(seen).free.sum()) if fit.common.frames_estimated else 0
-    if components.sum() >= coefficients + frames:
-        return []
-    of_frames = f" and {frames} of base and targets" if frames else ""
-    return [
-        suspicion(
-            "few_poses",
-            f"{len(components)} different poses give {components.sum():.0f} independent numbers "
-            f"for the {coefficients} coefficients of the VEC model of order {fit.order}"
-            f"{of_frames}: its prior decides most of them, not the measurements",
-            (),
-            "measure more poses, lower calibration.vec.order, or let it be chosen (order: auto)",
-            poses=len(components),
-            coefficients=coefficients,
-        ).held_to(())
     ]
 
 

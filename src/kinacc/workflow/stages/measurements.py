@@ -14,7 +14,6 @@ from kinacc.measurements import folds
 from kinacc.measurements.reader import UNCERTAINTY
 
 TIME_BLOCK = "time_block"
-SAME_CONFIGURATION_DEG = 0.1  # joints this close are one configuration visited again
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
@@ -45,7 +44,7 @@ def split(columns: Mapping, settings: Mapping) -> Columns:
     count = len(columns["pose"])
     fold = np.full(count, np.nan)
     if section["folds"] is not None:
-        same = configurations(columns)
+        same = folds.configurations_of(columns)
         if section["fold_by"] == TIME_BLOCK:
             fold = folds.blocks(same, int(section["folds"])).astype(float)
         else:
@@ -61,15 +60,6 @@ def split(columns: Mapping, settings: Mapping) -> Columns:
     held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])
     subset = np.where(held_out, "validation", "train").astype(object)
     return {**_not_stated(count), **columns, "subset": subset, "fold": fold}
-
-
-def configurations(columns: Mapping) -> np.ndarray:
-    """Number (n,) of every row's configuration: rows of one pose, or of the same joints."""
-    names = [name for name in columns if name[:1] == "q" and name[1:].isdigit()]
-    q_rad = np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
-    return folds.configurations(
-        np.asarray(columns["pose"]), q_rad, np.deg2rad(SAME_CONFIGURATION_DEG)
-    )
 
 
 def _not_stated(count: int) -> Columns:
