@@ -79,7 +79,8 @@ class Stage:
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
 _DRAWS = "synthetic/accepted_draws.csv"
-_CONTEST = ("seed", "size", "assessors", "noise_mm", "robots")
+_READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.search")
+_CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
 _MODELS = ("vec_model", "dh_model", "frames")
 
@@ -206,7 +207,7 @@ STAGES: dict[str, Stage] = {
             "gathering the simulations and summing them up (Fig. 4)",
             ("study_chunk", "assessment_points"),
             ("study", "study_summary", "readings"),
-            ("study.outlier_rule", "study.distance", "study.covariance", "study.search"),
+            _READINGS,
         ),
         Stage(
             "histories",
