@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import paper_settings as paper
 import pytest
 
-from kinacc.assess.model_invalidation import ModelInvalidation
-from kinacc.errors import InputError
+from kinacc.assess.model_invalidation import Invalidation
+from kinacc.config.records import of_section
 from kinacc.study.histories import (
     FALLBACKS,
     KEPT,
@@ -17,11 +18,16 @@ from kinacc.study.histories import (
     examples,
     histories,
 )
-from kinacc.study.monte_carlo import StudySettings, world_of
+from kinacc.study.monte_carlo import Visits, world_of
 from kinacc.workflow.stages import histories as stage
 
 SEED = 3
-STUDY = StudySettings()
+STUDY = of_section(Visits, paper.study())
+ASSESSOR = of_section(Invalidation, paper.study())
+
+
+def settings(**changes) -> HistorySettings:
+    return of_section(HistorySettings, paper.histories(**changes))
 
 
 def field() -> np.ndarray:
@@ -42,13 +48,15 @@ def of(table: dict, example: str) -> dict:
 
 @pytest.fixture(scope="module")
 def table() -> dict:
-    return histories(ERROR, HistorySettings(), STUDY, SEED, point=np.arange(200) + 1000)
+    return histories(ERROR, settings(), STUDY, ASSESSOR, SEED, point=np.arange(200) + 1000)
 
 
 def test_bounds_stand_to_the_truth_as_the_papers_do(table):
-    for example, ratio in ((REJECTED, 0.834), (LARGER, 0.844), (KEPT, 1.023)):
-        rows = of(table, example)
-        np.testing.assert_allclose(rows["eta_mm"], ratio / 0.906 * SIZES.max(), rtol=1e-12)
+    papers = {"rejected": 0.834 / 0.906, "larger": 0.844 / 0.906, "kept": 1.023 / 0.906}
+    for example, (name, ratio) in zip((REJECTED, LARGER, KEPT), papers.items(), strict=True):
+        stated = paper.histories()[f"eta_ratio_{name}"]
+        assert stated == round(ratio, 7)
+        np.testing.assert_allclose(of(table, example)["eta_mm"], stated * SIZES.max(), rtol=1e-12)
 
 
 def test_examples_obey_their_rules(table):
@@ -66,7 +74,7 @@ def test_examples_obey_their_rules(table):
 
 
 def test_no_earlier_simulation_obeys_the_rules(table):
-    assessor = ModelInvalidation()
+    assessor = ASSESSOR
     first = {name: int(of(table, name)["simulation"][0]) for name in (REJECTED, KEPT)}
     eta = {name: float(of(table, name)["eta_mm"][0]) for name in (REJECTED, LARGER, KEPT)}
     for simulation in range(first[REJECTED]):
@@ -97,26 +105,24 @@ def test_a_history_is_consistent_with_itself(table):
 
 
 def test_where_no_simulation_obeys_the_rule_the_nearest_is_shown_and_says_so():
-    settings = HistorySettings(eta_ratio_rejected=3.0, eta_ratio_kept=0.05, simulations_searched=4)
-    table = histories(ERROR, settings, STUDY, SEED)
+    far = settings(eta_ratio_rejected=3.0, eta_ratio_kept=0.05, simulations_searched=4)
+    table = histories(ERROR, far, STUDY, ASSESSOR, SEED)
     for example in (REJECTED, KEPT):
         rows = of(table, example)
         assert not rows["rule_met"].any()
         assert rows["rule"][0] == FALLBACKS[example][1]
         assert rows["simulation"][0] == 0
     # Rejected at eta, but at the larger bound too.
-    settings = HistorySettings(
-        eta_ratio_rejected=0.05, eta_ratio_larger=0.06, simulations_searched=4
-    )
-    found = examples(ERROR, settings, STUDY, SEED)[0]
+    near = settings(eta_ratio_rejected=0.05, eta_ratio_larger=0.06, simulations_searched=4)
+    found = examples(ERROR, near, STUDY, ASSESSOR, SEED)[0]
     assert (found.simulation, found.rule, found.rule_met) == (0, FALLBACKS[REJECTED][0], False)
 
 
 @pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 20), (8, 3), (8, 30)])
 def test_any_number_of_points_and_any_budget(points, budget):
-    study = StudySettings(measurements=budget, visiting_order="shuffled")
-    settings = HistorySettings(simulations_searched=20)
-    table = histories(ERROR[:points], settings, study, SEED)
+    study = paper.study(measurements=budget, visiting_order="shuffled")
+    visits, assessor = of_section(Visits, study), of_section(Invalidation, study)
+    table = histories(ERROR[:points], settings(simulations_searched=20), visits, assessor, SEED)
     for example in (REJECTED, LARGER, KEPT):
         assert 1 <= of(table, example)["iteration"].size <= budget
 
@@ -124,18 +130,7 @@ def test_any_number_of_points_and_any_budget(points, budget):
 def test_stage_passes_configuration_and_point_numbers_on(table):
     points = {"point": np.arange(200) + 1000, "true_error_mm": SIZES}
     points |= {f"e{axis}_mm": ERROR[:, i] for i, axis in enumerate("xyz")}
-    settings = {"seed": SEED, "study": {"chunks": 2}, "histories": {"simulations_searched": 1000}}
-    made = stage.run({"assessment_points": points}, settings)["histories"]
+    configured = {"seed": SEED, "study": paper.study(), "histories": paper.histories()}
+    made = stage.run({"assessment_points": points}, configured)["histories"]
     for name, column in made.items():
         np.testing.assert_array_equal(column, table[name])
-
-
-def test_settings_are_refused_together():
-    with pytest.raises(InputError) as caught:
-        HistorySettings(noise_mm=0.0, eta_ratio_kept=float("nan"), simulations_searched=0)
-    where = {problem.where for problem in caught.value.problems}
-    assert where == {
-        "histories.noise_mm",
-        "histories.eta_ratio_kept",
-        "histories.simulations_searched",
-    }

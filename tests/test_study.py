@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
+from pathlib import Path
 
+import numpy as np
+import paper_settings as paper
+import pytest
+import yaml
+
+from kinacc.config.records import of_section
 from kinacc.errors import InputError
 from kinacc.study.monte_carlo import (
     StudySettings,
+    assessors,
     default_reading,
     part_of,
     readings,
@@ -15,12 +21,15 @@ from kinacc.study.monte_carlo import (
     summary,
     true_accuracy_mm,
 )
+from kinacc.workflow.contradictions import load
 from kinacc.workflow.stages import study as study_stage
 from kinacc.workflow.stages import study_chunk as chunk_stage
 
+ROOT = Path(__file__).parents[1]
 ERROR = np.random.default_rng(11).normal(size=(40, 3)) * 0.3
 TRUE = float(np.linalg.norm(ERROR, axis=1).max())
-SMALL = StudySettings(noise_mm=(0.1, 0.3), repetitions=4, measurements=40)
+SECTION = paper.study(noise_mm=[0.1, 0.3], repetitions=4, measurements=40)
+SMALL = of_section(StudySettings, SECTION)
 POINTS = {
     "point": np.arange(40),
     "ex_mm": ERROR[:, 0],
@@ -31,8 +40,13 @@ POINTS = {
 
 
 def configured(**study) -> dict:
-    section = {"noise_mm": [0.1, 0.3], "repetitions": 4, "measurements": 40, "chunks": 2}
-    return {"seed": 3, "study": section | study}
+    return {"seed": 3, "study": SECTION | study}
+
+
+def simulated(error, noise_mm, repetitions, seed, progress=None, **changes) -> dict:
+    section = SECTION | changes
+    visits = of_section(StudySettings, section)
+    return simulate(error, noise_mm, repetitions, visits, seed, assessors(section), progress)
 
 
 def equal(one: dict, other: dict) -> bool:
@@ -47,7 +61,7 @@ def equal(one: dict, other: dict) -> bool:
 
 @pytest.fixture(scope="module")
 def rows() -> dict:
-    return simulate(ERROR, SMALL.noise_mm, range(4), SMALL, 3)
+    return simulated(ERROR, SMALL.noise_mm, range(4), 3)
 
 
 def test_every_noise_repetition_assessor_and_reading_has_one_row(rows):
@@ -67,23 +81,22 @@ def test_parts_joined_in_any_order_give_the_same_bytes(rows):
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         inputs = {"assessment_points": POINTS, "study_chunk": joined}
         made = study_stage.run(inputs, configured())
-        assert equal(made["study"], default_reading(rows, SMALL))
-        assert equal(made["study_summary"], summary(default_reading(rows, SMALL), TRUE))
+        assert equal(made["study"], default_reading(rows, SECTION))
+        assert equal(made["study_summary"], summary(default_reading(rows, SECTION), TRUE))
         assert equal(made["readings"], readings(rows, TRUE))
 
 
 def test_a_simulation_does_not_know_its_neighbours(rows):
-    alone = simulate(ERROR, [0.3], [2], SMALL, 3)
+    alone = simulated(ERROR, [0.3], [2], 3)
     mine = (rows["noise_mm"] == 0.3) & (rows["repetition"] == 2)
     assert equal(alone, {name: column[mine] for name, column in rows.items()})
-    other = simulate(ERROR, [0.3], [2], SMALL, 4)
+    other = simulated(ERROR, [0.3], [2], 4)
     assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
 
 
 def test_all_conventional_assessors_see_the_same_first_readings():
-    settings = StudySettings(noise_mm=(0.2,), measurements=40, outlier_rule="iqr")
-    table = simulate(np.full((40, 3), 0.5), [0.2], range(20), settings, 1)
-    study = default_reading(table, settings)
+    table = simulated(np.full((40, 3), 0.5), [0.2], range(20), 1)
+    study = default_reading(table, paper.study(outlier_rule="iqr"))
     largest = study["assessed_mm"][study["assessor"] == "maximum"]
     kept = study["assessed_mm"][study["assessor"] == "outlier_rejection"]
     # Where nothing is an outlier the two agree to the last bit; else rejection is smaller.
@@ -92,8 +105,8 @@ def test_all_conventional_assessors_see_the_same_first_readings():
 
 
 def test_shapes_of_the_tables(rows):
-    assert default_reading(rows, SMALL)["noise_mm"].size == 2 * 4 * 3
-    assert summary(default_reading(rows, SMALL), TRUE)["assessor"].tolist() == [
+    assert default_reading(rows, SECTION)["noise_mm"].size == 2 * 4 * 3
+    assert summary(default_reading(rows, SECTION), TRUE)["assessor"].tolist() == [
         *["maximum"] * 2,
         *["outlier_rejection"] * 2,
         *["model_invalidation"] * 2,
@@ -110,14 +123,14 @@ def test_the_default_reading_follows_the_configuration(rows, switch):
     values = sorted({value for value in rows[switch] if value is not None})
     means = set()
     for value in values:
-        study = default_reading(rows, StudySettings.of({switch: value}))
+        study = default_reading(rows, paper.study(**{switch: value}))
         assert study["noise_mm"].size == 2 * 4 * 3
         means.add(float(study["assessed_mm"].mean()))
     assert len(means) == len(values)
 
 
 def test_summary_against_the_truth(rows):
-    study = default_reading(rows, SMALL)
+    study = default_reading(rows, SECTION)
     table = summary(study, TRUE)
     mine = (study["assessor"] == "maximum") & (study["noise_mm"] == 0.3)
     sample = study["assessed_mm"][mine]
@@ -132,19 +145,16 @@ def test_summary_against_the_truth(rows):
 @pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 30), (40, 1), (40, 15), (15, 40)])
 @pytest.mark.parametrize("order", ["sequence", "shuffled"])
 def test_any_number_of_points_and_any_budget(points, budget, order):
-    settings = StudySettings(
-        noise_mm=(0.2,), repetitions=2, measurements=budget, visiting_order=order
-    )
-    table = simulate(ERROR[:points], [0.2], range(2), settings, 1)
+    spent = {"measurements": budget, "visiting_order": order}
+    table = simulated(ERROR[:points], [0.2], range(2), 1, **spent)
     assert np.all(table["measurements"] <= budget)
     assert np.all(table["points_visited"] <= min(points, budget))
     assert np.all(np.isfinite(table["assessed_mm"]))
 
 
 def test_order_of_points_changes_only_what_depends_on_it():
-    shuffled = StudySettings(measurements=40, visiting_order="shuffled")
-    plain = simulate(ERROR, [0.3], range(3), StudySettings(measurements=40), 1)
-    other = simulate(ERROR, [0.3], range(3), shuffled, 1)
+    plain = simulated(ERROR, [0.3], range(3), 1)
+    other = simulated(ERROR, [0.3], range(3), 1, visiting_order="shuffled")
     once = plain["assessor"] != "model_invalidation"
     np.testing.assert_allclose(
         plain["assessed_mm"][once], other["assessed_mm"][once], rtol=1e-12, atol=0
@@ -159,7 +169,7 @@ def test_progress_counts_simulations():
         seen.append((what, total))
         return items
 
-    simulate(ERROR, [0.1, 0.3], range(2), SMALL, 1, progress)
+    simulated(ERROR, [0.1, 0.3], range(2), 1, progress)
     assert seen == [("simulations", 4)]
 
 
@@ -172,24 +182,32 @@ def test_parts_share_out_every_repetition_once():
             part_of(10, number, of)
 
 
-def test_settings_are_refused_together():
+def test_settings_are_refused_together(tmp_path):
+    wrong = {"repetitions": 0, "measurements": 0, "alpha": 1.0}
+    words = ("outlier_rule", "distance", "covariance", "search", "visiting_order")
+    sections = {
+        "study": {"noise_mm": [0.1, 0.1], **wrong, **dict.fromkeys(words, "sideways")},
+        "histories": {"noise_mm": 0.0, "eta_ratio_kept": float("nan"), "simulations_searched": 0},
+    }
+    path = tmp_path / "wrong.yaml"
+    path.write_text(yaml.safe_dump({**sections, "datasets": {"mh180": {"robot": "mh180"}}}))
     with pytest.raises(InputError) as caught:
-        StudySettings((0.1, 0.1), 0, 0, 1.5, "x", "y", "z", "w", "v")
-    where = {problem.where for problem in caught.value.problems}
-    names = "noise_mm repetitions measurements alpha outlier_rule distance covariance search"
-    assert where == {f"study.{name}" for name in [*names.split(), "visiting_order"]}
+        load([path])
+    told = (problem.where.partition(", ")[2] for problem in caught.value.problems)
+    where = {each.partition(" (data set")[0] for each in told}
+    assert where == {f"{name}.{key}" for name, keys in sections.items() for key in keys}
 
 
-@pytest.mark.parametrize("noise", [[], [0.0], [-0.1], [np.nan], [1e-8]])
+@pytest.mark.parametrize("noise", [[], [0.0], [-0.1], [np.nan], [1e-8], [0.3, 0.1]])
 def test_noise_that_means_nothing_is_refused(noise):
     with pytest.raises(InputError, match=r"study\.noise_mm"):
-        StudySettings(noise_mm=noise)
+        load([ROOT / "config.yaml"], {"study": {"noise_mm": noise}}, ROOT)
 
 
 @pytest.mark.parametrize("error", [np.zeros((0, 3)), np.zeros(3), np.full((2, 3), np.nan)])
 def test_errors_that_cannot_be_used_are_refused(error):
     with pytest.raises(InputError, match="true errors"):
-        simulate(error, [0.1], range(1), SMALL, 1)
+        simulated(error, [0.1], range(1), 1)
 
 
 def test_true_accuracy_is_the_largest_error():

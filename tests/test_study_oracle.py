@@ -5,20 +5,24 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import paper_settings as paper
 import pytest
 from oracles import assessors as oracle
 from oracles import worlds
 
+from kinacc.assess.model_invalidation import Invalidation
+from kinacc.config.records import of_section
 from kinacc.study import monte_carlo
 from kinacc.study.histories import HistorySettings, histories
 
 NOISE = (0.01, 0.03)
-SMALL = {
-    "noise_mm": NOISE,
-    "repetitions": 3,
-    "measurements": 12,
-    "alpha": 0.6,
-}
+SMALL = paper.study(noise_mm=NOISE, repetitions=3, measurements=12)
+
+
+def simulated(error, noise_mm, repetitions, section, seed):
+    visits = of_section(monte_carlo.Visits, section)
+    made = monte_carlo.assessors(section)
+    return monte_carlo.simulate(error, noise_mm, repetitions, visits, seed, made)
 
 
 def small_errors(points: int = 9) -> np.ndarray:
@@ -30,12 +34,12 @@ def text(table, name, i):
     return None if value is None or value != value else str(value)
 
 
-def expected_row(table, i, error, seed, settings, order=None):
+def expected_row(table, i, error, seed, study, order=None):
     """Assessed accuracy, measurements and points of one row, from its address alone."""
     noise, repetition = float(table["noise_mm"][i]), int(table["repetition"][i])
     reading = worlds.simulation(error.tolist(), noise, repetition, seed)
     order = list(range(len(error)) if order is None else order)
-    budget = settings.measurements
+    budget = study["measurements"]
     sizes = [oracle.norm(reading(j, 1)) for j in order[:budget]]
     assessor = text(table, "assessor", i)
     if assessor == "maximum":
@@ -44,7 +48,7 @@ def expected_row(table, i, error, seed, settings, order=None):
         rule = text(table, "outlier_rule", i)
         return oracle.outlier_rejection(sizes, rule), len(sizes), len(sizes)
     switches = oracle.Switches(
-        text(table, "distance", i), text(table, "covariance", i), settings.alpha
+        text(table, "distance", i), text(table, "covariance", i), study["alpha"]
     )
 
     def run(eta):
@@ -64,27 +68,23 @@ def expected_row(table, i, error, seed, settings, order=None):
 
 @pytest.fixture(scope="module")
 def rows():
-    settings = monte_carlo.StudySettings(**SMALL)
-    return monte_carlo.simulate(small_errors(), NOISE, range(3), settings, seed=99)
+    return simulated(small_errors(), NOISE, range(3), SMALL, seed=99)
 
 
 def test_every_row_of_a_small_study_equals_the_oracle(rows):
-    settings, error = monte_carlo.StudySettings(**SMALL), small_errors()
+    error = small_errors()
     count = len(rows["assessed_mm"])
     # One row of the maximum, three of outlier rejection, twelve of model invalidation.
     assert count == 2 * 3 * 16
     for i in range(count):
-        assessed, measurements, points = expected_row(rows, i, error, 99, settings)
+        assessed, measurements, points = expected_row(rows, i, error, 99, SMALL)
         assert rows["assessed_mm"][i] == pytest.approx(assessed, rel=1e-9, abs=1e-12)
         assert (rows["measurements"][i], rows["points_visited"][i]) == (measurements, points)
 
 
 def test_parts_of_the_study_join_to_the_whole(rows):
-    settings = monte_carlo.StudySettings(**SMALL)
     parts = [
-        monte_carlo.simulate(
-            small_errors(), NOISE[::-1], monte_carlo.part_of(3, n, 2), settings, seed=99
-        )
+        simulated(small_errors(), NOISE[::-1], monte_carlo.part_of(3, n, 2), SMALL, seed=99)
         for n in (2, 1)
     ]
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -94,15 +94,11 @@ def test_parts_of_the_study_join_to_the_whole(rows):
 
 
 def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
-    settings = monte_carlo.StudySettings(
-        **{**SMALL, "measurements": 5, "visiting_order": "shuffled"}
-    )
-    shuffled = monte_carlo.simulate(small_errors(), NOISE[:1], range(1), settings, seed=99)
+    study = {**SMALL, "measurements": 5, "visiting_order": "shuffled"}
+    shuffled = simulated(small_errors(), NOISE[:1], range(1), study, seed=99)
     order = np.random.default_rng([99, 10000, 0, 1]).permutation(9)
     for i in range(len(shuffled["assessed_mm"])):
-        assessed, measurements, points = expected_row(
-            shuffled, i, small_errors(), 99, settings, order
-        )
+        assessed, measurements, points = expected_row(shuffled, i, small_errors(), 99, study, order)
         assert shuffled["assessed_mm"][i] == pytest.approx(assessed, rel=1e-9, abs=1e-12)
         assert (shuffled["measurements"][i], shuffled["points_visited"][i]) == (
             measurements,
@@ -111,8 +107,7 @@ def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
 
 
 def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):
-    settings = monte_carlo.StudySettings(**SMALL)
-    default = monte_carlo.default_reading(rows, settings)
+    default = monte_carlo.default_reading(rows, SMALL)
     assert len(default["assessed_mm"]) == 2 * 3 * 3
     summary = monte_carlo.summary(default, 0.07)
     assert len(summary["assessor"]) == 6
@@ -158,8 +153,7 @@ def test_a_full_size_simulation_stands_just_above_its_highest_rejected_bound():
     rng = np.random.default_rng(6)
     error = rng.normal(size=(200, 3)) * 0.23
     error *= 0.906 / np.linalg.norm(error, axis=1).max()
-    settings = monte_carlo.StudySettings(noise_mm=(0.3,), repetitions=2)
-    table = monte_carlo.simulate(error, (0.3,), [1], settings, seed=7)
+    table = simulated(error, (0.3,), [1], paper.study(), seed=7)
     reading = worlds.simulation(error.tolist(), 0.3, 1, 7)
     top = max(oracle.norm(reading(j, 1)) for j in range(200))
     for i in range(len(table["assessed_mm"])):
@@ -227,10 +221,14 @@ def test_histories_are_the_first_runs_of_the_studys_worlds_that_satisfy_the_rule
     found = first_simulations(error, 3, 200)
     assert len(found) == 2
     found["rejected_larger_eta"] = found["rejected"]
+    keys = ("eta_ratio_rejected", "eta_ratio_larger", "eta_ratio_kept")
+    ratios = dict(zip(keys, HISTORY_RATIOS.values(), strict=True))
+    study = paper.study(measurements=60)
     table = histories(
         error,
-        HistorySettings(simulations_searched=200),
-        monte_carlo.StudySettings(measurements=60),
+        of_section(HistorySettings, paper.histories(simulations_searched=200, **ratios)),
+        of_section(monte_carlo.Visits, study),
+        of_section(Invalidation, study),
         seed=3,
         point=np.arange(60) + 500,
     )

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import paper_settings as paper
 import pytest
 
 from kinacc.artifacts.provenance import imported_names
@@ -30,7 +31,7 @@ from kinacc.errors import InputError
 from kinacc.kinematics import robot
 
 BOUNDING = [SingleShot, TwoStage, Sequential, InvalidationCalibrated, SearchAndConfirm]
-LIVE = [cls(measurements=40) for cls in ADAPTIVE.values()]
+LIVE = [paper.assessor(name, measurements=40) for name in ADAPTIVE]
 
 
 def directions(points: int, seed: int = 5) -> np.ndarray:
@@ -122,7 +123,9 @@ def test_an_assessor_begins_with_what_it_says_it_needs_and_not_with_less(assesso
 @pytest.mark.parametrize("cls", BOUNDING)
 def test_hardly_any_noise_leaves_hardly_any_doubt(cls):
     shell = directions(30) * np.linspace(0.98, 1.0, 30)[:, None]
-    said = conduct(cls(measurements=60), drawn_world(shell, 1e-6, key_of(2), 60)).statements()[0]
+    said = conduct(
+        paper.assessor(cls, measurements=60), drawn_world(shell, 1e-6, key_of(2), 60)
+    ).statements()[0]
     assert said.value_mm == pytest.approx(1.0, abs=0.02)
     assert said.upper_mm == pytest.approx(1.0, abs=0.02)
 
@@ -130,7 +133,9 @@ def test_hardly_any_noise_leaves_hardly_any_doubt(cls):
 @pytest.mark.parametrize("cls", BOUNDING)
 def test_points_that_are_all_equal_are_no_trouble(cls):
     errors = np.tile([0.3, 0.0, 0.0], (20, 1))
-    said = conduct(cls(measurements=50), drawn_world(errors, 0.05, key_of(3), 50)).statements()[0]
+    said = conduct(
+        paper.assessor(cls, measurements=50), drawn_world(errors, 0.05, key_of(3), 50)
+    ).statements()[0]
     assert said.lower_mm <= 0.3 <= said.upper_mm
 
 
@@ -179,7 +184,7 @@ def test_covariances_that_are_none_are_refused_with_their_point(covariance, said
 @pytest.mark.parametrize("cls", BOUNDING)
 def test_settings_that_make_no_sense_are_refused_together(cls):
     with pytest.raises(InputError) as caught:
-        cls(measurements=0, confidence=1.5)
+        paper.assessor(cls, measurements=0, confidence=1.5)
     assert {"measurements", "confidence"} <= {each.where for each in caught.value.problems}
 
 
@@ -253,7 +258,7 @@ def test_the_bound_on_the_measured_points_holds(cls, shape):
         "spread": field(25),
     }[shape]
     draws = 400
-    upper, lower = coverage(cls(measurements=40), errors, 0.2, draws)
+    upper, lower = coverage(paper.assessor(cls, measurements=40), errors, 0.2, draws)
     assert upper >= least(draws)
     assert lower >= least(draws)
 
@@ -309,7 +314,7 @@ def test_with_a_reading_for_nearly_every_candidate_the_recommended_bound_assumes
 
 def test_more_budget_than_candidates_visits_them_all_and_needs_no_assumption():
     for cls in (Sequential, SearchAndConfirm):
-        measured, everywhere = conduct(cls(measurements=60), world(30)).statements()
+        measured, everywhere = conduct(paper.assessor(cls, measurements=60), world(30)).statements()
         assert everywhere.upper_mm == measured.upper_mm
         assert not everywhere.assumption
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+import paper_settings as paper
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -33,7 +34,7 @@ def arguments(assessor: ModelInvalidation) -> tuple:
 
 def check(world, distance: str, covariance: str, **more) -> np.ndarray:
     """Hold the searches, and the scans between any two changes of decision, to single runs."""
-    plain = ModelInvalidation(distance=distance, covariance=covariance, **more)
+    plain = paper.assessor("model_invalidation", distance=distance, covariance=covariance, **more)
     top, settings = plain.top(world), arguments(plain)
     flags = np.array([kernels.run(world.arrays, k / 1000, *settings)[0] for k in range(top + 1)])
     highest = int(np.max(np.flatnonzero(flags), initial=-1))
@@ -108,7 +109,7 @@ def test_scans_of_any_world_equal_every_single_run(
 def test_bisection_ends_within_a_micrometre_of_a_change_of_decision():
     for repetition in range(5):
         world = drawn_world(field(3, 60), 0.2, key_of(repetition), 80)
-        assessor = ModelInvalidation(80, search="bisection")
+        assessor = paper.assessor("model_invalidation", measurements=80, search="bisection")
         found = assessor.assessed_mm(world)
         assert not assessor.run(world, found).rejected
         below = [found - step for step in np.linspace(0, 1e-3, 200)]
@@ -117,6 +118,6 @@ def test_bisection_ends_within_a_micrometre_of_a_change_of_decision():
 
 def test_a_scan_follows_far_fewer_paths_than_there_are_bounds():
     world = drawn_world(field(0, 200), 0.05, key_of(1), 200)
-    top = ModelInvalidation().top(world)
+    top = paper.assessor("model_invalidation").top(world)
     _, pieces = kernels.scan(world.arrays, 0, top, False, 0.6, True, 0.5, 200)
     assert pieces < top / 10

@@ -128,7 +128,7 @@ def test_distances_of_many_points_are_those_of_each():
 
 def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():
     readings = drawn_world(smooth_errors(joints(20)), 0.1, key_of(6), 40)
-    full = conduct(ModelInvalidationFull(40), readings)
+    full = conduct(ModelInvalidationFull(40, alpha=0.6), readings)
     reads = {row: int(full.ledger.count[row]) for row in full.ledger.visited}
     size_mm = {
         row: np.linalg.norm(np.mean([readings.reading_mm(row, i) for i in range(count)], axis=0))
@@ -137,8 +137,8 @@ def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():
 
     def rejection(bound_mm: float) -> float:
         """Eqs. 18 to 20 of the paper, as its own algorithm has them."""
-        excess = [mahalanobis_excess(size_mm[row], bound_mm, 0.1, reads[row]) for row in reads]
-        return 1.0 - math.prod(1.0 - point_probability(each) for each in excess)
+        excess = [mahalanobis_excess(size_mm[row], bound_mm, 0.1, reads[row], "r") for row in reads]
+        return 1.0 - math.prod(1.0 - point_probability(each, "squared") for each in excess)
 
     said_mm = full.statements()[0].value_mm
     assert max(reads.values()) > 1
@@ -181,7 +181,7 @@ def test_a_reading_with_a_covariance_of_its_own_widens_the_calibrated_bound():
     candidates = Candidates.with_equal_noise(np.full(5, 0.1))
     bounds = []
     for given in (None, 0.01 * np.eye(3)):
-        campaign = InvalidationCalibrated(40).begin(candidates)
+        campaign = InvalidationCalibrated(40, alpha=0.6).begin(candidates)
         while (point := campaign.next()) is not None:
             campaign.record(point, np.array([0.5, 0.0, 0.0]), given)
         bounds.append(campaign.statements()[0].upper_mm)
@@ -267,6 +267,8 @@ def test_accepting_what_is_beyond_the_tolerance_is_as_rare_as_stated():
     accepted = 0
     for draw in range(400):
         errors = np.vstack([[[1.01, 0.0, 0.0]], np.zeros((9, 3)) + 1e-3])
-        campaign = conduct(InvalidationCalibrated(30), drawn_world(errors, 0.1, key_of(draw), 30))
+        campaign = conduct(
+            InvalidationCalibrated(30, alpha=0.6), drawn_world(errors, 0.1, key_of(draw), 30)
+        )
         accepted += decide(campaign.statements()[0], 1.0).verdict == ACCEPT
     assert accepted <= 400 * (0.05 + 3.5 * math.sqrt(0.05 * 0.95 / 400))

@@ -105,7 +105,7 @@ def test_the_budget_named_is_enough_on_all_errors_and_beyond():
 
 def test_fewer_errors_than_poses_are_refused():
     with pytest.raises(InputError, match="only 100"):
-        outcomes([field()], 101, np.eye(3), [SingleShot()], 1, 0)
+        outcomes([field()], 101, np.eye(3), [SingleShot(measurements=200)], 1, 0)
 
 
 @pytest.fixture

@@ -283,7 +283,7 @@ def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
     return faults
 
 
-def check_budget(measurements: int, confidence: float = 0.95) -> list[Problem]:
+def check_budget(measurements: int, confidence: float) -> list[Problem]:
     """What is wrong with a budget and a confidence."""
     problems = []
     if not isinstance(measurements, (int, np.integer)) or measurements < 1:

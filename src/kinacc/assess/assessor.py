@@ -7,14 +7,12 @@ dataclass that inherits :class:`Assessor`, and a line in :mod:`kinacc.assess.reg
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
 from itertools import product
-from numbers import Integral
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from kinacc.assess.world import World
-from kinacc.errors import Problem, refuse
+from kinacc.config.records import of_section
 
 
 class Assessment(NamedTuple):
@@ -31,8 +29,8 @@ class Assessor(Protocol):
     """A method of assessment that looks back at one fixed world.
 
     ``name`` is its name in tables; ``switches`` maps each field that is a reading of the paper to
-    its choices, the default first; ``measurements`` is the budget; ``is_slow``: an assessment of
-    200 measurements takes more than 50 ms.
+    its choices; ``measurements`` is the budget; ``is_slow``: an assessment of 200 measurements
+    takes more than 50 ms. What is a key of the configuration's ``study`` has no default here.
     """
 
     name: ClassVar[str]
@@ -45,23 +43,11 @@ class Assessor(Protocol):
         ...
 
 
-def check(assessor: Assessor, more: list[Problem] | None = None) -> None:
-    """Raise InputError with everything wrong with the settings, ``more`` included."""
-    problems = list(more or [])
-    budget = assessor.measurements
-    if not isinstance(budget, Integral) or budget < 1:
-        problems.append(Problem("measurements", f"{budget!r}", "a whole number, at least 1"))
-    for switch, choices in assessor.switches.items():
-        if getattr(assessor, switch) not in choices:
-            found = f"{getattr(assessor, switch)!r}"
-            problems.append(Problem(switch, found, ", ".join(choices)))
-    refuse(problems, f"{assessor.name} cannot work with these settings")
-
-
 A = TypeVar("A", bound=Assessor)
 
 
-def every_reading(assessor: A) -> Iterator[A]:
-    """The assessor under every combination of its switches, other settings kept."""
-    for values in product(*assessor.switches.values()):
-        yield replace(assessor, **dict(zip(assessor.switches, values, strict=True)))
+def every_reading(cls: type[A], settings: Mapping[str, object]) -> Iterator[A]:
+    """An assessor under every combination of its switches, other settings as given."""
+    for values in product(*cls.switches.values()):
+        switched = dict(zip(cls.switches, values, strict=True))
+        yield of_section(cls, {**settings, **switched})

@@ -16,12 +16,10 @@ _STILL = 0.02  # of the budget: readings between two searches of the smallest bo
 
 
 def invalidation_problems(settings) -> list[Problem]:
-    """What is wrong with budget, share and threshold."""
+    """What is wrong with budget and share."""
     problems = check_budget(settings.measurements, settings.confidence)
     if not 0.0 < settings.visited <= 1.0:
         problems.append(Problem("visited", f"{settings.visited}", "above 0 and at most 1"))
-    if not 0.0 < settings.alpha < 1.0:
-        problems.append(Problem("alpha", f"{settings.alpha}", "above 0 and below 1"))
     return problems
 
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
-from kinacc.assess.statement import REGION, Reason, Statement
+from kinacc.assess.statement import CONFIDENCE, REGION, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import Problem, refuse
 
@@ -29,13 +29,13 @@ class GammaQuantile(AdaptiveAssessor):
     where the largest reading would be met less than once in a hundred campaigns.
     """
 
-    measurements: int = 200
+    measurements: int
     share: float = 0.99
     name: ClassVar[str] = "gamma_quantile"
-    confidence: ClassVar[float] = 0.95  # of limits on single points; its statement has none
+    confidence: ClassVar[float] = CONFIDENCE  # of limits on single points; its statement has none
 
     def __post_init__(self) -> None:
-        problems = check_budget(self.measurements)
+        problems = check_budget(self.measurements, self.confidence)
         if not 0.0 < self.share < 1.0:
             problems.append(Problem("share", f"{self.share}", "above 0 and below 1"))
         refuse(problems, f"{self.name} cannot work with these settings")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import ClassVar
 
@@ -13,7 +13,8 @@ from kinacc.assess.challenges import ChallengeCampaign, invalidation_problems
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.ellipsoid import largest_size
 from kinacc.assess.sequential_limits import Looks
-from kinacc.assess.statement import MEASURED, Reason, Statement
+from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
+from kinacc.assess.visits import FIRST_SHARE
 from kinacc.errors import refuse
 
 SIMULATIONS = 200_000
@@ -41,10 +42,10 @@ class InvalidationCalibrated(AdaptiveAssessor):
     c is taken from the Bonferroni inequality, which is a little wider.
     """
 
-    measurements: int = 200
-    visited: float = 0.6
-    alpha: float = 0.6
-    confidence: float = 0.95
+    measurements: int
+    visited: float = FIRST_SHARE
+    alpha: float = field(kw_only=True)
+    confidence: float = CONFIDENCE
     name: ClassVar[str] = "invalidation_calibrated"
 
     def __post_init__(self) -> None:

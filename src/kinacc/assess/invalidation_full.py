@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.challenges import ChallengeCampaign, invalidation_problems
+from kinacc.assess.statement import CONFIDENCE
+from kinacc.assess.visits import FIRST_SHARE
 from kinacc.errors import Problem, refuse
 
 
@@ -23,12 +25,12 @@ class ModelInvalidationFull(AdaptiveAssessor):
     confidence: ``alpha`` is a threshold on a product of p-values, not an error rate.
     """
 
-    measurements: int = 200
-    visited: float = 0.6
-    alpha: float = 0.6
+    measurements: int
+    visited: float = FIRST_SHARE
+    alpha: float = field(kw_only=True)
     bound_mm: float | None = None
     name: ClassVar[str] = "model_invalidation_full"
-    confidence: ClassVar[float] = 0.95  # of limits on single points; its statement has none
+    confidence: ClassVar[float] = CONFIDENCE  # of limits on single points; its statement has none
 
     def __post_init__(self) -> None:
         problems = invalidation_problems(self)

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
-from kinacc.assess.coverage import MISSING_PART, companions
+from kinacc.assess.coverage import CROWD, ISOLATION, MISSING_PART, companions
 from kinacc.assess.kinematic_model import (
     Basis,
     Posterior,
@@ -19,15 +19,14 @@ from kinacc.assess.kinematic_model import (
     points_needed,
     posterior,
 )
-from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
-from kinacc.assess.visits import first_points
+from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
+from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
 
 _DRAWS = 400
 _BATCH = 0.08  # of the budget: readings between two looks at who could be the largest
 _DOUBTED = 0.25  # of a batch, spent on the readings the model explains worst
 _CONTRADICTED = 0.01  # chance of the worst reading under the model, all points considered
-_ISOLATION, _CROWD = 1.25, 0.05  # as the recommended assessor assumes of unmeasured points
 _EXPLAINED = 0.5  # least share of the mean square error that joints have to explain
 
 
@@ -51,9 +50,9 @@ class Kinematic(AdaptiveAssessor):
     fewer components than the model has coefficients, for then its scales are guesses.
     """
 
-    measurements: int = 200
-    visited: float = 0.6
-    confidence: float = 0.95
+    measurements: int
+    visited: float = FIRST_SHARE
+    confidence: float = CONFIDENCE
     name: ClassVar[str] = "kinematic"
     needs: ClassVar[tuple[str, ...]] = ("q_rad", "effects")
     exchangeable: ClassVar[bool] = False
@@ -119,7 +118,7 @@ class KinematicCampaign(LedgerCampaign):
             crowd = companions(points, seen, MISSING_PART * (1.0 - self.settings.confidence))
         crowd = crowd if crowd > 1 else 0  # the largest itself was hardly missed
         missed = None
-        if crowd > _CROWD * points:
+        if crowd > CROWD * points:
             missed = Reason("missed", {"seen": seen, "points": points, "crowd": crowd})
         return (
             self._said(CANDIDATES, everywhere, withheld or missed, crowd),
@@ -133,7 +132,7 @@ class KinematicCampaign(LedgerCampaign):
         low, value, high = (float(x) for x in np.quantile(draws, [1 - confidence, 0.5, confidence]))
         assumption = Reason("smooth")
         if crowd:
-            assumption = Reason("smooth_and_crowd", {"crowd": crowd, "isolation": _ISOLATION})
+            assumption = Reason("smooth_and_crowd", {"crowd": crowd, "isolation": ISOLATION})
         resting = Statement(target, value, low, high, confidence, assumption=assumption)
         if withheld:
             return replace(resting, lower_mm=math.nan, upper_mm=math.nan, withheld=withheld)

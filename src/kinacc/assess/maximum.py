@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from kinacc.assess.assessor import Assessment, Assessor, check
+from kinacc.assess.assessor import Assessment, Assessor
 from kinacc.assess.world import World
 
 
@@ -13,11 +13,8 @@ from kinacc.assess.world import World
 class Maximum(Assessor):
     """Measure each point once, up to ``measurements`` points, and take the largest magnitude."""
 
-    measurements: int = 200
+    measurements: int
     name: ClassVar[str] = "maximum"
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def assess(self, world: World) -> Assessment:
         """Eq. 11 over the first readings."""

@@ -16,7 +16,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment, Assessor, check
+from kinacc.assess.assessor import Assessment, Assessor
 from kinacc.assess.world import World
 from kinacc.errors import InputError, Problem
 
@@ -47,7 +47,74 @@ class Step(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ModelInvalidation(Assessor):
+class Invalidation:
+    """Runs at one bound; the fields are those of :class:`ModelInvalidation`."""
+
+    measurements: int
+    alpha: float
+    distance: str
+    covariance: str
+
+    def run(self, world: World, eta_mm: float) -> Run:
+        """One sequential run at the bound eta."""
+        from kinacc.assess import invalidation_kernels as kernels
+
+        self._check_visits(world)
+        return Run(*kernels.run(world.arrays, float(eta_mm), *self._arguments))
+
+    def history(self, world: World, eta_mm: float) -> list[Step]:
+        """Every measurement of one run at the bound eta, in order (Figs. 5 and 6).
+
+        In plain Python, step by step; the compiled kernel is held to it.
+        """
+        self._check_visits(world)
+        sums: dict[int, np.ndarray] = {}  # the points visited, in visiting order
+        counts: dict[int, int] = {}
+        scores: dict[int, float] = {}
+        misses: dict[int, float] = {}
+        steps: list[Step] = []
+        rejection = 0.0
+        while len(steps) < self.measurements:
+            if rejection > self.alpha:
+                # p-hat grows with the distance but reaches 1 in floating point: compare distances.
+                # max() returns the first of equals, the point visited first.
+                row = max(scores, key=scores.__getitem__)
+            elif len(sums) < world.points:
+                row = len(sums)
+                sums[row], counts[row] = np.zeros(3), 0
+            else:
+                break
+            reading = world.reading_mm(row, counts[row])
+            sums[row] = sums[row] + reading
+            counts[row] += 1
+            average_mm = _magnitude(sums[row] / counts[row])
+            scores[row] = mahalanobis_excess(
+                average_mm, eta_mm, world.sigma_mm[row], counts[row], self.covariance
+            )
+            misses[row] = 1.0 - point_probability(scores[row], self.distance)
+            rejection = 1.0 - math.prod(misses.values())
+            steps.append(Step(row, counts[row], _magnitude(reading), average_mm, rejection))
+        return steps
+
+    @property
+    def _arguments(self) -> tuple[float, bool, float, int]:
+        squared = self.distance == "squared"
+        return (float(self.alpha), squared, _POWERS[self.covariance], int(self.measurements))
+
+    def _check_visits(self, world: World) -> None:
+        if world.visits < self.measurements:
+            raise InputError(
+                Problem(
+                    "repeats",
+                    f"{world.visits} readings a point for {self.measurements} measurements",
+                    f"{self.measurements} readings a point, for all may fall on one",
+                    "give more repeats or a smaller budget",
+                )
+            )
+
+
+@dataclass(frozen=True)
+class ModelInvalidation(Invalidation, Assessor):
     """Settings of the assessor.
 
     measurements: budget of a run; alpha: threshold on the rejection probability (eq. 22);
@@ -58,23 +125,13 @@ class ModelInvalidation(Assessor):
     the largest first reading, to 1 um).
     """
 
-    measurements: int = 200
-    alpha: float = 0.6
-    distance: str = "squared"
-    covariance: str = "r"
-    search: str = "from_above"
+    search: str
     name: ClassVar[str] = "model_invalidation"
     switches: ClassVar[dict[str, tuple[str, ...]]] = {
         "distance": DISTANCES,
         "covariance": COVARIANCES,
         "search": SEARCHES,
     }
-
-    def __post_init__(self) -> None:
-        wrong = []
-        if not 0.0 < self.alpha < 1.0:
-            wrong.append(Problem("alpha", f"{self.alpha}", "above 0 and below 1"))
-        check(self, wrong)
 
     def assess(self, world: World) -> Assessment:
         """Search the assessed accuracy; measurements and points are those of the run at it."""
@@ -86,7 +143,7 @@ class ModelInvalidation(Assessor):
         """The bound the search arrives at, mm."""
         from kinacc.assess import invalidation_kernels as kernels
 
-        _check_visits(world, self.measurements)
+        self._check_visits(world)
         largest = float(world.magnitudes_mm(self.measurements).max())
         if self.search == "bisection":
             return kernels.bisect(world.arrays, largest, 1.0 / GRID_PER_MM, *self._arguments)
@@ -98,64 +155,9 @@ class ModelInvalidation(Assessor):
         """Grid bound at or above every first reading: no run at it can reject."""
         return math.ceil(float(world.magnitudes_mm(self.measurements).max()) * GRID_PER_MM)
 
-    def run(self, world: World, eta_mm: float) -> Run:
-        """One sequential run at the bound eta."""
-        from kinacc.assess import invalidation_kernels as kernels
-
-        _check_visits(world, self.measurements)
-        return Run(*kernels.run(world.arrays, float(eta_mm), *self._arguments))
-
-    def history(self, world: World, eta_mm: float) -> list[Step]:
-        """Every measurement of one run at the bound eta, in order (Figs. 5 and 6)."""
-        _check_visits(world, self.measurements)
-        return history(world, eta_mm, self.alpha, self.distance, self.covariance, self.measurements)
-
-    @property
-    def _arguments(self) -> tuple[float, bool, float, int]:
-        squared = self.distance == "squared"
-        return (float(self.alpha), squared, _POWERS[self.covariance], int(self.measurements))
-
-
-def history(
-    world: World,
-    eta_mm: float,
-    alpha: float = 0.6,
-    distance: str = "squared",
-    covariance: str = "r",
-    measurements: int = 200,
-) -> list[Step]:
-    """One run in plain Python, step by step; the compiled kernel is held to it."""
-    sums: dict[int, np.ndarray] = {}  # the points visited, in visiting order
-    counts: dict[int, int] = {}
-    scores: dict[int, float] = {}
-    misses: dict[int, float] = {}
-    steps: list[Step] = []
-    rejection = 0.0
-    while len(steps) < measurements:
-        if rejection > alpha:
-            # p-hat grows with the distance but reaches 1 in floating point: compare distances.
-            # max() returns the first of equals, the point visited first.
-            row = max(scores, key=scores.__getitem__)
-        elif len(sums) < world.points:
-            row = len(sums)
-            sums[row], counts[row] = np.zeros(3), 0
-        else:
-            break
-        reading = world.reading_mm(row, counts[row])
-        sums[row] = sums[row] + reading
-        counts[row] += 1
-        average_mm = _magnitude(sums[row] / counts[row])
-        scores[row] = mahalanobis_excess(
-            average_mm, eta_mm, world.sigma_mm[row], counts[row], covariance
-        )
-        misses[row] = 1.0 - point_probability(scores[row], distance)
-        rejection = 1.0 - math.prod(misses.values())
-        steps.append(Step(row, counts[row], _magnitude(reading), average_mm, rejection))
-    return steps
-
 
 def mahalanobis_excess(
-    average_mm: float, eta_mm: float, sigma_mm: float, count: int, covariance: str = "r"
+    average_mm: float, eta_mm: float, sigma_mm: float, count: int, covariance: str
 ) -> float:
     """Mahalanobis distance of an averaged measurement beyond the bound, negative inside it.
 
@@ -166,7 +168,7 @@ def mahalanobis_excess(
     return (average_mm - eta_mm) * count ** _POWERS[covariance] / float(sigma_mm)
 
 
-def point_probability(distance_outside: float, distance: str = "squared") -> float:
+def point_probability(distance_outside: float, distance: str) -> float:
     """p-hat of one point (eq. 18) from its Mahalanobis distance to the candidate error (1)."""
     if distance_outside <= 0.0:
         return 0.0
@@ -187,15 +189,3 @@ def chi_square_3(x: float) -> float:
 
 def _magnitude(vector: np.ndarray) -> float:
     return math.sqrt(sum(float(x) ** 2 for x in vector))
-
-
-def _check_visits(world: World, measurements: int) -> None:
-    if world.visits < measurements:
-        raise InputError(
-            Problem(
-                "repeats",
-                f"{world.visits} readings a point for {measurements} measurements",
-                f"{measurements} readings a point, for all may fall on one",
-                "give more repeats or a smaller budget",
-            )
-        )

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment, Assessor, check
+from kinacc.assess.assessor import Assessment, Assessor
 from kinacc.assess.world import World
 from kinacc.distributions import gamma99
 
@@ -31,7 +31,7 @@ LIMITS: dict[str, Callable[[np.ndarray], float]] = {
 }
 
 
-def largest_inlier(magnitudes: np.ndarray, outlier_rule: str = "normal") -> float:
+def largest_inlier(magnitudes: np.ndarray, outlier_rule: str) -> float:
     """Largest of the magnitudes (n,) not above the limit c of the rule (eqs. 13-14), same unit."""
     # No rule puts its limit below the smallest magnitude but for rounding, where all are equal.
     limit = max(LIMITS[outlier_rule](magnitudes), float(magnitudes.min()))
@@ -42,13 +42,10 @@ def largest_inlier(magnitudes: np.ndarray, outlier_rule: str = "normal") -> floa
 class OutlierRejection(Assessor):
     """Measure each point once, up to ``measurements`` points, drop outliers, take the largest."""
 
-    measurements: int = 200
-    outlier_rule: str = "normal"
+    measurements: int
+    outlier_rule: str
     name: ClassVar[str] = "outlier_rejection"
     switches: ClassVar[dict[str, tuple[str, ...]]] = {"outlier_rule": tuple(LIMITS)}
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def assess(self, world: World) -> Assessment:
         """Eq. 13 over the first readings."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
-from kinacc.assess.statement import REGION, Reason, Statement
+from kinacc.assess.statement import CONFIDENCE, REGION, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import Problem, refuse
 
@@ -33,10 +33,10 @@ class RegionShare(AdaptiveAssessor):
     few for any order statistic.
     """
 
-    measurements: int = 200
+    measurements: int
     share: float = 0.9
     deviations: float = 1.0
-    confidence: float = 0.95
+    confidence: float = CONFIDENCE
     name: ClassVar[str] = "region_share"
 
     def __post_init__(self) -> None:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 
-PLACES = {
+# These look back at a world (kinacc.assess.assessor).
+LOOKING_BACK = {
     "maximum": "kinacc.assess.maximum:Maximum",
     "outlier_rejection": "kinacc.assess.outlier_rejection:OutlierRejection",
     "model_invalidation": "kinacc.assess.model_invalidation:ModelInvalidation",
+}
+# These choose as they go (kinacc.assess.adaptive).
+CHOOSING = {
     "gamma_quantile": "kinacc.assess.gamma_quantile:GammaQuantile",
     "region_share": "kinacc.assess.region_share:RegionShare",
     "single_shot": "kinacc.assess.single_shot:SingleShot",
@@ -19,8 +23,7 @@ PLACES = {
     "kinematic": "kinacc.assess.kinematic:Kinematic",
     "search_and_confirm": "kinacc.assess.search_and_confirm:SearchAndConfirm",
 }
-# These look back at a world (kinacc.assess.assessor); all others choose as they go (.adaptive).
-LOOKING_BACK = ("maximum", "outlier_rejection", "model_invalidation")
+PLACES = LOOKING_BACK | CHOOSING
 RECOMMENDED = "search_and_confirm"
 
 
@@ -45,4 +48,4 @@ class Registry(Mapping[str, type]):
 
 
 ASSESSORS = Registry(PLACES)
-ADAPTIVE = Registry({name: each for name, each in PLACES.items() if name not in LOOKING_BACK})
+ADAPTIVE = Registry(CHOOSING)

@@ -9,14 +9,21 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
-from kinacc.assess.coverage import MISSING_PART, at_most, companions, hardly_missed, records
+from kinacc.assess.coverage import (
+    CROWD,
+    ISOLATION,
+    MISSING_PART,
+    at_most,
+    companions,
+    hardly_missed,
+    records,
+)
 from kinacc.assess.population import LargestSize, largest_size
 from kinacc.assess.sequential_limits import Looks, LooksCampaign
-from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
-from kinacc.assess.visits import first_points
+from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
+from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
 
-FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
 _ALONE = 0.1  # chance of so little company below which the assumption counts as broken
 _RESERVE = 0.04  # of the budget, kept for confirming whatever is found last
 _RECONSIDER = 0.06  # of the budget, between two estimates of the likely largest size
@@ -48,10 +55,10 @@ class SearchAndConfirm(AdaptiveAssessor):
     the posterior of :mod:`kinacc.assess.population`.
     """
 
-    measurements: int = 200
-    confidence: float = 0.95
-    isolation: float = 1.25
-    crowd: float = 0.05
+    measurements: int
+    confidence: float = CONFIDENCE
+    isolation: float = ISOLATION
+    crowd: float = CROWD
     name: ClassVar[str] = "search_and_confirm"
 
     def __post_init__(self) -> None:

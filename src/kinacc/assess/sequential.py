@@ -11,8 +11,8 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.sequential_limits import Looks, LooksCampaign
-from kinacc.assess.statement import MEASURED, Reason, Statement
-from kinacc.assess.visits import first_points
+from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
+from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
 
 
@@ -28,10 +28,10 @@ class Sequential(AdaptiveAssessor):
     known covariance (eq. 9).
     """
 
-    measurements: int = 200
-    visited: float = 0.6
+    measurements: int
+    visited: float = FIRST_SHARE
     width_mm: float | None = None
-    confidence: float = 0.95
+    confidence: float = CONFIDENCE
     name: ClassVar[str] = "sequential"
 
     def __post_init__(self) -> None:

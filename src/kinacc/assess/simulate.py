@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS
 from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.world import World, drawn_world
+from kinacc.config.records import of_section
 
 Reading = Callable[[int, int], np.ndarray]  # (row, how often it was read before): (3,), mm
 
@@ -64,9 +65,14 @@ class Assessed(NamedTuple):
     visited: list[int] | None
 
 
-def assessed(name: str, measurements: int, world: World, **known: np.ndarray) -> Assessed:
-    """What an assessor of the registry says of a world, whichever its interface."""
-    assessor = ASSESSORS[name](measurements=measurements)
+def assessed(
+    name: str, settings: Mapping[str, object], world: World, **known: np.ndarray
+) -> Assessed:
+    """What an assessor of the registry says of a world, whichever its interface.
+
+    ``settings``: values of which it takes those that it has.
+    """
+    assessor = of_section(ASSESSORS[name], settings)
     if name in ADAPTIVE:
         campaign = conduct(assessor, world, **known)
         taken, rows = campaign.ledger.taken, campaign.ledger.visited

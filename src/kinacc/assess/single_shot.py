@@ -10,7 +10,7 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import MEASURED, Reason, Statement
+from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import refuse
 
@@ -27,8 +27,8 @@ class SingleShot(AdaptiveAssessor):
     speaks of the points measured; where these are all candidates, of all candidates.
     """
 
-    measurements: int = 200
-    confidence: float = 0.95
+    measurements: int
+    confidence: float = CONFIDENCE
     name: ClassVar[str] = "single_shot"
 
     def __post_init__(self) -> None:

@@ -15,6 +15,7 @@ MEASURED = "measured"
 CANDIDATES = "candidates"
 REGION = "region"
 TARGETS = (MEASURED, CANDIDATES, REGION)
+CONFIDENCE = 0.95  # of each bound, where no other is asked for
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
 from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import MEASURED, Reason, Statement
+from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.errors import Problem, refuse
 
 SCREENING_PART = 0.3  # of the allowed error, spent on points that are not re-measured
@@ -29,10 +29,10 @@ class TwoStage(AdaptiveAssessor):
     most one less the confidence. Assumes normal readings of known covariance (eq. 9).
     """
 
-    measurements: int = 200
+    measurements: int
     screened: float = 0.6
     repeats: int = 4
-    confidence: float = 0.95
+    confidence: float = CONFIDENCE
     name: ClassVar[str] = "two_stage"
 
     def __post_init__(self) -> None:

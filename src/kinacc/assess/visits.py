@@ -6,6 +6,8 @@ import math
 
 from kinacc.assess.adaptive import Candidates, LedgerCampaign
 
+FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
+
 
 def first_points(measurements: int, points: int, share: float) -> int:
     """How many points are visited before anything is known: all if the budget is 1.5 times them."""

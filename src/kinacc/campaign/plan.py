@@ -14,6 +14,8 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import Instrument
+from kinacc.config import schema
+from kinacc.config.values import check
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 
@@ -136,22 +138,29 @@ def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:
 
 
 def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
-    """An assessor by name with its settings. Raises InputError for unknown names and settings."""
+    """An assessor by name with its settings. Raises InputError for unknown names and settings.
+
+    What it shares with the configuration's ``study`` is held to the schema and defaults to it.
+    """
     if name not in ADAPTIVE:
         raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
     known = {field.name: field for field in fields(ADAPTIVE[name])}
-    problems = [
-        Problem(f"setting {each} of {name}", "is not there", ", ".join(known))
-        for each in settings
-        if each not in known
-    ]
-    problems += [
-        Problem(f"setting {each} of {name}", f"{value!r}"[:60], "a number")
-        for each, value in settings.items()
-        if each in known and _is_number(known[each].default) and not _is_number(value)
-    ]
+    # A campaign's budget is its own: it may be larger than that of a simulation.
+    own = {*known} - {"measurements"}
+    keys = schema.walk(schema.settings())
+    shared = {path[-1]: key for path, key in keys if path[0] == "study" and path[-1] in own}
+    problems: list[Problem] = []
+    for each, value in settings.items():
+        where = f"setting {each} of {name}"
+        if each not in known:
+            problems.append(Problem(where, "is not there", ", ".join(known)))
+        elif each in shared:
+            problems += check(shared[each], value, (where,), "".join)[1]
+        elif not _is_number(value) and value is not known[each].default:
+            problems.append(Problem(where, f"{value!r}"[:60], "a number"))
     refuse(problems)
-    return ADAPTIVE[name](**settings)
+    defaults = {each: key.default for each, key in shared.items()}
+    return ADAPTIVE[name](**{**defaults, **settings})
 
 
 def _is_number(value: object) -> bool:

@@ -87,7 +87,7 @@ def _times(job) -> dict[str, float]:
     fields = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
     work = jobs(fields, SIZES[job.settings["size"]])
     cell = next((each for each in work if each.budget == 200), work[-1])
-    return times_ms(cell, job.seed, job.settings["assessors"] or CONTESTANTS)
+    return times_ms(cell, job.seed, job.settings["study"], job.settings["assessors"] or CONTESTANTS)
 
 
 def _tell(outputs: Mapping[str, str], times: dict[str, float], as_json: bool) -> None:

@@ -136,6 +136,16 @@ def settings() -> Section:
     return _section("", yaml.load(text, Loader=loader))
 
 
+def key(path: str) -> Key:
+    """The key of a dotted path such as ``study.alpha``."""
+    entry: Key | Section | None = settings()
+    for name in path.split("."):
+        entry = entry.entry(name) if isinstance(entry, Section) else None
+    if not isinstance(entry, Key):
+        raise KeyError(path)
+    return entry
+
+
 def _section(name: str, content: Mapping[str, Any]) -> Section:
     entries = tuple(
         _key(each, value)

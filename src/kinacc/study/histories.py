@@ -6,18 +6,17 @@ the rule of an example is shown.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.assess.model_invalidation import ModelInvalidation, Step
+from kinacc.assess.model_invalidation import Invalidation, Step
 from kinacc.assess.world import World
-from kinacc.errors import Problem, refuse
-from kinacc.study.monte_carlo import StudySettings, checked_errors, world_of
+from kinacc.study.monte_carlo import Visits, checked_errors, world_of
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
 
@@ -50,25 +49,11 @@ class HistorySettings:
     simulations_searched: how many repetitions are looked through.
     """
 
-    noise_mm: float = 0.3
-    eta_ratio_rejected: float = 0.834 / 0.906
-    eta_ratio_larger: float = 0.844 / 0.906
-    eta_ratio_kept: float = 1.023 / 0.906
-    simulations_searched: int = 1000
-
-    def __post_init__(self) -> None:
-        found = [
-            Problem(f"histories.{name}", f"{getattr(self, name)}", "above 0")
-            for name in (field.name for field in fields(self))
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0)
-        ]
-        refuse(found, "the histories cannot be made with these settings")
-
-    @classmethod
-    def of(cls, section: Mapping[str, object]) -> HistorySettings:
-        """Settings from a configuration section; keys that are not known here are left out."""
-        names = {field.name for field in fields(cls)}
-        return cls(**{name: value for name, value in section.items() if name in names})
+    noise_mm: float
+    eta_ratio_rejected: float
+    eta_ratio_larger: float
+    eta_ratio_kept: float
+    simulations_searched: int
 
 
 @dataclass(frozen=True)
@@ -85,7 +70,8 @@ class Example:
 def histories(
     error_mm: ArrayLike,
     settings: HistorySettings,
-    study: StudySettings,
+    visits: Visits,
+    assessor: Invalidation,
     seed: int,
     point: ArrayLike | None = None,
     progress=None,
@@ -93,26 +79,26 @@ def histories(
     """Columns of ``histories``: each example measurement by measurement.
 
     error_mm: (m, 3) true errors at the operating points, robot base frame, mm; point: (m,) their
-    numbers, default 0 .. m-1. alpha, distance, covariance, budget and visiting order are the
-    study's. Raises InputError for errors that cannot be used.
+    numbers, default 0 .. m-1. ``visits`` and ``assessor`` are the study's. Raises InputError for
+    errors that cannot be used.
     """
     errors = checked_errors(error_mm)
     numbers = np.arange(errors.shape[0]) if point is None else np.asarray(point, np.int64)
     sizes = np.sqrt(np.sum(errors**2, axis=1))
-    assessor = ModelInvalidation(study.measurements, study.alpha, study.distance, study.covariance)
     found: list[dict] = []
-    for example in examples(errors, settings, study, seed, progress):
-        world = world_of(errors, settings.noise_mm, example.simulation, study, seed)
+    for example in examples(errors, settings, visits, assessor, seed, progress):
+        world = world_of(errors, settings.noise_mm, example.simulation, visits, seed)
         steps = assessor.history(world, example.eta_mm)
         rows = world.index[[step.row for step in steps]]
-        found += _rows(example, steps, numbers[rows], sizes[rows], settings, study)
+        found += _rows(example, steps, numbers[rows], sizes[rows], settings, assessor)
     return columns_of("histories", found)
 
 
 def examples(
     error_mm: np.ndarray,
     settings: HistorySettings,
-    study: StudySettings,
+    visits: Visits,
+    assessor: Invalidation,
     seed: int,
     progress=None,
 ) -> list[Example]:
@@ -121,7 +107,6 @@ def examples(
     Where none of the simulations searched does, the closest thing that exists is shown and said to
     be that (FALLBACKS), with ``rule_met`` false.
     """
-    assessor = ModelInvalidation(study.measurements, study.alpha, study.distance, study.covariance)
     sizes = np.sqrt(np.sum(error_mm**2, axis=1))
     truth, worst = float(sizes.max()), int(sizes.argmax())
     eta, larger, kept = (
@@ -154,7 +139,7 @@ def examples(
         simulations = range(settings.simulations_searched)
         memory = None
         for simulation in progress(simulations, "simulations") if progress else simulations:
-            world = world_of(error_mm, settings.noise_mm, simulation, study, seed, memory)
+            world = world_of(error_mm, settings.noise_mm, simulation, visits, seed, memory)
             memory = world.readings_mm
             if wanted(world):
                 return Example(name, simulation, bound, RULES[name], True)
@@ -175,7 +160,7 @@ def _rows(
     point: np.ndarray,
     true_mm: np.ndarray,
     settings: HistorySettings,
-    study: StudySettings,
+    assessor: Invalidation,
 ) -> list[dict]:
     return [
         {
@@ -184,9 +169,9 @@ def _rows(
             "rule": example.rule,
             "rule_met": int(example.rule_met),
             "noise_mm": settings.noise_mm,
-            "alpha": study.alpha,
-            "distance": study.distance,
-            "covariance": study.covariance,
+            "alpha": assessor.alpha,
+            "distance": assessor.distance,
+            "covariance": assessor.covariance,
             "iteration": place + 1,
             "point": point[place],
             "repeat": step.repeat,

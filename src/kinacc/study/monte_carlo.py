@@ -10,8 +10,8 @@ whatever led there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,74 +23,46 @@ from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.outlier_rejection import OutlierRejection
 from kinacc.assess.world import World, draw
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.config.records import of_section
+from kinacc.errors import InputError, Problem
 
 # The paper's three by class: a registry would make the study depend on whatever joins it.
 ASSESSORS: dict[str, type[Assessor]] = {
     each.name: each for each in (Maximum, OutlierRejection, ModelInvalidation)
 }
 NM_PER_MM = 1_000_000
-VISITING_ORDERS = ("sequence", "shuffled")
 SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
 _SHUFFLE = 1  # keeps the key of the order apart from the key of the readings
 
 
 @dataclass(frozen=True)
-class StudySettings:
-    """The ``study`` section of the configuration.
+class Visits:
+    """How a simulation spends its budget of ``measurements``.
 
-    noise_mm: standard deviations per axis, mm; repetitions: simulations per noise; measurements:
-    budget of every method; alpha, outlier_rule, distance, covariance, search: the default reading
-    (see :mod:`kinacc.assess`); visiting_order: ``sequence`` (points in the order given) or
-    ``shuffled`` (an order of its own for every simulation).
+    visiting_order: ``sequence`` (points in the order given) or ``shuffled`` (an order of its own
+    for every simulation).
     """
 
-    noise_mm: tuple[float, ...] = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
-    repetitions: int = 100
-    measurements: int = 200
-    alpha: float = 0.6
-    outlier_rule: str = "normal"
-    distance: str = "squared"
-    covariance: str = "r"
-    search: str = "from_above"
-    visiting_order: str = "sequence"
+    measurements: int
+    visiting_order: str
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "noise_mm", tuple(float(noise) for noise in self.noise_mm))
-        refuse(self._problems(), "the study cannot run with these settings")
 
-    @classmethod
-    def of(cls, section: Mapping[str, object]) -> StudySettings:
-        """Settings from a configuration section; keys that are not the study's are left out."""
-        names = {field.name for field in fields(cls)}
-        return cls(**{name: value for name, value in section.items() if name in names})
+@dataclass(frozen=True)
+class StudySettings(Visits):
+    """The simulations: noise_mm, standard deviations per axis; repetitions at each of them."""
 
-    def assessors(self) -> list[Assessor]:
-        """The assessors under the default reading, in the order of the paper."""
-        return [self._assessor(cls) for cls in ASSESSORS.values()]
+    noise_mm: tuple[float, ...]
+    repetitions: int
 
-    def _assessor(self, cls: type[Assessor]) -> Assessor:
-        return cls(**{field.name: getattr(self, field.name) for field in fields(cls)})
 
-    def _problems(self) -> Iterator[Problem]:
-        nm = [_nanometres(noise) if np.isfinite(noise) else 0 for noise in self.noise_mm]
-        if not nm or min(nm) < 1 or len(set(nm)) < len(nm):
-            allowed = "one or more different numbers of at least 1e-6 mm"
-            yield Problem("study.noise_mm", f"{list(self.noise_mm)}", allowed)
-        if self.repetitions < 1:
-            yield Problem("study.repetitions", f"{self.repetitions}", "at least 1")
-        if self.visiting_order not in VISITING_ORDERS:
-            found = f"{self.visiting_order!r}"
-            yield Problem("study.visiting_order", found, ", ".join(VISITING_ORDERS))
-        told = set()
-        for cls in ASSESSORS.values():
-            try:
-                self._assessor(cls)
-            except InputError as error:
-                for problem in error.problems:
-                    if problem.where not in told:
-                        told.add(problem.where)
-                        yield replace(problem, where=f"study.{problem.where}")
+def assessors(section: Mapping[str, object], all_readings: bool = True) -> list[Assessor]:
+    """The paper's assessors by the configuration's ``study``, in the order of the paper.
+
+    Each under every reading of the paper (see :mod:`kinacc.assess`), or only the one configured.
+    """
+    if all_readings:
+        return [each for cls in ASSESSORS.values() for each in every_reading(cls, section)]
+    return [of_section(cls, section) for cls in ASSESSORS.values()]
 
 
 def part_of(repetitions: int, number: int, of: int) -> range:
@@ -104,7 +76,7 @@ def world_of(
     error_mm: np.ndarray,
     noise_mm: float,
     repetition: int,
-    settings: StudySettings,
+    visits: Visits,
     seed: int,
     memory: np.ndarray | None = None,
 ) -> World:
@@ -117,41 +89,37 @@ def world_of(
 
     entropy = (seed, _nanometres(noise_mm), repetition)
     order = np.arange(error_mm.shape[0])
-    if settings.visiting_order == "shuffled":
+    if visits.visiting_order == "shuffled":
         order = np.random.default_rng([*entropy, _SHUFFLE]).permutation(order)
-    order = order[: settings.measurements]
+    order = order[: visits.measurements]
     sigma = np.full(order.size, float(noise_mm))
-    return draw(error_mm[order], sigma, key_of(*entropy), settings.measurements, order, memory)
+    return draw(error_mm[order], sigma, key_of(*entropy), visits.measurements, order, memory)
 
 
 def simulate(
     error_mm: ArrayLike,
     noise_mm: Sequence[float],
     repetitions: Iterable[int],
-    settings: StudySettings,
+    visits: Visits,
     seed: int,
+    assessors: Sequence[Assessor],
     progress=None,
-    all_readings: bool = True,
 ) -> Columns:
-    """Run every assessor under every reading on the given repetitions of each noise.
+    """Run every assessor on the given repetitions of each noise.
 
     error_mm: (m, 3) true errors at the operating points, robot base frame, mm. noise_mm: standard
     deviations per axis, mm. ``progress(iterable, what, total)`` reports on the simulations.
-    ``all_readings`` false leaves the default one of each assessor.
-    Returns the columns of ``study_chunk``, one row per noise, repetition, assessor and reading.
+    Returns the columns of ``study_chunk``, one row per noise, repetition and assessor.
     Raises InputError for errors of the wrong shape or not finite.
     """
     errors = checked_errors(error_mm)
-    readings = settings.assessors()
-    if all_readings:
-        readings = [each for assessor in readings for each in every_reading(assessor)]
     jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
-    reachable = min(errors.shape[0], settings.measurements)
-    memory = np.empty((reachable, settings.measurements, 3))
+    reachable = min(errors.shape[0], visits.measurements)
+    memory = np.empty((reachable, visits.measurements, 3))
     rows = []
     for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
-        world = world_of(errors, noise, repetition, settings, seed, memory)
-        rows += [_row(noise, repetition, each, world) for each in readings]
+        world = world_of(errors, noise, repetition, visits, seed, memory)
+        rows += [_row(noise, repetition, each, world) for each in assessors]
     return ordered(columns_of("study_chunk", rows))
 
 
@@ -166,12 +134,11 @@ def ordered(rows: Columns) -> Columns:
     return {name: np.asarray(column)[order] for name, column in rows.items()}
 
 
-def default_reading(rows: Columns, settings: StudySettings) -> Columns:
-    """The rows of the default reading: the columns of ``study``."""
+def default_reading(rows: Columns, section: Mapping[str, object]) -> Columns:
+    """The rows of the reading that the section ``study`` names: the columns of ``study``."""
     keep = np.ones(rows["noise_mm"].size, bool)
     for switch in SWITCHES:
-        chosen = getattr(settings, switch)
-        keep &= np.array([value in (None, chosen) for value in rows[switch]], bool)
+        keep &= np.array([value in (None, section[switch]) for value in rows[switch]], bool)
     return {name: column[keep] for name, column in rows.items() if name not in SWITCHES}
 
 

@@ -101,7 +101,8 @@ def _figure(
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
 _DRAWS = "synthetic/accepted_draws.csv"
-_CONTEST = ("seed", "size", "assessors", "noise_mm", "robots")
+_READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.search")
+_CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
 _MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 _FURTHER = tuple(f"{kind}_model" for kind in FITTED if kind not in ALWAYS)
@@ -237,7 +238,7 @@ STAGES: dict[str, Stage] = {
             "gathering the simulations and summing them up (Fig. 4)",
             ("study_chunk", "assessment_points"),
             ("study", "study_summary", "readings"),
-            ("study.outlier_rule", "study.distance", "study.covariance", "study.search"),
+            _READINGS,
         ),
         Stage(
             "histories",

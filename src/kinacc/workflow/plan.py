@@ -294,11 +294,14 @@ class Plan:
         """Configuration of a data set, or what the tournament depends on beside tables."""
         if dataset != TOURNAMENT:
             return self.datasets[dataset]
+        from kinacc.config.schema import defaults
+
         chosen = {name: list(self.tournament.get(name, ())) for name in ("assessors", "noise_mm")}
         return {
             "seed": next(iter(self.datasets.values()))["seed"],
             "size": self.tournament["size"],
             "robots": {name: config["robot"] for name, config in self.datasets.items()},
+            "study": defaults()["study"],  # of no data set: all are assessed alike
             **chosen,
         }
 

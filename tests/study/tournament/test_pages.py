@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import document_tournament as document
 import numpy as np
+import paper_settings as paper
 import pytest
 
 from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
@@ -24,7 +25,8 @@ def tables() -> dict:
         ErrorField(name, 0.4 * rng.normal(size=(n, 3)), kind="synthetic", meaning="chance")
         for name, n in (("first_0", 220), ("small", 60))
     ]
-    cells = summary.in_order(contest.summed(contest.jobs(made, SIZE), SIZE, 5, NAMES))
+    found = contest.summed(contest.jobs(made, SIZE), SIZE, 5, paper.study(), NAMES)
+    cells = summary.in_order(found)
     return {
         "tournament_cells": cells,
         "tournament_verdicts": summary.judged(cells),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import paper_settings as paper
 import pytest
 from scipy.stats import binomtest
 
@@ -37,7 +38,9 @@ def field() -> ErrorField:
 @pytest.fixture(scope="module")
 def rows(field):
     """All campaigns of the small tournament."""
-    parts = [contest.campaigns(job, range(3), 5)[0] for job in contest.jobs([field], SMALL)]
+    work = contest.jobs([field], SMALL)
+    names = contest.CONTESTANTS
+    parts = [contest.campaigns(job, range(3), 5, paper.study(), names)[0] for job in work]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -103,13 +106,13 @@ def test_every_assessor_is_in_every_cell(rows):
 
 
 def test_parts_of_any_number_give_the_same_table(field):
-    names = ("maximum", "single_shot")
+    names, few = ("maximum", "single_shot"), replace(SMALL, repetitions=2)
 
     def table(parts):
         found = []
         for number in range(1, parts + 1):
             work = contest.part_of(contest.jobs([field], SMALL), number, parts)
-            found.append(contest.summed(work, replace(SMALL, repetitions=2), 5, names))
+            found.append(contest.summed(work, few, 5, paper.study(), names))
         joined = {name: np.concatenate([each[name] for each in found]) for name in found[0]}
         return summary.in_order(joined)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -115,10 +115,16 @@ def part_of(work: Sequence[Job], number: int, of: int) -> Sequence[Job]:
 
 
 def summed(
-    work: Sequence[Job], size: Size, seed: int, assessors: Sequence[str], progress=None
+    work: Sequence[Job],
+    size: Size,
+    seed: int,
+    study: Mapping[str, object],
+    assessors: Sequence[str],
+    progress=None,
 ) -> Columns:
     """Summary of every job: rows as in :func:`kinacc.study.tournament.summary.summed`.
 
+    ``study``: settings that assessors share with the configuration's section of that name.
     ``progress(iterable, what, total)`` reports. The campaigns themselves are not kept.
     """
     found: list[dict] = []
@@ -126,21 +132,27 @@ def summed(
         for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
             own = [name for name in assessors if ASSESSORS[name].is_slow == is_slow]
             if own:
-                found += summary.cells(campaigns(job, range(count), seed, own)[0])
+                found += summary.cells(campaigns(job, range(count), seed, study, own)[0])
     return columns_of("tournament_chunk", found)
 
 
-def times_ms(job: Job, seed: int, assessors: Sequence[str] = CONTESTANTS) -> dict[str, float]:
+def times_ms(
+    job: Job, seed: int, study: Mapping[str, object], assessors: Sequence[str]
+) -> dict[str, float]:
     """Processor time of one campaign of every assessor, median of three, after one to warm up."""
     found = {}
     for name in assessors:
-        _, times = campaigns(job, range(4), seed, [name])
+        _, times = campaigns(job, range(4), seed, study, [name])
         found[name] = float(np.median(times[1:]))
     return found
 
 
 def campaigns(
-    job: Job, repetitions: Iterable[int], seed: int, assessors: Sequence[str] = CONTESTANTS
+    job: Job,
+    repetitions: Iterable[int],
+    seed: int,
+    study: Mapping[str, object],
+    assessors: Sequence[str],
 ) -> tuple[Columns, list[float]]:
     """Statements of the campaigns of one job, and the processor time of each campaign in ms.
 
@@ -149,7 +161,7 @@ def campaigns(
     """
     rows: list[dict] = []
     times: list[float] = []
-    cell = job.cell
+    cell, settings = job.cell, {**study, "measurements": job.budget}
     for repetition in repetitions:
         place = {
             "field": cell.field.name,
@@ -162,7 +174,7 @@ def campaigns(
         for name in assessors:
             own = {**place, "assessor": name}
             begun = time.process_time()
-            found = assessed(name, job.budget, world, **cell.field.known(chosen))
+            found = assessed(name, settings, world, **cell.field.known(chosen))
             times.append(1e3 * (time.process_time() - begun))
             rows += [{**own, **graded} for graded in _graded(found, world, cell.field)]
     kinds = {name: object if name in _TEXTS else None for name in rows[0]} if rows else {}

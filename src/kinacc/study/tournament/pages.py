@@ -10,6 +10,7 @@ from textwrap import dedent
 import numpy as np
 
 from kinacc.assess.registry import ASSESSORS, RECOMMENDED
+from kinacc.config.schema import defaults
 
 NAMES = tuple(ASSESSORS)
 SHOWN = (200, 200)  # candidates and budget of pictures and tables
@@ -71,9 +72,10 @@ def _prose(cls: type) -> str:
 
 def _settings(cls: type) -> str:
     lines = ["| setting | default |", "|---|---|"]
+    study = defaults()["study"]
     for each in fields(cls):
-        default = "required" if each.default is MISSING else f"`{each.default}`"
-        lines.append(f"| `{each.name}` | {default} |")
+        default = study[each.name] if each.default is MISSING else each.default
+        lines.append(f"| `{each.name}` | `{default}` |")
     return "\n".join(lines)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from kinacc.study.monte_carlo import (
-    StudySettings,
     default_reading,
     ordered,
     readings,
@@ -16,10 +15,9 @@ from kinacc.study.monte_carlo import (
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, dict]:
     """Return ``study``, ``study_summary`` and ``readings``."""
-    study = StudySettings.of(settings["study"])
     true_mm = true_accuracy_mm(inputs["assessment_points"]["true_error_mm"])
     rows = ordered(inputs["study_chunk"])
-    default = default_reading(rows, study)
+    default = default_reading(rows, settings["study"])
     return {
         "study": default,
         "study_summary": summary(default, true_mm),

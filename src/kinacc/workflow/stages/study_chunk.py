@@ -6,16 +6,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.study.monte_carlo import StudySettings, part_of, simulate
+from kinacc.config.records import of_section
+from kinacc.study.monte_carlo import StudySettings, assessors, part_of, simulate
 
 
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     """Return ``study_chunk`` for ``settings["part"]`` (default: all repetitions).
 
-    ``settings["all_readings"]`` false: the default reading alone.
+    ``settings["all_readings"]`` false: the reading that ``study`` names alone.
     """
     points = inputs["assessment_points"]
-    study = StudySettings.of(settings["study"])
+    study = of_section(StudySettings, settings["study"])
     part = settings.get("part") or {"number": 1, "of": 1}
     error_mm = np.stack([points["ex_mm"], points["ey_mm"], points["ez_mm"]], axis=1)
     repetitions = part_of(study.repetitions, part["number"], part["of"])
@@ -25,7 +26,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
         repetitions,
         study,
         settings["seed"],
+        assessors(settings["study"], settings.get("all_readings", True)),
         progress,
-        all_readings=settings.get("all_readings", True),
     )
     return {"study_chunk": rows}

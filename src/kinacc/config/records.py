@@ -1,0 +1,22 @@
+"""Records of configuration, apart from the schema: stages depend on this and not on its texts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, TypeVar
+
+Record = TypeVar("Record")
+
+
+def of_section(record: type[Record], section: Mapping[str, Any]) -> Record:
+    """A dataclass ``record`` of the values that a section has under the names of its fields.
+
+    Lists become tuples. The section's other values are left out; TypeError where one is missing.
+    """
+    named = (each.name for each in fields(record) if each.name in section)  # type: ignore[arg-type]
+    return record(**{name: _fixed(section[name]) for name in named})
+
+
+def _fixed(value: Any) -> Any:
+    return tuple(map(_fixed, value)) if isinstance(value, list) else value
