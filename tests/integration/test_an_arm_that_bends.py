@@ -48,20 +48,25 @@ NONE = compliant_arm.NOTHING
 
 @dataclass(frozen=True)
 class Cell:
-    """A measured arm: as it was built and bends, at reported joints (n, k) with payloads (n)."""
+    """A measured arm: as it was built and bends, at reported joints (n, k) with payloads (n).
+
+    ``at_rest``: bent until springs and gravity balance, and not to first order alone.
+    """
 
     robot: str
     arm: Arm
     joints_deg: np.ndarray
     payloads: Sequence[Body]
+    at_rest: bool = False
 
     def dh_joints(self, joints_deg: np.ndarray) -> np.ndarray:
         return np.radians(joints_deg) * compliant_arm.described(self.robot).sign
 
     def tool_poses(self, joints_deg: np.ndarray, payloads: Sequence[Body]) -> np.ndarray:
         """Where the tool truly is for the instrument (n, 4, 4)."""
+        bent = compliant_arm.flange_at_rest if self.at_rest else compliant_arm.flange
         at = zip(self.dh_joints(joints_deg), payloads, strict=True)
-        return np.array([BASE @ compliant_arm.flange(self.arm, q, load) @ TOOL for q, load in at])
+        return np.array([BASE @ bent(self.arm, q, load) @ TOOL for q, load in at])
 
 
 def arm_in_a_cell(name: str, arm: Arm, seed: int, loads: Sequence[Body]) -> Cell:
@@ -329,6 +334,16 @@ def test_the_answer_on_the_fits_shows_the_model_beside_the_others(finished):
     assert held_out["compliance"] == min(held_out.values())
 
 
+def test_an_arm_that_rests_in_full_equilibrium_is_met_to_first_order(tmp_path):
+    """What bending does to the levers moves this arm by 0.02 mm where bending moves it by 7 mm."""
+    cell = replace(fanuc(22, (GRIPPER,)), at_rest=True)
+    written(tmp_path / "poses.csv", cell, 22)
+    settings = stated_masses(cell, payload=in_words(GRIPPER))
+    found = selection(made("residuals", configured(tmp_path, cell.robot, settings, folds=3)))
+    assert found["selected"] == "compliance"
+    assert found["compliance"] < 1.4 * math.sqrt(3.0) * NOISE_MM
+
+
 def told_by(folder: Path) -> tuple[Arm, np.ndarray, np.ndarray]:
     """Arm, base and tool that tables alone describe, rebuilt by the oracle."""
     table, frames = tables_of(folder, "compliance_model", "frames")
@@ -439,6 +454,47 @@ def test_compensated_joints_bring_the_bent_arm_to_the_wanted_pose(finished, tmp_
     for pose, q in zip(wanted, cell.dh_joints(corrected), strict=True):
         there = base @ compliant_arm.flange(arm, q, GRIPPER) @ tool
         assert there[:3, 3] == pytest.approx(pose[:3, 3], abs=1e-5)
+
+
+def test_a_joint_that_has_become_softer_is_named_by_the_comparison(finished, tmp_path):
+    cell, folder = finished
+    softer = {**BENT, 2: 1.1 * BENT[2]}
+    worn = replace(cell, arm=replace(cell.arm, compliance=softer))
+    written(tmp_path / "poses.csv", worn, 23)
+    settings = stated_masses(cell, payload=in_words(GRIPPER))
+    later = made("residuals", configured(tmp_path, cell.robot, settings, folds=3))
+    done = call("compare", folder, later, "--model", "compliance", "--json")
+    assert done.exit_code == 0, done.output
+    rows = {row["parameter"]: row for row in yaml.safe_load(done.stdout)["rows"]}
+    sigmas = {name: abs(row["sigmas"] or 0.0) for name, row in rows.items()}
+    assert sigmas["j2.compliance_rad_per_nm"] > 10.0
+    assert max(sigmas, key=sigmas.get) == "j2.compliance_rad_per_nm"
+    assert sigmas["j3.compliance_rad_per_nm"] < 4.0
+
+
+def test_a_format_that_cannot_carry_bending_says_so(finished, tmp_path):
+    words = ("--model", "compliance", "--format", "urdf", "--to", tmp_path / "exported")
+    done = call("export", finished[1], *words)
+    assert "No such option" not in done.output
+    assert "Traceback" not in done.output
+    assert "compliance" in done.output
+    assert "urdf" in done.output.lower()
+
+
+@pytest.mark.parametrize("word", ["payload", "Nutzlast", "charge"])
+def test_init_takes_payloads_under_names_people_use(tmp_path, word):
+    cell = fanuc(3, (NONE, GRIPPER))
+    path = written(tmp_path / "poses.csv", cell, 3, with_payload=True)
+    path.write_text(path.read_text().replace("payload_", f"{word}_"))
+    done = call("init", path, "--out", tmp_path, "--robot", cell.robot, "--name", NAME, "--yes")
+    assert done.exit_code == 0, done.output
+    config = tmp_path / f"{NAME}.yaml"
+    done = call("run", "measurements", "--config", config, "--results", tmp_path / "results")
+    assert done.exit_code == 0, done.output
+    (table,) = tables_of(tmp_path / "results" / NAME, "measurements")
+    assert table["payload_kg"].tolist() == [load.mass_kg for load in cell.payloads]
+    assert table["payload_x_mm"].tolist() == [load.centre_mm[0] for load in cell.payloads]
+    assert len(table["pose"]) == POSES, "the payload is taken for a measured target"
 
 
 PORTAL = """\

@@ -122,6 +122,11 @@ def settled(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray
     raise ArithmeticError("the arm does not come to rest")
 
 
+def flange_at_rest(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
+    """Pose (4, 4) of the last DH frame where springs and gravity balance."""
+    return frames(arm.table, settled(arm, q, payload))[-1].real
+
+
 @dataclass(frozen=True)
 class Described:
     """What a shipped robot file says, read without the package."""
