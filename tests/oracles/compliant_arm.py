@@ -1,0 +1,197 @@
+"""A serial arm whose joints give way to gravity, by the derivative of its potential energy.
+
+Gravity turns joint j by -dU/dq_j, U the potential energy of everything that hangs on the arm. The
+derivative is a complex step: exact to rounding, and no axis, lever or cross product is ever formed.
+A DH table is a sequence of rows (theta_offset_rad, d_mm, a_mm, alpha_rad, beta_rad); gravity is a
+direction in the first DH frame, centres of gravity stand in the DH frame that carries them.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+STANDARD_GRAVITY = 9.80665  # m/s^2
+ROBOTS = Path(__file__).resolve().parents[2] / "src" / "kinacc" / "kinematics" / "robots"
+_STEP = 1e-30
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mass with its centre of gravity in the frame that carries it."""
+
+    mass_kg: float
+    centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+NOTHING = Body(0.0)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """DH rows, what each link weighs (none where nobody knows), and how much joints give way.
+
+    ``compliance`` (rad per N m) answers the moment of all that hangs beyond the joint and is known
+    to weigh something; ``lever`` (rad per mm) the horizontal distance of the last DH frame alone.
+    Both by joint, from 1.
+    """
+
+    table: tuple[tuple[float, ...], ...]
+    links: tuple[Body, ...] = ()
+    compliance: Mapping[int, float] = field(default_factory=dict)
+    lever: Mapping[int, float] = field(default_factory=dict)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -1.0)
+
+
+def frames(table: Sequence[Sequence[float]], q: Sequence[complex]) -> list[np.ndarray]:
+    """The DH frames after each joint in the first one, at joint angles that may be complex."""
+    found, frame = [], np.eye(4, dtype=complex)
+    for (theta, d, a, alpha, beta), angle in zip(table, q, strict=True):
+        c, s = cmath.cos(angle + theta), cmath.sin(angle + theta)
+        ca, sa = math.cos(alpha), math.sin(alpha)
+        cb, sb = math.cos(beta), math.sin(beta)
+        twist = np.array([[1, 0, 0, a], [0, ca, -sa, 0], [0, sa, ca, d], [0, 0, 0, 1]])
+        hayati = np.array([[cb, 0, sb, 0], [0, 1, 0, 0], [-sb, 0, cb, 0], [0, 0, 0, 1]])
+        turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+        frame = frame @ turn @ twist @ hayati
+        found.append(frame)
+    return found
+
+
+def height_mm(arm: Arm, frame: np.ndarray, centre_mm: Sequence[float]) -> complex:
+    """How far a point of a frame lies against gravity."""
+    size = math.hypot(*arm.gravity)
+    point = frame @ np.array([*centre_mm, 1.0])
+    return -sum(g / size * x for g, x in zip(arm.gravity, point[:3], strict=True))
+
+
+def energy_j(arm: Arm, q: Sequence[complex], payload: Body) -> complex:
+    """Potential energy in joule of links and payload."""
+    at = frames(arm.table, q)
+    bodies = [*zip(at, arm.links, strict=False), (at[-1], payload)]
+    return sum(
+        body.mass_kg * STANDARD_GRAVITY * 1e-3 * height_mm(arm, frame, body.centre_mm)
+        for frame, body in bodies
+    )
+
+
+def _stepped(q: Sequence[float], joint: int) -> list[complex]:
+    return [angle + (1j * _STEP if i == joint - 1 else 0.0) for i, angle in enumerate(q)]
+
+
+def moment_nm(arm: Arm, q: Sequence[float], joint: int, payload: Body = NOTHING) -> float:
+    """Moment in N m by which gravity turns a joint, positive as its angle counts."""
+    return -complex(energy_j(arm, _stepped(q, joint), payload)).imag / _STEP
+
+
+def lever_mm(arm: Arm, q: Sequence[float], joint: int) -> float:
+    """How fast the last DH frame sinks with a joint, in mm per rad."""
+    last = frames(arm.table, _stepped(q, joint))[-1]
+    return -complex(height_mm(arm, last, (0.0, 0.0, 0.0))).imag / _STEP
+
+
+def deflections(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
+    """By what angle (rad) each joint gives way, moments taken at the joints ``q`` themselves."""
+    given = np.zeros(len(arm.table))
+    for joint, per_nm in arm.compliance.items():
+        given[joint - 1] += per_nm * moment_nm(arm, q, joint, payload)
+    for joint, per_mm in arm.lever.items():
+        given[joint - 1] += per_mm * lever_mm(arm, q, joint)
+    return given
+
+
+def flange(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
+    """Pose (4, 4) of the last DH frame of the bent arm, to first order."""
+    return frames(arm.table, np.asarray(q) + deflections(arm, q, payload))[-1].real
+
+
+def settled(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
+    """Joint angles (k,) at which springs and gravity balance: moments on the arm as it is bent."""
+    at = np.asarray(q, dtype=float)
+    for _ in range(100):
+        after = np.asarray(q) + deflections(arm, at, payload)
+        if np.max(np.abs(after - at)) < 1e-15:
+            return after
+        at = after
+    raise ArithmeticError("the arm does not come to rest")
+
+
+def flange_at_rest(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
+    """Pose (4, 4) of the last DH frame where springs and gravity balance."""
+    return frames(arm.table, settled(arm, q, payload))[-1].real
+
+
+@dataclass(frozen=True)
+class Described:
+    """What a shipped robot file says, read without the package."""
+
+    table: tuple[tuple[float, ...], ...]
+    sign: np.ndarray  # DH joint angle = sign * reported angle
+    limits_deg: np.ndarray  # (k, 2), of reported angles
+
+
+def described(name: str) -> Described:
+    """A shipped robot file of revolute joints without couplings."""
+    told = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
+    if "joint_map" in told or told.get("convention", "standard") != "standard":
+        raise ValueError(f"{name} is not a plain chain of standard DH rows")
+    table = tuple(
+        (
+            math.radians(row["theta_offset_deg"]),
+            float(row["d_mm"]),
+            float(row["a_mm"]),
+            math.radians(row["alpha_deg"]),
+            0.0,
+        )
+        for row in told["dh"]
+    )
+    sign = np.array([float(row.get("sign", 1)) for row in told["dh"]])
+    return Described(table, sign, np.array(told["limits_deg"], dtype=float))
+
+
+def disturbed(arm: Arm, rng: np.random.Generator, hayati_joints: Sequence[int] = ()) -> Arm:
+    """The arm as it was built: theta, d, a and alpha a little off, beta for d at joints named."""
+    size = np.tile([5e-4, 0.3, 0.3, 5e-4, 0.0], (len(arm.table), 1))
+    for joint in hayati_joints:
+        size[joint - 1] = [5e-4, 0.0, 0.3, 5e-4, 5e-4]
+    table = np.array(arm.table) + size * rng.normal(size=size.shape)
+    return replace(arm, table=tuple(tuple(row) for row in table.tolist()))
+
+
+def turn_about(rotation_vector: Sequence[float]) -> np.ndarray:
+    """Rotation matrix of a rotation vector (Rodrigues)."""
+    x, y, z = rotation_vector
+    angle = math.sqrt(x * x + y * y + z * z)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
+    if angle < 1e-12:
+        return np.eye(3) + cross
+    one, two = math.sin(angle) / angle, (1 - math.cos(angle)) / angle**2
+    return np.eye(3) + one * cross + two * cross @ cross
+
+
+def placed(rotation_vector: Sequence[float], position_mm: Sequence[float]) -> np.ndarray:
+    """Pose (4, 4) of a frame."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn_about(rotation_vector), position_mm
+    return pose
+
+
+def quaternion(rotation: np.ndarray) -> np.ndarray:
+    """Unit quaternion (w, x, y, z), w >= 0: eigenvector of the largest eigenvalue (Bar-Itzhack)."""
+    r = rotation
+    upper = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
+            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
+            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
+        ]
+    )
+    x, y, z, w = np.linalg.eigh(upper)[1][:, -1]
+    return np.array([w, x, y, z]) * (1.0 if w >= 0 else -1.0)
