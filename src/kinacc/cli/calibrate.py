@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 import subprocess
@@ -20,13 +21,15 @@ WORDS = {"ignore_unknown_options": True}
 CORES = click.option(
     "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
 )
+JSON = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 TARGETS = click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml]...")
 
 
 @click.command("calibrate", context_settings=WORDS)
 @CORES
+@JSON
 @TARGETS
-def calibrate(words: tuple[str, ...], cores: int | None) -> None:
+def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """Fit the models of the data sets of FILE.yaml, and say what they are worth.
 
     Checks the measurements, fits the VEC and the DH model, holds poses out to judge them, and
@@ -43,9 +46,12 @@ def calibrate(words: tuple[str, ...], cores: int | None) -> None:
     configs, plan = carried_out("calibration", words, cores, default=None)
     if plan is None:
         return
-    for dataset in plan.datasets:
-        folder = Path(plan.results) / dataset
-        click.echo(f"\n{in_words(dataset, summary(read(folder)))}")
+    answers = {name: summary(read(Path(plan.results) / name)) for name in plan.datasets}
+    if as_json:
+        click.echo(json.dumps(answers, indent=2))
+        return
+    for dataset, answer in answers.items():
+        click.echo(f"\n{in_words(dataset, answer)}")
     first = f"{plan.results}/{next(iter(plan.datasets))}"
     campaign = ["campaign", "start", "check", "--calibration", first, "--noise-mm", "NOISE"]
     click.echo(

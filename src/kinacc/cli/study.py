@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 
 import click
 
-from kinacc.cli.calibrate import CORES, TARGETS, WORDS, carried_out
+from kinacc.cli.calibrate import CORES, JSON, TARGETS, WORDS, carried_out
 
 
 @click.command("study", context_settings=WORDS)
 @CORES
+@JSON
 @TARGETS
-def study(words: tuple[str, ...], cores: int | None) -> None:
+def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """Carry out the whole study of the data sets of FILE.yaml.
 
     Beside the calibration: the map of errors, the operating points, the paper's assessors under
@@ -29,6 +31,9 @@ def study(words: tuple[str, ...], cores: int | None) -> None:
     paper = SNAKEFILE.parent / "config.yaml"
     configs, plan = carried_out("all", words, cores, default=paper)
     if plan is None:
+        return
+    if as_json:
+        click.echo(json.dumps({"results": [f"{plan.results}/{name}" for name in plan.datasets]}))
         return
     for dataset in plan.datasets:
         click.echo(f"{dataset}: tables and figures are in {plan.results}/{dataset}")
