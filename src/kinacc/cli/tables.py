@@ -31,9 +31,7 @@ def given_joints(
         joints = rows.of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")
         label = np.arange(1, len(joints) + 1)
         given = Rows(len(joints), label, joints, None, None, ())
-    problems = rows.limit_problems(robot, given.joints, given.label, path or "joints")
-    if problems:
-        raise InputError(problems, "Joints outside the robot's limits")
+    rows.require_within_limits(robot, given, path or "joints")
     return given
 
 

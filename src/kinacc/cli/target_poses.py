@@ -55,10 +55,7 @@ def poses(
     if given.joints is None and near is not None:
         given = replace(given, joints=np.broadcast_to(near, (given.count, near.shape[1])))
     if given.joints is not None:
-        place = program or path or "--near-deg"
-        problems = rows.limit_problems(arm.robot, given.joints, given.label, place)
-        if problems:
-            raise InputError(problems, "Joints outside the robot's limits")
+        rows.require_within_limits(arm.robot, given, program or path or "--near-deg")
     return given
 
 
