@@ -21,8 +21,7 @@ from kinacc.cli.campaigns_answers import as_facts
 from kinacc.cli.output import Output
 from kinacc.cli.rows import ANGLE, LENGTH, Reader, open_table
 from kinacc.errors import InputError, Problem
-from kinacc.measurements.table import RawTable
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import RawTable, numbers_of
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "position_error_mm"}  # columns of theirs
 

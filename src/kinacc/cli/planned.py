@@ -20,7 +20,7 @@ from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import travel_unit
 from kinacc.kinematics.robot import Robot
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import numbers_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

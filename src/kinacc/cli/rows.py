@@ -25,8 +25,7 @@ from kinacc.measurements.layout import (
     listed,
     names_of,
 )
-from kinacc.measurements.table import RawTable, load, numbers
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import RawTable, load, numbers, numbers_of
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3

@@ -15,7 +15,7 @@ from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import numbers_of
 
 _FAR_FROM_PROGRAM_RAD = np.deg2rad(20.0)  # a calibration moves joints by less
 _NUMBERS = "7 numbers: x, y, z in mm, then a unit quaternion w, x, y, z"
