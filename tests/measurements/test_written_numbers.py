@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import numbers_of
 
 
 @pytest.mark.parametrize("text", ["1,2.5,-3e-1", "1 2.5 -3e-1", " 1, 2.5 , -3e-1 "])

@@ -10,7 +10,7 @@ import numpy as np
 from kinacc.assess.adaptive import covariance_faults
 from kinacc.config.names import not_in_a_line
 from kinacc.errors import Problem, refuse
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import numbers_of
 
 BASE, INSTRUMENT = "base", "instrument"
 FRAMES = (BASE, INSTRUMENT)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import click
 
 from kinacc.cli import choice
-from kinacc.cli.groups import InOrder
+from kinacc.cli.choice import option
+from kinacc.cli.group import InOrder
+from kinacc.cli.output import answers
 
 
 @click.group("campaign", cls=InOrder)
@@ -30,49 +32,37 @@ def campaign() -> None:
 
 @campaign.command("start")
 @click.argument("folder", type=click.Path(file_okay=False))
-@click.option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
-@click.option("--model", type=choice.MODEL, help="Model to judge. [the one selected]")
-@click.option("--robot", help="Robot of the results. [as the results say]")
-@click.option("--config", multiple=True, help=f"Configuration naming it. [{choice.CONFIG}]")
-@click.option("--session", help="Session whose instrument placement is meant. [the first]")
-@click.option("--point", help="Target that is measured, or flange. [the tool]")
-@click.option("--candidates", type=click.Path(), help="File of joints that may be measured.")
-@click.option("--drawn", default=200, show_default=True, type=click.IntRange(1, 20_000),
-              help="Candidates drawn where there is no file.")  # fmt: skip
-@click.option(
+@option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
+@choice.SELECTED
+@choice.ROBOT
+@choice.NAMING
+@choice.SESSION
+@choice.POINT
+@option("--candidates", type=click.Path(), help="File of joints that may be measured.")
+@option("--drawn", default=200, type=click.IntRange(1, 20_000),
+        help="Candidates drawn where there is no file.")  # fmt: skip
+@option(
     "--region",
     type=click.Choice(["configured", "fitted", "limits"]),
     help="Draw from the configured evaluation space, the joints the calibration covers, or the "
     "joint limits. [configured if there is a configuration, else fitted]",
 )
-@click.option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...".')
-@click.option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')
-@click.option("--noise-mm", help="Standard deviation per axis: one number, or three.")
-@click.option("--covariance-mm2", help="Covariance of a reading: nine numbers, row by row.")
-@click.option("--instrument", multiple=True,
-              help="NAME=noise, NAME=three or NAME=nine numbers; may be repeated.")  # fmt: skip
-@click.option("--frame", type=click.Choice(["instrument", "base"]), default="instrument",
-              show_default=True, help="Frame of readings and covariances.")  # fmt: skip
-@click.option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]")
-@click.option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE.")
-@click.option("--budget", default=200, show_default=True, type=click.IntRange(max=1_000_000),
-              help="Readings in all.")  # fmt: skip
-@click.option("--confidence", default=0.95, show_default=True, type=float,
-              help="How surely each bound is to hold.")  # fmt: skip
-@click.option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have.")
-@click.option("--width-mm", type=float, help="Wanted distance of upper from lower bound.")
-@click.option("--target", type=click.Choice(["candidates", "measured"]), default="candidates",
-              show_default=True, help="Which largest error the width is wanted of.")  # fmt: skip
-@click.option("--joint-tolerance-deg", default=0.02, show_default=True, type=float,
-              help="How far reported joints may be from those asked for.")  # fmt: skip
-@click.option("--implausible-mm", type=float, help="Error beyond which a reading is refused.")
-@click.option("--from-deg", help="Joints the arm starts at. [zero]")
-@click.option("--visit", type=click.Choice(["travel", "random"]), default="travel",
-              show_default=True, help="Order of the first visit.")  # fmt: skip
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0),
-              help="Decides every random draw.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print what was begun as JSON.")
-def start(**given) -> None:
+@option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...".')
+@option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')
+@option("--instrument", multiple=True,
+        help="NAME=noise, NAME=three or NAME=nine numbers; may be repeated.")  # fmt: skip
+@option("--frame", type=click.Choice(["instrument", "base"]), default="instrument",
+        help="Frame of readings and covariances.")  # fmt: skip
+@choice.campaign_options
+@option("--budget", default=200, type=click.IntRange(max=1_000_000), help="Readings in all.")
+@option("--joint-tolerance-deg", default=0.02, type=float,
+        help="How far reported joints may be from those asked for.")  # fmt: skip
+@option("--implausible-mm", type=float, help="Error beyond which a reading is refused.")
+@option("--from-deg", help="Joints the arm starts at. [zero]")
+@option("--visit", type=click.Choice(["travel", "random"]), default="travel",
+        help="Order of the first visit.")  # fmt: skip
+@answers("Print what was begun as JSON.")
+def start(out, **given) -> None:
     """Begin a campaign in FOLDER: nothing of this can be changed once there are readings.
 
     Candidates are the joint configurations the statement is about: rows of a file (q1_deg .. or
@@ -91,15 +81,16 @@ def start(**given) -> None:
     """
     from kinacc.cli import campaigns
 
-    campaigns.start(given)
+    campaigns.start(given, out)
 
 
 @campaign.command("next")
 @click.argument("folder", type=click.Path())
-@click.option("--all", "every", is_flag=True,
-              help="All points that are measured whatever is read, in order.")  # fmt: skip
-@choice.output_options
-def next_(folder, every, output, as_json, force) -> None:
+@option(
+    "--all", "every", is_flag=True, help="All points that are measured whatever is read, in order."
+)
+@answers(table=True)
+def next_(folder, every, out) -> None:
     """Name the joint values to measure next, in degrees and radians.
 
     Nothing is written, so it may be asked as often as wanted. With --all the rest of the first
@@ -112,24 +103,25 @@ def next_(folder, every, output, as_json, force) -> None:
     """
     from kinacc.cli import campaigns
 
-    campaigns.next_(folder, every, output, as_json, force)
+    campaigns.next_(folder, every, out)
 
 
 @campaign.command("record")
 @click.argument("folder", type=click.Path())
 @click.argument("file", type=click.Path(), required=False)
-@click.option("--position-mm", help='Measured position "x,y,z".')
-@click.option("--point", help="Point it was measured at. [the one asked for]")
-@click.option("--joints-deg", help="Joints the controller reported (mm where a joint slides).")
-@click.option("--joints-rad", help="The same in radians.")
-@click.option("--instrument", help="Instrument that measured. [the first]")
-@click.option("--std-mm", help="Noise of this reading where it is not the instrument's.")
-@click.option("--accept-implausible", is_flag=True, help="Take it however large the error is.")
-@click.option("--skip-bad", is_flag=True, help="Take the good rows of a file, name the others.")
-@click.option("--again", is_flag=True,
-              help="They are new readings, though they repeat or replace others.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
-def record(**given) -> None:
+@option("--position-mm", help='Measured position "x,y,z".')
+@option("--point", help="Point it was measured at. [the one asked for]")
+@option("--joints-deg", help="Joints the controller reported (mm where a joint slides).")
+@option("--joints-rad", help="The same in radians.")
+@option("--instrument", help="Instrument that measured. [the first]")
+@option("--std-mm", help="Noise of this reading where it is not the instrument's.")
+@option("--accept-implausible", is_flag=True, help="Take it however large the error is.")
+@option("--skip-bad", is_flag=True, help="Take the good rows of a file, name the others.")
+@option(
+    "--again", is_flag=True, help="They are new readings, though they repeat or replace others."
+)
+@answers()
+def record(out, **given) -> None:
     """Take a reading, or all readings of a CSV, Parquet or JSON FILE.
 
     A file has x_mm, y_mm, z_mm (or _m) and says which point by a column `pose` or by joints
@@ -145,15 +137,15 @@ def record(**given) -> None:
     """
     from kinacc.cli import campaigns_record
 
-    campaigns_record.record(given)
+    campaigns_record.record(campaigns_record.Asked(**given), out)
 
 
 @campaign.command("leave-out")
 @click.argument("folder", type=click.Path())
 @click.argument("point")
-@click.option("--reason", required=True, help="Why it cannot be measured.")
-@click.option("--json", "as_json", is_flag=True, help="Print the standing as JSON.")
-def leave_out(folder, point, reason, as_json) -> None:
+@option("--reason", required=True, help="Why it cannot be measured.")
+@answers("Print the standing as JSON.")
+def leave_out(folder, point, reason, out) -> None:
     """Leave out a POINT that cannot be measured: hidden from the instrument, or not to be reached.
 
     Only a point without readings, and only for a reason that has nothing to do with its error. The
@@ -165,15 +157,15 @@ def leave_out(folder, point, reason, as_json) -> None:
     """
     from kinacc.cli import campaigns_record
 
-    campaigns_record.leave_out(folder, point, reason, as_json)
+    campaigns_record.leave_out(folder, point, reason, out)
 
 
 @campaign.command("strike")
 @click.argument("folder", type=click.Path())
 @click.argument("number", type=click.IntRange(1))
-@click.option("--reason", required=True, help="What went wrong with it.")
-@click.option("--json", "as_json", is_flag=True, help="Print the standing as JSON.")
-def strike(folder, number, reason, as_json) -> None:
+@option("--reason", required=True, help="What went wrong with it.")
+@answers("Print the standing as JSON.")
+def strike(folder, number, reason, out) -> None:
     """Declare reading NUMBER void: something went wrong that has nothing to do with its size.
 
     The reading stays in the journal and in every report, with the reason. A reading that is struck
@@ -185,20 +177,19 @@ def strike(folder, number, reason, as_json) -> None:
     """
     from kinacc.cli import campaigns_record
 
-    campaigns_record.strike(folder, number, reason, as_json)
+    campaigns_record.strike(folder, number, reason, out)
 
 
 @campaign.command("status")
 @click.argument("folder", type=click.Path())
-@click.option("--width-mm", type=float,
-              help="Wanted distance of upper from lower bound. [as begun]")  # fmt: skip
-@click.option("--tolerance-mm", type=float, help="Largest error allowed. [as begun]")
-@click.option("--target", type=click.Choice(["candidates", "measured"]),
-              help="Which largest error the forecast is about. [as begun]")  # fmt: skip
-@click.option("--simulations", default=20, show_default=True, type=click.IntRange(0, 10_000),
-              help="Simulated ends for the forecast; 0 for none.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
-def status(**given) -> None:
+@option("--width-mm", type=float, help="Wanted distance of upper from lower bound. [as begun]")
+@option("--tolerance-mm", type=float, help="Largest error allowed. [as begun]")
+@option("--target", type=click.Choice(["candidates", "measured"]),
+        help="Which largest error the forecast is about. [as begun]")  # fmt: skip
+@option("--simulations", default=20, type=click.IntRange(0, 10_000),
+        help="Simulated ends for the forecast; 0 for none.")  # fmt: skip
+@answers()
+def status(out, **given) -> None:
     """Say what the readings so far allow to say, and what is still needed.
 
     How many more readings the wanted width should take, or what the tolerance is likely to be
@@ -211,15 +202,14 @@ def status(**given) -> None:
     """
     from kinacc.cli import campaigns
 
-    campaigns.status(given)
+    campaigns.status(out=out, **given)
 
 
 @campaign.command("report")
 @click.argument("folder", type=click.Path())
-@click.option("--to", type=click.Path(file_okay=False), help="Folder. [report in the campaign's]")
-@click.option("--force", is_flag=True, help="Replace files that are there.")
-@click.option("--json", "as_json", is_flag=True, help="Print what it says as JSON.")
-def report(**given) -> None:
+@option("--to", type=click.Path(file_okay=False), help="Folder. [report in the campaign's]")
+@answers("Print what it says as JSON.", force="Replace files that are there.")
+def report(folder, to, out) -> None:
     """Write what was measured and what may be said of it: tables, picture, text.
 
     Leaves campaign_points, campaign_readings and campaign_bounds (.parquet), campaign (.svg, .png)
@@ -232,4 +222,4 @@ def report(**given) -> None:
     """
     from kinacc.cli import campaigns
 
-    campaigns.write_report(given)
+    campaigns.write_report(folder, to, out)

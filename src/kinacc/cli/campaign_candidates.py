@@ -32,12 +32,7 @@ class Found:
 def candidates(given: Mapping, arm: Calibration) -> Found:
     """The candidates the options ask for. Raises InputError."""
     if given["candidates"] is not None:
-        file = rows.read(given["candidates"], arm.robot)
-        found = rows.limit_problems(arm.robot, file.joints, file.label, given["candidates"])
-        refuse(found, "Candidates outside the robot's limits")
-        if len(file.joints) > _MOST_CANDIDATES:
-            what = f"{len(file.joints)} candidates"
-            raise InputError(Problem(given["candidates"], what, f"at most {_MOST_CANDIDATES}"))
+        file = rows.candidates(given["candidates"], arm.robot, _MOST_CANDIDATES)
         label = [str(each) for each in file.label]
         source = f"rows of {Path(given['candidates']).name}"
         return Found(file.joints, label, file.directions, source)

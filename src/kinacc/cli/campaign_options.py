@@ -51,9 +51,10 @@ def assessor(given: Mapping) -> AdaptiveAssessor:
         ) from None
 
 
-def not_positive(given: Mapping, name: str) -> list[Problem]:
-    """A problem where an option is given and not above 0, or beyond all arms."""
-    value = given[name]
-    if value is None or 0.0 < value <= _LARGEST_MM:
-        return []
-    return [Problem(f"--{name.replace('_', '-')}", f"{value:g}", f"above 0, to {_LARGEST_MM:g}")]
+def not_positive(**given: float | None) -> list[Problem]:
+    """A problem for each option that is given and not above 0, or beyond all arms."""
+    return [
+        Problem(f"--{name.replace('_', '-')}", f"{value:g}", f"above 0, to {_LARGEST_MM:g}")
+        for name, value in given.items()
+        if value is not None and not 0.0 < value <= _LARGEST_MM
+    ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.table import numbers
 from kinacc.study.tournament import fields
 from kinacc.study.tournament.fields import ErrorField
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 _SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
@@ -44,8 +48,8 @@ def question(given: Mapping) -> Question:
     assessors, chosen = [], []
     with gathered(problems):
         instruments = campaign_options.instruments({**given, "frame": "base"})
-    for name in ("width_mm", "tolerance_mm", "largest_mm"):
-        problems += campaign_options.not_positive(given, name)
+    lengths = ("width_mm", "tolerance_mm", "largest_mm")
+    problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     points = given["poses"]
     budgets = given["budget"] or [max(round(share * points), 2) for share in _SHARES]
     if points * max(budgets) > _MOST_READINGS:
@@ -243,10 +247,9 @@ def _none_did(asked: Question, found: list[Row], said: str) -> str:
     )
 
 
-def draw(asked: Question, found: list[Row], picture: str) -> None:
+def drawn(asked: Question, found: list[Row]) -> Figure:
     """Width against budget."""
     from kinacc.figures import campaign_plan
-    from kinacc.figures.save import write
 
     by_errors: dict[str, list[Row]] = {}
     for row in found:
@@ -262,9 +265,7 @@ def draw(asked: Question, found: list[Row], picture: str) -> None:
     ]
     aim = asked.aim
     enough = power.smallest_budget(found, aim) if _aims(aim) else None
-    figure = campaign_plan.draw(curves, aim.width_mm, aim.power if _aims(aim) else None, enough)
-    path = Path(picture)
-    write(figure, {path.suffix[1:]: path})
+    return campaign_plan.draw(curves, aim.width_mm, aim.power if _aims(aim) else None, enough)
 
 
 def _aims(aim: Aim) -> bool:

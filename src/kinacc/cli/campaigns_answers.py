@@ -159,17 +159,13 @@ def _scatter_facts(found: State) -> dict[str, object] | None:
 
 
 def _statement_facts(said: Statement, found: State, tolerance: float | None) -> dict[str, object]:
-    """A statement for a machine; null for what is not said."""
-
-    def plain(value: float) -> float | None:
-        return None if math.isnan(value) else value
-
+    """A statement for a machine; what is not said is no number."""
     facts = {
         "target": said.target,
-        "value_mm": plain(said.value_mm),
-        "lower_mm": plain(said.lower_mm),
-        "upper_mm": plain(said.upper_mm),
-        "confidence": plain(said.confidence),
+        "value_mm": said.value_mm,
+        "lower_mm": said.lower_mm,
+        "upper_mm": said.upper_mm,
+        "confidence": said.confidence,
         "share": said.share,
         "assumption": words.reason(said.assumption),
         "withheld": words.reason(said.withheld),
@@ -183,13 +179,12 @@ def _statement_facts(said: Statement, found: State, tolerance: float | None) -> 
 def _decision_facts(said: Statement, tolerance: float) -> dict[str, object]:
     """A decision for a machine."""
     found = decide(said, tolerance)
-    known = math.isfinite(found.guard_band_mm)
     return {
         "verdict": found.verdict,
         "reason": words.reason(found.reason),
-        "guard_band_mm": found.guard_band_mm if known else None,
-        "acceptance_limit_mm": found.acceptance_limit_mm if known else None,
-        "risk": None if math.isnan(found.risk) else found.risk,
+        "guard_band_mm": found.guard_band_mm,
+        "acceptance_limit_mm": found.acceptance_limit_mm,
+        "risk": found.risk,
     }
 
 
@@ -197,12 +192,11 @@ def forecast_facts(ahead: Forecast | None) -> dict[str, object] | None:
     """A forecast for a machine."""
     if ahead is None:
         return None
-    finite = [value if math.isfinite(value) else None for value in ahead.width_mm]
     return {
         "by": "simulation from the readings so far",
         "simulations": ahead.simulations,
         "readings_left": ahead.left,
-        "final_width_mm": dict(zip(("q05", "median", "q95"), finite, strict=True)),
+        "final_width_mm": dict(zip(("q05", "median", "q95"), ahead.width_mm, strict=True)),
         "target": ahead.target,
         "wanted_width_mm": ahead.wanted_mm,
         "reached_within_budget": ahead.reached,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,28 +18,45 @@ from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import State
 from kinacc.cli.campaigns import say_doubts
 from kinacc.cli.campaigns_answers import as_facts
+from kinacc.cli.output import Output
 from kinacc.cli.rows import ANGLE, LENGTH, Reader, open_table
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.measurements.table import RawTable
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import RawTable, numbers_of
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "position_error_mm"}  # columns of theirs
 
 
-def record(given: Mapping) -> None:
+@dataclass(frozen=True)
+class Asked:
+    """The options of ``record``: one reading, or a file of them, as they were written."""
+
+    folder: str
+    file: str | None
+    position_mm: str | None
+    point: str | None
+    joints_deg: str | None
+    joints_rad: str | None
+    instrument: str | None
+    std_mm: str | None
+    accept_implausible: bool
+    skip_bad: bool
+    again: bool
+
+
+def record(given: Asked, out: Output) -> None:
     """Take what the options give, or nothing."""
-    one = given["position_mm"] is not None
-    if one == (given["file"] is not None):
+    one = given.position_mm is not None
+    if one == (given.file is not None):
         what = "is given twice" if one else "is not given"
         raise InputError(Problem("the reading", what, "--position-mm, or a FILE"))
-    with folder.writing(given["folder"]) as opened:
+    with folder.writing(given.folder) as opened:
         before = opened.state()
         say_doubts(opened)
         made = _Made([_single(given, before)]) if one else _of_file(given, before)
         if made.taken:
             opened.write(folder.readings_entry(made.taken, *made.source))
-        after = folder.open_(given["folder"]).state()
-    _say_taken(given, made, before, after)
+        after = folder.open_(given.folder).state()
+    _say_taken(given, made, before, after, out)
 
 
 @dataclass(frozen=True)
@@ -58,7 +74,7 @@ class _Made:
     source: tuple = ()
 
 
-def leave_out(path: str, name: str, reason: str, as_json: bool) -> None:
+def leave_out(path: str, name: str, reason: str, out: Output) -> None:
     """Leave a point without readings out of the campaign."""
     with folder.writing(path) as opened:
         before = opened.state()
@@ -77,10 +93,10 @@ def leave_out(path: str, name: str, reason: str, as_json: bool) -> None:
         refuse(problems, "Nothing was left out")
         opened.write(folder.leave_out_entry(point, reason.strip()))
         after = folder.open_(path).state()
-    _say_standing(after, as_json)
+    _say_standing(after, out)
 
 
-def strike(path: str, number: int, reason: str, as_json: bool) -> None:
+def strike(path: str, number: int, reason: str, out: Output) -> None:
     """Declare a reading void."""
     with folder.writing(path) as opened:
         before = opened.state()
@@ -96,44 +112,39 @@ def strike(path: str, number: int, reason: str, as_json: bool) -> None:
         refuse(problems, "Nothing was struck")
         opened.write(folder.strike_entry(number, reason.strip()))
         after = folder.open_(path).state()
-    _say_standing(after, as_json)
+    _say_standing(after, out)
 
 
-def _say_standing(after: State, as_json: bool) -> None:
-    if as_json:
-        click.echo(json.dumps(as_facts(after, after.plan.limits.tolerance_mm), indent=1))
-        return
-    click.echo("\n".join(words.standing(after)))
+def _say_standing(after: State, out: Output) -> None:
+    out.say(as_facts(after, after.plan.limits.tolerance_mm), "\n".join(words.standing(after)))
 
 
-def _single(given: Mapping, before: State) -> Reading:
+def _single(given: Asked, before: State) -> Reading:
     plan = before.plan
     problems: list[Problem] = []
-    position = _three(given["position_mm"], problems)
+    position = _three(given.position_mm, problems)
     joints = None
     for option, unit in (("joints_deg", "deg"), ("joints_rad", "rad")):
-        if given[option] is not None:
-            joints = _joints(given[option], unit, plan.slides, f"--{option[:6]}-{unit}", problems)
-    instrument = given["instrument"] or plan.instruments[0].name
+        if getattr(given, option) is not None:
+            joints = _joints(
+                getattr(given, option), unit, plan.slides, f"--{option[:6]}-{unit}", problems
+            )
+    instrument = given.instrument or plan.instruments[0].name
     if instrument not in {each.name for each in plan.instruments}:
         known = ", ".join(each.name for each in plan.instruments)
         problems.append(Problem("--instrument", f"{instrument!r}", known))
     point = before.asked
-    if given["point"] is not None:
-        point = (
-            plan.points.label.index(given["point"]) if given["point"] in plan.points.label else None
-        )
+    if given.point is not None:
+        point = plan.points.label.index(given.point) if given.point in plan.points.label else None
         if point is None:
-            problems.append(Problem("--point", f"{given['point']!r} is no candidate"))
+            problems.append(Problem("--point", f"{given.point!r} is no candidate"))
     elif point is None:
         problems.append(Problem("the reading", words.standing(before)[-1], fix="give --point"))
     refuse(problems, "Nothing was recorded")
-    found = Reading(point, position, instrument, joints, given["std_mm"])
+    found = Reading(point, position, instrument, joints, given.std_mm)
     left_out = frozenset(before.left_out)
-    problems = reading.problems_of(
-        plan, found, "the reading", left_out, given["accept_implausible"]
-    )
-    if not given["again"]:
+    problems = reading.problems_of(plan, found, "the reading", left_out, given.accept_implausible)
+    if not given.again:
         problems += _repeated(found, "the reading", _recorded(before))
     refuse(problems, "Nothing was recorded")
     return found
@@ -154,19 +165,19 @@ def _repeated(found: Reading, where: str, earlier: Mapping[tuple, str]) -> list[
     return [Problem(where, f"is {same}, to the last digit", fix=fix)]
 
 
-def _of_file(given: Mapping, before: State) -> _Made:
+def _of_file(given: Asked, before: State) -> _Made:
     """What is taken of a file, and what is not. InputError where nothing may be."""
-    path = given["file"]
+    path = given.file
     for option in ("point", "joints_deg", "joints_rad", "std_mm"):
-        if given[option] is not None:
+        if getattr(given, option) is not None:
             option = option.replace("_", "-")
             raise InputError(Problem(f"--{option}", "is given with a file", "a column of the file"))
     table = open_table(path)
     mark = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
-    place = Path(os.path.relpath(Path(path).resolve(), Path(given["folder"]).resolve())).as_posix()
-    rows, problems = _rows(table, given["instrument"], before)
+    place = Path(os.path.relpath(Path(path).resolve(), Path(given.folder).resolve())).as_posix()
+    rows, problems = _rows(table, given.instrument, before)
     read = {number: row for number, row in enumerate(rows) if isinstance(row, Reading)}
-    compared = imports.compare(read, before, place, given["again"])
+    compared = imports.compare(read, before, place, given.again)
     readings = _numbered(before)
     left_out = frozenset(before.left_out)
     earlier = _recorded(before)
@@ -180,12 +191,10 @@ def _of_file(given: Mapping, before: State) -> _Made:
             wrong = _altered(row, where, one, readings[one], before)
         elif number in compared.changed:
             one = compared.changed[number]
-            wrong = [_in_place(where, one, readings[one], given["folder"], before)]
+            wrong = [_in_place(where, one, readings[one], given.folder, before)]
         else:
-            wrong = reading.problems_of(
-                before.plan, row, where, left_out, given["accept_implausible"]
-            )
-            if not given["again"]:
+            wrong = reading.problems_of(before.plan, row, where, left_out, given.accept_implausible)
+            if not given.again:
                 wrong += _repeated(row, where, earlier)
             good += [] if wrong else [row]
         if isinstance(row, Reading):
@@ -195,7 +204,7 @@ def _of_file(given: Mapping, before: State) -> _Made:
         what = f"was recorded before: {_listed(compared.known.values())}, no row is new"
         fix = "a reading that is equal to another to the last digit is a further row of the file"
         raise InputError(Problem(path, what, fix=fix), "Nothing was recorded")
-    if problems and not given["skip_bad"]:
+    if problems and not given.skip_bad:
         raise InputError(problems, "Nothing was recorded")
     known = tuple(sorted(compared.known.values()))
     source = mark, place, compared.grown, compared.adopted
@@ -317,37 +326,36 @@ def _joints(
     return values * np.where(slides, 1.0, ANGLE[unit])
 
 
-def _say_taken(given: Mapping, made: _Made, before: State, after: State) -> None:
+def _say_taken(given: Asked, made: _Made, before: State, after: State, out: Output) -> None:
     label = after.plan.points.label
-    if given["as_json"]:
-        content = {
-            "taken": len(made.taken),
-            "skipped": [str(each) for each in made.skipped],
-            "known": list(made.known),
-            "gone": list(made.gone),
-            "next": None if after.asked is None else label[after.asked],
-            "readings": after.taken,
-            "last_reading": after.numbered,
-        }
-        click.echo(json.dumps(content, indent=1))
-        return
-    for each in made.skipped:
-        click.echo(f"not taken: {each}", err=True)
-    if given["file"] is None:
+    facts = {
+        "taken": len(made.taken),
+        "skipped": [str(each) for each in made.skipped],
+        "known": list(made.known),
+        "gone": list(made.gone),
+        "next": None if after.asked is None else label[after.asked],
+        "readings": after.taken,
+        "last_reading": after.numbered,
+    }
+    lines = []
+    if not out.as_json:
+        for each in made.skipped:
+            click.echo(f"not taken: {each}", err=True)
+        if made.gone:
+            said = f"not in the file any more, and still in the campaign: {_listed(made.gone)}"
+            click.echo(f"{said}; strike what is void", err=True)
+    if given.file is None:
         found = made.taken[0]
         size = float(np.linalg.norm(reading.error_mm(after.plan, found)))
-        click.echo(
+        lines.append(
             f"recorded: reading {after.numbered}, point {label[found.point]}, {size:.3f} mm from "
             "the model"
         )
         if before.asked is not None and found.point != before.asked:
-            click.echo(f"point {label[before.asked]} was asked for: this reading is kept in hand")
+            lines.append(f"point {label[before.asked]} was asked for: this reading is kept in hand")
     else:
         if made.known:
             rows = f"{len(made.known)} row{'s' if len(made.known) > 1 else ''}"
-            click.echo(f"known: {rows} recorded before, as {_listed(made.known)}")
-        if made.gone:
-            said = f"not in the file any more, and still in the campaign: {_listed(made.gone)}"
-            click.echo(f"{said}; strike what is void", err=True)
-        click.echo(f"recorded: {len(made.taken)} readings of {given['file']}")
-    click.echo("\n".join(words.standing(after)))
+            lines.append(f"known: {rows} recorded before, as {_listed(made.known)}")
+        lines.append(f"recorded: {len(made.taken)} readings of {given.file}")
+    out.say(facts, "\n".join([*lines, *words.standing(after)]))

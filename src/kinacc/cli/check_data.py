@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from dataclasses import asdict
 
 import click
 
@@ -102,26 +103,23 @@ def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict
 
 
 def _check_figure(figure: str | None, force: bool, datasets: list[str]) -> None:
-    from kinacc.cli.compare import PICTURES
-    from kinacc.cli.sheet import check_output
+    from kinacc.cli.output import PICTURES, require_writable
     from kinacc.errors import InputError, Problem
 
     if figure is not None and len(datasets) > 1:
         what = "draws one data set, and there are several"
         raise InputError(Problem("--figure", what, ", ".join(datasets), "choose with --dataset"))
-    check_output(figure, force, PICTURES)
+    require_writable([figure], force, PICTURES)
 
 
 def _draw(report, figure: str) -> None:
-    from pathlib import Path
-
+    from kinacc.cli.output import Output
     from kinacc.figures.checked_data import draw
-    from kinacc.figures.save import write
 
     suspects = {each.kind: each.lines for each in report.suspicions}
     limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
     drawn = draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
-    write(drawn, {Path(figure).suffix[1:]: Path(figure)})
+    Output(picture=figure).draw(drawn)
 
 
 def _unusable(dataset: str, path: str, error) -> dict:
@@ -129,8 +127,5 @@ def _unusable(dataset: str, path: str, error) -> dict:
         "dataset": dataset,
         "path": path,
         "verdict": "unusable",
-        "problems": [
-            {"where": each.where, "what": each.what, "allowed": each.allowed, "fix": each.fix}
-            for each in error.problems
-        ],
+        "problems": [asdict(each) for each in error.problems],
     }

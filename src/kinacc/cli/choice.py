@@ -1,8 +1,9 @@
-"""Options the commands share: which calibration, which robot, and where the answer goes."""
+"""Options the commands share: which calibration, which robot, which point."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,60 +13,66 @@ from kinacc.artifacts.allowed import SELECTABLE
 from kinacc.errors import InputError, Problem
 
 if TYPE_CHECKING:
-    from kinacc.cli.sheet import Sheet
     from kinacc.deployment.record import Calibration
     from kinacc.kinematics.robot import Robot
 
 CONFIG = "config.yaml"
+option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
 
 
-def calibration_options(command: Callable) -> Callable:
-    """Which calibration: its folder, the model, and the robot or the configuration naming it."""
-    for option in (
-        click.option(
-            "--robot", help="Robot of the results: a shipped name or file. [as the results say]"
-        ),
-        click.option("--config", multiple=True, help="Configuration naming the robot."),
-        click.option(
-            "--model",
-            type=MODEL,
-            help="Model to use. [the one selected; else the better on held-out poses]",
-        ),
-        click.argument("folder", type=click.Path()),
-    ):
-        command = option(command)
-    return command
+ROBOT = option("--robot", help="Robot of the results: a shipped name or file. [as the results say]")
+NAMING = option("--config", multiple=True, help="Configuration naming the robot.")
+SELECTED = option(
+    "--model",
+    type=MODEL,
+    help="Model to use. [the one selected; else the better on held-out poses]",
+)
+SESSION = option("--session", help="Session whose instrument is meant. [the first]")
+POINT = option("--point", help="Target, or flange. [the tool]")
 
 
-def output_options(command: Callable) -> Callable:
-    """Where the answer goes."""
-    for option in (
-        click.option("--force", is_flag=True, help="Replace a file that is there."),
-        click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON."),
-        click.option(
-            "--output", "-o", type=click.Path(), help="Write to a .csv, .json or .parquet file."
-        ),
-    ):
-        command = option(command)
-    return command
+def together(*options: Callable[[Callable], Callable]) -> Callable[[Callable], Callable]:
+    """Several options as one decorator, in their order."""
+
+    def decorate(command: Callable) -> Callable:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
 
 
-def point_options(command: Callable) -> Callable:
-    """Which point in which frame."""
-    for option in (
-        click.option("--session", help="Session whose instrument is meant. [the first]"),
-        click.option("--point", help="Target, or flange. [the tool]"),
-        click.option(
-            "--frame",
-            type=click.Choice(["base", "instrument"]),
-            default="base",
-            show_default=True,
-            help="The robot's own base, or the instrument that measured it.",
-        ),
-    ):
-        command = option(command)
-    return command
+# Which calibration: its folder, the model, and the robot or the configuration naming it.
+calibration_options = together(click.argument("folder", type=click.Path()), SELECTED, NAMING, ROBOT)
+# Which point in which frame.
+point_options = together(
+    option(
+        "--frame",
+        type=click.Choice(["base", "instrument"]),
+        default="base",
+        help="The robot's own base, or the instrument that measured it.",
+    ),
+    POINT,
+    SESSION,
+)
+# Noise, assessor and aims of a campaign that is begun or planned.
+campaign_options = together(
+    option("--noise-mm", help="Standard deviation per axis: one number, or three."),
+    option("--covariance-mm2", help="Covariance of a reading: nine numbers, row by row."),
+    option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]"),
+    option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
+    option("--confidence", default=0.95, type=float, help="How surely each bound is to hold."),
+    option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have."),
+    option("--width-mm", type=float, help="Wanted distance of upper from lower bound."),
+    option(
+        "--target",
+        type=click.Choice(["candidates", "measured"]),
+        default="candidates",
+        help="Which largest error the aims are about.",
+    ),
+    option("--seed", default=0, type=click.IntRange(0), help="Decides every random draw."),
+)
 
 
 def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> Robot:
@@ -114,15 +121,3 @@ def calibration_of(
     tables = results.read_tables(folder)
     name = Path(folder).resolve().name
     return results.calibration(tables, robot_of(folder, robot, config), model, name, session)
-
-
-def deliver(sheet: Sheet, output: str | None, as_json: bool, force: bool) -> None:
-    """Write, and print for a machine or for a person."""
-    if output is not None:
-        sheet.write(output, force)
-    if as_json:
-        click.echo(sheet.as_json())
-    elif output is None:
-        click.echo(sheet.as_text())
-    else:
-        click.echo(f"{sheet.title}\n{len(sheet)} rows: {output}" if sheet.title else output)

@@ -5,36 +5,20 @@ from __future__ import annotations
 import click
 
 from kinacc.cli import choice
-
-PICTURES = (".svg", ".png", ".pdf")
+from kinacc.cli.choice import option
+from kinacc.cli.output import answers
 
 
 @click.command("compare")
 @click.argument("first", type=click.Path())
 @click.argument("second", type=click.Path())
-@click.option("--joints", type=click.Path(), help="Joints to compare poses at. [as measured]")
-@click.option(
-    "--poses",
-    "count",
-    default=500,
-    show_default=True,
-    type=click.IntRange(10, 100_000),
-    help="At most.",
-)
-@click.option("--picture", type=click.Path(), help="Draw to a .svg, .png or .pdf file.")
-@click.option(
-    "--model",
-    type=choice.MODEL,
-    default="dh",
-    show_default=True,
-    help="Model compared.",
-)
-@click.option("--robot", help="Robot of both. [as the results say]")
-@click.option("--config", multiple=True, help="Configuration naming it.")
-@choice.output_options
-def compare(
-    first, second, joints, count, picture, model, robot, config, output, as_json, force
-) -> None:
+@option("--joints", type=click.Path(), help="Joints to compare poses at. [as measured]")
+@option("--poses", "count", default=500, type=click.IntRange(10, 100_000), help="At most.")
+@option("--model", type=choice.MODEL, default="dh", help="Model compared.")
+@choice.ROBOT
+@choice.NAMING
+@answers(table=True, picture="Draw to a .svg, .png or .pdf file.")
+def compare(first, second, joints, count, model, robot, config, out) -> None:
     """Compare two calibrations of one arm: what moved, and by how many standard deviations.
 
     FIRST and SECOND are results folders of data sets, or robot files. Parameters that the poses of
@@ -47,25 +31,17 @@ def compare(
       kinacc compare results/ur10_b results/ur10_d --picture moved.svg
       kinacc compare before.yaml after.yaml --json
     """
-    from kinacc.cli import comparison_report, sheet
+    from kinacc.cli import comparison_report
     from kinacc.deployment.compare import compare as compared
     from kinacc.progress import reporting
 
-    sheet.check_output(output, force)
-    sheet.check_output(picture, force, PICTURES)
     with reporting("compare", bar=True):
         arms = [comparison_report.source(each, model, robot, config) for each in (first, second)]
         q_rad = comparison_report.joints(arms, (first, second), joints, count)
         found = compared(*arms, q_rad)
     answer = comparison_report.answer(found, arms, len(q_rad))
-    if picture is not None:
-        from pathlib import Path
-
+    if out.picture is not None:
         from kinacc.figures.comparison import draw
-        from kinacc.figures.save import write
 
-        path = Path(picture)
-        write(draw(found, *comparison_report.short_names(arms)), {path.suffix[1:]: path})
-    choice.deliver(answer, output, as_json, force)
-    if not as_json:
-        click.echo(comparison_report.in_words(found, arms))
+        out.draw(draw(found, *comparison_report.short_names(arms)))
+    out.deliver(answer, comparison_report.in_words(found, arms))

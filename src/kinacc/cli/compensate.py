@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from kinacc.cli import choice
+from kinacc.cli.output import answers
 
 
 @click.command("compensate")
@@ -18,11 +19,10 @@ from kinacc.cli import choice
     help="Instead of poses: joints written for the nominal arm, to be corrected.",
 )
 @choice.point_options
-@choice.output_options
+@answers(table=True)
 def compensate(
-    folder, model, config, robot, poses, pose, near_deg, program, frame, point, session, output,
-    as_json, force,
-) -> None:  # fmt: skip
+    folder, model, config, robot, poses, pose, near_deg, program, frame, point, session, out
+) -> None:
     """Find the joints at which the calibrated arm puts its tool where it is wanted.
 
     FOLDER is the results folder of a data set. POSES is a CSV, Parquet or JSON file with x_mm,
@@ -40,17 +40,16 @@ def compensate(
       kinacc compensate results/ur10_b target_poses.csv -o joints.csv
       kinacc compensate results/mh180 --program program.csv -o corrected.csv
     """
-    from kinacc.cli import rows, sheet, target_poses
+    from kinacc.cli import rows, target_poses
     from kinacc.deployment.compensate import compensate as joints_for
     from kinacc.progress import reporting
 
-    sheet.check_output(output, force)
     arm = choice.calibration_of(folder, model, robot, config, session)
     given = target_poses.poses(arm, poses, pose, near_deg, program, frame, point)
     with reporting("compensate", bar=True):
         found = joints_for(arm, given.pose, given.joints, given.directions, frame, point)
     answer = target_poses.compensated(arm, given, found, frame, point, program is not None)
-    choice.deliver(answer, output, as_json, force)
+    out.deliver(answer)
     rows.say_unused(given)
     missed = int((found.q_rad != found.q_rad).any(axis=1).sum())
     if missed:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
+from kinacc.cli.choice import option
+from kinacc.cli.output import Output, answers
 from kinacc.workflow import arm_search
 
 
 @click.command("draw-robots")
 @click.argument("output", type=click.Path(dir_okay=False))
-@click.option(
-    "--draws", type=click.IntRange(1, 1000), default=21, show_default=True, help="Arms wanted."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
-def draw_robots(output: str, draws: int, as_json: bool) -> None:
+@option("--draws", type=click.IntRange(1, 1000), default=21, help="Arms wanted.")
+@answers()
+def draw_robots(output: str, draws: int, out: Output) -> None:
     """Search synthetic arms like the paper's and write them to OUTPUT, a CSV file.
 
     Random arms are tried in order of their seeds, under the default configuration; those that meet
@@ -28,7 +26,5 @@ def draw_robots(output: str, draws: int, as_json: bool) -> None:
       kinacc draw-robots my_draws.csv --draws 5
     """
     tried = arm_search.write(output, draws)
-    if as_json:
-        click.echo(json.dumps({"draws": draws, "seeds_tried": tried, "file": output}))
-        return
-    click.echo(f"{tried} seeds tried for {draws} draws: {output}")
+    facts = {"draws": draws, "seeds_tried": tried, "file": output}
+    out.say(facts, f"{tried} seeds tried for {draws} draws: {output}")

@@ -5,29 +5,27 @@ from __future__ import annotations
 import click
 
 from kinacc.cli import choice
+from kinacc.cli.choice import option
+from kinacc.cli.output import answers
 
 FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 
 
 @click.command("export")
 @click.argument("folder", type=click.Path())
-@click.option("--to", "target", type=click.Path(), default=".", show_default=True, help="Folder.")
-@click.option(
-    "--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]"
-)
-@click.option("--name", help="Name of the files. [the data set's]")
-@click.option("--urdf", type=click.Path(), help="A URDF whose origins are corrected.")
-@click.option("--base-link", help="Link of that file the arm starts at. [its root]")
-@click.option("--tip-link", help="Link of that file the arm ends at. [the only one it can]")
-@click.option("--dh-joints", is_flag=True, help="URDF in the joints of the DH table.")
-@click.option("--robot", help="Robot of the results. [as the results say]")
-@click.option("--config", multiple=True, help="Configuration naming the robot.")
-@click.option("--json", "as_json", is_flag=True, help="List the files as JSON.")
-@click.option("--force", is_flag=True, help="Replace files that are there.")
+@option("--to", "target", type=click.Path(), default=".", help="Folder.")
+@option("--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]")
+@option("--name", help="Name of the files. [the data set's]")
+@option("--urdf", type=click.Path(), help="A URDF whose origins are corrected.")
+@option("--base-link", help="Link of that file the arm starts at. [its root]")
+@option("--tip-link", help="Link of that file the arm ends at. [the only one it can]")
+@option("--dh-joints", is_flag=True, help="URDF in the joints of the DH table.")
+@choice.ROBOT
+@choice.NAMING
+@answers("List the files as JSON.", force="Replace files that are there.")
 def export(
-    folder, target, formats, name, urdf, base_link, tip_link, dh_joints, robot, config, as_json,
-    force,
-) -> None:  # fmt: skip
+    folder, target, formats, name, urdf, base_link, tip_link, dh_joints, robot, config, out
+) -> None:
     """Write the calibrated DH model of FOLDER, a results folder, for other programs.
 
     \b
@@ -67,13 +65,8 @@ def export(
         (base_link, tip_link),
         dh_joints,
     )
-    paths = write(made, target, force)
-    if as_json:
-        import json
-
-        click.echo(json.dumps({"files": paths}, indent=1))
-    else:
-        click.echo("\n".join(paths))
+    paths = write(made, target, out.force)
+    out.say({"files": paths}, "\n".join(paths))
     said = note(folder)
     if said:
         click.echo(said, err=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from kinacc.artifacts.allowed import SELECTABLE
+from kinacc.cli.output import Output, answers, plain
 
 IF_THERE = ("data_check", "excluded_rows")
 TABLES = ("residuals", "model_selection", "dh_identified", "vec_model", "worst_rows")
@@ -19,8 +20,8 @@ _WORST = 5
 
 @click.command("fitted")
 @click.argument("folder", type=click.Path())
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
-def fitted(folder: str, as_json: bool) -> None:
+@answers("Print JSON instead of text.")
+def fitted(folder: str, out: Output) -> None:
     """Say what the fits of FOLDER, a results folder of a data set, are worth.
 
     Position errors of rows that trained and of rows held out, the model these select, what the
@@ -32,12 +33,7 @@ def fitted(folder: str, as_json: bool) -> None:
       kinacc fitted results/ur10_b --json
     """
     answer = summary(read(Path(folder)))
-    if as_json:
-        import json
-
-        click.echo(json.dumps(answer, indent=2))
-    else:
-        click.echo(in_words(Path(folder).name, answer))
+    out.say(answer, in_words(Path(folder).name, answer))
 
 
 def read(folder: Path) -> dict[str, dict]:
@@ -71,8 +67,8 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
     error = choice["gain_std_error_mm2"][list(choice["model"]).index("vec")]
     return {
         "selected": selected,
-        "gain_of_vec_mm2": _plain(gain),
-        "gain_std_error_mm2": _plain(error),
+        "gain_of_vec_mm2": plain(gain),
+        "gain_std_error_mm2": plain(error),
         "vec_order": int(max(tables["vec_model"]["order"])),
         "position_error_mm": {
             model: {subset: _errors(tables["residuals"], model, subset) for subset in _SUBSETS}
@@ -100,7 +96,7 @@ def _errors(table: Mapping, model: str, subset: str) -> dict | None:
     for i, comparison in enumerate(table["comparison"]):
         wanted = comparison == f"{model}_vs_measured" and table["subset"][i] == subset
         if wanted and table["quantity"][i] == "position" and table["fold"][i] != table["fold"][i]:
-            return {name: _plain(table[name][i]) for name in _FIGURES}
+            return {name: plain(table[name][i]) for name in _FIGURES}
     return None
 
 
@@ -114,7 +110,7 @@ def _excluded(table: Mapping, model: str) -> list[dict]:
         {
             "line": int(table["line"][row]),
             "reason": str(table["reason"][row]),
-            "error_mm": _plain(size[row]),
+            "error_mm": plain(size[row]),
         }
         for row in rows[np.argsort(table["line"][rows], kind="stable")]
     ]
@@ -149,18 +145,14 @@ def _worst(table: Mapping, model: str) -> list[dict]:
     held_out.sort(key=lambda i: table["rank"][i])
     return [
         {
-            "line": _plain(table["line"][i]),
+            "line": plain(table["line"][i]),
             "row": int(table["row"][i]),
             "pose": int(table["pose"][i]),
             "target": str(table["target"][i]),
-            "error_mm": _plain(table["error_mm"][i]),
+            "error_mm": plain(table["error_mm"][i]),
         }
         for i in held_out[:_WORST]
     ]
-
-
-def _plain(value: float) -> float | None:
-    return None if value != value else float(value)
 
 
 def in_words(name: str, answer: Mapping) -> str:

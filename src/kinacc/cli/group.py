@@ -32,7 +32,15 @@ class Named(Mapping[str, click.Command]):
         return len(self.names)
 
 
-class Lazy(click.Group):
+class InOrder(click.Group):
+    """A group whose commands are listed in the order in which they were added."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        """The commands in the order of the work."""
+        return list(self.commands)
+
+
+class Lazy(InOrder):
     """A group that lists its commands without importing them.
 
     ``sections`` are titles with names of commands, each with what it does in few words; ``make``
@@ -49,10 +57,6 @@ class Lazy(click.Group):
         names = {name: words for each in sections.values() for name, words in each.items()}
         super().__init__(*args, commands=Named(names, make), **more)
         self.sections = sections
-
-    def list_commands(self, context: click.Context) -> list[str]:
-        """The commands in the order of the work."""
-        return list(self.commands)
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """The commands by what they are for, in the order of the work."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
+from kinacc.cli.choice import option
+from kinacc.cli.output import Output, answers
 
 if TYPE_CHECKING:
     from kinacc.checks.report import Report
@@ -19,32 +21,31 @@ _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "z
 
 @click.command("init")
 @click.argument("measurement_file", type=click.Path())
-@click.option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
-@click.option("--out", default=".", show_default=True, help="Folder to write to.")
-@click.option("--name", help="Name of the data set. [as the file]")
-@click.option("--joint-unit", type=click.Choice(["deg", "rad"]), help="Unit of the joints.")
-@click.option("--length-unit", type=click.Choice(["mm", "m"]), help="Unit of the positions.")
-@click.option("--angle-unit", type=click.Choice(["deg", "rad"]), help="Unit of orientations.")
-@click.option(
+@option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
+@option("--out", "folder", default=".", help="Folder to write to.")
+@option("--name", help="Name of the data set. [as the file]")
+@option("--joint-unit", type=click.Choice(["deg", "rad"]), help="Unit of the joints.")
+@option("--length-unit", type=click.Choice(["mm", "m"]), help="Unit of the positions.")
+@option("--angle-unit", type=click.Choice(["deg", "rad"]), help="Unit of orientations.")
+@option(
     "--orientation",
     help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "
     "convention such as XYZ.",
 )
-@click.option(
+@option(
     "--take",
     multiple=True,
     metavar="COLUMN",
     help="Read this column, and those that go with it, where the names leave several readings "
     "open. May be given again.",
 )
-@click.option(
+@option(
     "--yes",
     is_flag=True,
     help="Ask nothing; take the guesses, which are stated. Stops where there is no guess.",
 )
-@click.option("--force", is_flag=True, help="Replace files that are there.")
-@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON; asks nothing.")
-def init(measurement_file: str, **options) -> None:
+@answers("Print the answer as JSON; asks nothing.", force="Replace files that are there.")
+def init(measurement_file: str, out: Output, **options) -> None:
     """Describe MEASUREMENT_FILE: write its data set and, where needed, its robot.
 
     Looks at the names and numbers of the file, asks what they do not say, and tries the answer on
@@ -63,12 +64,12 @@ def init(measurement_file: str, **options) -> None:
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
 
-    ask = not (options["yes"] or options["as_json"])
+    ask = not (options["yes"] or out.as_json)
     guess = _stated(looked(measurement_file, options, ask), options)
     name = options["name"] or plain_name(measurement_file)
-    folder = Path(options["out"])
+    folder = Path(options["folder"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
-    _refuse(paths, name, options["force"])
+    _refuse(paths, name, out.force)
     if ask:
         guess = _asked(guess)
     robot, chosen = _robot(guess, options["robot"], ask)
@@ -81,7 +82,7 @@ def init(measurement_file: str, **options) -> None:
     with replacing(list(texts)) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
             part.write_text(text, encoding="utf-8")
-    _tell(options["as_json"], guess, robot or own, chosen, report, list(texts), paths[0])
+    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0])
 
 
 _FOLDS_UNKNOWN = 60
@@ -105,30 +106,27 @@ def _stated(guess: Guess, options: dict) -> Guess:
     """The guess with what the options say, which is no assumption then."""
     from kinacc.errors import Problem, refuse
 
+    units = {name: options[name] for name in ("joint_unit", "length_unit", "angle_unit")}
+    units = {name: unit for name, unit in units.items() if unit}
     problems = []
-    for option in ("joint_unit", "length_unit", "angle_unit"):
-        unit, listed = guess.stated.get(option, ("", ""))
-        if options[option] and unit not in ("", options[option]):
-            where = f"--{option.replace('_', '-')} {options[option]}"
+    for name, given in units.items():
+        unit, listed = guess.stated.get(name, ("", ""))
+        if unit not in ("", given):
+            where = f"--{name.replace('_', '-')} {given}"
             what = f"columns {listed} of {guess.section['path']} say {unit}"
             fix = (
                 "leave the option out, or correct the names where they are the ones that are wrong"
             )
             problems.append(Problem(where, what, "the same in both places", fix))
     refuse(problems)
-    settings: dict = {}
-    turn: dict = {}
-    for option, setting in (("joint_unit", "joint_unit"), ("length_unit", "length_unit")):
-        if options[option]:
-            settings[setting] = options[option]
-    if options["angle_unit"]:
-        turn["unit"] = options["angle_unit"]
+    settings: dict = {name: unit for name, unit in units.items() if name != "angle_unit"}
+    turn = {"unit": units["angle_unit"]} if "angle_unit" in units else {}
+    known = set(units)
     if options["orientation"]:
         turn |= _orientation(options["orientation"])
+        known |= {"orientation", "order"}
     if turn:
         settings["orientation"] = turn
-    known = {name for name in ("joint_unit", "length_unit", "angle_unit") if options[name]}
-    known |= {"orientation", "order"} if options["orientation"] else set()
     kept = {k: v for k, v in guess.assumed.items() if k not in known}
     return replace(guess.but(settings), assumed=kept)
 
@@ -335,50 +333,50 @@ def _turned(guess: Guess) -> str:
     return ""
 
 
-def _tell(as_json, guess, robot, chosen, report, written, dataset: Path) -> None:
+def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> None:
     commands = [shlex.join(["kinacc", name, str(dataset)]) for name in ("check-data", "calibrate")]
-    if as_json:
-        answer = {
-            "written": [str(path) for path in written],
-            "robot": robot,
-            "robot_because": chosen,
-            "joints": guess.joints,
-            "targets": list(guess.targets),
-            "file": guess.section,
-            "assumed": guess.assumed,
-            "unused_columns": [name for names, _ in guess.unused() for name in names],
-            "left_aside": [
-                {"columns": list(names), "because": why} for names, why in guess.unused() if why
-            ],
-            "suspicions": [] if report is None else [s.kind for s in report.suspicions],
-            "remarks": _remarks(report),
-            "next": commands,
-        }
-        click.echo(json.dumps(answer, indent=1))
-        return
+    answer = {
+        "written": [str(path) for path in written],
+        "robot": robot,
+        "robot_because": chosen,
+        "joints": guess.joints,
+        "targets": list(guess.targets),
+        "file": guess.section,
+        "assumed": guess.assumed,
+        "unused_columns": [name for names, _ in guess.unused() for name in names],
+        "left_aside": [
+            {"columns": list(names), "because": why} for names, why in guess.unused() if why
+        ],
+        "suspicions": [] if report is None else [s.kind for s in report.suspicions],
+        "remarks": _remarks(report),
+        "next": commands,
+    }
     section, turn = guess.section, guess.section["orientation"]
-    click.echo(f"robot: {robot} ({chosen})")
-    click.echo(f"joints: {guess.joints}, in {section['joint_unit']}: {_listed(guess.found.joints)}")
+    lines = [
+        f"robot: {robot} ({chosen})",
+        f"joints: {guess.joints}, in {section['joint_unit']}: {_listed(guess.found.joints)}",
+    ]
     if guess.found.commanded:
-        click.echo(f"joints as commanded: {_listed(guess.found.commanded)}")
+        lines.append(f"joints as commanded: {_listed(guess.found.commanded)}")
     targets = [f"{name} ({_point(each)})" for name, each in guess.found.targets.items()]
-    click.echo(f"targets, in {section['length_unit']}: {', '.join(targets)}")
+    lines.append(f"targets, in {section['length_unit']}: {', '.join(targets)}")
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
-    click.echo(f"orientation: {kind}{unit}{_turned(guess)}")
+    lines.append(f"orientation: {kind}{unit}{_turned(guess)}")
     for words in guess.assumed.values():
-        click.echo(f"{_how(report)}: {words}")
+        lines.append(f"{_how(report)}: {words}")
     for names, why in guess.unused():
-        click.echo(f"columns not used: {', '.join(names)}" + (f" ({why})" if why else ""))
+        lines.append(f"columns not used: {', '.join(names)}" + (f" ({why})" if why else ""))
     if report is not None and report.suspicions:
         kinds = ", ".join(dict.fromkeys(each.kind for each in report.suspicions))
-        click.echo(f"suspicions: {kinds} (check-data says more)")
+        lines.append(f"suspicions: {kinds} (check-data says more)")
     for words in _remarks(report):
-        click.echo(f"note: {words}")
+        lines.append(f"note: {words}")
     for path in written:
-        click.echo(f"written: {path}")
+        lines.append(f"written: {path}")
     if report is None:
-        click.echo("fill in the robot file first")
-    click.echo("next:")
+        lines.append("fill in the robot file first")
+    lines.append("next:")
     for command in commands:
-        click.echo(f"  {command}")
+        lines.append(f"  {command}")
+    out.say(answer, "\n".join(lines))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +21,10 @@ from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import travel_unit
 from kinacc.kinematics.robot import Robot
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import numbers_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _RANDOM_SETS, _SIZES = 40, 9
 _SEED = 0
@@ -88,12 +91,7 @@ def question(given: Mapping) -> Question:
         threshold=given["threshold"],
     )
     if given["candidates"] is not None:
-        file = rows.read(given["candidates"], robot)
-        found = rows.limit_problems(robot, file.joints, file.label, given["candidates"])
-        refuse(found, "Candidates outside the robot's limits")
-        if len(file.joints) > MOST_CANDIDATES:
-            what = f"{len(file.joints)} candidates"
-            raise InputError(Problem(given["candidates"], what, f"at most {MOST_CANDIDATES}"))
+        file = rows.candidates(given["candidates"], robot, MOST_CANDIDATES)
         joints, label = file.joints, file.label
     else:
         inside = settings.inside if space is None else inside_box(space)
@@ -162,10 +160,9 @@ def in_words(asked: Question, found: Answer) -> str:
     return "\n".join(lines)
 
 
-def draw(asked: Question, found: Answer, picture: str, progress: Callable | None = None) -> None:
+def drawn(asked: Question, found: Answer, progress: Callable | None = None) -> Figure:
     """Index against number of poses, with random sets beside it."""
     from kinacc.figures import planned_poses
-    from kinacc.figures.save import write
 
     rows_, index = found.information.rows, asked.index
     least = -(-found.information.rank // rows_.shape[1])
@@ -180,10 +177,7 @@ def draw(asked: Question, found: Answer, picture: str, progress: Callable | None
     )
     random = exchange.random_sets(rows_, counts, index, _RANDOM_SETS, _SEED)
     meaning = observability.INDICES[index]
-    figure = planned_poses.draw(counts, chosen, random, asked.count, index, meaning,
-                                asked.robot.name)  # fmt: skip
-    path = Path(picture)
-    write(figure, {path.suffix[1:]: path})
+    return planned_poses.draw(counts, chosen, random, asked.count, index, meaning, asked.robot.name)
 
 
 def _numbers(option: str, text: str, count: int | None, problems: list[Problem]) -> np.ndarray:

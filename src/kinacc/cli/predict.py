@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from kinacc.cli import choice
+from kinacc.cli.output import answers
 
 
 @click.command("predict")
@@ -13,11 +14,10 @@ from kinacc.cli import choice
 @click.option("--joints-deg", multiple=True, help='One configuration, e.g. "0,-20,30,0,45,0".')
 @click.option("--joints-rad", multiple=True, help="The same in radians.")
 @choice.point_options
-@choice.output_options
+@answers(table=True)
 def predict(
-    folder, model, config, robot, joints, joints_deg, joints_rad, frame, point, session, output,
-    as_json, force,
-) -> None:  # fmt: skip
+    folder, model, config, robot, joints, joints_deg, joints_rad, frame, point, session, out
+) -> None:
     """Predict the pose of the tool at given joints, with how sure that is.
 
     FOLDER is the results folder of a data set, JOINTS a CSV, Parquet or JSON file with columns
@@ -37,15 +37,14 @@ def predict(
       kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
       kinacc predict results/ur10_b plan.csv --frame instrument -o predicted.csv
     """
-    from kinacc.cli import rows, sheet, tables
+    from kinacc.cli import rows, tables
     from kinacc.deployment.predict import predict as poses_at
     from kinacc.progress import reporting
 
-    sheet.check_output(output, force)
     arm = choice.calibration_of(folder, model, robot, config, session)
     given = tables.given_joints(arm.robot, joints, joints_deg, joints_rad)
     with reporting("predict", bar=True) as progress:
         found = poses_at(arm, given.joints, given.directions, frame, point, progress)
-    choice.deliver(tables.predicted(arm, given, found, frame, point), output, as_json, force)
+    out.deliver(tables.predicted(arm, given, found, frame, point))
     rows.say_unused(given)
     rows.say_missing(found.pose.position_mm)

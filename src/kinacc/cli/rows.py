@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import click
 import numpy as np
 
 from kinacc.config.names import of_csv
@@ -24,8 +25,7 @@ from kinacc.measurements.layout import (
     listed,
     names_of,
 )
-from kinacc.measurements.table import RawTable, load, numbers
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import RawTable, load, numbers, numbers_of
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
@@ -92,10 +92,8 @@ def _answered(table: RawTable, names: list[str], what: str) -> RawTable:
     none = np.all([table.gaps(each) for each in columns], axis=0) & ~table.gaps("status")
     if none.all() or not none.any():
         return table
-    import sys
-
     rows = table.rows_in_words(np.flatnonzero(none))
-    print(f"left out, without {what} by their status: {rows}", file=sys.stderr)
+    click.echo(f"left out, without {what} by their status: {rows}", err=True)
     kept = np.flatnonzero(~none)
     cells = {name: [own[row] for row in kept] for name, own in table.columns.items()}
     return replace(table, columns=cells, line=table.line[kept])
@@ -114,18 +112,28 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
     return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
 
 
-def limit_problems(
-    robot: Robot, joints: np.ndarray, label: np.ndarray, where: str
-) -> list[Problem]:
-    """A problem for every joint of which a row lies outside the robot's limits."""
+def candidates(path: str, robot: Robot, most: int) -> Rows:
+    """Joints of a file to choose from; InputError outside the limits, or for more than ``most``."""
+    given = read(path, robot)
+    require_within_limits(robot, given, path, "Candidates")
+    if given.count > most:
+        raise InputError(Problem(path, f"{given.count} candidates", f"at most {most}"))
+    return given
+
+
+def require_within_limits(robot: Robot, given: Rows, where: str, what: str = "Joints") -> None:
+    """Raise InputError with every joint of which a row lies outside the robot's limits."""
     problems = []
-    for each in outside_limits(robot, joints, 1e-9):
+    for each in outside_limits(robot, given.joints, 1e-9):
         name = f"q{each.joint}"
         hint = f"the column looks like degrees: name it {name}_deg"
-        place = f"{where}, {name}, rows {first_few(label[each.rows])}"
-        what = f"{each.values[0]:g} {each.unit}"
-        problems.append(Problem(place, what, each.allowed, hint if each.looks_like_degrees else ""))
-    return problems
+        place = f"{where}, {name}, rows {first_few(given.label[each.rows])}"
+        value = f"{each.values[0]:g} {each.unit}"
+        problems.append(
+            Problem(place, value, each.allowed, hint if each.looks_like_degrees else "")
+        )
+    if problems:
+        raise InputError(problems, f"{what} outside the robot's limits")
 
 
 class Reader:
@@ -280,16 +288,12 @@ def _with_units(table: RawTable) -> RawTable:
 def say_unused(given: Rows) -> None:
     """Name the columns of a file that were not used, on the error stream."""
     if given.unused:
-        import sys
-
-        print(f"not used: {', '.join(given.unused)}", file=sys.stderr)
+        click.echo(f"not used: {', '.join(given.unused)}", err=True)
 
 
 def say_missing(position_mm: np.ndarray) -> None:
     """Count the rows without an answer, positions (n, 3), on the error stream."""
     missing = int(np.isnan(position_mm).any(axis=1).sum())
     if missing:
-        import sys
-
         all_of = len(position_mm)
-        print(f"{missing} of {all_of} rows without a pose: status says why", file=sys.stderr)
+        click.echo(f"{missing} of {all_of} rows without a pose: status says why", err=True)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
-from kinacc.cli.choice import CONFIG
+from kinacc.cli.choice import CONFIG, option
 from kinacc.cli.group import Lazy
+from kinacc.cli.output import Output, answers
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.workflow.catalogue import STAGES, Stage
 
@@ -17,35 +17,25 @@ def _stage_command(name: str) -> click.Command:
     """The command that runs one stage."""
     stage = STAGES[name]
 
+    @option("--dataset", help="Data set of the configuration; needed if there are two.")
+    @option("--config", multiple=True, help=f"Configuration file; may be repeated. [{CONFIG}]")
+    @option("--results", default="results", help="Results folder.")
+    @answers("Print what was written as JSON.")
     def command(
         dataset: str | None,
         config: tuple[str, ...],
         results: str,
-        as_json: bool,
+        out: Output,
         part: str | None = None,
     ) -> None:
         written = _run(stage, dataset, config or (CONFIG,), results, part)
-        if as_json:
-            click.echo(json.dumps({"stage": name, "written": written}, indent=1))
-            return
-        for path in written:
-            click.echo(f"written: {path}")
+        words = "\n".join(f"written: {path}" for path in written)
+        out.say({"stage": name, "written": written}, words)
 
-    options = [
-        click.Option(["--dataset"], help="Data set of the configuration; needed if there are two."),
-        click.Option(
-            ["--config"], multiple=True, help=f"Configuration file; may be repeated. [{CONFIG}]"
-        ),
-        click.Option(["--results"], default="results", show_default=True, help="Results folder."),
-        click.Option(["--json", "as_json"], is_flag=True, help="Print what was written as JSON."),
-    ]
     if stage.scattered:
-        options.append(
-            click.Option(["--part"], help="Part to compute, e.g. 1-of-2; all if left out.")
-        )
-    return click.Command(
-        name, params=options, callback=command, help=_help(stage), short_help=stage.message
-    )
+        words = "Part to compute, e.g. 1-of-2; all if left out."
+        command = option("--part", help=words)(command)
+    return click.command(name, help=_help(stage), short_help=stage.message)(command)
 
 
 @click.group(

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts.atomic import write_whole
+from kinacc.cli.output import plain
 from kinacc.config.names import in_csv
-from kinacc.errors import Problem, refuse
 
-KINDS = (".csv", ".json", ".parquet")
 _SHOWN_ROWS = 24
 _NOTHING = 5e-5  # less is no digit of the four shown after the point
 
@@ -48,10 +47,10 @@ class Sheet:
 
     def as_json(self) -> str:
         """The facts, units and rows as one JSON object."""
-        columns = [(field.name, [_plain(value) for value in field.values]) for field in self.fields]
+        columns = [(field.name, [plain(value) for value in field.values]) for field in self.fields]
         rows = [{name: values[i] for name, values in columns} for i in range(len(self))]
         units = {field.name: field.unit for field in self.fields if field.unit}
-        return json.dumps({**_plain_facts(self.facts), "units": units, "rows": rows}, indent=1)
+        return json.dumps({**plain(self.facts), "units": units, "rows": rows}, indent=1)
 
     def as_csv(self) -> str:
         """Column names, then one line per row; empty cells for none."""
@@ -79,10 +78,9 @@ class Sheet:
             lines.append(f".. {len(self) - count} rows more; give --output to have them all")
         return "\n".join(lines)
 
-    def write(self, path: Path | str, force: bool = False) -> None:
-        """Write a .csv, .json or .parquet file, whole or not at all; see ``check_output``."""
+    def write(self, path: Path | str) -> None:
+        """Write a .csv, .json or .parquet file, whole or not at all."""
         path = Path(path)
-        check_output(path, force)
         if path.suffix == ".parquet":
             content = self._parquet()
         else:
@@ -96,30 +94,15 @@ class Sheet:
 
         arrays, described = [], []
         for field in self.fields:
-            array = pa.array([_plain(value) for value in field.values])
+            array = pa.array([plain(value) for value in field.values])
             arrays.append(array)
             about = {"unit": field.unit, "meaning": field.meaning}
             described.append(pa.field(field.name, array.type, metadata=about))
-        facts = {key: json.dumps(value) for key, value in _plain_facts(self.facts).items()}
+        facts = {key: json.dumps(value) for key, value in plain(self.facts).items()}
         sink = pa.BufferOutputStream()
         table = pa.Table.from_arrays(arrays, schema=pa.schema(described, metadata=facts))
         pq.write_table(table, sink, compression="zstd", version="2.6")
         return sink.getvalue().to_pybytes()
-
-
-def check_output(path: Path | str | None, force: bool, kinds: Sequence[str] = KINDS) -> None:
-    """Raise InputError where an output file could not or should not be written."""
-    if path is None:
-        return
-    path = Path(path)
-    problems = []
-    if kinds and path.suffix not in kinds:
-        problems.append(Problem(str(path), f"ends in {path.suffix!r}", ", ".join(kinds)))
-    if path.exists() and not force:
-        problems.append(Problem(str(path), "is there already", fix="give --force to replace it"))
-    if path.is_dir():
-        problems = [Problem(str(path), "is a folder", "a file")]
-    refuse(problems, "Nothing was written")
 
 
 def number(value: float) -> str:
@@ -129,21 +112,8 @@ def number(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
-def _plain(value: object) -> object:
-    """A value JSON and Arrow know; None for NaN."""
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
-
-
-def _plain_facts(facts: Mapping[str, object]) -> dict[str, object]:
-    return {key: _plain(value) for key, value in facts.items()}
-
-
 def _cell(value: object) -> str:
-    value = _plain(value)
+    value = plain(value)
     if value is None:
         return ""
     # Twelve digits: a nanometre in ten metres, and a text that ends where the digits end.
@@ -151,7 +121,7 @@ def _cell(value: object) -> str:
 
 
 def _short(value: object) -> str:
-    value = _plain(value)
+    value = plain(value)
     if value is None:
         return "-"
     if isinstance(value, float):

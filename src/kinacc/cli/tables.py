@@ -9,7 +9,7 @@ from kinacc.cli.rows import Rows
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.deployment.predict import Prediction
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.robot import Robot
 
@@ -31,8 +31,7 @@ def given_joints(
         joints = rows.of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")
         label = np.arange(1, len(joints) + 1)
         given = Rows(len(joints), label, joints, None, None, ())
-    problems = rows.limit_problems(robot, given.joints, given.label, path or "joints")
-    refuse(problems, "Joints outside the robot's limits")
+    rows.require_within_limits(robot, given, path or "joints")
     return given
 
 

@@ -15,7 +15,7 @@ from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, rotation_from_quaternion
-from kinacc.measurements.written_numbers import numbers_of
+from kinacc.measurements.table import numbers_of
 
 _FAR_FROM_PROGRAM_RAD = np.deg2rad(20.0)  # a calibration moves joints by less
 _NUMBERS = "7 numbers: x, y, z in mm, then a unit quaternion w, x, y, z"
@@ -55,9 +55,7 @@ def poses(
     if given.joints is None and near is not None:
         given = replace(given, joints=np.broadcast_to(near, (given.count, near.shape[1])))
     if given.joints is not None:
-        place = program or path or "--near-deg"
-        problems = rows.limit_problems(arm.robot, given.joints, given.label, place)
-        refuse(problems, "Joints outside the robot's limits")
+        rows.require_within_limits(arm.robot, given, program or path or "--near-deg")
     return given
 
 

@@ -6,27 +6,26 @@ from collections.abc import Mapping
 
 import click
 
+from kinacc.cli.choice import option
+from kinacc.cli.output import Output, answers
+
 
 @click.command("tournament")
-@click.option("--config", multiple=True, help="Configuration; may be repeated. [config.yaml]")
-@click.option("--results", default="results", show_default=True, help="Results folder.")
-@click.option(
+@option("--config", multiple=True, help="Configuration; may be repeated. [config.yaml]")
+@option("--results", default="results", help="Results folder.")
+@option(
     "--size",
     type=click.Choice(["default", "coverage", "budgets", "full"]),
     help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
-@click.option("--parts", type=click.IntRange(1, 10_000), help="Number of parts. [configuration]")
-@click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
-@click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
-@click.option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")
-@click.option(
-    "--cores", type=click.IntRange(1, 1000), default=1, show_default=True, help="Parts at a time."
-)
-@click.option("--times", is_flag=True, help="Also measure the time of a campaign of each.")
-@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
-def tournament(
-    config, results, size, parts, part, assessor, noise_mm, cores, times, as_json
-) -> None:
+@option("--parts", type=click.IntRange(1, 10_000), help="Number of parts. [configuration]")
+@option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
+@option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
+@option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")
+@option("--cores", type=click.IntRange(1, 1000), default=1, help="Parts at a time.")
+@option("--times", is_flag=True, help="Also measure the time of a campaign of each.")
+@answers("Print the verdicts as JSON.")
+def tournament(config, results, size, parts, part, assessor, noise_mm, cores, times, out) -> None:
     """Let every assessor assess errors that are known, and hold what it says to the truth.
 
     The error fields are those of the configuration's data sets, whose tables have to be there
@@ -75,7 +74,7 @@ def tournament(
             err=True,
         )
         raise
-    _tell(gathering.outputs, _times(waiting[0]) if times else {}, as_json)
+    _tell(gathering.outputs, _times(waiting[0]) if times else {}, out)
 
 
 def _times(job) -> dict[str, float]:
@@ -90,39 +89,34 @@ def _times(job) -> dict[str, float]:
     return times_ms(cell, job.seed, job.settings["study"], job.settings["assessors"] or CONTESTANTS)
 
 
-def _tell(outputs: Mapping[str, str], times: dict[str, float], as_json: bool) -> None:
+def _tell(outputs: Mapping[str, str], times: dict[str, float], out: Output) -> None:
     """Print the verdicts, and how statements fared whose assumption is not true of the field."""
-    import json
-
     from kinacc.artifacts.store import read
 
     path = outputs["tournament_verdicts"]
     table = read(path)
     rows = [dict(zip(table, each, strict=True)) for each in zip(*_plain(table), strict=True)]
-    if as_json:
-        click.echo(json.dumps({"verdicts": rows, "time_ms": times, "table": path}, indent=2))
-        return
     cells = read(outputs["tournament_cells"])
-    click.echo(
+    lines = [
         "assessor                 about       statements   held  worst cell  rejected  below  cells"
         "  no statement  untrue  then held"
-    )
+    ]
     for row in rows:
         untrue, held = _untrue(cells, row["assessor"], row["target"])
-        click.echo(
+        lines.append(
             f"{row['assessor']:23s}  {row['target']:10s}  {row['statements']:10d}  "
             f"{row['mean_holds']:5.3f}  {row['worst_holds']:10.3f}  {row['rejected']:8d}  "
             f"{row['below']:5d}  {row['cells']:5d}  {row['withheld']:12.1%}  {untrue:6d}  "
             + (f"{held / untrue:9.3f}" if untrue else f"{'-':>9s}")
         )
-    click.echo(
+    lines.append(
         "held: share of upper bounds not below the truth; rejected: cells significantly below the "
         "confidence;\nbelow: cells more than 3 points below it; untrue: statements left out of all "
         "this because what they\nassume is not true of the field, which the readings did not show"
     )
-    for name, taken in times.items():
-        click.echo(f"{name:24s}  {taken:8.1f} ms a campaign of 200 measurements")
-    click.echo(f"all of it: {path.rpartition('/')[0]}")
+    lines += [f"{n:24s}  {ms:8.1f} ms a campaign of 200 measurements" for n, ms in times.items()]
+    lines.append(f"all of it: {path.rpartition('/')[0]}")
+    out.say({"verdicts": rows, "time_ms": times, "table": path}, "\n".join(lines))
 
 
 def _untrue(cells: Mapping, assessor: str, target: str) -> tuple[int, int]:

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.errors import Problem
-from kinacc.measurements import roles
-from kinacc.measurements.names import name_of
+from kinacc.measurements import column_names
+from kinacc.measurements.column_names import name_of
 from kinacc.measurements.table import RawTable, numbers
 
 TOOL = "tool"  # name of the target whose columns carry no name
@@ -51,7 +51,7 @@ _TARGET_QUANTITIES = (
     *ANGLES_IN_ORDER,
 )
 _POINT = re.compile(r"(?P<name>.+_x)_(?:mm|m)")
-_READ = (roles.MEASURED, roles.REPORTED, roles.PLAIN)
+_READ = (column_names.MEASURED, column_names.REPORTED, column_names.PLAIN)
 
 
 @dataclass(frozen=True)
@@ -227,13 +227,13 @@ class _Finder:
         mapped = [split(name) for name in self.layout.columns]
         named = [target or TOOL for target, quantity in mapped if quantity == "x"]
         there = list(dict.fromkeys(self._points()))
-        says = {name: roles.role(name_of(f"{name} x").words) for name in there}
-        letters = [n for n in there if len(n) == 1 and says[n] == roles.PLAIN]
+        says = {name: column_names.role(name_of(f"{name} x").words) for name in there}
+        letters = [n for n in there if len(n) == 1 and says[n] == column_names.PLAIN]
         read = [n for n in there if says[n] in _READ or n in named or (letters and len(n) == 1)]
-        frames = [n for n in there if n not in read and roles.is_frame(name_of(n).words)]
+        frames = [n for n in there if n not in read and column_names.is_frame(name_of(n).words)]
         if not read and not named and len(frames) == 1:
             read = frames  # the tool centre point, under its usual name
-        unclear = [n for n in there if n not in read and says[n] == roles.OPEN]
+        unclear = [n for n in there if n not in read and says[n] == column_names.OPEN]
         if unclear or (there and not read and not named):
             self._unclear(unclear or there, read)
         return list(dict.fromkeys([*read, *named])) or [TOOL]
@@ -249,8 +249,8 @@ class _Finder:
 
     def _unclear(self, names: list[str], read: list[str]) -> None:
         columns = [c for c in self.table.columns for n in names if c in (f"{n}_x_mm", f"{n}_x_m")]
-        said = [roles.role(name_of(column).words) for column in columns]
-        told = ", ".join("open" if each == roles.OPEN else each for each in said)
+        said = [column_names.role(name_of(column).words) for column in columns]
+        told = ", ".join("open" if each == column_names.OPEN else each for each in said)
         named = ", ".join(dict.fromkeys([*read, *names]))
         self._problem(
             ", ".join(columns),

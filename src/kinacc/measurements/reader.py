@@ -13,7 +13,6 @@ from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
 from kinacc.measurements.layout import STD, TOOL, Found, Layout, Place, Target, find
 from kinacc.measurements.orientation import quaternions, rotation_std
-from kinacc.measurements.stated_units import contradictions
 from kinacc.measurements.table import RawTable, load, numbers
 
 POSITION = ("x_mm", "y_mm", "z_mm")
@@ -112,7 +111,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     problems: list[Problem] = []
     title = f"{table.path} cannot be used"
     found = find(table, layout, robot.dh.prismatic, problems)
-    problems += contradictions(table, layout, robot.dh.prismatic)
+    problems += faults.unit_problems(table, layout, robot.dh.prismatic)
     if found is None or problems:
         raise InputError(problems, title)
     q_rad = _stacked(table, found.joints, problems)

@@ -1,4 +1,4 @@
-"""A file of rows and named columns, as text with the line every row came from."""
+"""A file of rows and named columns, as text with the line every row came from; text as numbers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from kinacc.errors import InputError, Problem, first_few, refuse
 
 _NOTHING = ("", "nan", "na", "n/a", "null", "none", "#n/a")
 _LONGEST_NOTHING = max(map(len, _NOTHING))
+_LARGEST = 1e12  # beyond all lengths and angles
 _SHOWN = 5  # rows named per problem; the rest is counted
 
 # What is held at once; calibrations are made from some hundred to some ten thousand rows.
@@ -102,6 +103,18 @@ def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool =
             )
         )
     return values
+
+
+def numbers_of(text: str) -> np.ndarray:
+    """Numbers (n,) of a text such as "1, 2.5,-3" or "1 2.5 -3".
+
+    None where a word is no number, or one beyond all lengths and angles.
+    """
+    try:
+        values = np.array([float(word) for word in text.replace(",", " ").split()])
+    except ValueError:
+        return np.zeros(0)
+    return values if (np.abs(values) <= _LARGEST).all() else np.zeros(0)
 
 
 def _shortened(text: str) -> str:

@@ -3,9 +3,9 @@
 import pytest
 
 from kinacc.errors import InputError
+from kinacc.measurements.column_names import name_of
 from kinacc.measurements.intake import guess, text
 from kinacc.measurements.intake.columns import recognise
-from kinacc.measurements.names import name_of
 
 KUKA = """exported by a controller
 Nr;A1;A2;A3;A4;A5;A6;X;Y;Z;A;B;C

@@ -9,11 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from kinacc.measurements.intake import groups
-from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, TURN, Group, Values
-from kinacc.measurements.layout import TOOL
-from kinacc.measurements.names import Name
-from kinacc.measurements.roles import (
+from kinacc.measurements.column_names import (
     CALCULATED,
     DEVIATION,
     MEASURED,
@@ -23,9 +19,13 @@ from kinacc.measurements.roles import (
     PLAIN,
     REPORTED,
     SPREAD,
+    Name,
     is_own_pose,
     role,
 )
+from kinacc.measurements.intake import groups
+from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, TURN, Group, Values
+from kinacc.measurements.layout import TOOL
 
 _LENGTHS, _ANGLES = {"mm", "m"}, {"deg", "rad"}
 _NOT_MEASURED = (NOMINAL, CALCULATED, DEVIATION, SPREAD, OTHER)

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.measurements import roles
+from kinacc.measurements import column_names
+from kinacc.measurements.column_names import READ, Name
 from kinacc.measurements.layout import TOOL
-from kinacc.measurements.names import READ, Name
 
 JOINTS, POINT, TURN, SPREAD, POSE = "joints", "point", "orientation", "spread", "pose"
 Values = Callable[[Name], np.ndarray]
@@ -101,7 +101,7 @@ def is_deviation(name: Name) -> bool:
     told = [
         w for w in name.words if w not in _FILLING and not w.isdigit() and w not in ("d", "total")
     ]
-    said = roles.role(name.words) == roles.DEVIATION or {*name.words} == {"deviation"}
+    said = column_names.role(name.words) == column_names.DEVIATION or {*name.words} == {"deviation"}
     return said and len(told) <= 1 and name.unit not in ("deg", "rad")
 
 
@@ -124,7 +124,7 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
         if len(row) == 4 and (turn := _quaternion(row, about, values)):
             yield turn
         elif len(row) == 6 and about & _POSE_WORDS and not about & {"joint", "joints"}:
-            yield Group(POSE, roles.role(words), "", dict(zip("123456", row, strict=True)))
+            yield Group(POSE, column_names.role(words), "", dict(zip("123456", row, strict=True)))
         elif 4 <= len(row) <= 7:
             known = bool(about & _JOINT_WORDS) and not about & _EXTERNAL
             if known or len(row) >= 6:
@@ -146,10 +146,10 @@ def _quaternion(row: list[Name], about: set[str], values: Values | None) -> Grou
         return None
     words = row[0].words
     columns = {f"quat{number}": name for number, name in enumerate(row, 1)}
-    role = roles.role([w for w in words if w not in _QUATERNION_WORDS])
+    role = column_names.role([w for w in words if w not in _QUATERNION_WORDS])
     return Group(
         TURN,
-        role if unit else roles.OTHER,
+        role if unit else column_names.OTHER,
         _target(row[0], drop=True),
         columns,
         ("quaternion", "XYZ"),
@@ -158,15 +158,15 @@ def _quaternion(row: list[Name], about: set[str], values: Values | None) -> Grou
 
 def _joints(row: Sequence[Name], words: Sequence[str], weak: bool = False) -> Group:
     rest = [w for w in words if w not in _JOINT_WORDS | _FILLING and not w.isdigit()]
-    rest = [w for w in rest if roles.role([w]) != roles.CALCULATED]
-    said = roles.role(rest)
-    if roles.commands(rest):
-        said = roles.NOMINAL
-    elif said == roles.MEASURED:
-        said = roles.REPORTED
+    rest = [w for w in rest if column_names.role([w]) != column_names.CALCULATED]
+    said = column_names.role(rest)
+    if column_names.commands(rest):
+        said = column_names.NOMINAL
+    elif said == column_names.MEASURED:
+        said = column_names.REPORTED
     if weak and _EXTERNAL & {*words}:
-        said = roles.OTHER
-    strange = any(not roles.speaks(word) for word in rest)
+        said = column_names.OTHER
+    strange = any(not column_names.speaks(word) for word in rest)
     columns = {f"q{number}": name for number, name in enumerate(row, 1)}
     return Group(JOINTS, said, "_".join(rest) if strange else "", columns, weak=weak)
 
@@ -207,10 +207,10 @@ def _by_axis(names: Sequence[Name]) -> Iterator[Group]:
         units = {axes[axis].unit for axis in "xyz"} - {""}
         vector = bool(about & _VECTOR_WORDS) and (stem == "r" or bool(about & _TURN_WORDS))
         told = [w for w in words if not (vector and w == "vector")]
-        role = roles.role(told)
+        role = column_names.role(told)
         letter = [w for w in one.words[one.words.index(f"{stem}x") + 1 :] if len(w) == 1]
-        if role == roles.PLAIN and any(w.isalpha() and w not in _TURN_WORDS for w in letter):
-            role = roles.OPEN  # x_n, x_c: what the letter means is anyone's guess
+        if role == column_names.PLAIN and any(w.isalpha() and w not in _TURN_WORDS for w in letter):
+            role = column_names.OPEN  # x_n, x_c: what the letter means is anyone's guess
         is_turn = stem == "r" or bool(about & _TURN_WORDS)
         quaternion = stem == "q" or bool(about & _QUATERNION_WORDS)
         if quaternion or (is_turn and "w" in axes and stem == ""):
@@ -220,7 +220,7 @@ def _by_axis(names: Sequence[Name]) -> Iterator[Group]:
                 yield Group(TURN, role, target, columns, ("quaternion", "XYZ"))
             continue
         is_turn = is_turn or (bool(units) and units <= {"deg", "rad"})
-        if role == roles.SPREAD:
+        if role == column_names.SPREAD:
             kept = "r" if is_turn else ""
             columns = {f"std_{kept}{axis}": axes[axis] for axis in "xyz"}
             yield Group(SPREAD, role, _target(one, drop=is_turn), columns, weak=not _one_sigma(one))
@@ -246,8 +246,8 @@ def _by_word(names: Sequence[Name], points: set[tuple[str, ...]]) -> Iterator[Gr
                 continue
             parts = [columns[letter] for letter in letters]
             named = dict(zip(("rx", "ry", "rz"), parts, strict=True))
-            role = roles.role(words)
-            if role == roles.SPREAD:
+            role = column_names.role(words)
+            if role == column_names.SPREAD:
                 named = {f"std_{axis}": name for axis, name in named.items()}
                 yield Group(SPREAD, role, _target_of(parts[0], words), named, weak=True)
             else:
@@ -297,16 +297,16 @@ def _target(one: Name, drop: bool = False) -> str:
 
 def _target_of(one: Name, words: Sequence[str]) -> str:
     spelling = dict(zip(one.words, one.spelled, strict=True))
-    told = [w for w in words if not roles.speaks(w) and w not in _FILLING]
+    told = [w for w in words if not column_names.speaks(w) and w not in _FILLING]
     return "_".join(spelling[w] for w in told) or TOOL
 
 
 def _one_sigma(one: Name) -> bool:
     """Whether a spread is one standard deviation: no interval, no multiple of it."""
     words = one.words
-    if not ({*words} & roles.ONE_SIGMA or {"standard", "deviation"} <= {*words}):
+    if not ({*words} & column_names.ONE_SIGMA or {"standard", "deviation"} <= {*words}):
         return False
-    places = [place for place, word in enumerate(words) if word in roles.ONE_SIGMA]
+    places = [place for place, word in enumerate(words) if word in column_names.ONE_SIGMA]
     beside = {words[p + step] for p in places for step in (-1, 1) if 0 <= p + step < len(words)}
     return not any(each.isdigit() for each in beside)
 

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from kinacc.errors import InputError, Problem, refuse
+from kinacc.measurements.column_names import NOMINAL, Name, name_of
 from kinacc.measurements.intake import columns, text
 from kinacc.measurements.intake.columns import Columns
 from kinacc.measurements.layout import TOOL, Layout, find
-from kinacc.measurements.names import Name, name_of
-from kinacc.measurements.roles import NOMINAL
 from kinacc.measurements.table import RawTable, numbers
 
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
