@@ -17,8 +17,9 @@ from kinacc.kinematics import robot
 ARM = robot.load("ur10")
 FREE = dh_fit.free_parameters(6, (2, 3))
 OPTIONS = Options(
-    500.0, True, 1, Prior(0.3, 3e-4, 0.7, 3e-4), dh_to_vec=False, hayati_joints=(2, 3)
-)
+    500.0, True, 1, Prior(0.3, 3e-4, 0.7, 3e-4), dh_to_vec=False, hayati_joints=(2, 3),
+    loss="squares", threshold=1e-2,
+)  # fmt: skip
 
 
 def observed(kind, sessions, count=120, seed=0, noise_mm=0.02):

@@ -15,7 +15,6 @@ from kinacc.calibration.constraints import ArmTerms, arm_terms, frame_terms, fre
 from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import BASE, Frames, coordinates, known
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.calibration.robust import SQUARES
 from kinacc.calibration.selection import Choice, Grid
 from kinacc.calibration.solve import Spectrum
 from kinacc.calibration.vec_fit import Prior, VECFit
@@ -56,6 +55,7 @@ COMPARISONS = tuple(Comparison(*pair) for pair in allowed.COMPARED)
 class Options:
     """How models are fitted; see the ``calibration`` section of the configuration.
 
+    What is None is not stated: a fit that asks for it has not been given its section.
     ``frames_estimated``: base and tool are unknown; else they are ``base`` and ``tool``, the
     robot's own. ``frame_rules``: what is known of them beforehand, by DH and nominal fit; the VEC
     model holds a base or target they leave nothing free of. ``dh_to_vec``: the DH model follows the
@@ -67,17 +67,17 @@ class Options:
 
     rotation_weight_mm_per_rad: float
     frames_estimated: bool
-    order: int = 0
+    order: int | None = None
     prior: Prior | None = None
     grid: Grid | None = None
-    travel_direction: bool = False
+    travel_direction: bool | None = None
     dh_to_vec: bool = True
     hayati_joints: tuple[int, ...] = ()
     hayati_instead: bool = False
     arm_rules: tuple[Rule, ...] = ()
     frame_rules: tuple[Rule, ...] = ()
-    loss: str = SQUARES
-    threshold: float = 1e-2
+    loss: str | None = None
+    threshold: float | None = None
     base: Pose = IDENTITY
     tool: Pose = IDENTITY
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.artifacts.allowed import SELECTABLE
+from kinacc.config import schema
 from kinacc.errors import InputError, Problem
 
 if TYPE_CHECKING:
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
 
 CONFIG = "config.yaml"
 MODEL = click.Choice([*SELECTABLE, "nominal"])
+
+
+def range_of(path: str) -> click.IntRange | click.FloatRange:
+    """The range of an option that stands for a key of the configuration, such as study.alpha."""
+    key = schema.key(path)
+    if key.kind == "int":
+        return click.IntRange(key.low, key.high)
+    return click.FloatRange(key.low, key.high, min_open=key.open_ends, max_open=key.open_ends)
 
 
 def calibration_options(command: Callable) -> Callable:

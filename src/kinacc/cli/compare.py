@@ -48,6 +48,7 @@ def compare(
       kinacc compare before.yaml after.yaml --json
     """
     from kinacc.cli import comparison_report, sheet
+    from kinacc.config import schema
     from kinacc.deployment.compare import compare as compared
     from kinacc.progress import reporting
 
@@ -56,7 +57,8 @@ def compare(
     with reporting("compare", bar=True):
         arms = [comparison_report.source(each, model, robot, config) for each in (first, second)]
         q_rad = comparison_report.joints(arms, (first, second), joints, count)
-        found = compared(*arms, q_rad)
+        weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+        found = compared(*arms, q_rad, weight)
     answer = comparison_report.answer(found, arms, len(q_rad))
     if picture is not None:
         from pathlib import Path

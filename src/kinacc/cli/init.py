@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kinacc.config import schema
+
 if TYPE_CHECKING:
     from kinacc.checks.report import Report
     from kinacc.measurements.intake.guess import Guess
@@ -17,14 +19,19 @@ if TYPE_CHECKING:
 _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
 
 
+def choices_of(name: str) -> click.Choice:
+    """The words of a key of ``measurements.file``."""
+    return click.Choice(schema.key(f"measurements.file.{name}").choices)
+
+
 @click.command("init")
 @click.argument("measurement_file", type=click.Path())
 @click.option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
 @click.option("--name", help="Name of the data set. [as the file]")
-@click.option("--joint-unit", type=click.Choice(["deg", "rad"]), help="Unit of the joints.")
-@click.option("--length-unit", type=click.Choice(["mm", "m"]), help="Unit of the positions.")
-@click.option("--angle-unit", type=click.Choice(["deg", "rad"]), help="Unit of orientations.")
+@click.option("--joint-unit", type=choices_of("joint_unit"), help="Unit of the joints.")
+@click.option("--length-unit", type=choices_of("length_unit"), help="Unit of the positions.")
+@click.option("--angle-unit", type=choices_of("orientation.unit"), help="Unit of orientations.")
 @click.option(
     "--orientation",
     help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "

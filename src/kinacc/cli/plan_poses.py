@@ -5,9 +5,11 @@ from __future__ import annotations
 import click
 
 from kinacc.cli import choice
+from kinacc.config import schema
 
 PICTURES = (".svg", ".png", ".pdf")
 MOST_CANDIDATES = 100_000
+TRUNCATION = "calibration.dh.truncation"
 INDICES = ("O1", "O2", "O3", "O4", "O5")
 
 
@@ -40,8 +42,8 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 @click.option("--position-only", is_flag=True, help="Orientations are not measured.")
 @click.option("--frames-known", is_flag=True, help="Base and tool are not estimated.")
 @click.option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
-@click.option("--threshold", default=1e-2, show_default=True,
-              type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+@click.option("--threshold", default=schema.key(TRUNCATION).default, show_default=True,
+              type=choice.range_of(TRUNCATION),
               help="Directions seen less than this share of the best are left out.")  # fmt: skip
 @click.option("--metric", type=click.Choice(["largest", "sum"]), default="largest",
               show_default=True,

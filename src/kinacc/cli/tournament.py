@@ -6,16 +6,20 @@ from collections.abc import Mapping
 
 import click
 
+from kinacc.cli import choice
+from kinacc.config import schema
+
 
 @click.command("tournament")
 @click.option("--config", multiple=True, help="Configuration; may be repeated. [config.yaml]")
 @click.option("--results", default="results", show_default=True, help="Results folder.")
 @click.option(
     "--size",
-    type=click.Choice(["default", "coverage", "budgets", "full"]),
+    type=click.Choice(schema.key("tournament.size").choices),
     help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
-@click.option("--parts", type=click.IntRange(1, 10_000), help="Number of parts. [configuration]")
+@click.option("--parts", type=choice.range_of("tournament.chunks"),
+              help="Number of parts. [configuration]")  # fmt: skip
 @click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
 @click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
 @click.option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")

@@ -85,8 +85,8 @@ def joints_of(
     robot: Robot,
     models: Models,
     tool: Pose,
+    invert_with: str,
     branches: tuple[str, ...] | None = None,
-    invert_with: str = "dh",
 ) -> inverse.Solutions:
     """Joints of tool poses (n, ...) per branch, from the model named ``invert_with``.
 
@@ -110,8 +110,8 @@ def accuracy_map(
     cells: Cells,
     reference: np.ndarray,
     orientations: Orientations,
+    invert_with: str,
     branches: tuple[str, ...] | None = None,
-    invert_with: str = "dh",
 ) -> AccuracyMap:
     """Largest errors at cells (n,) over ``orientations`` and ``branches``.
 
@@ -151,7 +151,7 @@ def _block(
     count = len(cells.radius_mm)
     repeated = Cells(*(np.repeat(axis, turns) for axis in cells))
     tool = tool_poses(repeated, reference, np.tile(orientations.rotation, (count, 1, 1)))
-    solved = joints_of(robot, models, tool, branches, invert_with)
+    solved = joints_of(robot, models, tool, invert_with, branches)
     found = solved.status == Status.FOUND
     position, orientation = np.full((2, *found.shape), -np.inf)
     error = errors_at(models, solved.q_rad[found])

@@ -34,8 +34,8 @@ class PosesWanted(NamedTuple):
     cylinder: Cylinder
     reference: np.ndarray
     orientations: Orientations
+    invert_with: str
     branches: tuple[str, ...] | None = None
-    invert_with: str = "dh"
 
 
 def with_errors(models: Models, q_rad: np.ndarray) -> OperatingPoints:
@@ -74,7 +74,7 @@ def _solve_draws(
     branches = inverse.machining_branches(robot) if wanted.branches is None else wanted.branches
     branch = (unit[:, 4] * len(branches)).astype(int)
     tool = region.tool_poses(cells, wanted.reference, wanted.orientations.rotation[turn])
-    solved = joints_of(robot, models, tool, branches, wanted.invert_with)
+    solved = joints_of(robot, models, tool, wanted.invert_with, branches)
     rows = np.arange(len(unit))
     return solved.q_rad[rows, branch], solved.status[rows, branch]
 
