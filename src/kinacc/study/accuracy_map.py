@@ -17,7 +17,7 @@ from kinacc.kinematics import inverse
 from kinacc.kinematics.inverse import Status
 from kinacc.kinematics.inverse.newton import pose_error
 from kinacc.kinematics.model import ErrorModel
-from kinacc.kinematics.region import Cells, Orientations, tool_poses
+from kinacc.kinematics.region import Cells, Cylinder, Orientations, tool_poses
 from kinacc.kinematics.robot import Robot
 
 _CELLS_PER_BLOCK = 256
@@ -56,6 +56,19 @@ class Models(NamedTuple):
         """DH joints (k,), (k,) that the reference says something of."""
         true = self.by_name[self.reference].model
         return true.domain or (np.full(true.joints, -np.inf), np.full(true.joints, np.inf))
+
+
+class PosesWanted(NamedTuple):
+    """Which tool poses points are drawn from, and which joints are taken for them.
+
+    ``branches`` are those of ``inverse.machining_branches`` where None.
+    """
+
+    cylinder: Cylinder
+    reference: np.ndarray
+    orientations: Orientations
+    invert_with: str
+    branches: tuple[str, ...] | None = None
 
 
 class AccuracyMap(NamedTuple):

@@ -10,9 +10,9 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose
 from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
-from kinacc.kinematics.region import Cylinder, Orientations
+from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
-from kinacc.study.accuracy_map import Models, errors_at, joints_of
+from kinacc.study.accuracy_map import Models, PosesWanted, errors_at, joints_of
 
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
 
@@ -23,19 +23,6 @@ class OperatingPoints(NamedTuple):
     q_rad: np.ndarray
     travel: np.ndarray
     error_mm: np.ndarray
-
-
-class PosesWanted(NamedTuple):
-    """Which tool poses points are drawn from, and which joints are taken for them.
-
-    ``branches`` are those of ``inverse.machining_branches`` where None.
-    """
-
-    cylinder: Cylinder
-    reference: np.ndarray
-    orientations: Orientations
-    invert_with: str
-    branches: tuple[str, ...] | None = None
 
 
 def with_errors(models: Models, q_rad: np.ndarray) -> OperatingPoints:

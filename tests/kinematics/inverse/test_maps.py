@@ -54,7 +54,7 @@ def test_a_base_of_its_own_moves_the_space_with_the_arm():
     base = Pose(exp_so3(np.array([0.0, 0.0, 0.7])), np.array([0.0, 0.0, 150.0]))
     space = SPACES["ur10"]
     here = accuracy_map(
-        UR10, models_of(UR10), region.grid(space, np.array([0.3]), 150.0), DOWN, ORIENTATIONS
+        UR10, models_of(UR10), region.grid(space, np.array([0.3]), 150.0), DOWN, ORIENTATIONS, "dh"
     )
     moved = region.grid(replace(space, bottom_mm=150), np.array([1.0]), 150.0)
     there = accuracy_map(replace(UR10, base=base), models_of(UR10), moved, DOWN, ORIENTATIONS, "dh")
