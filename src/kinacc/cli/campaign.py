@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from kinacc.assess.statement import CONFIDENCE
 from kinacc.cli import choice
 from kinacc.cli.groups import InOrder
 
@@ -57,7 +58,7 @@ def campaign() -> None:
 @click.option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE.")
 @click.option("--budget", default=200, show_default=True, type=click.IntRange(max=1_000_000),
               help="Readings in all.")  # fmt: skip
-@click.option("--confidence", default=0.95, show_default=True, type=float,
+@click.option("--confidence", default=CONFIDENCE, show_default=True, type=float,
               help="How surely each bound is to hold.")  # fmt: skip
 @click.option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have.")
 @click.option("--width-mm", type=float, help="Wanted distance of upper from lower bound.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from kinacc.assess.statement import CONFIDENCE
 from kinacc.cli import choice
 from kinacc.cli.plan_poses import PICTURES
 
@@ -26,7 +27,7 @@ from kinacc.cli.plan_poses import PICTURES
 @click.option("--largest-mm", type=float, help="Scale the errors so that the largest is this.")
 @click.option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]")
 @click.option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE.")
-@click.option("--confidence", default=0.95, show_default=True, type=float,
+@click.option("--confidence", default=CONFIDENCE, show_default=True, type=float,
               help="How surely each bound is to hold.")  # fmt: skip
 @click.option("--repetitions", default=30, show_default=True, type=click.IntRange(2, 100_000),
               help="Simulated campaigns per budget.")  # fmt: skip
