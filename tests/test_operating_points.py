@@ -18,7 +18,7 @@ from kinacc.study.operating_points import PosesWanted
 
 TRUE = wavy()
 MODELS = two_models(TRUE, TABLE_II)
-WANTED = PosesWanted(SPACE, DOWN, NINE)
+WANTED = PosesWanted(SPACE, DOWN, NINE, "dh")
 
 
 @pytest.mark.parametrize("sequence", region.SEQUENCES)

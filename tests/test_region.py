@@ -63,7 +63,7 @@ def test_contains_knows_every_face():
 
 
 def test_orientations_are_turns_about_the_flanges_own_axes():
-    eight = region.orientations(np.pi / 4)
+    eight = region.orientations(np.pi / 4, "signs_and_zero")
     assert len(eight.names) == 9
     assert eight.names[0] == "X0 Y0 Z0"
     assert np.array_equal(eight.rotation[0], np.eye(3))

@@ -28,7 +28,7 @@ def test_sequences_are_those_of_scipy(dimensions):
 
 def test_orientations_are_flange_rotations_about_x_then_y_then_z():
     angle = math.radians(45)
-    both = region.orientations(angle)
+    both = region.orientations(angle, "signs_and_zero")
     signs = list(itertools.product((-1, 1), repeat=3))
     expected = [Rotation.from_euler("XYZ", np.array(s) * angle).as_matrix() for s in signs]
     expected.append(np.eye(3))

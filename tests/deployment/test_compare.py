@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 from small_arms import calibrated, joints
 
-from kinacc.deployment.compare import compare
+from kinacc.config import schema
+from kinacc.deployment import compare as comparison
 from kinacc.deployment.record import nominal
 from kinacc.errors import InputError
 from kinacc.figures.comparison import draw
 from kinacc.figures.save import render
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot
+
+
+def compare(first, second, q_rad):
+    weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+    return comparison.compare(first, second, q_rad, weight)
 
 
 def changed(arm, **by_name):

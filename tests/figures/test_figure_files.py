@@ -22,11 +22,11 @@ HERE = Path(__file__).parent
 
 @pytest.fixture(scope="module")
 def rendered():
-    return {name: save.render(figure) for name, figure in figures("mh180").items()}
+    return {name: save.render(figure, save.FORMATS) for name, figure in figures("mh180").items()}
 
 
 def test_two_drawings_have_the_same_bytes(rendered):
-    again = {name: save.render(figure) for name, figure in figures("mh180").items()}
+    again = {name: save.render(figure, save.FORMATS) for name, figure in figures("mh180").items()}
     differing = [
         f"{name}.{kind}"
         for name, files in rendered.items()
@@ -42,7 +42,7 @@ def test_another_process_gives_the_same_bytes(rendered):
         "from figure_words import figures\n"
         "from kinacc.figures import save\n"
         "for name, figure in figures('mh180').items():\n"
-        "    for kind, content in save.render(figure).items():\n"
+        "    for kind, content in save.render(figure, save.FORMATS).items():\n"
         "        print(name, kind, hashlib.sha256(content).hexdigest())\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
@@ -62,9 +62,9 @@ def test_another_process_gives_the_same_bytes(rendered):
 
 
 def test_surrounding_settings_do_not_matter():
-    plain = save.render(fig4.draw(tables.study_summary()))
+    plain = save.render(fig4.draw(tables.study_summary()), save.FORMATS)
     with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 9, "svg.fonttype": "none"}):
-        assert save.render(fig4.draw(tables.study_summary())) == plain
+        assert save.render(fig4.draw(tables.study_summary()), save.FORMATS) == plain
 
 
 def test_files_carry_no_date_and_no_version(rendered):
@@ -75,7 +75,7 @@ def test_files_carry_no_date_and_no_version(rendered):
 
 
 def test_every_format_order_and_choice_gives_the_same_bytes():
-    every = save.render(fig1.draw())
+    every = save.render(fig1.draw(), save.FORMATS)
     assert save.render(fig1.draw(), ["pdf"])["pdf"] == every["pdf"]
     assert save.render(fig1.draw(), ["png", "svg"])["svg"] == every["svg"]
 

@@ -48,7 +48,7 @@ INPUTS = {
 CYLINDER_SPACE = {
     "dataset": "mh180",
     "robot": "mh180",
-    "evaluation": {"space": "cylinder", "cylinder": CYLINDER},
+    "evaluation": {"space": "cylinder", "cylinder": CYLINDER, "tool_mm": [0.0, 0.0, 0.0]},
 }
 
 

@@ -10,22 +10,14 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.spatial.transform import Rotation
 
+from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.geometry import rotation_from_quaternion
 from kinacc.kinematics import dh, robot
 from kinacc.measurements.reader import read
 
 ARM = robot.load("ur10")
-SECTION = {
-    "path": None,
-    "source": "the tracker of hall 3",
-    "delimiter": ",",
-    "decimal": ".",
-    "joint_unit": "deg",
-    "length_unit": "mm",
-    "orientation": {"kind": "euler", "convention": "XYZ", "unit": "deg"},
-    "columns": {},
-}
+SECTION = defaults()["measurements"]["file"] | {"source": "the tracker of hall 3"}
 
 
 @pytest.fixture

@@ -144,6 +144,13 @@ datasets:
         "assessors": [],
         "noise_mm": [0.1],
         "robots": {"arm": "mh180", "two": "mh180"},
+        "study": {
+            "alpha": 0.6,
+            "outlier_rule": "normal",
+            "distance": "squared",
+            "covariance": "r",
+            "search": "from_above",
+        },
     }
 
 

@@ -37,6 +37,7 @@ class Fit(NamedTuple):
 class Common:
     """What all fits of a data set share; see the ``calibration`` section of the configuration.
 
+    What is None is not stated: a fit that asks for it has not been given its section.
     ``frames_estimated``: base and tool are unknown; else they are ``base`` and ``tool``, the
     robot's own. ``frame_rules``: what is known of them beforehand.
     """

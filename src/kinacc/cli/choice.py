@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.artifacts.allowed import SELECTABLE
+from kinacc.assess.statement import CONFIDENCE
+from kinacc.config import schema
 from kinacc.errors import InputError, Problem
 
 if TYPE_CHECKING:
@@ -19,6 +21,14 @@ if TYPE_CHECKING:
 CONFIG = "config.yaml"
 option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
+
+
+def range_of(path: str) -> click.IntRange | click.FloatRange:
+    """The range of an option that stands for a key of the configuration, such as study.alpha."""
+    key = schema.key(path)
+    if key.kind == "int":
+        return click.IntRange(key.low, key.high)
+    return click.FloatRange(key.low, key.high, min_open=key.open_ends, max_open=key.open_ends)
 
 
 ROBOT = option("--robot", help="Robot of the results: a shipped name or file. [as the results say]")
@@ -62,7 +72,9 @@ campaign_options = together(
     option("--covariance-mm2", help="Covariance of a reading: nine numbers, row by row."),
     option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]"),
     option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
-    option("--confidence", default=0.95, type=float, help="How surely each bound is to hold."),
+    option(
+        "--confidence", default=CONFIDENCE, type=float, help="How surely each bound is to hold."
+    ),
     option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have."),
     option("--width-mm", type=float, help="Wanted distance of upper from lower bound."),
     option(

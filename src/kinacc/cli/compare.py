@@ -32,13 +32,15 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
       kinacc compare before.yaml after.yaml --json
     """
     from kinacc.cli import comparison_report
+    from kinacc.config import schema
     from kinacc.deployment.compare import compare as compared
     from kinacc.progress import reporting
 
     with reporting("compare", bar=True):
         arms = [comparison_report.source(each, model, robot, config) for each in (first, second)]
         q_rad = comparison_report.joints(arms, (first, second), joints, count)
-        found = compared(*arms, q_rad)
+        weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+        found = compared(*arms, q_rad, weight)
     answer = comparison_report.answer(found, arms, len(q_rad))
     if out.picture is not None:
         from kinacc.figures.comparison import draw

@@ -7,8 +7,10 @@ import click
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import answers
+from kinacc.config import schema
 
 MOST_CANDIDATES = 100_000
+TRUNCATION = "calibration.dh.truncation"
 INDICES = ("O1", "O2", "O3", "O4", "O5")
 
 
@@ -26,7 +28,7 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 @option("--position-only", is_flag=True, help="Orientations are not measured.")
 @option("--frames-known", is_flag=True, help="Base and tool are not estimated.")
 @option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
-@option("--threshold", default=1e-2, type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+@option("--threshold", default=schema.key(TRUNCATION).default, type=choice.range_of(TRUNCATION),
         help="Directions seen less than this share of the best are left out.")  # fmt: skip
 @option("--metric", type=click.Choice(["largest", "sum"]), default="largest",
         help="Travel between poses: of the joint that moves most, or of all.")  # fmt: skip

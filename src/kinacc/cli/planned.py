@@ -12,7 +12,7 @@ from kinacc.calibration.blind_words import sentences
 from kinacc.cli import rows
 from kinacc.cli.plan_poses import MOST_CANDIDATES
 from kinacc.cli.sheet import Field, Sheet
-from kinacc.cli.spaces import Settings, inside_box, joint_ranges, ranges, settings_of
+from kinacc.cli.spaces import inside_box, joint_ranges, ranges, settings_of, without_dataset
 from kinacc.cli.tables import joint_fields
 from kinacc.deployment.planning import candidates, exchange, observability, travel
 from kinacc.deployment.planning.information import Experiment, Information, information
@@ -59,8 +59,9 @@ def question(given: Mapping) -> Question:
     """The question of the command's options. Raises InputError listing what is wrong."""
     if given["dataset"] is None and given["robot"] is None:
         raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
-    settings = Settings()
-    if given["dataset"] is not None:
+    if given["dataset"] is None:
+        settings = without_dataset()
+    else:
         settings = settings_of(given["dataset"], given["config"])
     robot = robots.load(given["robot"] or settings.robot)
     problems: list[Problem] = []

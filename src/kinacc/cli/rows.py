@@ -262,7 +262,7 @@ def _of_json(path: Path) -> RawTable:
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
         what, allowed = "holds no rows", "a table of rows, as commands write with -o NAME.json"
         raise InputError(Problem(str(path), what, allowed)) from None
-    return RawTable(str(path), columns, np.arange(1, len(rows) + 1))
+    return RawTable(str(path), columns, np.arange(1, len(rows) + 1), ".")
 
 
 def _whole(digits: str) -> int | float:

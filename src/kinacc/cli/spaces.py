@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.cli.choice import CONFIG
+from kinacc.config import schema
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import region
 from kinacc.kinematics import robot as robots
@@ -18,17 +19,24 @@ Inside = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Settings:
-    """What is fitted of a robot and where; the defaults are those of no data set.
+    """What is fitted of a robot and where.
 
     ``box``: ends (k,), (k,) of the reported joints; ``inside`` tests positions (n, 3) of the tool.
     """
 
-    robot: str | None = None
-    frames_estimated: bool = True
-    rotation_weight_mm_per_rad: float = 500.0
-    hayati_joints: tuple[int, ...] = ()
+    robot: str | None
+    frames_estimated: bool
+    rotation_weight_mm_per_rad: float
+    hayati_joints: tuple[int, ...]
     box: Ends | None = None
     inside: Inside | None = None
+
+
+def without_dataset() -> Settings:
+    """The settings of no data set: base and tool are unknown, else as the schema has them."""
+    calibration = schema.defaults()["calibration"]
+    hayati = tuple(calibration["dh"]["hayati_joints"])
+    return Settings(None, True, calibration["rotation_weight_mm_per_rad"], hayati)
 
 
 def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 
 import click
 
+from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
+from kinacc.config import schema
 
 
 @click.command("tournament")
@@ -15,10 +17,11 @@ from kinacc.cli.output import Output, answers
 @option("--results", default="results", help="Results folder.")
 @option(
     "--size",
-    type=click.Choice(["default", "coverage", "budgets", "full"]),
+    type=click.Choice(schema.key("tournament.size").choices),
     help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
-@option("--parts", type=click.IntRange(1, 10_000), help="Number of parts. [configuration]")
+@option("--parts", type=choice.range_of("tournament.chunks"),
+        help="Number of parts. [configuration]")  # fmt: skip
 @option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
 @option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
 @option("--noise-mm", type=float, multiple=True, help="Simulate only this noise of the size.")

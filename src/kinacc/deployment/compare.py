@@ -86,7 +86,7 @@ def compare(
     first: Calibration,
     second: Calibration,
     q_rad: np.ndarray,
-    rotation_weight_mm_per_rad: float = 500.0,
+    rotation_weight_mm_per_rad: float,
 ) -> Comparison:
     """What moved from ``first`` to ``second``, over reported joints ``q_rad`` (n, k), rad and mm.
 

@@ -50,7 +50,7 @@ def _tool_mm(
     fitted = tables.fitted_tool(frames, "dh", own)
     if fitted is not None:
         return fitted.position_mm
-    offset = np.asarray(evaluation.get("tool_mm", (0.0, 0.0, 0.0)), dtype=float)
+    offset = np.asarray(evaluation["tool_mm"], dtype=float)
     return own.position_mm + own.rotation @ offset
 
 

@@ -27,7 +27,7 @@ _METADATA = {
 }
 
 
-def render(figure: Figure, formats: Iterable[str] = FORMATS) -> dict[str, bytes]:
+def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
     """Return the file content for each format.
 
     Raises InputError for formats other than svg, png and pdf.

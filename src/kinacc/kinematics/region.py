@@ -95,7 +95,7 @@ def fill(cylinder: Cylinder, unit: np.ndarray) -> Cells:
     )
 
 
-def orientations(angle_rad: float, rotations: str = "signs_and_zero") -> Orientations:
+def orientations(angle_rad: float, rotations: str) -> Orientations:
     """Rotations by +-angle about the flange's own X, then Y, then Z axis.
 
     ``signs_and_zero``: the eight sign combinations and no rotation. ``all_27``: every combination

@@ -65,13 +65,13 @@ class Layout:
     """
 
     columns: Mapping[str, str]
-    joint_unit: str = "deg"
-    length_unit: str = "mm"
-    orientation: str = "euler"
-    convention: str = "XYZ"
-    angle_unit: str = "deg"
-    order: str = "wxyz"
-    targets: tuple[str, ...] | None = None
+    joint_unit: str
+    length_unit: str
+    orientation: str
+    convention: str
+    angle_unit: str
+    order: str | None
+    targets: tuple[str, ...] | None
 
     @classmethod
     def of(cls, section: Mapping) -> Layout:
@@ -84,7 +84,7 @@ class Layout:
             turn["kind"],
             turn["convention"],
             turn["unit"],
-            turn.get("order", "wxyz"),
+            turn.get("order"),
             None if targets is None else tuple(targets),
         )
 

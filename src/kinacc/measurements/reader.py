@@ -90,7 +90,7 @@ def _loaded(section: Mapping) -> RawTable:
         section["delimiter"],
         section["decimal"],
         section.get("source"),
-        (section.get("skip_lines", 0), section.get("skip_under_names", 0)),
+        (section["skip_lines"], section["skip_under_names"]),
     )
     excluded = excluded_lines(section)
     absent = sorted(set(excluded) - set(table.line.tolist()))

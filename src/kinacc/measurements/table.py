@@ -37,7 +37,7 @@ class RawTable:
     path: str
     columns: dict[str, list]
     line: np.ndarray
-    decimal: str = "."
+    decimal: str
     under: tuple[str, ...] = ()
 
     def __len__(self) -> int:
@@ -180,7 +180,7 @@ def _csv(path: Path, delimiter: str, decimal: str, skip: tuple[int, int]) -> Raw
     problems = _header_problems(path, header, rows, delimiter)
     ragged = [i for i, cells in enumerate(rows) if len(cells) != len(header)]
     if ragged and not problems:
-        named = RawTable(str(path), {}, np.array(lines)).rows_in_words(np.array(ragged))
+        named = RawTable(str(path), {}, np.array(lines), decimal).rows_in_words(np.array(ragged))
         problems.append(
             Problem(
                 f"{path}: {named}",
@@ -258,7 +258,7 @@ def _parquet(path: Path) -> RawTable:
         else [f"<{field.type}>"] * rows  # one cell of a list may hold a million values
         for field in schema
     }
-    return RawTable(str(path), columns, np.arange(1, rows + 1))
+    return RawTable(str(path), columns, np.arange(1, rows + 1), ".")
 
 
 def _is_text(kind) -> bool:

@@ -17,7 +17,7 @@ from kinacc.kinematics import inverse
 from kinacc.kinematics.inverse import Status
 from kinacc.kinematics.inverse.newton import pose_error
 from kinacc.kinematics.model import ErrorModel, JointState
-from kinacc.kinematics.region import Cells, Orientations, tool_poses
+from kinacc.kinematics.region import Cells, Cylinder, Orientations, tool_poses
 from kinacc.kinematics.robot import Robot
 
 _CELLS_PER_BLOCK = 256
@@ -58,6 +58,19 @@ class Models(NamedTuple):
         return true.domain or (np.full(true.joints, -np.inf), np.full(true.joints, np.inf))
 
 
+class PosesWanted(NamedTuple):
+    """Which tool poses points are drawn from, and which joints are taken for them.
+
+    ``branches`` are those of ``inverse.machining_branches`` where None.
+    """
+
+    cylinder: Cylinder
+    reference: np.ndarray
+    orientations: Orientations
+    invert_with: str
+    branches: tuple[str, ...] | None = None
+
+
 class AccuracyMap(NamedTuple):
     """One row per cell, all (n,); see ``accuracy_map``."""
 
@@ -85,8 +98,8 @@ def joints_of(
     robot: Robot,
     models: Models,
     tool: Pose,
+    invert_with: str,
     branches: tuple[str, ...] | None = None,
-    invert_with: str = "dh",
 ) -> inverse.Solutions:
     """Joints of tool poses (n, ...) per branch, from the model named ``invert_with``.
 
@@ -110,8 +123,8 @@ def accuracy_map(
     cells: Cells,
     reference: np.ndarray,
     orientations: Orientations,
+    invert_with: str,
     branches: tuple[str, ...] | None = None,
-    invert_with: str = "dh",
 ) -> AccuracyMap:
     """Largest errors at cells (n,) over ``orientations`` and ``branches``.
 
@@ -151,7 +164,7 @@ def _block(
     count = len(cells.radius_mm)
     repeated = Cells(*(np.repeat(axis, turns) for axis in cells))
     tool = tool_poses(repeated, reference, np.tile(orientations.rotation, (count, 1, 1)))
-    solved = joints_of(robot, models, tool, branches, invert_with)
+    solved = joints_of(robot, models, tool, invert_with, branches)
     found = solved.status == Status.FOUND
     position, orientation = np.full((2, *found.shape), -np.inf)
     error = errors_at(models, solved.q_rad[found])

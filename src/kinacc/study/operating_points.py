@@ -10,9 +10,9 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import compose
 from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
-from kinacc.kinematics.region import Cylinder, Orientations
+from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
-from kinacc.study.accuracy_map import Models, errors_at, joints_of
+from kinacc.study.accuracy_map import Models, PosesWanted, errors_at, joints_of
 
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
 
@@ -23,19 +23,6 @@ class OperatingPoints(NamedTuple):
     q_rad: np.ndarray
     travel: np.ndarray
     error_mm: np.ndarray
-
-
-class PosesWanted(NamedTuple):
-    """Which tool poses points are drawn from, and which joints are taken for them.
-
-    ``branches`` are those of ``inverse.machining_branches`` where None.
-    """
-
-    cylinder: Cylinder
-    reference: np.ndarray
-    orientations: Orientations
-    branches: tuple[str, ...] | None = None
-    invert_with: str = "dh"
 
 
 def with_errors(models: Models, q_rad: np.ndarray) -> OperatingPoints:
@@ -74,7 +61,7 @@ def _solve_draws(
     branches = inverse.machining_branches(robot) if wanted.branches is None else wanted.branches
     branch = (unit[:, 4] * len(branches)).astype(int)
     tool = region.tool_poses(cells, wanted.reference, wanted.orientations.rotation[turn])
-    solved = joints_of(robot, models, tool, branches, wanted.invert_with)
+    solved = joints_of(robot, models, tool, wanted.invert_with, branches)
     rows = np.arange(len(unit))
     return solved.q_rad[rows, branch], solved.status[rows, branch]
 

@@ -1,8 +1,9 @@
-"""What the map and the assessment points share: settings and tables as records."""
+"""The section ``evaluation`` and the fitted models as records, for the map and the points."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import region, robot, tables
 from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
-from kinacc.study.accuracy_map import Equipped, Models
+from kinacc.study.accuracy_map import Equipped, Models, PosesWanted
 
 
 def joint_box(evaluation: Mapping, arm: Robot) -> tuple[np.ndarray, np.ndarray] | None:
@@ -37,26 +38,34 @@ def cylinder(evaluation: Mapping) -> Cylinder:
     )
 
 
-def reference(evaluation: Mapping) -> np.ndarray:
-    """Reference flange orientation (3, 3) in the slice's frame."""
-    return region.reference_rotation(np.deg2rad(evaluation["reference_orientation_deg"]))
+def poses_wanted(evaluation: Mapping) -> PosesWanted:
+    """The tool poses of the ``evaluation`` settings and the model they are inverted with."""
+    return PosesWanted(
+        cylinder(evaluation),
+        region.reference_rotation(np.deg2rad(evaluation["reference_orientation_deg"])),
+        region.orientations(np.deg2rad(evaluation["rotation_deg"]), evaluation["rotations"]),
+        evaluation["invert_with"],
+    )
 
 
-def orientations(evaluation: Mapping) -> region.Orientations:
-    """Flange rotations about the reference orientation."""
-    return region.orientations(np.deg2rad(evaluation["rotation_deg"]), evaluation["rotations"])
+@dataclass(frozen=True)
+class Equipment:
+    """What the models carry, from the flange, and how all joints travel (0 for unknown)."""
+
+    tool_mm: tuple[float, float, float]
+    travel_direction: int
 
 
-def models(inputs: Mapping, evaluation: Mapping, arm: Robot) -> Models:
+def models(inputs: Mapping, equipment: Equipment, arm: Robot) -> Models:
     """The arm's models with their bases and tools, joints travelling as the settings say.
 
     The nominal model carries the tool of the DH model.
     """
-    direction = int(evaluation["travel_direction"])
+    direction = equipment.travel_direction
     by_name = {
         name: Equipped(
             model,
-            _tool(inputs, evaluation, arm, model.kind),
+            _tool(inputs, equipment, arm, model.kind),
             _base(inputs, name) if model.table is None else None,
         )
         for name, model in tables.models(inputs, arm.dh).items()
@@ -73,9 +82,9 @@ def _base(inputs: Mapping, model: str) -> Pose | None:
     return None if same else compose(invert(dh), own)
 
 
-def _tool(inputs: Mapping, evaluation: Mapping, arm: Robot, model: str) -> Pose:
+def _tool(inputs: Mapping, equipment: Equipment, arm: Robot, model: str) -> Pose:
     """The tool fitted with a model; the configured one, on the arm's flange, where none was."""
     own = robot.carried(arm)
     fitted = tables.fitted_tool(inputs.get("frames"), model, own)
-    offset = np.array(evaluation["tool_mm"], dtype=float)
+    offset = np.array(equipment.tool_mm)
     return compose(own, Pose(np.eye(3), offset)) if fitted is None else fitted

@@ -3,12 +3,13 @@
 from itertools import combinations
 
 import numpy as np
+import paper_settings as paper
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.deployment.planning import candidates, exchange, observability
-from kinacc.deployment.planning.information import Experiment, information
+from kinacc.deployment.planning.information import information
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 
@@ -81,7 +82,7 @@ def test_no_single_swap_improves_and_the_best_set_is_near(index):
 def test_planned_poses_of_an_arm_beat_random_ones(index):
     arm = robot.load("ur10")
     joints = candidates.spread(arm, 200)
-    told = information(arm, joints, Experiment(robot.carried(arm), hayati_joints=(2, 3)))
+    told = information(arm, joints, paper.experiment(robot.carried(arm), hayati_joints=(2, 3)))
     found = exchange.choose(told.rows, 15, index)
     random = exchange.random_sets(told.rows, np.array([15]), index, 100, 0)
     assert found.value > random.max()
@@ -95,7 +96,7 @@ def test_a_d_optimal_set_shrinks_the_volume_of_the_uncertainty():
     """The determinant of a real fit's covariance falls as O1 says it does."""
     arm = robot.load("mh180")
     joints = candidates.spread(arm, 150)
-    told = information(arm, joints, Experiment(robot.carried(arm), frames_estimated=False))
+    told = information(arm, joints, paper.experiment(robot.carried(arm), frames_estimated=False))
     found = exchange.choose(told.rows, 12, "O1")
     flat = told.rows[found.chosen].reshape(-1, told.rows.shape[2])
     _, log_determinant = np.linalg.slogdet(np.linalg.inv(flat.T @ flat))

@@ -1,13 +1,14 @@
 """What poses tell of an arm: directions nobody sees are those of the fit, in its words."""
 
 import numpy as np
+import paper_settings as paper
 import pytest
 
 from kinacc.calibration import dh_fit
 from kinacc.calibration.blind_words import sentences
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.planning import candidates
-from kinacc.deployment.planning.information import Experiment, information
+from kinacc.deployment.planning.information import information
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
@@ -19,7 +20,7 @@ TOOL = Pose(exp_so3(np.array([0.1, -0.3, 0.2])), np.array([40.0, 15.0, 120.0]))
 def test_the_rank_is_that_of_a_fit_to_the_same_poses(name, hayati):
     arm = robot.load(name)
     joints = candidates.spread(arm, 120)
-    told = information(arm, joints, Experiment(TOOL, hayati_joints=hayati))
+    told = information(arm, joints, paper.experiment(TOOL, hayati_joints=hayati))
     q_dh = joints @ arm.joint_map.T
     seen = compose(dh.forward(arm.dh, q_dh), TOOL)
     fit = dh_fit.fit(
@@ -37,7 +38,7 @@ def test_rows_times_displacement_are_the_movement_of_the_pose():
     """Norms survive the projection: a determined displacement moves poses by what rows say."""
     arm = robot.load("mh180")
     joints = candidates.spread(arm, 50)
-    told = information(arm, joints, Experiment(TOOL, frames_estimated=False))
+    told = information(arm, joints, paper.experiment(TOOL, frames_estimated=False))
     step = np.zeros(30)
     step[2 + 5] = 1e-4  # a of joint 2, mm
     low, high = (
@@ -57,7 +58,7 @@ def test_rows_times_displacement_are_the_movement_of_the_pose():
 
 def test_what_no_candidate_shows_is_said_as_of_a_fit():
     arm = robot.load("mh180")
-    told = information(arm, candidates.spread(arm, 100), Experiment(TOOL))
+    told = information(arm, candidates.spread(arm, 100), paper.experiment(TOOL))
     assert tuple(sentences(told.left_open)) == (
         "theta of joint 1 cannot be told from a turn of the base about the axis of joint 1",
         "d of joint 1 cannot be told from a shift of the base along the axis of joint 1",
@@ -73,7 +74,7 @@ def test_what_other_candidates_would_show_is_said_to_be_so():
     arm = robot.load("mh180")
     joints = candidates.spread(arm, 100)
     joints[:, 3] = 0.3
-    said = sentences(information(arm, joints, Experiment(TOOL)).left_open)
+    said = sentences(information(arm, joints, paper.experiment(TOOL)).left_open)
     weak = [words for words in said if "others may" in words]
     assert weak
     assert all("joint 3" in words or "joint 4" in words for words in weak)
@@ -83,7 +84,9 @@ def test_what_other_candidates_would_show_is_said_to_be_so():
 def test_a_point_on_the_last_axis_shows_no_turn_of_it():
     arm = robot.load("ur10")
     on_axis = Pose(np.eye(3), np.array([0.0, 0.0, 100.0]))
-    told = information(arm, candidates.spread(arm, 100), Experiment(on_axis, orientation=False))
+    told = information(
+        arm, candidates.spread(arm, 100), paper.experiment(on_axis, orientation=False)
+    )
     assert "theta of joint 6 changes no measured pose" in sentences(told.left_open)
 
 

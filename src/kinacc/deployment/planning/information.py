@@ -36,11 +36,11 @@ class Experiment:
     """
 
     tool: Pose
-    orientation: bool = True
-    frames_estimated: bool = True
-    hayati_joints: tuple[int, ...] = ()
-    rotation_weight_mm_per_rad: float = 500.0
-    threshold: float = 1e-2
+    orientation: bool
+    frames_estimated: bool
+    hayati_joints: tuple[int, ...]
+    rotation_weight_mm_per_rad: float
+    threshold: float
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from kinacc.config.records import of_section
+from kinacc.config.schema import defaults
 from kinacc.errors import InputError, Problem
 from kinacc.measurements.table import RawTable, load
 
@@ -22,10 +24,10 @@ class Written:
     ``units`` are the cells of a line of units under the names, empty where there is none.
     """
 
-    delimiter: str = ","
-    decimal: str = "."
-    skip_lines: int = 0
-    skip_under_names: int = 0
+    delimiter: str
+    decimal: str
+    skip_lines: int
+    skip_under_names: int
     units: tuple[str, ...] = ()
 
     def load(self, path: str | Path) -> RawTable:
@@ -40,7 +42,7 @@ def look(path: str | Path) -> Written:
     if not path.is_file():
         raise InputError(Problem(str(path), "no such file", "a CSV or Parquet file"))
     if path.suffix.lower() in (".parquet", ".pq"):
-        return Written()
+        return of_section(Written, defaults()["measurements"]["file"])
     with open(path, encoding="utf-8-sig", errors="replace") as stream:
         head = stream.read(_CHARACTERS)
     lines = head.split("\n")

@@ -8,10 +8,11 @@ import re
 from pathlib import Path
 from typing import Any
 
+from kinacc.config.schema import defaults
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake.guess import Guess
 
-_DEFAULTS = {"delimiter": ",", "decimal": ".", "skip_lines": 0, "skip_under_names": 0}
+_WRITTEN = ("delimiter", "decimal", "skip_lines", "skip_under_names")
 _FEW_POSES = 60  # below, every configuration is held out once
 _PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./ -]*")
 _WORDS_OF_YAML = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
@@ -32,8 +33,9 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         "      file:",
         f"        path: {scalar(section['path'])}",
     ]
-    for key, default in _DEFAULTS.items():
-        if section[key] != default:
+    usual = defaults()["measurements"]
+    for key in _WRITTEN:
+        if section[key] != usual["file"][key]:
             lines.append(f"        {key}: {scalar(section[key])}")
     lines.append(f"        joint_unit: {section['joint_unit']}")
     lines.append(f"        length_unit: {section['length_unit']}")
@@ -52,7 +54,7 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         for ours, own in section["columns"].items():
             key = ours if _PLAIN.fullmatch(ours) else scalar(ours)
             lines.append(f"          {key}: {scalar(own)}")
-    folds = configurations if configurations < _FEW_POSES else 5
+    folds = configurations if configurations < _FEW_POSES else usual["folds"]
     held = " # one configuration held out at a time" if configurations < _FEW_POSES else ""
     lines += [
         f"      folds: {folds}{held}",

@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.config.records import of_section
 from kinacc.kinematics import region, robot
 from kinacc.study.accuracy_map import accuracy_map
 from kinacc.workflow import evaluation as shared
 
 
+@dataclass(frozen=True)
+class MapSettings:
+    """The ``map`` section of the configuration: angles of the slices, spacing of their grid."""
+
+    slices_deg: tuple[float, ...]
+    grid_mm: float
+
+
 def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     """``accuracy_map`` from ``vec_model`` and ``dh_model`` (and ``frames``, if given)."""
-    evaluation, layout = settings["evaluation"], settings["map"]
-    cells = region.grid(
-        shared.cylinder(evaluation), np.deg2rad(layout["slices_deg"]), layout["grid_mm"]
-    )
+    layout = of_section(MapSettings, settings["map"])
+    wanted = shared.poses_wanted(settings["evaluation"])
+    equipment = of_section(shared.Equipment, settings["evaluation"])
+    cells = region.grid(wanted.cylinder, np.deg2rad(layout.slices_deg), layout.grid_mm)
     arm = robot.load(settings["robot"])
+    models = shared.models(inputs, equipment, arm)
     result = accuracy_map(
-        arm,
-        shared.models(inputs, evaluation, arm),
-        cells,
-        shared.reference(evaluation),
-        shared.orientations(evaluation),
-        invert_with=evaluation["invert_with"],
+        arm, models, cells, wanted.reference, wanted.orientations, wanted.invert_with
     )
     # The slice as configured: degrees that went through radians and back are not the same number.
-    per_slice = len(cells.radius_mm) // len(layout["slices_deg"])
+    per_slice = len(cells.radius_mm) // len(layout.slices_deg)
     columns = {
-        "slice_deg": np.repeat(np.array(layout["slices_deg"], dtype=float), per_slice),
+        "slice_deg": np.repeat(np.array(layout.slices_deg), per_slice),
         "radius_mm": cells.radius_mm,
         "height_mm": cells.height_mm,
     }

@@ -4,45 +4,54 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
+from kinacc.config.records import of_section
 from kinacc.kinematics import robot
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.robot import Robot
 from kinacc.study import operating_points
-from kinacc.study.operating_points import OperatingPoints, PosesWanted
+from kinacc.study.accuracy_map import Models
+from kinacc.study.operating_points import OperatingPoints
 from kinacc.workflow import evaluation as shared
+
+
+@dataclass(frozen=True)
+class PointSettings:
+    """How many points are drawn, by which sequence, in which space, as poses or as joints."""
+
+    space: str
+    sequence: str
+    points: int
+    points_in: str
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     """``assessment_points`` of a modelled space, or chosen from what was measured."""
-    evaluation = settings["evaluation"]
+    section = settings["evaluation"]
+    wanted = of_section(PointSettings, section)
     arm = robot.load(settings["robot"])
-    if evaluation["space"] == "measured":
-        return {"assessment_points": _measured(inputs, int(evaluation["points"]))}
-    return {"assessment_points": _columns(arm, _drawn(arm, inputs, evaluation))}
+    if wanted.space == "measured":
+        return {"assessment_points": _measured(inputs, wanted.points)}
+    models = shared.models(inputs, of_section(shared.Equipment, section), arm)
+    return {"assessment_points": _columns(arm, _drawn(arm, models, wanted, section))}
 
 
-def _drawn(arm: Robot, inputs: Mapping, evaluation: Mapping) -> OperatingPoints:
-    models = shared.models(inputs, evaluation, arm)
-    sequence, count = evaluation["sequence"], int(evaluation["points"])
+def _drawn(arm: Robot, models: Models, wanted: PointSettings, section: Mapping) -> OperatingPoints:
     limited = arm.q_min_rad, arm.q_max_rad
-    if evaluation["space"] == "joint_box":
-        box = shared.joint_box(evaluation, arm) or limited
-        q_rad = operating_points.in_joints(arm, models, box, sequence, count)
-    elif evaluation["points_in"] == "joints":
-        space = shared.cylinder(evaluation)
-        q_rad = operating_points.in_joints(arm, models, limited, sequence, count, space)
+    drawn = wanted.sequence, wanted.points
+    if wanted.space == "joint_box":
+        box = shared.joint_box(section, arm) or limited
+        q_rad = operating_points.in_joints(arm, models, box, *drawn)
+    elif wanted.points_in == "joints":
+        space = shared.cylinder(section)
+        q_rad = operating_points.in_joints(arm, models, limited, *drawn, space)
     else:
-        wanted = PosesWanted(
-            shared.cylinder(evaluation),
-            shared.reference(evaluation),
-            shared.orientations(evaluation),
-            invert_with=evaluation["invert_with"],
-        )
-        q_rad = operating_points.in_space(arm, models, wanted, sequence, count)
+        poses = shared.poses_wanted(section)
+        q_rad = operating_points.in_space(arm, models, poses, *drawn)
     return operating_points.with_errors(models, q_rad)
 
 

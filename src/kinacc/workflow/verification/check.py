@@ -16,6 +16,7 @@ from kinacc.artifacts import campaign_tables, store, tournament_tables
 from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
+from kinacc.config import schema
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, maker_of
 from kinacc.workflow.plan import RESULTS, Plan
@@ -25,7 +26,7 @@ from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_
 from kinacc.workflow.verification.pictures import check_picture
 from kinacc.workflow.verification.rules import contradictions
 
-FORMATS = ("svg", "png", "pdf")
+FORMATS = schema.key("figures.formats").choices
 
 
 @dataclass(frozen=True)
