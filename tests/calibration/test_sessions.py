@@ -87,8 +87,8 @@ def test_every_base_keeps_its_session_in_the_tables():
 def test_errors_of_every_session_are_in_its_own_base():
     seen = observed(simulated.POSE, 3, noise_mm=1e-4)
     span = seen.q_rad.min(axis=0), seen.q_rad.max(axis=0)
-    by_vec = VECEstimator(COMMON, span, 1, Prior(0.3, 3e-4, 0.7, 3e-4))
-    by_dh = DHEstimator(COMMON, follows_vec=False, hayati_joints=(2, 3))
+    by_vec = VECEstimator(COMMON, span, 1, Prior(0.3, 3e-4, 0.7, 3e-4), None, False)
+    by_dh = DHEstimator(COMMON, False, (2, 3), False, (), "squares", 1e-2)
     fitted = models.fit_all(seen, [by_vec, by_dh])
     errors = residuals.errors(fitted, seen)
     assert np.abs(errors["dh_vs_measured"].position_mm).max() < 0.03

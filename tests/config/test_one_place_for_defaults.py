@@ -30,12 +30,11 @@ OTHERS = {
         "loss",
     ): "least squares where no loss is asked; a run asks",
     ("checks/hand_eye.py", "draws"): "random draws of poses, not of the synthetic arm",
-    ("cli/campaign.py", "seed"): "of a campaign, which no configuration speaks of",
+    ("cli/choice.py", "seed"): "of a campaign, which no configuration speaks of",
     ("cli/compare.py", "poses"): "poses compared, not poses of the synthetic arm",
     ("cli/draw_robots.py", "draws"): "arms searched for the package, not arms that a run uses",
     ("cli/plan_campaign.py", "poses"): "poses of simulated campaigns, not of the synthetic arm",
     ("cli/plan_campaign.py", "repetitions"): "of simulated campaigns, not of the study",
-    ("cli/plan_campaign.py", "seed"): "of simulated campaigns, which no configuration speaks of",
     ("cli/plan_poses.py", "poses"): "poses chosen, not poses of the synthetic arm",
 }
 
@@ -129,8 +128,8 @@ def defaults(module: Module) -> Iterator[tuple[int, str, ast.expr]]:
             pairs = [*zip(with_default, node.args.defaults, strict=True)]
             pairs += zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
             yield from ((node.lineno, each.arg, value) for each, value in pairs if value)
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            if node.func.attr == "get" and len(node.args) == 2:
+        elif isinstance(node, ast.Call):
+            if name_of(node.func) == "get" and len(node.args) == 2:
                 yield node.lineno, str(module.value(node.args[0])), node.args[1]
             for name in option_names(node):
                 for each in node.keywords:
@@ -140,7 +139,7 @@ def defaults(module: Module) -> Iterator[tuple[int, str, ast.expr]]:
 
 def option_names(call: ast.Call) -> list[str]:
     """What an option of a command is called in Python; nothing for another call."""
-    if getattr(call.func, "attr", "") != "option":
+    if name_of(call.func) != "option":
         return []
     texts = [each.value for each in call.args if isinstance(each, ast.Constant)]
     return [text.lstrip("-").replace("-", "_") for text in texts]

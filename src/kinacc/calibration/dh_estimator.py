@@ -15,7 +15,6 @@ from kinacc.calibration.dh_fit import DHFit
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.calibration.robust import SQUARES
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
@@ -34,12 +33,12 @@ class DHEstimator(Estimator):
     ``rules``: parameters that are fixed or known beforehand.
     """
 
-    follows_vec: bool = True
-    hayati_joints: tuple[int, ...] = ()
-    hayati_instead: bool = False
-    rules: tuple[Rule, ...] = ()
-    loss: str = SQUARES
-    threshold: float = 1e-2
+    follows_vec: bool
+    hayati_joints: tuple[int, ...]
+    hayati_instead: bool
+    rules: tuple[Rule, ...]
+    loss: str
+    threshold: float
 
     kind: ClassVar[str] = "dh"
     name: ClassVar[str] = "DH fit"

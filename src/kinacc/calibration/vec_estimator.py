@@ -34,8 +34,8 @@ class VECEstimator(Estimator):
     joint_range_rad: tuple[np.ndarray, np.ndarray]
     order: int
     prior: Prior
-    grid: Grid | None = None
-    travel_direction: bool = False
+    grid: Grid | None
+    travel_direction: bool
 
     kind: ClassVar[str] = "vec"
     name: ClassVar[str] = "VEC fit"
