@@ -50,7 +50,7 @@ def written(folder, tmp_path_factory):
 
 def begin(folder, campaign, *words):
     done = call("campaign", "start", campaign, "--calibration", folder, "--model", "dh",
-                "--noise-mm", 0.05, "--frame", "base", "--budget", 8, *words)  # fmt: skip
+                "--noise-mm", 0.05, "--frame", "base", "--budget", 8, "--sure", *words)  # fmt: skip
     assert done.exit_code == 0, done.output
 
 

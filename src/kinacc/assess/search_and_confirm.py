@@ -77,6 +77,11 @@ class SearchAndConfirm(AdaptiveAssessor):
         """What a larger budget would be good for with so many candidates; None if nothing."""
         if self.measurements >= (enough := self.enough_for_all(points)):
             return None
+        error, most = MISSING_PART * (1.0 - self.confidence), max(1.0, self.crowd * points)
+        if companions(points, min(self.measurements, points), error) > most:
+            visits = range(self.measurements, points + 1)
+            needed = next(seen for seen in visits if companions(points, seen, error) <= most)
+            return Reason("no_bound_on_all", {"needed": needed})
         return Reason("assumption_ahead", {"enough": enough})
 
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:

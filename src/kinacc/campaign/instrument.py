@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -66,7 +67,10 @@ def covariance_of(text: str, where: str, problems: list[Problem]) -> np.ndarray 
     """Covariance (3, 3) of a text with 1, 3 or 9 numbers; None with what is wrong noted."""
     values = numbers_of(text)
     if values.size not in (1, 3, 9):
-        problems.append(Problem(where, repr(text), _FORMS))
+        fix = ""
+        if re.fullmatch(r"\s*-?\d+,\d+\s*", text):
+            fix = f"a comma stands between numbers: write {text.strip().replace(',', '.')}"
+        problems.append(Problem(where, repr(text), _FORMS, fix))
         return None
     if values.size == 9:
         covariance = values.reshape(3, 3)

@@ -91,8 +91,12 @@ def problems_of(
     where: str,
     left_out: frozenset[int] = frozenset(),
     accept_implausible: bool = False,
+    unusual_mm: float = np.inf,
 ) -> list[Problem]:
-    """Everything that speaks against taking a reading."""
+    """Everything that speaks against taking a reading.
+
+    ``unusual_mm``: size of an error beyond which a reading is asked about, being unlike the others.
+    """
     problems = []
     label = plan.points.label[reading.point]
     if reading.point in left_out:
@@ -115,6 +119,16 @@ def problems_of(
                 f"at most {plan.limits.implausible_mm:g} mm",
                 "another pose, target, unit or frame? If the reading was repeated and stands, "
                 "give --accept-implausible: to drop it for its size would make the bound wrong",
+            )
+        )
+    elif size > unusual_mm:
+        problems.append(
+            Problem(
+                where,
+                f"{size:.3f} mm from where the model has point {label}, unlike the readings so far",
+                f"at most {unusual_mm:.3g} mm without being asked about",
+                "read the point again; what stands is recorded with --accept-implausible: to drop "
+                "it for its size would make the bound wrong",
             )
         )
     return problems

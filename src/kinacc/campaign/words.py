@@ -39,6 +39,8 @@ REASONS = {
     "unexplained_half": "smooth errors of single joints explain less than half of the errors",
     # of budgets that are small
     "no_bound_ahead": "no bound will be stated: that takes {needed} points in the first visit",
+    "no_bound_on_all": "no bound on all candidates would ever be stated: that takes {needed} "
+    "readings at least",
     "assumption_ahead": "with {enough} readings, the bound on all candidates would need no "
     "assumption",
     # of forecasts that are not made

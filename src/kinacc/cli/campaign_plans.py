@@ -11,7 +11,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.binomial import binomial_interval
-from kinacc.campaign import power, simulate
+from kinacc.campaign import power, simulate, slips
 from kinacc.campaign.power import Aim, Row
 from kinacc.cli import campaign_options, rows
 from kinacc.cli.sheet import Field, Sheet
@@ -48,6 +48,7 @@ def question(given: Mapping) -> Question:
     assessors, chosen = [], []
     with gathered(problems):
         instruments = campaign_options.instruments({**given, "frame": "base"})
+        problems += [] if given["sure"] else slips.of_noise(instruments)
     lengths = ("width_mm", "tolerance_mm", "largest_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     points = given["poses"]

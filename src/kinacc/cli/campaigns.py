@@ -23,7 +23,7 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 
 def start(given: Mapping, out: Output) -> None:
     """Begin a campaign and say what was begun."""
-    from kinacc.campaign import begin, prediction_check
+    from kinacc.campaign import begin, prediction_check, slips
     from kinacc.cli import campaign_candidates, campaign_options, rows
 
     problems = folders.in_the_way(given["folder"])
@@ -62,6 +62,10 @@ def start(given: Mapping, out: Output) -> None:
         arm, points, assessor, instruments, limits, given["seed"], joints_now, about,
         by_travel=given["visit"] == "travel",
     )  # fmt: skip
+    if not given["sure"]:
+        left_mm = arm.residual.position_mm if arm.residual else math.nan
+        problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
+        refuse(problems, "The campaign was not begun")
     unsure = prediction_check.unsure(
         arm, points, instruments, given["point"], limits.implausible_mm
     )

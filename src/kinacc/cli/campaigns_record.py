@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from kinacc.campaign import folder, imports, reading, words
+from kinacc.campaign import folder, imports, reading, slips, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import State
@@ -143,11 +143,21 @@ def _single(given: Asked, before: State) -> Reading:
     refuse(problems, "Nothing was recorded")
     found = Reading(point, position, instrument, joints, given.std_mm)
     left_out = frozenset(before.left_out)
-    problems = reading.problems_of(plan, found, "the reading", left_out, given.accept_implausible)
+    problems = reading.problems_of(
+        plan, found, "the reading", left_out, given.accept_implausible, _unusual_mm(before)
+    )
     if not given.again:
         problems += _repeated(found, "the reading", _recorded(before))
     refuse(problems, "Nothing was recorded")
     return found
+
+
+def _unusual_mm(before: State, more: Iterable[Reading] = ()) -> float:
+    """Size of an error that is unlike those of the readings taken, and of ``more`` of a file."""
+    sizes = [float(np.linalg.norm(each.error_mm)) for each in (*before.told, *before.in_hand)]
+    sizes += [float(np.linalg.norm(reading.error_mm(before.plan, each))) for each in more]
+    usable = [size for size in sizes if np.isfinite(size)]
+    return slips.unusual_mm(usable, float(np.sqrt(np.trace(before.plan.covariance_mm2))))
 
 
 def _recorded(before: State) -> dict[tuple, str]:
@@ -181,6 +191,7 @@ def _of_file(given: Asked, before: State) -> _Made:
     readings = _numbered(before)
     left_out = frozenset(before.left_out)
     earlier = _recorded(before)
+    unusual_mm = _unusual_mm(before, read.values())
     good = []
     for number, row in enumerate(rows):
         where = f"{table.path}, line {table.line[number]}"
@@ -193,7 +204,9 @@ def _of_file(given: Asked, before: State) -> _Made:
             one = compared.changed[number]
             wrong = [_in_place(where, one, readings[one], given.folder, before)]
         else:
-            wrong = reading.problems_of(before.plan, row, where, left_out, given.accept_implausible)
+            wrong = reading.problems_of(
+                before.plan, row, where, left_out, given.accept_implausible, unusual_mm
+            )
             if not given.again:
                 wrong += _repeated(row, where, earlier)
             good += [] if wrong else [row]

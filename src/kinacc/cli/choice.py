@@ -84,6 +84,7 @@ campaign_options = together(
         help="Which largest error the aims are about.",
     ),
     option("--seed", default=0, type=click.IntRange(0), help="Decides every random draw."),
+    option("--sure", is_flag=True, help="Take values that look like slips as they are."),
 )
 
 

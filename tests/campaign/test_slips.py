@@ -1,0 +1,105 @@
+"""Values that are allowed and look like slips are asked about, with the reason."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from command_line import call, small_study
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    """Results of a small synthetic study, made by the workflow's own stages."""
+    return small_study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.fixture
+def start(calibration, tmp_path):
+    """Start a campaign of 200 candidates with further options."""
+
+    def begin(*more):
+        return call("campaign", "start", tmp_path / "check", "--calibration", calibration,
+                    "--robot", "mh180", "--model", "dh", *more)  # fmt: skip
+
+    return begin
+
+
+def test_micrometres_given_as_millimetres_of_noise_are_asked_about(start, tmp_path):
+    done = start("--noise-mm", 50)
+    assert done.exit_code == 2
+    assert "are micrometres meant? Then it is 0.05 mm" in done.output
+    assert not (tmp_path / "check").exists()
+    assert start("--noise-mm", 50, "--sure").exit_code == 0
+
+
+def test_a_budget_that_never_leads_to_a_bound_is_asked_about_with_the_one_that_does(start):
+    done = start("--noise-mm", 0.05, "--budget", 10)
+    assert done.exit_code == 2
+    assert "10 readings for 200 candidates" in done.output
+    needed = int(done.output.partition("that takes ")[2].split()[0])
+    assert "no bound on all" in start("--noise-mm", 0.05, "--budget", needed - 1).output
+    assert start("--noise-mm", 0.05, "--budget", needed).exit_code == 0
+
+
+def test_a_decimal_comma_of_the_noise_is_said(start):
+    done = start("--noise-mm", "0,05")
+    assert done.exit_code == 2
+    assert "write 0.05" in done.output
+
+
+def test_both_slips_are_said_at_once(start):
+    output = start("--noise-mm", 50, "--budget", 10).output
+    assert "micrometres" in output
+    assert "--budget" in output
+
+
+@pytest.fixture
+def visited(start, tmp_path):
+    """A campaign, and the rows of its first visit with small errors: pose, x, y, z in mm."""
+    assert start("--noise-mm", 0.05).exit_code == 0
+    folder = tmp_path / "check"
+    rows = json.loads(call("campaign", "next", folder, "--all", "--json").stdout)["rows"]
+    noise = np.random.default_rng(5).normal(size=(len(rows), 3)) * 0.25
+    return folder, [
+        [
+            row["pose"],
+            *(row[f"expected_{axis}_mm"] + off for axis, off in zip("xyz", own, strict=True)),
+        ]
+        for row, own in zip(rows, noise, strict=True)
+    ]
+
+
+def written(path, rows):
+    """A file of readings."""
+    lines = ["pose,x_mm,y_mm,z_mm", *(",".join(map(str, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_reading_three_mm_off_where_less_than_one_is_usual_is_asked_about(visited, tmp_path):
+    folder, rows = visited
+    rows[7][1] += 3.5
+    path = written(tmp_path / "readings.csv", rows)
+    done = call("campaign", "record", folder, path)
+    assert done.exit_code == 2
+    assert "line 9" in done.output
+    assert "unlike the readings so far" in done.output
+    assert done.output.count("unlike") == 1
+    assert json.loads(call("campaign", "status", folder, "--json").stdout)["readings"] == 0
+    # What was read again and stands is taken, for to drop it would make the bound wrong.
+    assert call("campaign", "record", folder, path, "--accept-implausible").exit_code == 0
+
+
+def test_one_reading_at_a_time_is_held_to_those_before_it(visited, tmp_path):
+    folder, rows = visited
+    path = written(tmp_path / "readings.csv", rows[:20])
+    assert call("campaign", "record", folder, path).exit_code == 0
+    pose, x, y, z = rows[20]
+    far, near = (f"{x + off},{y},{z}" for off in (3.5, 0.0))
+    done = call("campaign", "record", folder, "--point", pose, "--position-mm", far)
+    assert done.exit_code == 2
+    assert "unlike the readings so far" in done.output
+    done = call("campaign", "record", folder, "--point", pose, "--position-mm", near)
+    assert done.exit_code == 0
