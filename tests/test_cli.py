@@ -139,3 +139,55 @@ def test_checking_a_folder_that_is_not_there_fails(tmp_path):
     done = call("check-results", tmp_path / "nowhere")
     assert done.exit_code == 1
     assert "no such folder" in done.output
+
+
+@pytest.mark.parametrize(
+    ("tried", "meant"),
+    [
+        (["inverse", "results/a"], "compensate"),
+        (["fit"], "calibrate"),
+        (["verify"], "check-results"),
+        (["chek-data"], "check-data"),
+        (["campaign", "undo", "check"], "strike"),
+        (["campaign", "recrod"], "record"),
+        (["measure"], "campaign next"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else " ".join(value),
+)
+def test_a_word_that_is_no_command_is_told_the_one_that_is_meant(tried, meant):
+    done = call(*tried)
+    assert done.exit_code == 2
+    assert f"Did you mean {meant}?" in done.stderr
+
+
+def test_an_option_that_is_none_is_told_the_nearest():
+    done = call("init", "x.csv", "--robto", "ur10")
+    assert done.exit_code == 2
+    assert "--robot" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words", [("predict", "nowhere"), ("fitted", "nowhere"), ("nonsense",), ("init", "--robto")]
+)
+def test_what_is_wrong_is_said_as_json_where_the_answer_is_wanted_so(words):
+    done = call(*words, "--json")
+    assert done.exit_code == 2
+    problems = json.loads(done.stdout)["problems"]
+    assert all({"where", "what", "allowed", "fix"} == set(each) for each in problems)
+    assert problems[0]["what"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("export", "nowhere", "--to", "there"),
+        ("check-data", "nowhere.yaml", "--figure", "a.svg"),
+        ("predict", "nowhere", "--output=a.csv"),
+        ("campaign", "report", "nowhere", "--to", "there"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_options_of_the_last_version_still_work_and_say_what_they_are_called_now(words):
+    done = call(*words)
+    assert " is called --" in done.stderr
+    assert "No such option" not in done.stderr

@@ -64,10 +64,10 @@ def test_the_picture_is_drawn_once(configuration, tmp_path):
         return rows
 
     config, picture = configuration(shifted), tmp_path / "checked.svg"
-    assert call("check-data", config, "--figure", picture).exit_code == 1
+    assert call("check-data", config, "--picture", picture).exit_code == 1
     assert picture.read_bytes().startswith(b"<?xml")
-    assert call("check-data", config, "--figure", picture).exit_code == 2
-    assert call("check-data", config, "--figure", picture, "--force").exit_code == 1
+    assert call("check-data", config, "--picture", picture).exit_code == 2
+    assert call("check-data", config, "--picture", picture, "--force").exit_code == 1
 
 
 @pytest.mark.parametrize("flag", [[], ["--json"]])

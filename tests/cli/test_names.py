@@ -33,7 +33,7 @@ def called(text, name):
 def test_an_export_stays_in_its_folder_whatever_its_name(folder, tmp_path, name):
     inside = tmp_path / "a" / "b"
     inside.mkdir(parents=True)
-    done = call("export", folder, "--to", inside, "--name", name)
+    done = call("export", folder, "--out", inside, "--name", name)
     assert done.exit_code == 2, done.output
     assert "--name" in done.output
     assert "letters, digits, _ - . and spaces" in done.output
@@ -41,7 +41,9 @@ def test_an_export_stays_in_its_folder_whatever_its_name(folder, tmp_path, name)
 
 
 def test_an_export_may_be_named_after_a_version(folder, tmp_path):
-    done = call("export", folder, "--to", tmp_path, "--name", "Prüfling v1.2-b", "--format", "yaml")
+    done = call(
+        "export", folder, "--out", tmp_path, "--name", "Prüfling v1.2-b", "--format", "yaml"
+    )
     assert done.exit_code == 0, done.output
     assert (tmp_path / "Prüfling v1.2-b.yaml").is_file()
 
@@ -49,7 +51,7 @@ def test_an_export_may_be_named_after_a_version(folder, tmp_path):
 def test_the_name_of_a_results_folder_is_text_in_the_exported_tables(folder, tmp_path):
     renamed = tmp_path / "cell|3_$x$ *new*"
     shutil.copytree(folder, renamed)
-    done = call("export", renamed, "--to", tmp_path / "out", "--format", "markdown",
+    done = call("export", renamed, "--out", tmp_path / "out", "--format", "markdown",
                 "--format", "latex", "--name", "arm")  # fmt: skip
     assert done.exit_code == 0, done.output
     shown = (tmp_path / "out" / "arm_tables.md").read_text()
@@ -61,7 +63,7 @@ def test_the_name_of_a_results_folder_is_text_in_the_exported_tables(folder, tmp
 def test_a_name_with_two_dashes_is_exported_to_urdf(folder, tmp_path):
     renamed = tmp_path / "cell---3"
     shutil.copytree(folder, renamed)
-    done = call("export", renamed, "--to", tmp_path / "out", "--format", "urdf")
+    done = call("export", renamed, "--out", tmp_path / "out", "--format", "urdf")
     assert done.exit_code == 0, done.output
     assert robot.load(tmp_path / "out" / "cell---3.urdf").dh.joints == 6
 

@@ -73,7 +73,7 @@ def test_predict_and_compensate_undo_each_other(folder, tmp_path):
     assert done.exit_code == 0, done.output
     rows = list(csv.DictReader(back.open()))
     assert all(row["status"].startswith("converged") for row in rows)
-    assert max(float(row["position_error_mm"]) for row in rows) <= 1e-6
+    assert max(float(row["solver_residual_mm"]) for row in rows) <= 1e-6
     found = np.array([[float(row[f"q{i}_deg"]) for i in range(1, 7)] for row in rows])
     assert np.abs(found - q_deg).max() < 1e-6
 
@@ -147,7 +147,7 @@ def test_another_robot_is_refused(folder):
 
 
 def test_export_writes_every_form(folder, tmp_path):
-    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--json")
+    done = call("export", folder, "--robot", "mh180", "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.output
     files = [Path(name).name for name in json.loads(done.stdout)["files"]]
     assert files == ["mh180.yaml", "mh180.json", "mh180.csv", "mh180.urdf", "mh180_tables.md",
@@ -161,14 +161,14 @@ def test_export_writes_every_form(folder, tmp_path):
 
 
 def test_a_urdf_that_is_not_there_is_said(folder, tmp_path):
-    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--format", "urdf",
+    done = call("export", folder, "--robot", "mh180", "--out", tmp_path, "--format", "urdf",
                 "--urdf", tmp_path / "none.urdf")  # fmt: skip
     assert done.exit_code == 2
     assert "none.urdf: no such file or directory" in done.output
-    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--tip-link", "tool0")
+    done = call("export", folder, "--robot", "mh180", "--out", tmp_path, "--tip-link", "tool0")
     assert done.exit_code == 2
     assert "--tip-link" in done.output
-    done = call("export", folder, "--robot", "mh180", "--to", tmp_path, "--format", "yaml",
+    done = call("export", folder, "--robot", "mh180", "--out", tmp_path, "--format", "yaml",
                 "--urdf", tmp_path / "none.urdf")  # fmt: skip
     assert done.exit_code == 2
     assert "--urdf" in done.output

@@ -421,7 +421,7 @@ POSE_NAMES = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
 def answered(command: str, folder: Path, given: Path, model: str, expected: int = 0) -> dict:
     """Columns of what a command writes for a file, in the instrument's frame."""
     out = given.with_name(f"{command}-{model}.parquet")
-    words = (folder, given, "--model", model, "--frame", "instrument", "--output", out)
+    words = (folder, given, "--model", model, "--frame", "instrument", "--out", out)
     done = call(command, *words)
     assert done.exit_code == expected, done.output
     import pyarrow.parquet
@@ -497,7 +497,7 @@ def test_a_joint_that_has_become_softer_is_named_by_the_comparison(finished, tmp
 
 
 def test_a_format_that_cannot_carry_bending_says_so(finished, tmp_path):
-    words = ("--model", "compliance", "--format", "urdf", "--to", tmp_path / "exported")
+    words = ("--model", "compliance", "--format", "urdf", "--out", tmp_path / "exported")
     done = call("export", finished[1], *words)
     assert "No such option" not in done.output
     assert "Traceback" not in done.output

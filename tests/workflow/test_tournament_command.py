@@ -92,7 +92,7 @@ def test_statements_whose_assumption_is_untrue_are_told_apart(results, monkeypat
     head, row, *_ = run(results, "--parts", "1").stdout.splitlines()
     assert row.split() == ["search_and_confirm", "candidates", "50", "0.980", "0.900", "1", "1",
                            "2", "12.5%", "7", "0.714"]  # fmt: skip
-    assert head.endswith("rejected  below  cells  no statement  untrue  then held")
+    assert head.endswith("rejected  below  cells  no statement  assumption broken  held so")
     assert len(head) == len(row)
 
 

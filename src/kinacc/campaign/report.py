@@ -143,11 +143,10 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     """The report as text."""
     plan = state.plan
     about = {key: in_markdown(value) for key, value in plan.about.items()}
-    said = state.statements()
     lines = [
         f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
         "",
-        *(f"- {words.statement(each, state)}" for each in said),
+        *(f"- {each}" for each in words.statements(state)),
         *(f"- {in_markdown(each)}" for each in read_above(state, found["campaign_points"])),
         "",
     ]

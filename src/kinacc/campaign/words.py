@@ -61,6 +61,21 @@ def reason(why: Reason | None) -> str | None:
     return None if why is None else REASONS[why.code].format(**why.numbers)
 
 
+def statements(state: State) -> list[str]:
+    """What may be said, a sentence each.
+
+    Where all candidates are measured and the same holds of them, that is one sentence.
+    """
+    said = state.statements()
+    points = len(state.plan.points) - len(state.left_out)
+    texts = {each.target: statement(each, state) for each in said}
+    measured, whole = texts.get(MEASURED, ""), texts.get(CANDIDATES, "")
+    same = measured.partition(" is ")[2] == whole.partition(" is ")[2]
+    if whole and same and _visited(state) == points:
+        del texts[MEASURED]
+    return list(texts.values())
+
+
 def statement(said: Statement, state: State) -> str:
     """One sentence a person may quote."""
     about = _about(said, state)
@@ -87,7 +102,7 @@ def statement(said: Statement, state: State) -> str:
 def standing(state: State) -> list[str]:
     """How far the campaign is, line by line."""
     budget = state.plan.assessor.measurements
-    visited = len({each.reading.point for each in state.told})
+    visited = _visited(state)
     points = len(state.plan.points) - len(state.left_out)
     lines = [
         f"{state.taken} of {budget} readings taken, at {visited} of {points} points"
@@ -119,10 +134,15 @@ def not_counted(state: State) -> list[str]:
     ]
 
 
+def _visited(state: State) -> int:
+    return len({each.reading.point for each in state.told})
+
+
 def _about(said: Statement, state: State) -> str:
     if said.target == MEASURED:
-        visited = len({each.reading.point for each in state.told})
-        return f"the largest error of the {visited} measured points"
+        visited = _visited(state)
+        points = "one measured point" if visited == 1 else f"{visited} measured points"
+        return f"the largest error of the {points}"
     if said.target == CANDIDATES:
         points = len(state.plan.points) - len(state.left_out)
         return f"the largest error of all {points} candidates"

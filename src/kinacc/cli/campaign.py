@@ -207,7 +207,7 @@ def status(out, **given) -> None:
 
 @campaign.command("report")
 @click.argument("folder", type=click.Path())
-@option("--to", type=click.Path(file_okay=False), help="Folder. [report in the campaign's]")
+@option("--out", "to", type=click.Path(file_okay=False), help="Folder. [report in the campaign's]")
 @answers("Print what it says as JSON.", force="Replace files that are there.")
 def report(folder, to, out) -> None:
     """Write what was measured and what may be said of it: tables, picture, text.
@@ -218,7 +218,7 @@ def report(folder, to, out) -> None:
     \b
     Example:
       kinacc campaign report check
-      kinacc campaign report check --to papers/check --json
+      kinacc campaign report check --out papers/check --json
     """
     from kinacc.cli import campaigns
 

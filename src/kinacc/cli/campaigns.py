@@ -124,7 +124,7 @@ def status(
     if not out.as_json:
         say_doubts(opened)
     lines = words.standing(found)
-    lines += [words.statement(said, found) for said in found.statements()]
+    lines += words.statements(found)
     if tolerance is not None:
         for said in found.statements():
             verdict = decide(said, tolerance)
@@ -176,7 +176,7 @@ def write_report(path: str, to: str | None, out: Output) -> None:
     write_whole(text, report.markdown(opened, state, tables, "campaign.svg").encode())
     written = [each.name for each in made_here]
     facts = answers.as_facts(state, state.plan.limits.tolerance_mm)
-    lines = [words.statement(said, state) for said in state.statements()]
+    lines = words.statements(state)
     lines += report.read_above(state, tables["campaign_points"])
     lines.append(f"{into}: {', '.join(written)}")
     out.say({**facts, "folder": str(into), "files": written}, "\n".join(lines))

@@ -23,7 +23,7 @@ from kinacc.cli.rows import ANGLE, LENGTH, Reader, open_table
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.table import RawTable, numbers_of
 
-_COMPUTED = {"predict": "unexplained_mm", "compensate": "position_error_mm"}  # columns of theirs
+_COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
 
 
 @dataclass(frozen=True)

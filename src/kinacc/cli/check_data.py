@@ -14,11 +14,17 @@ from kinacc.cli.choice import CONFIG
 @click.command("check-data")
 @click.argument("files", nargs=-1, type=click.Path())
 @click.option("--dataset", multiple=True, help="Data set of the configuration. [all that are read]")
-@click.option("--figure", type=click.Path(), help="Draw one data set to a .svg, .png or .pdf file.")
-@click.option("--force", is_flag=True, help="Replace a figure that is there.")
+@click.option(
+    "--picture", type=click.Path(), help="Draw one data set to a .svg, .png or .pdf file."
+)
+@click.option("--force", is_flag=True, help="Replace a picture that is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 def check_data(
-    files: tuple[str, ...], dataset: tuple[str, ...], figure: str | None, force: bool, as_json: bool
+    files: tuple[str, ...],
+    dataset: tuple[str, ...],
+    picture: str | None,
+    force: bool,
+    as_json: bool,
 ) -> None:
     """Check measured files before anything is fitted: what is there, and what looks wrong.
 
@@ -28,7 +34,7 @@ def check_data(
 
     \b
     Example:
-      kinacc check-data examples/ur10_published.yaml --figure checked.svg
+      kinacc check-data examples/ur10_published.yaml --picture checked.svg
       kinacc check-data config.yaml examples/ur10.yaml --dataset ur10_b --json
     """
     from kinacc.checks.report import UNUSABLE, to_json
@@ -36,19 +42,19 @@ def check_data(
 
     try:
         sections = _sections(files or (CONFIG,), dataset)
-        _check_figure(figure, force, list(sections))
+        _check_picture(picture, force, list(sections))
     except InputError as error:
         if not as_json:
             raise
         click.echo(to_json([_unusable(", ".join(files or (CONFIG,)), "", error)]))
         sys.exit(UNUSABLE)
-    code = report_on(sections, as_json, figure)
+    code = report_on(sections, as_json, picture)
     if not as_json and code < UNUSABLE:
         click.echo(f"next:\n  {shlex.join(['kinacc', 'calibrate', *(files or (CONFIG,))])}")
     sys.exit(code)
 
 
-def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = None) -> int:
+def report_on(sections: dict[str, dict], as_json: bool, picture: str | None = None) -> int:
     """Check every data set (complete configurations by name), print, and say the exit code."""
     from kinacc.checks.report import UNUSABLE, to_json
     from kinacc.errors import InputError
@@ -68,8 +74,8 @@ def report_on(sections: dict[str, dict], as_json: bool, figure: str | None = Non
                 click.echo(f"{error}\n", err=True)
             continue
         worst = max(worst, report.code)
-        if figure is not None:
-            _draw(report, figure)
+        if picture is not None:
+            _draw(report, picture)
         told.append(report.as_dict())
         if not as_json:
             click.echo(report.as_text() + "\n")
@@ -102,24 +108,24 @@ def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict
     return {name: full[name] for name in wanted or measured}
 
 
-def _check_figure(figure: str | None, force: bool, datasets: list[str]) -> None:
+def _check_picture(picture: str | None, force: bool, datasets: list[str]) -> None:
     from kinacc.cli.output import PICTURES, require_writable
     from kinacc.errors import InputError, Problem
 
-    if figure is not None and len(datasets) > 1:
+    if picture is not None and len(datasets) > 1:
         what = "draws one data set, and there are several"
-        raise InputError(Problem("--figure", what, ", ".join(datasets), "choose with --dataset"))
-    require_writable([figure], force, PICTURES)
+        raise InputError(Problem("--picture", what, ", ".join(datasets), "choose with --dataset"))
+    require_writable([picture], force, PICTURES)
 
 
-def _draw(report, figure: str) -> None:
+def _draw(report, picture: str) -> None:
     from kinacc.cli.output import Output
     from kinacc.figures.checked_data import draw
 
     suspects = {each.kind: each.lines for each in report.suspicions}
     limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
     drawn = draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
-    Output(picture=figure).draw(drawn)
+    Output(picture=picture).draw(drawn)
 
 
 def _unusable(dataset: str, path: str, error) -> dict:

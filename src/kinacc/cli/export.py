@@ -13,7 +13,7 @@ FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 
 @click.command("export")
 @click.argument("folder", type=click.Path())
-@option("--to", "target", type=click.Path(), default=".", help="Folder.")
+@option("--out", "target", type=click.Path(), default=".", help="Folder.")
 @option("--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]")
 @option("--name", help="Name of the files. [the data set's]")
 @option("--urdf", type=click.Path(), help="A URDF whose origins are corrected.")
@@ -40,8 +40,8 @@ def export(
 
     \b
     Example:
-      kinacc export results/mh180 --to exported
-      kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --to exported
+      kinacc export results/mh180 --out exported
+      kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --out exported
     """
     from kinacc.deployment.export.files import contents, note, write
     from kinacc.errors import Problem, refuse

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
+from difflib import get_close_matches
 from importlib import import_module
 
 import click
 
 from kinacc import __version__
-from kinacc.errors import InputError
+from kinacc.errors import InputError, Problem
+
+_AS_JSON = f"{__name__}.as_json"
 
 
 class Named(Mapping[str, click.Command]):
@@ -32,12 +37,59 @@ class Named(Mapping[str, click.Command]):
         return len(self.names)
 
 
+# Words that people try, and the command that does it.
+_MEANT = {
+    "check": "check-data",
+    "fit": "calibrate",
+    "forward": "predict",
+    "identify": "calibrate",
+    "ik": "compensate",
+    "import": "init",
+    "inverse": "compensate",
+    "measure": "campaign next",
+    "correct": "compensate",
+    "remove": "strike",
+    "reproduce": "study",
+    "results": "fitted",
+    "show": "fitted",
+    "summary": "fitted",
+    "undo": "strike",
+    "validate": "check-data",
+    "verify": "check-results",
+}
+# Spellings of options that are gone with the next version, by command.
+_FORMERLY = {
+    "check-data": {"--figure": "--picture"},
+    "export": {"--to": "--out"},
+    "campaign": {"--to": "--out", "--output": "--out"},
+    "predict": {"--output": "--out"},
+    "compensate": {"--output": "--out"},
+    "compare": {"--output": "--out"},
+    "plan-poses": {"--output": "--out"},
+    "plan-campaign": {"--output": "--out"},
+}
+
+
 class InOrder(click.Group):
     """A group whose commands are listed in the order in which they were added."""
 
     def list_commands(self, context: click.Context) -> list[str]:
         """The commands in the order of the work."""
         return list(self.commands)
+
+    def resolve_command(
+        self, context: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command of a word; for one that is none, what may be meant."""
+        word = args[0]
+        if word in self.commands or word.startswith("-"):
+            return super().resolve_command(context, args)
+        names = self.list_commands(context)
+        meant = _MEANT.get(word.lower(), "")
+        if meant.partition(" ")[0] not in names:
+            meant = next(iter(get_close_matches(word.lower(), names, 1)), "")
+        fix = f" Did you mean {meant}?" if meant else f" There are: {', '.join(names)}."
+        raise click.UsageError(f"{word!r} is no command.{fix}", context)
 
 
 class Lazy(InOrder):
@@ -82,16 +134,38 @@ class Terminated(KeyboardInterrupt):
 class Commands(Lazy):
     """A group whose commands report bad input as a list of problems, without a traceback."""
 
+    def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
+        """Words of the command line, with options under the names they have now."""
+        own = args[: args.index("--")] if "--" in args else args
+        context.meta[_AS_JSON] = "--json" in own
+        for i, word in enumerate(own):
+            name, mark, value = word.partition("=")
+            new = _FORMERLY.get(own[0], {}).get(name)
+            if new:
+                args = [*args[:i], f"{new}{mark}{value}", *args[i + 1 :]]
+                click.echo(f"{name} is called {new} now, and goes with the next version", err=True)
+        return super().parse_args(context, args)
+
     def invoke(self, context: click.Context) -> object:
         """Run the command; exit code 2 on bad input, 130 and 143 where it was stopped.
 
-        What the machine refuses (memory, a disk that is full) is 1, in one sentence as well.
+        What the machine refuses (memory, a disk that is full) is 1, in one sentence as well. With
+        --json problems are printed as JSON.
         """
         try:
             with _ended_in_order():
                 return super().invoke(context)
+        except click.UsageError as error:
+            if not context.meta[_AS_JSON]:
+                raise
+            code, said = 2, ""
+            problem = Problem(error.ctx.command_path if error.ctx else "", error.format_message())
+            click.echo(json.dumps({"problems": [asdict(problem)]}, indent=1))
         except InputError as error:
             code, said = 2, str(error)
+            if context.meta[_AS_JSON]:
+                facts = [asdict(each) for each in error.problems]
+                click.echo(json.dumps({"problems": facts}, indent=1))
         except Terminated:
             code, said = 143, "stopped by the system"
         except KeyboardInterrupt:
@@ -106,7 +180,8 @@ class Commands(Lazy):
             if error.filename is None or error.strerror is None:
                 raise
             code, said = 1, f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
-        click.echo(said, err=True)
+        if said:
+            click.echo(said, err=True)
         context.exit(code)
 
 

@@ -67,12 +67,12 @@ def answers(
 ) -> Callable[[Callable], Callable]:
     """Options of a command's answer, handed over as ``out``; its files can be written then.
 
-    ``as_json``, ``picture`` and ``force`` are helps of options, ``table`` is for --output.
+    ``as_json``, ``picture`` and ``force`` are helps of options, ``table`` is for --out.
     """
     options = [click.option("--json", "as_json", is_flag=True, help=as_json)]
     if table:
         words = "Write to a .csv, .json or .parquet file."
-        options.insert(0, click.option("--output", "-o", "table", type=click.Path(), help=words))
+        options.insert(0, click.option("--out", "-o", "table", type=click.Path(), help=words))
     if picture:
         options.insert(0, click.option("--picture", type=click.Path(), help=picture))
     if table or picture or force:

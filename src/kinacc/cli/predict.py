@@ -30,7 +30,7 @@ def predict(
 
     Where the base was estimated with the arm, the base frame is that of the DH model, for a VEC
     model as well. Where joints can take its place, it is a convention (undetermined_*):
-    --frame instrument leaves that out.
+    --frame instrument leaves that out. Exit code 1 if a row has no pose.
 
     \b
     Example:
@@ -47,4 +47,4 @@ def predict(
         found = poses_at(arm, given.joints, given.directions, frame, point, progress)
     out.deliver(tables.predicted(arm, given, found, frame, point))
     rows.say_unused(given)
-    rows.say_missing(found.pose.position_mm)
+    rows.end_where_missing(found.pose.position_mm, "a pose")

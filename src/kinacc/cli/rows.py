@@ -291,9 +291,9 @@ def say_unused(given: Rows) -> None:
         click.echo(f"not used: {', '.join(given.unused)}", err=True)
 
 
-def say_missing(position_mm: np.ndarray) -> None:
-    """Count the rows without an answer, positions (n, 3), on the error stream."""
-    missing = int(np.isnan(position_mm).any(axis=1).sum())
+def end_where_missing(answers: np.ndarray, what: str) -> None:
+    """Count the rows (n, m) without an answer on the error stream, and leave with exit code 1."""
+    missing = int(np.isnan(answers).any(axis=1).sum())
     if missing:
-        all_of = len(position_mm)
-        click.echo(f"{missing} of {all_of} rows without a pose: status says why", err=True)
+        click.echo(f"{missing} of {len(answers)} rows without {what}: status says why", err=True)
+        raise SystemExit(1)

@@ -75,7 +75,7 @@ class Sheet:
             cells = (column[i].rjust(width) for column, width in zip(columns, widths, strict=True))
             lines.append("  ".join(cells).rstrip())
         if count < len(self):
-            lines.append(f".. {len(self) - count} rows more; give --output to have them all")
+            lines.append(f".. {len(self) - count} rows more; give --out to have them all")
         return "\n".join(lines)
 
     def write(self, path: Path | str) -> None:

@@ -75,7 +75,7 @@ def compensated(
         Field("row", given.label, "", "the file's pose, or its line"),
         *joint_fields(arm.robot.dh.prismatic, found.q_rad),
         Field("status", _words(arm, found, is_program), "", "why there are joints, or none"),
-        Field("position_error_mm", found.position_error_mm, "mm", "left by the forward model"),
+        Field("solver_residual_mm", found.position_error_mm, "mm", "of the search for the joints"),
         Field(
             "orientation_error_mrad",
             1e3 * found.rotation_error_rad,

@@ -102,20 +102,21 @@ def _tell(outputs: Mapping[str, str], times: dict[str, float], out: Output) -> N
     cells = read(outputs["tournament_cells"])
     lines = [
         "assessor                 about       statements   held  worst cell  rejected  below  cells"
-        "  no statement  untrue  then held"
+        "  no statement  assumption broken  held so"
     ]
     for row in rows:
         untrue, held = _untrue(cells, row["assessor"], row["target"])
         lines.append(
             f"{row['assessor']:23s}  {row['target']:10s}  {row['statements']:10d}  "
             f"{row['mean_holds']:5.3f}  {row['worst_holds']:10.3f}  {row['rejected']:8d}  "
-            f"{row['below']:5d}  {row['cells']:5d}  {row['withheld']:12.1%}  {untrue:6d}  "
-            + (f"{held / untrue:9.3f}" if untrue else f"{'-':>9s}")
+            f"{row['below']:5d}  {row['cells']:5d}  {row['withheld']:12.1%}  {untrue:17d}  "
+            + (f"{held / untrue:7.3f}" if untrue else f"{'-':>7s}")
         )
     lines.append(
         "held: share of upper bounds not below the truth; rejected: cells significantly below the "
-        "confidence;\nbelow: cells more than 3 points below it; untrue: statements left out of all "
-        "this because what they\nassume is not true of the field, which the readings did not show"
+        "confidence;\nbelow: cells more than 3 points below it; assumption broken: statements left "
+        "out of all this because\nthe field breaks what they assume, which no reading showed; "
+        "held so: share of these that held"
     )
     lines += [f"{n:24s}  {ms:8.1f} ms a campaign of 200 measurements" for n, ms in times.items()]
     lines.append(f"all of it: {path.rpartition('/')[0]}")
