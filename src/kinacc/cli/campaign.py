@@ -208,8 +208,10 @@ def status(out, **given) -> None:
 @campaign.command("report")
 @click.argument("folder", type=click.Path())
 @option("--out", "to", type=click.Path(file_okay=False), help="Folder. [report in the campaign's]")
+@option("--table", "formats", multiple=True, type=click.Choice(["csv", "xlsx"]),
+        help="The tables in this form as well; may be repeated.")  # fmt: skip
 @answers("Print what it says as JSON.", force="Replace files that are there.")
-def report(folder, to, out) -> None:
+def report(folder, to, formats, out) -> None:
     """Write what was measured and what may be said of it: tables, picture, text.
 
     Leaves campaign_points, campaign_readings and campaign_bounds (.parquet), campaign (.svg, .png)
@@ -218,8 +220,8 @@ def report(folder, to, out) -> None:
     \b
     Example:
       kinacc campaign report check
-      kinacc campaign report check --out papers/check --json
+      kinacc campaign report check --out papers/check --table xlsx
     """
     from kinacc.cli import campaigns
 
-    campaigns.write_report(folder, to, out)
+    campaigns.write_report(folder, to, formats, out)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import click
@@ -141,7 +141,7 @@ def status(
     out.say(facts, "\n".join(lines))
 
 
-def write_report(path: str, to: str | None, out: Output) -> None:
+def write_report(path: str, to: str | None, formats: Sequence[str], out: Output) -> None:
     """Write tables, picture and text of a campaign."""
     from kinacc.artifacts.atomic import write_whole
     from kinacc.artifacts.store import TableToWrite, write_all
@@ -160,7 +160,10 @@ def write_report(path: str, to: str | None, out: Output) -> None:
         name: into / f"{name}.parquet"
         for name in ("campaign_points", "campaign_readings", "campaign_bounds")
     }
-    made_here = (*tables_to.values(), *pictures.values(), text)
+    sheets_to = {
+        into / f"{name}.{kind}": name for kind in dict.fromkeys(formats) for name in tables_to
+    }
+    made_here = (*tables_to.values(), *sheets_to, *pictures.values(), text)
     require_writable(made_here, out.force or to is None)
     with reporting("report", bar=True) as progress:
         state, tables = report.tables(opened, progress)
@@ -168,6 +171,8 @@ def write_report(path: str, to: str | None, out: Output) -> None:
         raise InputError(Problem(str(opened.folder), "no reading was asked for and taken yet"))
     made = marks.marks_of(opened)
     write_all([TableToWrite(at, name, tables[name], made) for name, at in tables_to.items()])
+    for at, name in sheets_to.items():
+        answers.sheet_of(name, tables[name]).write(at)
     figure = drawing.draw(
         tables["campaign_points"], tables["campaign_bounds"], len(state.plan.route),
         state.plan.limits.tolerance_mm, state.plan.about["calibration"],

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns, joint_count
+from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.assess.conformity import decide
 from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, instrument, words
@@ -63,6 +65,17 @@ def _refusals(begun: Plan) -> str:
         f"more than {math.degrees(begun.limits.joint_rad):g} deg from the joints asked for, or "
         f"more than {begun.limits.implausible_mm:g} mm from the model"
     )
+
+
+def sheet_of(name: str, columns: Columns) -> Sheet:
+    """A table of a report for other programs, with units and meanings of its contract."""
+    contract = ARTEFACTS[name]
+    known = {each.name: each for each in contract.for_joints(joint_count(contract, columns))}
+    fields = [
+        Field(each, np.asarray(values), known[each].unit, known[each].meaning)
+        for each, values in columns.items()
+    ]
+    return Sheet("", {}, fields)
 
 
 def next_in_words(found: State) -> str:

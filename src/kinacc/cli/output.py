@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from kinacc.cli.sheet import Sheet
 
-TABLES = (".csv", ".json", ".parquet")
+TABLES = (".csv", ".json", ".parquet", ".xlsx")
 PICTURES = (".svg", ".png", ".pdf")
 
 
@@ -71,7 +71,7 @@ def answers(
     """
     options = [click.option("--json", "as_json", is_flag=True, help=as_json)]
     if table:
-        words = "Write to a .csv, .json or .parquet file."
+        words = "Write to a .csv, .xlsx, .json or .parquet file."
         options.insert(0, click.option("--out", "-o", "table", type=click.Path(), help=words))
     if picture:
         options.insert(0, click.option("--picture", type=click.Path(), help=picture))

@@ -1,12 +1,14 @@
-"""Rows a command hands out: as text for people, CSV, JSON or Parquet with units for machines."""
+"""Rows a command hands out: as text or Excel for people, CSV, JSON or Parquet for machines."""
 
 from __future__ import annotations
 
 import csv
 import io
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -79,14 +81,46 @@ class Sheet:
         return "\n".join(lines)
 
     def write(self, path: Path | str) -> None:
-        """Write a .csv, .json or .parquet file, whole or not at all."""
+        """Write a .csv, .xlsx, .json or .parquet file, whole or not at all."""
         path = Path(path)
         if path.suffix == ".parquet":
             content = self._parquet()
+        elif path.suffix == ".xlsx":
+            content = self._excel()
         else:
             text = self.as_csv() if path.suffix == ".csv" else self.as_json() + "\n"
             content = text.encode()
         write_whole(path, content)
+
+    def _excel(self) -> bytes:
+        """Names, units and rows on one sheet; the same rows, the same bytes."""
+        import zipfile
+
+        from openpyxl import Workbook
+        from openpyxl.styles import Font
+
+        book = Workbook()
+        page = book.active
+        page.append([field.name for field in self.fields])
+        page.append([field.unit for field in self.fields])
+        columns = [[_in_excel(value) for value in field.values] for field in self.fields]
+        for row in zip(*columns, strict=True):
+            page.append(row)
+        for cell in page[1]:
+            cell.font = Font(bold=True)
+        page.freeze_panes = "A3"
+        book.properties.created = book.properties.modified = datetime(2000, 1, 1)
+        written, kept = io.BytesIO(), io.BytesIO()
+        book.save(written)
+        # A zip file holds the time each part was written at, and the book that of its saving.
+        with zipfile.ZipFile(written) as old, zipfile.ZipFile(kept, "w") as new:
+            for part in old.infolist():
+                content = old.read(part)
+                if part.filename == "docProps/core.xml":
+                    content = re.sub(rb"\d{4}-\d\d-\d\dT[\d:]+Z", b"2000-01-01T00:00:00Z", content)
+                plain_part = zipfile.ZipInfo(part.filename)
+                new.writestr(plain_part, content, zipfile.ZIP_DEFLATED)
+        return kept.getvalue()
 
     def _parquet(self) -> bytes:
         import pyarrow as pa
@@ -118,6 +152,12 @@ def _cell(value: object) -> str:
         return ""
     # Twelve digits: a nanometre in ten metres, and a text that ends where the digits end.
     return f"{value:.12g}" if isinstance(value, float) else in_csv(str(value))
+
+
+def _in_excel(value: object) -> object:
+    """A value as a cell takes it: a text is a text, and never a formula."""
+    value = plain(value)
+    return in_csv(value) if isinstance(value, str) else value
 
 
 def _short(value: object) -> str:
