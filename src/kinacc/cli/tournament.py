@@ -85,14 +85,15 @@ def tournament(
 
 def _times(job) -> dict[str, float]:
     """Milliseconds of a campaign by assessor; no table holds them, for they differ by the hour."""
-    from kinacc.study.tournament.contest import CONTESTANTS, SIZES, jobs, times_ms
+    from kinacc.study.tournament.contest import Contest, jobs, times_ms
     from kinacc.study.tournament.fields import of_tables
     from kinacc.workflow.runner import read_inputs
 
     fields = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
-    work = jobs(fields, SIZES[job.settings["size"]])
+    contest = Contest.of(job.settings)
+    work = jobs(fields, contest.size)
     cell = next((each for each in work if each.budget == 200), work[-1])
-    return times_ms(cell, job.seed, job.settings["study"], job.settings["assessors"] or CONTESTANTS)
+    return times_ms(cell, contest)
 
 
 def _tell(outputs: Mapping[str, str], times: dict[str, float], as_json: bool) -> None:
