@@ -10,18 +10,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinacc.config import schema
+from kinacc.cli import choice
 
 if TYPE_CHECKING:
     from kinacc.checks.report import Report
     from kinacc.measurements.intake.guess import Guess
 
 _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
-
-
-def choices_of(name: str) -> click.Choice:
-    """The words of a key of ``measurements.file``."""
-    return click.Choice(schema.key(f"measurements.file.{name}").choices)
+_FILE = "measurements.file"
 
 
 @click.command("init")
@@ -29,9 +25,12 @@ def choices_of(name: str) -> click.Choice:
 @click.option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
 @click.option("--name", help="Name of the data set. [as the file]")
-@click.option("--joint-unit", type=choices_of("joint_unit"), help="Unit of the joints.")
-@click.option("--length-unit", type=choices_of("length_unit"), help="Unit of the positions.")
-@click.option("--angle-unit", type=choices_of("orientation.unit"), help="Unit of orientations.")
+@click.option("--joint-unit", type=choice.values_of(f"{_FILE}.joint_unit"),
+              help="Unit of the joints.")  # fmt: skip
+@click.option("--length-unit", type=choice.values_of(f"{_FILE}.length_unit"),
+              help="Unit of the positions.")  # fmt: skip
+@click.option("--angle-unit", type=choice.values_of(f"{_FILE}.orientation.unit"),
+              help="Unit of orientations.")  # fmt: skip
 @click.option(
     "--orientation",
     help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "

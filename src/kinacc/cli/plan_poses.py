@@ -43,7 +43,7 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 @click.option("--frames-known", is_flag=True, help="Base and tool are not estimated.")
 @click.option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
 @click.option("--threshold", default=schema.key(TRUNCATION).default, show_default=True,
-              type=choice.range_of(TRUNCATION),
+              type=choice.values_of(TRUNCATION),
               help="Directions seen less than this share of the best are left out.")  # fmt: skip
 @click.option("--metric", type=click.Choice(["largest", "sum"]), default="largest",
               show_default=True,

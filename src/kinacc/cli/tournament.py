@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import click
 
 from kinacc.cli import choice
-from kinacc.config import schema
 
 
 @click.command("tournament")
@@ -15,10 +14,10 @@ from kinacc.config import schema
 @click.option("--results", default="results", show_default=True, help="Results folder.")
 @click.option(
     "--size",
-    type=click.Choice(schema.key("tournament.size").choices),
+    type=choice.values_of("tournament.size"),
     help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
-@click.option("--parts", type=choice.range_of("tournament.chunks"),
+@click.option("--parts", type=choice.values_of("tournament.chunks"),
               help="Number of parts. [configuration]")  # fmt: skip
 @click.option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
 @click.option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
