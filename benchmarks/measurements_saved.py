@@ -15,7 +15,7 @@ import sys
 import numpy as np
 
 from kinacc.config.schema import defaults
-from kinacc.study.tournament.contest import Cell, Job, campaigns
+from kinacc.study.tournament.contest import SIZES, Cell, Contest, Job, campaigns
 from kinacc.study.tournament.fields import ErrorField, of_tables
 from kinacc.study.tournament.summary import summed
 from kinacc.workflow.catalogue import TOURNAMENT
@@ -37,7 +37,8 @@ def measured(configs: list[str]) -> list[ErrorField]:
 def width_mm(field: ErrorField, noise_mm: float, name: str, budget: int) -> float:
     """Mean width between the bounds on the measured points."""
     job = Job(Cell(field, min(CANDIDATES, field.points), noise_mm), budget)
-    cells = summed(campaigns(job, range(CAMPAIGNS), SEED, defaults()["study"], [name])[0])
+    alone = Contest(SIZES["default"], SEED, (name,), defaults()["study"])
+    cells = summed(campaigns(job, range(CAMPAIGNS), alone)[0])
     return float(cells["width_mm"][np.asarray(cells["target"]) == "measured"][0])
 
 

@@ -20,6 +20,7 @@ ARM = robot.load("mh180")
 SPACE = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, np.pi / 3)
 DOWN = region.reference_rotation(np.deg2rad([180.0, 0.0, 0.0]))
 NINE = region.orientations(np.pi / 4, "signs_and_zero")
+WANTED = maps.PosesWanted(SPACE, DOWN, NINE, "dh")
 TABLE_II = dh.DHModel(
     [0.001, -1.568, 0.001, -3.142, -3.141, 0.002],
     [-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698],
@@ -111,7 +112,7 @@ OTHER_TOOL = Pose(rotation_y(np.array(0.2003)), np.array([20.1, -10.0, 150.1]))
 )
 def test_a_cell_is_what_a_slow_loop_makes_of_it(models):
     cells = region.Cells(np.array([0.3]), np.array([1725.0]), np.array([150.0]))
-    found = maps.accuracy_map(ARM, models, cells, DOWN, NINE, "dh")
+    found = maps.accuracy_map(ARM, models, cells, WANTED)
     slow = slow_cell(models, 0.3, 1725.0, 150.0)
     assert found.solutions[0] == found.wanted[0] == 18
     assert abs(found.position_max_mm[0] - slow["position"][0]) < 1e-6
@@ -122,7 +123,7 @@ def test_a_cell_is_what_a_slow_loop_makes_of_it(models):
 
 def test_the_default_space_is_reached_in_every_pose():
     cells = region.grid(SPACE, np.deg2rad([0.0, 60.0]), 100.0)
-    found = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), cells, DOWN, NINE, "dh")
+    found = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), cells, WANTED)
     assert (found.solutions == 18).all()
     assert (found.extrapolating == 0).all()
     assert np.isfinite(found.position_max_mm).all()
@@ -130,7 +131,7 @@ def test_the_default_space_is_reached_in_every_pose():
 
 def test_unreachable_cells_are_marked_and_the_others_not_touched():
     cells = region.Cells(np.zeros(3), np.array([1500.0, 2600.0, 4000.0]), np.zeros(3))
-    found = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), cells, DOWN, NINE, "dh")
+    found = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), cells, WANTED)
     assert found.solutions[0] == 18
     assert 0 < found.solutions[1] < 18
     assert np.isfinite(found.position_max_mm[1])
@@ -140,7 +141,7 @@ def test_unreachable_cells_are_marked_and_the_others_not_touched():
     assert found.worst_branch[2] is None
     assert found.orientation_worst_branch[2] is None
     alone = region.Cells(*(axis[:1] for axis in cells))
-    first = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), alone, DOWN, NINE, "dh")
+    first = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), alone, WANTED)
     assert first.position_max_mm[0] == found.position_max_mm[0]
 
 
@@ -148,9 +149,7 @@ def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
     lower, upper = (np.array(bound) for bound in RANGE)
     upper[4] = np.deg2rad(10.0)  # leaves only one wrist
     cells = region.grid(SPACE, np.array([0.2]), 300.0)
-    found = maps.accuracy_map(
-        ARM, two_models(wavy((lower, upper)), TABLE_II), cells, DOWN, NINE, "dh"
-    )
+    found = maps.accuracy_map(ARM, two_models(wavy((lower, upper)), TABLE_II), cells, WANTED)
     assert (found.solutions == 9).all()
     assert (found.extrapolating == 9).all()
     assert all(name.endswith("front-up-flip") for name in found.worst_branch)
@@ -186,6 +185,6 @@ def test_the_chosen_model_is_the_one_whose_tool_reaches_the_pose(invert_with):
 def test_no_error_where_the_models_agree():
     same = two_models(vec.without_errors(TABLE_II, *RANGE, 2), TABLE_II)
     cells = region.grid(SPACE, np.array([0.0]), 300.0)
-    found = maps.accuracy_map(ARM, same, cells, DOWN, NINE, "dh")
+    found = maps.accuracy_map(ARM, same, cells, WANTED)
     assert found.position_max_mm.max() < 1e-9
     assert found.orientation_max_mrad.max() < 1e-6

@@ -60,14 +60,9 @@ def models(arms) -> accuracy_map.Models:
 def test_cell_equals_brute_force(arms, models, angle_deg, radius, height):
     angle = math.radians(angle_deg)
     cells = region.Cells(np.array([angle]), np.array([radius]), np.array([height]))
-    found = accuracy_map.accuracy_map(
-        robot.load("mh180"),
-        models,
-        cells,
-        REFERENCE,
-        region.orientations(TURN, "signs_and_zero"),
-        "dh",
-    )
+    rotations = region.orientations(TURN, "signs_and_zero")
+    wanted = accuracy_map.PosesWanted(CYLINDER, REFERENCE, rotations, "dh")
+    found = accuracy_map.accuracy_map(robot.load("mh180"), models, cells, wanted)
     position, turn, name, count = maps.cell(arms, LIMITS, angle, radius, height, REFERENCE, TURN)
     assert found.wanted[0] == 18
     assert found.solutions[0] == count
@@ -97,7 +92,7 @@ def test_errors_at_joints_are_true_minus_model_tool(arms, models):
 @pytest.mark.parametrize("sequence", ["sobol", "halton"])
 def test_operating_points_stand_in_the_space_with_a_wanted_orientation(arms, models, sequence):
     rotations = region.orientations(TURN, "signs_and_zero")
-    wanted = operating_points.PosesWanted(CYLINDER, REFERENCE, rotations, "dh")
+    wanted = accuracy_map.PosesWanted(CYLINDER, REFERENCE, rotations, "dh")
     q = operating_points.in_space(robot.load("mh180"), models, wanted, sequence, 40)
     assert q.shape == (40, 6)
     seen = set()

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_accuracy_map import ARM, DOWN, NINE, RANGE, SPACE, TABLE_II, wavy
+from test_accuracy_map import ARM, DOWN, NINE, RANGE, SPACE, TABLE_II, WANTED, wavy
 from two_models import two_models
 
 from kinacc.errors import InputError
@@ -14,11 +14,9 @@ from kinacc.geometry import IDENTITY
 from kinacc.kinematics import dh, region, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.study import operating_points
-from kinacc.study.operating_points import PosesWanted
 
 TRUE = wavy()
 MODELS = two_models(TRUE, TABLE_II)
-WANTED = PosesWanted(SPACE, DOWN, NINE, "dh")
 
 
 @pytest.mark.parametrize("sequence", region.SEQUENCES)

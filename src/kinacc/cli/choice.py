@@ -23,9 +23,11 @@ option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
 
 
-def range_of(path: str) -> click.IntRange | click.FloatRange:
-    """The range of an option that stands for a key of the configuration, such as study.alpha."""
+def values_of(path: str) -> click.ParamType:
+    """What an option takes that stands for a key of the configuration, such as study.alpha."""
     key = schema.key(path)
+    if key.kind == "text":
+        return click.Choice(key.choices)
     if key.kind == "int":
         return click.IntRange(key.low, key.high)
     return click.FloatRange(key.low, key.high, min_open=key.open_ends, max_open=key.open_ends)

@@ -9,20 +9,16 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
-from kinacc.config import schema
 
 if TYPE_CHECKING:
     from kinacc.checks.report import Report
     from kinacc.measurements.intake.guess import Guess
 
 _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
-
-
-def choices_of(name: str) -> click.Choice:
-    """The words of a key of ``measurements.file``."""
-    return click.Choice(schema.key(f"measurements.file.{name}").choices)
+_FILE = "measurements.file"
 
 
 @click.command("init")
@@ -30,9 +26,13 @@ def choices_of(name: str) -> click.Choice:
 @option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @option("--out", "folder", default=".", help="Folder to write to.")
 @option("--name", help="Name of the data set. [as the file]")
-@option("--joint-unit", type=choices_of("joint_unit"), help="Unit of the joints.")
-@option("--length-unit", type=choices_of("length_unit"), help="Unit of the positions.")
-@option("--angle-unit", type=choices_of("orientation.unit"), help="Unit of orientations.")
+@option("--joint-unit", type=choice.values_of(f"{_FILE}.joint_unit"), help="Unit of the joints.")
+@option(
+    "--length-unit", type=choice.values_of(f"{_FILE}.length_unit"), help="Unit of the positions."
+)
+@option(
+    "--angle-unit", type=choice.values_of(f"{_FILE}.orientation.unit"), help="Unit of orientations."
+)
 @option(
     "--orientation",
     help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "

@@ -28,7 +28,7 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 @option("--position-only", is_flag=True, help="Orientations are not measured.")
 @option("--frames-known", is_flag=True, help="Base and tool are not estimated.")
 @option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
-@option("--threshold", default=schema.key(TRUNCATION).default, type=choice.range_of(TRUNCATION),
+@option("--threshold", default=schema.key(TRUNCATION).default, type=choice.values_of(TRUNCATION),
         help="Directions seen less than this share of the best are left out.")  # fmt: skip
 @option("--metric", type=click.Choice(["largest", "sum"]), default="largest",
         help="Travel between poses: of the joint that moves most, or of all.")  # fmt: skip

@@ -9,7 +9,6 @@ import click
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
-from kinacc.config import schema
 
 
 @click.command("tournament")
@@ -17,10 +16,10 @@ from kinacc.config import schema
 @option("--results", default="results", help="Results folder.")
 @option(
     "--size",
-    type=click.Choice(schema.key("tournament.size").choices),
+    type=choice.values_of("tournament.size"),
     help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
 )
-@option("--parts", type=choice.range_of("tournament.chunks"),
+@option("--parts", type=choice.values_of("tournament.chunks"),
         help="Number of parts. [configuration]")  # fmt: skip
 @option("--part", help="Compute this part alone, e.g. 1-of-8, and gather nothing.")
 @option("--assessor", multiple=True, help="Let only these take part; may be repeated.")
@@ -82,14 +81,15 @@ def tournament(config, results, size, parts, part, assessor, noise_mm, cores, ti
 
 def _times(job) -> dict[str, float]:
     """Milliseconds of a campaign by assessor; no table holds them, for they differ by the hour."""
-    from kinacc.study.tournament.contest import CONTESTANTS, SIZES, jobs, times_ms
+    from kinacc.study.tournament.contest import Contest, jobs, times_ms
     from kinacc.study.tournament.fields import of_tables
     from kinacc.workflow.runner import read_inputs
 
     fields = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
-    work = jobs(fields, SIZES[job.settings["size"]])
+    contest = Contest.of(job.settings)
+    work = jobs(fields, contest.size)
     cell = next((each for each in work if each.budget == 200), work[-1])
-    return times_ms(cell, job.seed, job.settings["study"], job.settings["assessors"] or CONTESTANTS)
+    return times_ms(cell, contest)
 
 
 def _tell(outputs: Mapping[str, str], times: dict[str, float], out: Output) -> None:

@@ -138,12 +138,7 @@ def settings() -> Section:
 
 def key(path: str) -> Key:
     """The key of a dotted path such as ``study.alpha``."""
-    entry: Key | Section | None = settings()
-    for name in path.split("."):
-        entry = entry.entry(name) if isinstance(entry, Section) else None
-    if not isinstance(entry, Key):
-        raise KeyError(path)
-    return entry
+    return dict(walk(settings()))[tuple(path.split("."))]
 
 
 def _section(name: str, content: Mapping[str, Any]) -> Section:

@@ -59,16 +59,12 @@ class Models(NamedTuple):
 
 
 class PosesWanted(NamedTuple):
-    """Which tool poses points are drawn from, and which joints are taken for them.
-
-    ``branches`` are those of ``inverse.machining_branches`` where None.
-    """
+    """Which tool poses are assessed, and the model whose joints are taken for them."""
 
     cylinder: Cylinder
     reference: np.ndarray
     orientations: Orientations
     invert_with: str
-    branches: tuple[str, ...] | None = None
 
 
 class AccuracyMap(NamedTuple):
@@ -94,18 +90,11 @@ def errors_at(models: Models, q_rad: np.ndarray) -> np.ndarray:
     return pose_error(true, modelled)
 
 
-def joints_of(
-    robot: Robot,
-    models: Models,
-    tool: Pose,
-    invert_with: str,
-    branches: tuple[str, ...] | None = None,
-) -> inverse.Solutions:
+def joints_of(robot: Robot, models: Models, tool: Pose, invert_with: str) -> inverse.Solutions:
     """Joints of tool poses (n, ...) per branch, from the model named ``invert_with``.
 
-    Tool poses are in the arm's base frame; without ``branches`` they are taken in those of
-    ``inverse.machining_branches``. A solution outside the joint range of the reference is
-    Status.OUTSIDE_RANGE.
+    Tool poses are in the arm's base frame, branches those of ``inverse.machining_branches``. A
+    solution outside the joint range of the reference is Status.OUTSIDE_RANGE.
     """
     chosen = models.by_name[invert_with]
     flange = compose(tool, invert(chosen.tool))
@@ -113,58 +102,38 @@ def joints_of(
         flange = compose(invert(robot.base), flange)
     if chosen.base is not None:
         flange = compose(invert(chosen.base), flange)
-    branches = inverse.machining_branches(robot) if branches is None else branches
+    branches = inverse.machining_branches(robot)
     return inverse.solve(robot, chosen.model, flange, branches, models.travel, models.range_rad)
 
 
-def accuracy_map(
-    robot: Robot,
-    models: Models,
-    cells: Cells,
-    reference: np.ndarray,
-    orientations: Orientations,
-    invert_with: str,
-    branches: tuple[str, ...] | None = None,
-) -> AccuracyMap:
-    """Largest errors at cells (n,) over ``orientations`` and ``branches``.
+def accuracy_map(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> AccuracyMap:
+    """Largest errors at cells (n,) over the orientations ``wanted`` and every branch.
 
     ``solutions`` counts the combinations reached within the joint limits and within the range of
     the reference, of ``wanted``; only those enter the maxima, since beyond its range it says
     nothing. ``extrapolating`` counts the combinations left out for that reason alone. Cells without
-    a solution have NaN maxima and None branches, which read ``X+ Y- Z0, front-up-flip``. Without
-    ``branches`` those of ``inverse.machining_branches``.
+    a solution have NaN maxima and None branches, which read ``X+ Y- Z0, front-up-flip``.
     """
-    branches = inverse.machining_branches(robot) if branches is None else branches
     count = len(cells.radius_mm)
     parts = [
         _block(
             robot,
             models,
             Cells(*(axis[begin : begin + _CELLS_PER_BLOCK] for axis in cells)),
-            reference,
-            orientations,
-            branches,
-            invert_with,
+            wanted,
         )
         for begin in range(0, count, _CELLS_PER_BLOCK)
     ]
     return AccuracyMap(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def _block(
-    robot: Robot,
-    models: Models,
-    cells: Cells,
-    reference: np.ndarray,
-    orientations: Orientations,
-    branches: tuple[str, ...],
-    invert_with: str,
-) -> AccuracyMap:
+def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> AccuracyMap:
+    orientations, branches = wanted.orientations, inverse.machining_branches(robot)
     turns = len(orientations.names)
     count = len(cells.radius_mm)
     repeated = Cells(*(np.repeat(axis, turns) for axis in cells))
-    tool = tool_poses(repeated, reference, np.tile(orientations.rotation, (count, 1, 1)))
-    solved = joints_of(robot, models, tool, invert_with, branches)
+    tool = tool_poses(repeated, wanted.reference, np.tile(orientations.rotation, (count, 1, 1)))
+    solved = joints_of(robot, models, tool, wanted.invert_with)
     found = solved.status == Status.FOUND
     position, orientation = np.full((2, *found.shape), -np.inf)
     error = errors_at(models, solved.q_rad[found])
@@ -177,9 +146,9 @@ def _block(
         orientation.reshape(shape), orientations, branches
     )
     outside = (solved.status == Status.OUTSIDE_RANGE).reshape(shape).sum(axis=1)
-    wanted = np.full(count, shape[1])
+    tried = np.full(count, shape[1])
     return AccuracyMap(
-        position_max, orientation_max, worst, orientation_worst, solutions, wanted, outside
+        position_max, orientation_max, worst, orientation_worst, solutions, tried, outside
     )
 
 

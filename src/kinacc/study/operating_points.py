@@ -58,10 +58,9 @@ def _solve_draws(
 ) -> tuple[np.ndarray, np.ndarray]:
     cells = region.fill(wanted.cylinder, unit[:, :3])
     turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
-    branches = inverse.machining_branches(robot) if wanted.branches is None else wanted.branches
-    branch = (unit[:, 4] * len(branches)).astype(int)
+    branch = (unit[:, 4] * len(inverse.machining_branches(robot))).astype(int)
     tool = region.tool_poses(cells, wanted.reference, wanted.orientations.rotation[turn])
-    solved = joints_of(robot, models, tool, wanted.invert_with, branches)
+    solved = joints_of(robot, models, tool, wanted.invert_with)
     rows = np.arange(len(unit))
     return solved.q_rad[rows, branch], solved.status[rows, branch]
 

@@ -14,12 +14,16 @@ from kinacc.kinematics import dh, region, robot, vec
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import Cylinder
 from kinacc.study import operating_points
-from kinacc.study.accuracy_map import Models, accuracy_map, errors_at
+from kinacc.study.accuracy_map import Models, PosesWanted, accuracy_map, errors_at
 
 UR10, IIWA = robot.load("ur10"), robot.load("iiwa14")
 DOWN = region.reference_rotation(np.array([np.pi, 0.0, 0.0]))
 SPACES = {"ur10": Cylinder(500, 300, 0, 200, 0, 1), "iiwa14": Cylinder(450, 100, 300, 100, 0, 1)}
 ORIENTATIONS = region.orientations(np.deg2rad(20.0), "signs_and_zero")
+
+
+def wanted(arm: str) -> PosesWanted:
+    return PosesWanted(SPACES[arm], DOWN, ORIENTATIONS, "dh")
 
 
 def models_of(arm: robot.Robot) -> Models:
@@ -35,7 +39,7 @@ def with_base(models: Models, base: Pose) -> Models:
 @pytest.mark.parametrize("arm", [UR10, IIWA], ids=lambda arm: arm.name)
 def test_a_map_is_made_with_the_branches_of_the_arm(arm):
     cells = region.grid(SPACES[arm.name], np.array([0.3]), 150.0)
-    result = accuracy_map(arm, models_of(arm), cells, DOWN, ORIENTATIONS, "dh")
+    result = accuracy_map(arm, models_of(arm), cells, wanted(arm.name))
     reached = result.solutions > 0
     assert reached.mean() > 0.8
     assert (result.position_max_mm[reached] > 0.01).all()
@@ -45,9 +49,8 @@ def test_a_map_is_made_with_the_branches_of_the_arm(arm):
 
 
 def test_points_are_drawn_in_the_space_of_an_arm_without_spherical_wrist():
-    wanted = operating_points.PosesWanted(SPACES["ur10"], DOWN, ORIENTATIONS, "dh")
     models = models_of(UR10)
-    q = operating_points.in_space(UR10, models, wanted, "sobol", 40)
+    q = operating_points.in_space(UR10, models, wanted("ur10"), "sobol", 40)
     assert region.contains(SPACES["ur10"], dh.forward(UR10.dh, q).position_mm).all()
 
 
@@ -55,10 +58,10 @@ def test_a_base_of_its_own_moves_the_space_with_the_arm():
     base = Pose(exp_so3(np.array([0.0, 0.0, 0.7])), np.array([0.0, 0.0, 150.0]))
     space = SPACES["ur10"]
     here = accuracy_map(
-        UR10, models_of(UR10), region.grid(space, np.array([0.3]), 150.0), DOWN, ORIENTATIONS, "dh"
+        UR10, models_of(UR10), region.grid(space, np.array([0.3]), 150.0), wanted("ur10")
     )
     moved = region.grid(replace(space, bottom_mm=150), np.array([1.0]), 150.0)
-    there = accuracy_map(replace(UR10, base=base), models_of(UR10), moved, DOWN, ORIENTATIONS, "dh")
+    there = accuracy_map(replace(UR10, base=base), models_of(UR10), moved, wanted("ur10"))
     assert np.array_equal(here.solutions, there.solutions)
     assert np.allclose(here.position_max_mm, there.position_max_mm, equal_nan=True)
 

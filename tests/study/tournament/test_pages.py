@@ -25,7 +25,8 @@ def tables() -> dict:
         ErrorField(name, 0.4 * rng.normal(size=(n, 3)), kind="synthetic", meaning="chance")
         for name, n in (("first_0", 220), ("small", 60))
     ]
-    found = contest.summed(contest.jobs(made, SIZE), SIZE, 5, paper.study(), NAMES)
+    four = contest.Contest(SIZE, 5, NAMES, paper.study())
+    found = contest.summed(contest.jobs(made, SIZE), four)
     cells = summary.in_order(found)
     return {
         "tournament_cells": cells,

@@ -39,8 +39,8 @@ def field() -> ErrorField:
 def rows(field):
     """All campaigns of the small tournament."""
     work = contest.jobs([field], SMALL)
-    names = contest.CONTESTANTS
-    parts = [contest.campaigns(job, range(3), 5, paper.study(), names)[0] for job in work]
+    everyone = contest.Contest(SMALL, 5, contest.CONTESTANTS, paper.study())
+    parts = [contest.campaigns(job, range(3), everyone)[0] for job in work]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -106,13 +106,14 @@ def test_every_assessor_is_in_every_cell(rows):
 
 
 def test_parts_of_any_number_give_the_same_table(field):
-    names, few = ("maximum", "single_shot"), replace(SMALL, repetitions=2)
+    names = ("maximum", "single_shot")
+    two = contest.Contest(replace(SMALL, repetitions=2), 5, names, paper.study())
 
     def table(parts):
         found = []
         for number in range(1, parts + 1):
             work = contest.part_of(contest.jobs([field], SMALL), number, parts)
-            found.append(contest.summed(work, few, 5, paper.study(), names))
+            found.append(contest.summed(work, two))
         joined = {name: np.concatenate([each[name] for each in found]) for name in found[0]}
         return summary.in_order(joined)
 

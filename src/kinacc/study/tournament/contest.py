@@ -69,6 +69,26 @@ SIZES = {
 
 
 @dataclass(frozen=True)
+class Contest:
+    """Who takes part in how large a tournament.
+
+    ``study``: settings that assessors share with the configuration's section of that name.
+    """
+
+    size: Size
+    seed: int
+    assessors: tuple[str, ...]
+    study: Mapping[str, object]
+
+    @classmethod
+    def of(cls, settings: Mapping) -> Contest:
+        """The contest of a stage's settings: all assessors and noises where none is named."""
+        size = SIZES[settings["size"]].only(settings["noise_mm"])
+        names = tuple(settings["assessors"]) or CONTESTANTS
+        return cls(size, settings["seed"], names, settings["study"])
+
+
+@dataclass(frozen=True)
 class Cell:
     """One field at one candidate count and noise: what a world belongs to."""
 
@@ -114,45 +134,33 @@ def part_of(work: Sequence[Job], number: int, of: int) -> Sequence[Job]:
     return work[number - 1 :: of]
 
 
-def summed(
-    work: Sequence[Job],
-    size: Size,
-    seed: int,
-    study: Mapping[str, object],
-    assessors: Sequence[str],
-    progress=None,
-) -> Columns:
+def summed(work: Sequence[Job], contest: Contest, progress=None) -> Columns:
     """Summary of every job: rows as in :func:`kinacc.study.tournament.summary.summed`.
 
-    ``study``: settings that assessors share with the configuration's section of that name.
     ``progress(iterable, what, total)`` reports. The campaigns themselves are not kept.
     """
     found: list[dict] = []
+    size = contest.size
     for job in progress(work, "cells", len(work)) if progress else work:
         for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
-            own = [name for name in assessors if ASSESSORS[name].is_slow == is_slow]
+            own = tuple(each for each in contest.assessors if ASSESSORS[each].is_slow == is_slow)
             if own:
-                found += summary.cells(campaigns(job, range(count), seed, study, own)[0])
+                some = replace(contest, assessors=own)
+                found += summary.cells(campaigns(job, range(count), some)[0])
     return columns_of("tournament_chunk", found)
 
 
-def times_ms(
-    job: Job, seed: int, study: Mapping[str, object], assessors: Sequence[str]
-) -> dict[str, float]:
+def times_ms(job: Job, contest: Contest) -> dict[str, float]:
     """Processor time of one campaign of every assessor, median of three, after one to warm up."""
     found = {}
-    for name in assessors:
-        _, times = campaigns(job, range(4), seed, study, [name])
+    for name in contest.assessors:
+        _, times = campaigns(job, range(4), replace(contest, assessors=(name,)))
         found[name] = float(np.median(times[1:]))
     return found
 
 
 def campaigns(
-    job: Job,
-    repetitions: Iterable[int],
-    seed: int,
-    study: Mapping[str, object],
-    assessors: Sequence[str],
+    job: Job, repetitions: Iterable[int], contest: Contest
 ) -> tuple[Columns, list[float]]:
     """Statements of the campaigns of one job, and the processor time of each campaign in ms.
 
@@ -161,7 +169,7 @@ def campaigns(
     """
     rows: list[dict] = []
     times: list[float] = []
-    cell, settings = job.cell, {**study, "measurements": job.budget}
+    cell, settings = job.cell, {**contest.study, "measurements": job.budget}
     for repetition in repetitions:
         place = {
             "field": cell.field.name,
@@ -170,8 +178,8 @@ def campaigns(
             "budget": job.budget,
             "repetition": repetition,
         }
-        world, chosen = world_of(cell, repetition, job.budget, seed)
-        for name in assessors:
+        world, chosen = world_of(cell, repetition, job.budget, contest.seed)
+        for name in contest.assessors:
             own = {**place, "assessor": name}
             begun = time.process_time()
             found = assessed(name, settings, world, **cell.field.known(chosen))

@@ -29,9 +29,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     cells = region.grid(wanted.cylinder, np.deg2rad(layout.slices_deg), layout.grid_mm)
     arm = robot.load(settings["robot"])
     models = shared.models(inputs, equipment, arm)
-    result = accuracy_map(
-        arm, models, cells, wanted.reference, wanted.orientations, wanted.invert_with
-    )
+    result = accuracy_map(arm, models, cells, wanted)
     # The slice as configured: degrees that went through radians and back are not the same number.
     per_slice = len(cells.radius_mm) // len(layout.slices_deg)
     columns = {

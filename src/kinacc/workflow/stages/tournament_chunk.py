@@ -16,10 +16,8 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     ``noise_mm`` (all of the size if empty), ``study`` (what assessors share with that section of
     the configuration) and, by data set, ``robots``.
     """
-    size = contest.SIZES[settings["size"]].only(settings["noise_mm"])
-    fields = of_tables(inputs, settings["robots"], size.draws)
+    given = contest.Contest.of(settings)
+    fields = of_tables(inputs, settings["robots"], given.size.draws)
     part = settings.get("part") or {"number": 1, "of": 1}
-    work = contest.part_of(contest.jobs(fields, size), part["number"], part["of"])
-    assessors = settings["assessors"] or contest.CONTESTANTS
-    found = contest.summed(work, size, settings["seed"], settings["study"], assessors, progress)
-    return {"tournament_chunk": found}
+    work = contest.part_of(contest.jobs(fields, given.size), part["number"], part["of"])
+    return {"tournament_chunk": contest.summed(work, given, progress)}

@@ -11,7 +11,7 @@ from kinacc.study.tournament.fields import described, of_tables
 def run(inputs: Mapping, settings: Mapping) -> dict[str, dict]:
     """Return ``tournament_cells``, ``tournament_verdicts`` and ``tournament_fields``."""
     cells = summary.in_order(inputs["tournament_chunk"])
-    fields = of_tables(inputs, settings["robots"], contest.SIZES[settings["size"]].draws)
+    fields = of_tables(inputs, settings["robots"], contest.Contest.of(settings).size.draws)
     return {
         "tournament_cells": cells,
         "tournament_verdicts": summary.judged(cells),
