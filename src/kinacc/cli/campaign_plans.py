@@ -30,7 +30,7 @@ _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be the one that is read 
 
 
 @dataclass(frozen=True)
-class Question:
+class Simulation:
     """What is simulated, and what for."""
 
     fields: tuple[ErrorField, ...]
@@ -42,7 +42,7 @@ class Question:
     seed: int
 
 
-def question(given: Mapping) -> Question:
+def question(given: Mapping) -> Simulation:
     """The question of the command's options. Raises InputError listing what is wrong."""
     problems: list[Problem] = []
     instruments = campaign_options.gathered(
@@ -71,7 +71,7 @@ def question(given: Mapping) -> Question:
     if given["largest_mm"] is not None:
         chosen = [_scaled(each, given["largest_mm"]) for each in chosen]
     aim = Aim(given["target"], given["width_mm"], given["tolerance_mm"], given["power"])
-    return Question(
+    return Simulation(
         tuple(chosen),
         points,
         instruments[0].covariance_mm2,
@@ -82,7 +82,7 @@ def question(given: Mapping) -> Question:
     )
 
 
-def answer(asked: Question, progress: Callable | None = None) -> list[Row]:
+def answer(asked: Simulation, progress: Callable | None = None) -> list[Row]:
     """Simulate."""
     found = simulate.outcomes(
         asked.fields, asked.points, asked.covariance_mm2, asked.assessors, asked.repetitions,
@@ -140,7 +140,7 @@ def _scaled(field: ErrorField, largest_mm: float) -> ErrorField:
     return replace(field, error_mm=field.error_mm * (largest_mm / largest))
 
 
-def as_sheet(asked: Question, found: list[Row]) -> Sheet:
+def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
     """One row per kind of errors and budget."""
     aim = asked.aim
 
@@ -208,7 +208,7 @@ def _counted(row: Row) -> str | None:
     return f"{row.holding} of {row.judged}" if row.judged else None
 
 
-def in_words(asked: Question, found: list[Row]) -> str:
+def in_words(asked: Simulation, found: list[Row]) -> str:
     """The budget that does, or that none did, and how surely so many repetitions show it."""
     aim = asked.aim
     if not _aims(aim):
@@ -241,7 +241,7 @@ def in_words(asked: Question, found: list[Row]) -> str:
     )
 
 
-def _none_did(asked: Question, found: list[Row], said: str) -> str:
+def _none_did(asked: Simulation, found: list[Row], said: str) -> str:
     aim, most = asked.aim, max(row.budget for row in found)
     best = min(row.reaches(aim) for row in found if row.budget == most)
     hits = round(best * asked.repetitions)
@@ -253,7 +253,7 @@ def _none_did(asked: Question, found: list[Row], said: str) -> str:
     )
 
 
-def drawn(asked: Question, found: list[Row]) -> Figure:
+def drawn(asked: Simulation, found: list[Row]) -> Figure:
     """Width against budget."""
     from kinacc.figures import campaign_plan
 

@@ -25,7 +25,7 @@ _SAME_ARM_MM = 1e-3  # how far a file's nominal arm may be from the robot's
 _PROBES = 24
 
 
-def generated(arm: Calibration, dh_joints: bool = False) -> str:
+def generated(calibration: Calibration, dh_joints: bool = False) -> str:
     """A URDF of the calibrated DH chain: base_link, link_1 .. link_k, flange and tool.
 
     Joints are those the controller reports, or with ``dh_joints`` those of the DH table. Raises
@@ -33,13 +33,13 @@ def generated(arm: Calibration, dh_joints: bool = False) -> str:
     """
     from lxml import etree
 
-    robot, dh = arm.robot, arm.model
+    robot, dh = calibration.robot, calibration.model
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
     senses = np.ones(dh.joints) if dh_joints else links.signs(robot)
     frames, end = links.origins(dh)
     frames[0] = compose(robot.base, frames[0])
-    root = etree.Element("robot", name=_name(robot_name(arm)))
-    about = f"calibrated from {robot.name} with data set {arm.name}"
+    root = etree.Element("robot", name=_name(robot_name(calibration)))
+    about = f"calibrated from {robot.name} with data set {calibration.name}"
     about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
     root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
     etree.SubElement(root, "link", name="base_link")
@@ -65,15 +65,15 @@ def generated(arm: Calibration, dh_joints: bool = False) -> str:
     etree.SubElement(root, "link", name="flange")
     flange = compose(end, robot.flange)
     _joint(root, "flange_fixed", "fixed", last, "flange", flange)
-    if TOOL in arm.targets:
+    if TOOL in calibration.targets:
         etree.SubElement(root, "link", name="tool")
-        tool = compose(invert(robot.flange), arm.targets[TOOL])
+        tool = compose(invert(robot.flange), calibration.targets[TOOL])
         _joint(root, "tool_fixed", "fixed", "flange", "tool", tool)
     return _written(root)
 
 
 def corrected(
-    arm: Calibration,
+    calibration: Calibration,
     path: str | Path,
     base_link: str | None = None,
     tip_link: str | None = None,
@@ -90,11 +90,11 @@ def corrected(
     path = Path(path)
     chain = joints_between(path, base_link, tip_link)
     moving = [joint for joint in chain if joint.kind in MOVING]
-    base, tip = _ends_in_file(arm, chain, path)
+    base, tip = _ends_in_file(calibration, chain, path)
     fixed, tail = _fixed_parts(chain)
     at_zero = _link_frames(chain)
-    plain, _ = links.origins(arm.robot.dh)
-    better, end = links.origins(arm.model)
+    plain, _ = links.origins(calibration.robot.dh)
+    better, end = links.origins(calibration.model)
     frame, anchors = base, []
     for origin, there in zip(plain, at_zero, strict=True):
         frame = compose(frame, origin)
@@ -118,9 +118,9 @@ def corrected(
     return etree.tostring(tree, encoding="unicode") + "\n"
 
 
-def _ends_in_file(arm: Calibration, chain: list[Joint], path: Path) -> tuple[Pose, Pose]:
+def _ends_in_file(calibration: Calibration, chain: list[Joint], path: Path) -> tuple[Pose, Pose]:
     """First DH frame in the file's base link, and its tip link in the last DH frame."""
-    robot = arm.robot
+    robot = calibration.robot
     count = sum(joint.kind in MOVING for joint in chain)
     if count != robot.dh.joints:
         what = f"its chain has {count} moving joints, {robot.name} has {robot.dh.joints}"
