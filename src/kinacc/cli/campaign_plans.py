@@ -46,7 +46,7 @@ def question(given: Mapping) -> Simulation:
     """The question of the command's options. Raises InputError listing what is wrong."""
     problems: list[Problem] = []
     instruments = campaign_options.gathered(
-        problems, lambda: campaign_options.instruments({**given, "frame": "base"})
+        problems, lambda: campaign_options.instruments(given["noise_mm"], given["covariance_mm2"])
     )
     lengths = ("width_mm", "tolerance_mm", "largest_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
@@ -56,9 +56,10 @@ def question(given: Mapping) -> Simulation:
         what = f"{points} poses with up to {max(budgets)} readings each"
         allowed = f"at most {_MOST_READINGS:g}, poses times the largest budget"
         problems.append(Problem("--poses, --budget", what, allowed))
+    name, *method = (given[each] for each in ("assessor", "confidence", "settings"))
     assessors = [
         campaign_options.gathered(
-            problems, lambda each=each: campaign_options.assessor({**given, "budget": each})
+            problems, lambda each=each: campaign_options.assessor(name, each, *method)
         )
         for each in sorted(set(budgets))
     ]

@@ -27,10 +27,12 @@ def start(given: Mapping, out: Output) -> None:
     from kinacc.cli import campaign_candidates, campaign_options, rows
 
     problems = folders.in_the_way(given["folder"])
+    noise = (given[each] for each in ("noise_mm", "covariance_mm2", "instrument", "frame"))
+    method = (given[each] for each in ("assessor", "budget", "confidence", "settings"))
     instruments = campaign_options.gathered(
-        problems, lambda: campaign_options.instruments(given), ()
+        problems, lambda: campaign_options.instruments(*noise), ()
     )
-    assessor = campaign_options.gathered(problems, lambda: campaign_options.assessor(given))
+    assessor = campaign_options.gathered(problems, lambda: campaign_options.assessor(*method))
     lengths = ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     if problems:
@@ -38,7 +40,8 @@ def start(given: Mapping, out: Output) -> None:
     calibration = choice.calibration_of(
         given["calibration"], given["model"], given["robot"], given["config"], given["session"]
     )
-    found = campaign_candidates.candidates(given, calibration)
+    region = choice.record_of(campaign_candidates.Region, given)
+    found = campaign_candidates.candidates(region, calibration)
     points = begin.points_of(
         calibration, found.joints, found.label, found.directions, given["point"]
     )
