@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from command_line import call
 from small_results import SmallResults
 
 from kinacc.artifacts import provenance, store
@@ -74,15 +75,17 @@ def test_one_data_set_may_be_checked_by_its_own_folder(results):
     assert not check.check_results(folder).ok
 
 
-def test_the_report_is_readable_by_people_and_machines(results, capsys):
+def test_the_report_is_readable_by_people_and_machines(results):
     (results.folder / "figures" / "fig4.png").unlink()
-    assert check.main(str(results.root), as_json=True) == 1
-    told = json.loads(capsys.readouterr().out)
+    done = call("check-results", results.root, "--json")
+    assert done.exit_code == 1
+    told = json.loads(done.stdout)
     assert told["ok"] is False
     assert told["datasets"][0]["name"] == "mh180"
     assert told["datasets"][0]["problems"][0]["where"].endswith("fig4.png")
-    assert check.main(str(results.root)) == 1
-    assert "fig4.png: no such file" in capsys.readouterr().out
+    done = call("check-results", results.root)
+    assert done.exit_code == 1
+    assert "fig4.png: no such file" in done.stdout
 
 
 def test_a_folder_that_is_none(tmp_path):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from small_arms import calibrated, joints
 
 from kinacc.deployment.compensate import compensate, programmed
-from kinacc.deployment.postures import Status
+from kinacc.deployment.postures import PoseStatus
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, compose, invert, log_so3
@@ -29,7 +29,7 @@ def test_joints_come_back_from_their_own_poses(name, model):
     arm, q_rad = calibrated(name, model), joints(name, 30, seed=4)
     wanted = predict(arm, q_rad, None, "instrument").pose
     found = compensate(arm, wanted, q_rad + 0.03, None, "instrument")
-    assert (found.status <= Status.EXTRAPOLATED).all()
+    assert (found.status <= PoseStatus.EXTRAPOLATED).all()
     off, turn = left(arm, found.q_rad, wanted, "instrument")
     assert off < 1e-6
     assert turn < 1e-9
@@ -44,7 +44,7 @@ def test_a_nominal_program_is_corrected_by_little(seed, model):
     arm, q_rad = calibrated("mh180", model), joints("mh180", 5, seed)
     wanted = programmed(arm, q_rad)
     found = compensate(arm, wanted, q_rad)
-    good = found.status <= Status.OTHER_POSTURE
+    good = found.status <= PoseStatus.OTHER_POSTURE
     assert good.mean() >= 0.8  # a wrist near alignment may need a turn the range does not have
     off, _ = left(arm, found.q_rad[good], Pose(*(part[good] for part in wanted)))
     assert off < 1e-6
@@ -57,7 +57,7 @@ def test_without_joints_to_be_near_any_posture_the_data_cover_is_good():
     arm, q_rad = calibrated("mh180", "dh"), joints("mh180", 20, seed=5)
     wanted = predict(arm, q_rad).pose
     found = compensate(arm, wanted)
-    assert (found.status == Status.CONVERGED).all()
+    assert (found.status == PoseStatus.CONVERGED).all()
     assert left(arm, found.q_rad, wanted)[0] < 1e-6
     assert not arm.outside_range(found.q_rad @ arm.robot.joint_map.T).any()
     assert np.isnan(found.change).all()
@@ -67,15 +67,15 @@ def test_every_kind_of_row_without_joints_says_why():
     arm = calibrated("mh180", "dh")
     far = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))
     found = compensate(arm, far)
-    assert found.status.tolist() == [Status.NOT_REACHED]
+    assert found.status.tolist() == [PoseStatus.NOT_REACHED]
     assert np.isnan(found.q_rad).all()
     q_rad = joints("mh180", 1)
     q_rad[0, 4] = arm.robot.q_max_rad[4] + 0.05  # joint 5 cannot get there, nor its mirror
     q_rad[0, 3] = arm.robot.q_max_rad[3] - 0.1
     wanted = arm.pose(JointState(q_rad @ arm.robot.joint_map.T))
     found = compensate(arm, wanted, q_rad)
-    assert found.status[0] in (Status.OUTSIDE_LIMITS, Status.OTHER_POSTURE)
-    if found.status[0] == Status.OUTSIDE_LIMITS:
+    assert found.status[0] in (PoseStatus.OUTSIDE_LIMITS, PoseStatus.OTHER_POSTURE)
+    if found.status[0] == PoseStatus.OUTSIDE_LIMITS:
         assert np.isnan(found.q_rad).all()
         assert found.offending[0, 4]
 
@@ -86,7 +86,7 @@ def test_a_posture_outside_the_limits_is_left_for_another_and_that_is_said():
     wanted = predict(arm, q_rad).pose
     # The same pose with the wrist flipped: joint 5 mirrored.
     flipped = compensate(arm, wanted, np.array([0.1, 0.2, 0.3, 0.2 + np.pi, -1.0, 0.4 - np.pi]))
-    assert flipped.status[0] == Status.CONVERGED
+    assert flipped.status[0] == PoseStatus.CONVERGED
     assert flipped.q_rad[0, 4] == pytest.approx(-1.0, abs=1e-6)
     near = compensate(arm, wanted, q_rad)
     assert near.q_rad[0] == pytest.approx(q_rad[0], abs=1e-9)
@@ -94,7 +94,7 @@ def test_a_posture_outside_the_limits_is_left_for_another_and_that_is_said():
 
     tight = replace(arm.robot, q_max_rad=np.where(np.arange(6) == 4, 0.9, arm.robot.q_max_rad))
     found = compensate(replace(arm, robot=tight), wanted, q_rad)
-    assert found.status[0] == Status.OTHER_POSTURE
+    assert found.status[0] == PoseStatus.OTHER_POSTURE
     assert found.q_rad[0, 4] < 0.0
     assert left(arm, found.q_rad, wanted)[0] < 1e-6
 
@@ -114,7 +114,7 @@ def test_a_vec_model_gives_no_joints_outside_its_range():
     q_rad[0, 0] = 2.9  # the arm turned away from all that was measured
     wanted = predict(by_dh, q_rad).pose
     found = compensate(arm, wanted, q_rad)
-    assert found.status[0] == Status.OUTSIDE_RANGE
+    assert found.status[0] == PoseStatus.OUTSIDE_RANGE
     assert found.offending[0, 0]
     assert np.isnan(found.q_rad).all()
 
@@ -123,7 +123,7 @@ def test_seven_axes_stay_where_they_are_asked_to():
     arm, q_rad = nominal(robot.load("iiwa14")), joints("iiwa14", 10)
     wanted = predict(arm, q_rad).pose
     found = compensate(arm, wanted, q_rad + 0.05)
-    assert (found.status == Status.CONVERGED).all()
+    assert (found.status == PoseStatus.CONVERGED).all()
     assert left(arm, found.q_rad, wanted)[0] < 1e-6
     assert np.abs(found.q_rad - q_rad).max() < 0.5
 

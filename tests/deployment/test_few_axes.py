@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinacc.deployment.compensate import compensate, programmed
-from kinacc.deployment.postures import FEW_AXES_TURN_RAD, Status
+from kinacc.deployment.postures import FEW_AXES_TURN_RAD, PoseStatus
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, log_so3, rotation_x, skew
 from kinacc.kinematics import dh, robot
@@ -53,7 +53,7 @@ def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
     q = program(name)
     wanted = programmed(plain, q)
     found = compensate(arm, wanted, q)
-    assert (found.status == Status.CONVERGED).all()
+    assert (found.status == PoseStatus.CONVERGED).all()
     there = arm.pose(JointState(found.q_rad))
     assert np.linalg.norm(there.position_mm - wanted.position_mm, axis=1).max() < 1e-6
     turn = np.linalg.norm(log_so3(there.rotation @ np.swapaxes(wanted.rotation, 1, 2)), axis=1)
@@ -80,7 +80,7 @@ def test_without_joints_to_be_near_a_posture_is_found():
     plain, arm = real_arm("scara")
     wanted = programmed(plain, program("scara", 3))
     found = compensate(arm, wanted)
-    assert (found.status == Status.CONVERGED).all()
+    assert (found.status == PoseStatus.CONVERGED).all()
     there = arm.pose(JointState(found.q_rad))
     assert np.linalg.norm(there.position_mm - wanted.position_mm, axis=1).max() < 1e-6
 
@@ -91,6 +91,6 @@ def test_another_orientation_than_the_arm_takes_is_not_reached():
     wanted = programmed(plain, q)
     tipped = Pose(wanted.rotation @ rotation_x(0.3), wanted.position_mm)
     found = compensate(arm, tipped, q)
-    assert (found.status == Status.NOT_REACHED).all()
+    assert (found.status == PoseStatus.NOT_REACHED).all()
     assert np.isnan(found.q_rad).all()
     assert (found.rotation_error_rad > FEW_AXES_TURN_RAD).all()

@@ -30,7 +30,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
-from kinacc.measurements.reader import Reading, read
+from kinacc.measurements.reader import MeasuredFile, read
 
 Progress = Callable[[Iterable, str], Iterable]
 _FEWEST_POSES = 6
@@ -52,7 +52,7 @@ def check_file(section: Mapping, robot: Robot, dataset: str, progress: Progress)
 
 
 def check(
-    reading: Reading, layout: Layout, robot: Robot, dataset: str, path: str, progress: Progress
+    reading: MeasuredFile, layout: Layout, robot: Robot, dataset: str, path: str, progress: Progress
 ) -> Report:
     """Report on what was read."""
     every = cells.of_columns(reading.columns, robot.dh.joints)
@@ -98,7 +98,9 @@ def check(
     )
 
 
-def _meant(one: Cells, reading: Reading, layout: Layout, robot: Robot, first, progress: Progress):
+def _meant(
+    one: Cells, reading: MeasuredFile, layout: Layout, robot: Robot, first, progress: Progress
+):
     """The fit of the file as it is meant, what it was read from, and suspicions of all rows."""
     written = changes.as_written(robot.joint_map)
     here = fitting.fit(meaning.seen_as(one, written), robot.dh)
@@ -292,7 +294,7 @@ def _gross_lines(fitted: Fitted | None) -> list[int]:
     return fitted.seen.cells.lines(off)
 
 
-def _commanded(fitted: Fitted, reading: Reading, raw: rows.Raw, first, robot: Robot):
+def _commanded(fitted: Fitted, reading: MeasuredFile, raw: rows.Raw, first, robot: Robot):
     if reading.commanded is not None:
         return commanded.compared(fitted, raw.q, raw.commanded, raw.meaning)
     return commanded.coarse(fitted, raw.q, robot.dh.prismatic)

@@ -9,7 +9,7 @@ from kinacc.checks.fitting import Fitted
 from kinacc.checks.noise import Distance, Repeats, Revisits, revisits
 from kinacc.checks.suspicion import NOTE, Suspicion
 from kinacc.kinematics.robot import Robot
-from kinacc.measurements.reader import Reading
+from kinacc.measurements.reader import MeasuredFile
 
 _WEAK = 0.1  # of a joint's range
 _SAME_RAD = np.deg2rad(0.01)  # joints nearer than this are one configuration
@@ -126,7 +126,7 @@ def coverage_of(coverage: list[dict[str, object]]) -> tuple[Suspicion, ...]:
 
 
 def remarks_of(
-    every: Cells, reading: Reading, repeats: Repeats, distances: list[Distance]
+    every: Cells, reading: MeasuredFile, repeats: Repeats, distances: list[Distance]
 ) -> tuple[str, ...]:
     """What else to know about the file, in words."""
     remarks = list(reading.left_out())

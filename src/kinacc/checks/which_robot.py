@@ -9,7 +9,7 @@ import numpy as np
 from kinacc.errors import InputError
 from kinacc.kinematics.robot import load, shipped
 from kinacc.measurements.intake.guess import Guess
-from kinacc.measurements.reader import Reading, read
+from kinacc.measurements.reader import MeasuredFile, read
 
 _ROWS = 240
 _SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
@@ -36,7 +36,7 @@ def fitting(guess: Guess, progress: Progress) -> str | None:
     return left[0][1]
 
 
-def _left(reading: Reading, arm) -> float:
+def _left(reading: MeasuredFile, arm) -> float:
     """What base and target alone leave of the positions, as a share of their spread.
 
     The arm is taken as described: corrected, an arm of similar build would fit as well.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +19,20 @@ _MOST_CANDIDATES = 20_000
 
 
 @dataclass(frozen=True)
-class Found:
+class Region:
+    """Options that say what may be measured: a file, or where joints are drawn."""
+
+    candidates: str | None
+    drawn: int
+    region: str | None
+    joints_deg: str | None
+    inside_mm: str | None
+    point: str | None
+    config: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CandidatePoses:
     """Reported joints (m, k), their names and directions of travel, and where they come from."""
 
     joints: np.ndarray
@@ -29,61 +41,63 @@ class Found:
     source: str
 
 
-def candidates(given: Mapping, arm: Calibration) -> Found:
+def candidates(wanted: Region, calibration: Calibration) -> CandidatePoses:
     """The candidates the options ask for. Raises InputError."""
-    if given["candidates"] is not None:
-        file = rows.candidates(given["candidates"], arm.robot, _MOST_CANDIDATES)
+    if wanted.candidates is not None:
+        file = rows.candidates(wanted.candidates, calibration.robot, _MOST_CANDIDATES)
         label = [str(each) for each in file.label]
-        source = f"rows of {Path(given['candidates']).name}"
-        return Found(file.joints, label, file.directions, source)
+        source = f"rows of {Path(wanted.candidates).name}"
+        return CandidatePoses(file.joints, label, file.directions, source)
     problems: list[Problem] = []
-    box = spaces.joint_ranges(given["joints_deg"], arm.robot, problems)
-    space = spaces.ranges("--inside-mm", given["inside_mm"], 3, problems)
+    box = spaces.joint_ranges(wanted.joints_deg, calibration.robot, problems)
+    space = spaces.ranges("--inside-mm", wanted.inside_mm, 3, problems)
     refuse(problems)
     inside, source = None, "drawn evenly from the joint ranges given"
     if box is None:
-        box, inside, source = _region(given, arm)
+        box, inside, source = _region(wanted, calibration)
     if space is not None:
         inside = spaces.inside_box(space)
         source += ", the tool in the box given"
-    limited = arm.robot.q_min_rad, arm.robot.q_max_rad
-    low, high = limited if given["region"] == "limits" else _covered(arm)
+    limited = calibration.robot.q_min_rad, calibration.robot.q_max_rad
+    low, high = limited if wanted.region == "limits" else _covered(calibration)
     if box is not None:
         low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
-    drawn = _spoken_of(arm, given, (low, high), inside)
+    drawn = _spoken_of(calibration, wanted, (low, high), inside)
     label = [str(number) for number in range(1, len(drawn) + 1)]
-    return Found(drawn, label, None, source)
+    return CandidatePoses(drawn, label, None, source)
 
 
-def _spoken_of(arm: Calibration, given: Mapping, box, inside) -> np.ndarray:
+def _spoken_of(calibration: Calibration, wanted: Region, box, inside) -> np.ndarray:
     """Joints drawn from a box, without those that the model says nothing of."""
-    wanted = given["drawn"]
-    count = wanted
+    count = wanted.drawn
     while True:
-        drawn = spread(arm.robot, count, box, inside, arm.point(given["point"]))
-        if arm.model.domain is not None:  # coupled joints have no box of their own
-            drawn = drawn[~arm.outside_range(arm.robot.dh_joints(drawn)).any(axis=1)]
-        if len(drawn) >= wanted:
-            return drawn[:wanted]
-        if count >= _MOST_DRAWS * wanted:
+        drawn = spread(calibration.robot, count, box, inside, calibration.point(wanted.point))
+        if calibration.model.domain is not None:  # coupled joints have no box of their own
+            drawn = drawn[
+                ~calibration.outside_range(calibration.robot.dh_joints(drawn)).any(axis=1)
+            ]
+        if len(drawn) >= wanted.drawn:
+            return drawn[: wanted.drawn]
+        if count >= _MOST_DRAWS * wanted.drawn:
             what = f"the model speaks of only {len(drawn)} of {count} joint values drawn"
-            raise InputError(Problem("candidates", what, f"{wanted}", "narrow the region"))
+            raise InputError(Problem("candidates", what, f"{wanted.drawn}", "narrow the region"))
         count *= 4
 
 
-def _region(given: Mapping, arm: Calibration):
+def _region(wanted: Region, calibration: Calibration):
     """Joint box, test of tool positions and words of the region asked for."""
-    wanted = given["region"]
-    if wanted is None:
-        wanted = "configured" if _is_configured(given, arm) else "fitted"
-    if wanted == "limits":
-        if arm.model.domain is not None:
-            what = f"the {arm.choice.upper()} model says nothing beyond the joints the data cover"
+    region = wanted.region
+    if region is None:
+        region = "configured" if _is_configured(wanted, calibration) else "fitted"
+    if region == "limits":
+        if calibration.model.domain is not None:
+            model = calibration.choice.upper()
+            what = f"the {model} model says nothing beyond the joints the data cover"
             raise InputError(Problem("--region limits", what, "fitted"))
         return None, None, "drawn evenly from the joint limits"
-    if wanted == "fitted":
+    if region == "fitted":
         return None, None, "drawn evenly from the joints the calibration covers"
-    settings = spaces.settings_of(arm.name, given["config"])
+    settings = spaces.settings_of(calibration.name, wanted.config)
     if settings.inside is not None:
         source = "drawn evenly in joints from the configured evaluation space"
         return None, settings.inside, source
@@ -92,24 +106,26 @@ def _region(given: Mapping, arm: Calibration):
     return None, None, "drawn evenly from the joints the calibration covers"
 
 
-def _is_configured(given: Mapping, arm: Calibration) -> bool:
+def _is_configured(wanted: Region, calibration: Calibration) -> bool:
     """Whether the configuration given, or the one that lies here, has the calibration's data set.
 
     One that was given has to be readable; one that only lies here need not be about this arm.
     """
     from kinacc.workflow.plan import planned as read
 
-    if given["config"]:
-        return arm.name in read(given["config"]).datasets
+    if wanted.config:
+        return calibration.name in read(wanted.config).datasets
     try:
-        return Path(CONFIG).is_file() and arm.name in read((CONFIG,)).datasets
+        return Path(CONFIG).is_file() and calibration.name in read((CONFIG,)).datasets
     except InputError:
         return False
 
 
-def _covered(arm: Calibration) -> tuple[np.ndarray, np.ndarray]:
+def _covered(calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
     """Range of the reported joints that the data cover, where a joint is not coupled to others."""
-    robot = arm.robot
-    if arm.fitted_range_rad is None:
+    robot = calibration.robot
+    if calibration.fitted_range_rad is None:
         return robot.q_min_rad, robot.q_max_rad
-    return limits.cut_to_range(robot, robot.q_min_rad, robot.q_max_rad, arm.fitted_range_rad)
+    return limits.cut_to_range(
+        robot, robot.q_min_rad, robot.q_max_rad, calibration.fitted_range_rad
+    )

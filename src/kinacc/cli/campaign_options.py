@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 
 from kinacc.assess.adaptive import AdaptiveAssessor
@@ -14,35 +14,37 @@ from kinacc.errors import InputError, Problem
 _LARGEST_MM = 1e6
 
 
-def instruments(given: Mapping) -> tuple[instrument.Instrument, ...]:
-    """Instruments of ``--noise-mm``, ``--covariance-mm2`` and ``--instrument``."""
-    texts = list(given.get("instrument", ()))
-    for option in ("noise_mm", "covariance_mm2"):
-        if given[option] is not None:
-            texts.insert(0, f"instrument={given[option]}")
+def instruments(
+    noise_mm: str | None,
+    covariance_mm2: str | None,
+    named: Sequence[str] | None = None,
+    frame: str = "base",
+) -> tuple[instrument.Instrument, ...]:
+    """Instruments of ``--noise-mm``, ``--covariance-mm2`` and ``--instrument``, if there is one."""
+    unnamed = [f"instrument={each}" for each in (covariance_mm2, noise_mm) if each is not None]
+    texts = [*unnamed, *(named or ())]
     if not texts:
         allowed = "--noise-mm or --covariance-mm2"
-        allowed += ", or --instrument NAME=.." if "instrument" in given else ""
+        allowed += "" if named is None else ", or --instrument NAME=.."
         raise InputError(Problem("noise", "is not given", allowed))
-    return instrument.instruments(texts, given["frame"])
+    return instrument.instruments(texts, frame)
 
 
-def assessor(given: Mapping) -> AdaptiveAssessor:
+def assessor(
+    name: str | None, budget: int, confidence: float, stated: Sequence[str]
+) -> AdaptiveAssessor:
     """The assessor of ``--assessor``, ``--budget``, ``--confidence`` and ``--set``."""
-    settings: dict[str, object] = {
-        "measurements": given["budget"],
-        "confidence": given["confidence"],
-    }
-    for text in given["settings"]:
-        name, mark, value = text.partition("=")
+    settings: dict[str, object] = {"measurements": budget, "confidence": confidence}
+    for text in stated:
+        key, mark, value = text.partition("=")
         if not mark:
             raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
         try:
-            settings[name.strip()] = json.loads(value)
+            settings[key.strip()] = json.loads(value)
         except (ValueError, RecursionError):
-            settings[name.strip()] = value.strip()
+            settings[key.strip()] = value.strip()
     try:
-        return plan.assessor_of(given["assessor"] or RECOMMENDED, settings)
+        return plan.assessor_of(name or RECOMMENDED, settings)
     except InputError as error:
         # An assessor knows its settings, not the options they came from.
         options = {"measurements": "--budget", "confidence": "--confidence"}

@@ -30,7 +30,7 @@ _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be the one that is read 
 
 
 @dataclass(frozen=True)
-class Question:
+class Simulation:
     """What is simulated, and what for."""
 
     fields: tuple[ErrorField, ...]
@@ -42,12 +42,12 @@ class Question:
     seed: int
 
 
-def question(given: Mapping) -> Question:
+def question(given: Mapping) -> Simulation:
     """The question of the command's options. Raises InputError listing what is wrong."""
     problems: list[Problem] = []
     assessors, chosen = [], []
     with gathered(problems):
-        instruments = campaign_options.instruments({**given, "frame": "base"})
+        instruments = campaign_options.instruments(given["noise_mm"], given["covariance_mm2"])
         problems += [] if given["sure"] else slips.of_noise(instruments)
     lengths = ("width_mm", "tolerance_mm", "largest_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
@@ -57,17 +57,18 @@ def question(given: Mapping) -> Question:
         what = f"{points} poses with up to {max(budgets)} readings each"
         allowed = f"at most {_MOST_READINGS:g}, poses times the largest budget"
         problems.append(Problem("--poses, --budget", what, allowed))
+    name, *method = (given[each] for each in ("assessor", "confidence", "settings"))
     for budget in sorted(set(budgets)):
         with gathered(problems):
-            assessors.append(campaign_options.assessor({**given, "budget": budget}))
-    for name in given["errors"] or DEFAULT_ERRORS:
+            assessors.append(campaign_options.assessor(name, budget, *method))
+    for errors in given["errors"] or DEFAULT_ERRORS:
         with gathered(problems):
-            chosen.append(field_of(name))
+            chosen.append(field_of(errors))
     refuse(dict.fromkeys(problems), "Nothing was simulated")
     if given["largest_mm"] is not None:
         chosen = [_scaled(each, given["largest_mm"]) for each in chosen]
     aim = Aim(given["target"], given["width_mm"], given["tolerance_mm"], given["power"])
-    return Question(
+    return Simulation(
         tuple(chosen),
         points,
         instruments[0].covariance_mm2,
@@ -78,7 +79,7 @@ def question(given: Mapping) -> Question:
     )
 
 
-def answer(asked: Question, progress: Callable | None = None) -> list[Row]:
+def answer(asked: Simulation, progress: Callable | None = None) -> list[Row]:
     """Simulate."""
     found = simulate.outcomes(
         asked.fields, asked.points, asked.covariance_mm2, asked.assessors, asked.repetitions,
@@ -135,7 +136,7 @@ def _scaled(field: ErrorField, largest_mm: float) -> ErrorField:
     return replace(field, error_mm=field.error_mm * (largest_mm / largest))
 
 
-def as_sheet(asked: Question, found: list[Row]) -> Sheet:
+def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
     """One row per kind of errors and budget."""
     aim = asked.aim
 
@@ -203,7 +204,7 @@ def _counted(row: Row) -> str | None:
     return f"{row.holding} of {row.judged}" if row.judged else None
 
 
-def in_words(asked: Question, found: list[Row]) -> str:
+def in_words(asked: Simulation, found: list[Row]) -> str:
     """The budget that does, or that none did, and how surely so many repetitions show it."""
     aim = asked.aim
     if not _aims(aim):
@@ -236,7 +237,7 @@ def in_words(asked: Question, found: list[Row]) -> str:
     )
 
 
-def _none_did(asked: Question, found: list[Row], said: str) -> str:
+def _none_did(asked: Simulation, found: list[Row], said: str) -> str:
     aim, most = asked.aim, max(row.budget for row in found)
     best = min(row.reaches(aim) for row in found if row.budget == most)
     hits = round(best * asked.repetitions)
@@ -248,7 +249,7 @@ def _none_did(asked: Question, found: list[Row], said: str) -> str:
     )
 
 
-def drawn(asked: Question, found: list[Row]) -> Figure:
+def drawn(asked: Simulation, found: list[Row]) -> Figure:
     """Width against budget."""
     from kinacc.figures import campaign_plan
 

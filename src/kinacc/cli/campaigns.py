@@ -27,47 +27,54 @@ def start(given: Mapping, out: Output) -> None:
     from kinacc.cli import campaign_candidates, campaign_options, rows
 
     problems = folders.in_the_way(given["folder"])
+    noise = (given[each] for each in ("noise_mm", "covariance_mm2", "instrument", "frame"))
+    method = (given[each] for each in ("assessor", "budget", "confidence", "settings"))
     with gathered(problems):
-        instruments = campaign_options.instruments(given)
+        instruments = campaign_options.instruments(*noise)
     with gathered(problems):
-        assessor = campaign_options.assessor(given)
+        assessor = campaign_options.assessor(*method)
     lengths = ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     refuse(problems, "The campaign was not begun")
-    arm = choice.calibration_of(
+    calibration = choice.calibration_of(
         given["calibration"], given["model"], given["robot"], given["config"], given["session"]
     )
-    found = campaign_candidates.candidates(given, arm)
-    points = begin.points_of(arm, found.joints, found.label, found.directions, given["point"])
-    joints_now = np.zeros(arm.robot.dh.joints)
+    region = choice.record_of(campaign_candidates.Region, given)
+    found = campaign_candidates.candidates(region, calibration)
+    points = begin.points_of(
+        calibration, found.joints, found.label, found.directions, given["point"]
+    )
+    joints_now = np.zeros(calibration.robot.dh.joints)
     if given["from_deg"] is not None:
-        joints_now = rows.of_arguments((given["from_deg"],), "deg", arm.robot, "--from-deg")[0]
+        joints_now = rows.of_arguments(
+            (given["from_deg"],), "deg", calibration.robot, "--from-deg"
+        )[0]
     limits = Limits(
         math.radians(given["joint_tolerance_deg"]),
-        given["implausible_mm"] or begin.plausible_mm(arm, instruments),
+        given["implausible_mm"] or begin.plausible_mm(calibration, instruments),
         given["tolerance_mm"],
         given["width_mm"],
         given["target"],
     )
     about = {
-        "robot": arm.robot.name,
-        "calibration": arm.name,
-        "model": arm.choice,
-        "point": given["point"] or arm.default_point,
+        "robot": calibration.robot.name,
+        "calibration": calibration.name,
+        "model": calibration.choice,
+        "point": given["point"] or calibration.default_point,
         "candidates": found.source,
         "kinacc_version": __version__,
         "assessor_code": marks.assessor_code(assessor),
     }
     begun = begin.plan_of(
-        arm, points, assessor, instruments, limits, given["seed"], joints_now, about,
+        calibration, points, assessor, instruments, limits, given["seed"], joints_now, about,
         by_travel=given["visit"] == "travel",
     )  # fmt: skip
     if not given["sure"]:
-        left_mm = arm.residual.position_mm if arm.residual else math.nan
+        left_mm = calibration.residual.position_mm if calibration.residual else math.nan
         problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
         refuse(problems, "The campaign was not begun")
     unsure = prediction_check.unsure(
-        arm, points, instruments, given["point"], limits.implausible_mm
+        calibration, points, instruments, given["point"], limits.implausible_mm
     )
     for line in [] if unsure is None else unsure.in_words():
         click.echo(line, err=True)

@@ -19,7 +19,7 @@ from kinacc.campaign.state import State
 from kinacc.cli.campaigns import say_doubts
 from kinacc.cli.campaigns_answers import as_facts
 from kinacc.cli.output import Output
-from kinacc.cli.rows import ANGLE, LENGTH, Reader, open_table
+from kinacc.cli.rows import ANGLE, LENGTH, Quantities, open_table
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.table import RawTable, numbers_of
 
@@ -270,7 +270,7 @@ def _rows(table: RawTable, instrument: str | None, before: State):
     """A Reading, or the Problem with it, of every row; and problems of the file as a whole."""
     plan = before.plan
     # A cell that is no number spoils its row, not the file: it is found again row by row.
-    reader = Reader(table, cells=[])
+    reader = Quantities(table, cells=[])
     problems = reader.problems
     position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
     kinds = [LENGTH if slides else ANGLE for slides in plan.slides]

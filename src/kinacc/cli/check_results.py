@@ -6,15 +6,16 @@ import sys
 
 import click
 
+from kinacc.cli.output import Output, answers
 from kinacc.workflow.plan import planned
 from kinacc.workflow.verification import check
 
 
 @click.command("check-results")
 @click.argument("folder", type=click.Path(), default="results")
-@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
+@answers("Print the findings as JSON.")
 @click.option("--config", multiple=True, help="Configuration the results should come from.")
-def check_results(folder: str, as_json: bool, config: tuple[str, ...]) -> None:
+def check_results(folder: str, config: tuple[str, ...], out: Output) -> None:
     """Check every artefact in FOLDER: there, as the contract says, made from one another.
 
     With --config also that every data set of the configuration is there and was made with these
@@ -25,4 +26,6 @@ def check_results(folder: str, as_json: bool, config: tuple[str, ...]) -> None:
       kinacc check-results results/
       kinacc check-results results/ --config config.yaml --config my-robot.yaml --json
     """
-    sys.exit(check.main(folder, as_json, planned(config) if config else None, config))
+    report = check.check_results(folder, planned(config) if config else None, config)
+    out.say(report.to_dict(), str(report))
+    sys.exit(report.exit_code)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from kinacc.deployment.record import Calibration
     from kinacc.kinematics.robot import Robot
 
+Record = TypeVar("Record")
 CONFIG = "config.yaml"
 option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
@@ -42,6 +44,11 @@ SELECTED = option(
 )
 SESSION = option("--session", help="Session whose instrument is meant. [the first]")
 POINT = option("--point", help="Target, or flange. [the tool]")
+
+
+def record_of(kind: type[Record], options: Mapping[str, Any]) -> Record:
+    """The options of a command that are the fields of a record."""
+    return kind(**{each.name: options[each.name] for each in fields(kind)})
 
 
 def together(*options: Callable[[Callable], Callable]) -> Callable[[Callable], Callable]:

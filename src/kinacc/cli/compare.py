@@ -37,13 +37,15 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
     from kinacc.progress import reporting
 
     with reporting("compare", bar=True):
-        arms = [comparison_report.source(each, model, robot, config) for each in (first, second)]
-        q_rad = comparison_report.joints(arms, (first, second), joints, count)
+        calibrations = [
+            comparison_report.source(each, model, robot, config) for each in (first, second)
+        ]
+        q_rad = comparison_report.joints(calibrations, (first, second), joints, count)
         weight = schema.key("calibration.rotation_weight_mm_per_rad").default
-        found = compared(*arms, q_rad, weight)
-    answer = comparison_report.answer(found, arms, len(q_rad))
+        found = compared(*calibrations, q_rad, weight)
+    answer = comparison_report.answer(found, calibrations, len(q_rad))
     if out.picture is not None:
         from kinacc.figures.comparison import draw
 
-        out.draw(draw(found, *comparison_report.short_names(arms)))
-    out.deliver(answer, comparison_report.in_words(found, arms))
+        out.draw(draw(found, *comparison_report.short_names(calibrations)))
+    out.deliver(answer, comparison_report.in_words(found, calibrations))

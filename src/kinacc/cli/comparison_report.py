@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.cli import choice, rows
 from kinacc.cli.sheet import Field, Sheet, number
-from kinacc.deployment.compare import Comparison, Shift, require_alike
+from kinacc.deployment.compare import Difference, Shift, require_alike
 from kinacc.deployment.record import Calibration, nominal
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
@@ -31,14 +31,14 @@ def source(place: str, model: str, robot: str | None, config: tuple[str, ...]) -
 
 
 def joints(
-    arms: Sequence[Calibration], places: Sequence[str], path: str | None, count: int
+    calibrations: Sequence[Calibration], places: Sequence[str], path: str | None, count: int
 ) -> np.ndarray:
     """Reported joints (n, k) to compare at: of a file, as measured, or all over the limits.
 
     Raises InputError where the joints of the two do not mean the same.
     """
-    require_alike(*arms)
-    robot = arms[0].robot
+    require_alike(*calibrations)
+    robot = calibrations[0].robot
     if path is not None:
         return rows.read(path, robot).joints
     found = [_measured(Path(place), robot) for place in places]
@@ -46,8 +46,8 @@ def joints(
     if found:
         share = max(1, count // len(found))
         return np.concatenate([each[np.sort(spread_rows(len(each), share))] for each in found])
-    low = np.maximum(arms[0].robot.q_min_rad, arms[1].robot.q_min_rad)
-    high = np.minimum(arms[0].robot.q_max_rad, arms[1].robot.q_max_rad)
+    low = np.maximum(calibrations[0].robot.q_min_rad, calibrations[1].robot.q_min_rad)
+    high = np.minimum(calibrations[0].robot.q_max_rad, calibrations[1].robot.q_max_rad)
     return low + points("sobol", count, len(low)) * (high - low)
 
 
@@ -61,12 +61,12 @@ def _measured(folder: Path, robot: robots.Robot) -> np.ndarray | None:
     return np.stack([table[f"q{i + 1}"] for i in range(robot.dh.joints)], axis=1).astype(float)
 
 
-def answer(found: Comparison, arms: Sequence[Calibration], poses: int) -> Sheet:
+def answer(found: Difference, calibrations: Sequence[Calibration], poses: int) -> Sheet:
     """The sheet of ``kinacc compare``: one row per parameter, and what poses did as facts."""
     facts = {
-        "first": arms[0].name,
-        "second": arms[1].name,
-        "model": arms[0].choice,
+        "first": calibrations[0].name,
+        "second": calibrations[1].name,
+        "model": calibrations[0].choice,
         "same_robot": found.same_robot,
         "poses": poses,
         "statistic": found.statistic,
@@ -91,28 +91,28 @@ def answer(found: Comparison, arms: Sequence[Calibration], poses: int) -> Sheet:
         fields = [
             Field("parameter", np.array(names, dtype=object), "", "joint and DH parameter"),
             Field("unit", unit, "", "unit of the row: lengths in mm, angles in mrad"),
-            Field("first", each.first * scale, "see unit", arms[0].name),
-            Field("second", each.second * scale, "see unit", arms[1].name),
+            Field("first", each.first * scale, "see unit", calibrations[0].name),
+            Field("second", each.second * scale, "see unit", calibrations[1].name),
             Field("difference", each.difference * scale, "see unit", "second minus first"),
             Field("std", each.std * scale, "see unit", "of the difference"),
             Field("sigmas", each.sigmas, "1", "difference in standard deviations"),
             Field("remark", _remarks(each), "", "where the poses do not determine it"),
         ]
-    first, second = short_names(arms)
+    first, second = short_names(calibrations)
     return Sheet(f"{second} against {first}", facts, fields, shown_rows=100)
 
 
-def short_names(arms: Sequence[Calibration]) -> tuple[str, str]:
+def short_names(calibrations: Sequence[Calibration]) -> tuple[str, str]:
     """Last parts of the places the calibrations come from, where these differ."""
-    first, second = (Path(arm.name).name for arm in arms)
-    return (first, second) if first != second else (arms[0].name, arms[1].name)
+    first, second = (Path(calibration.name).name for calibration in calibrations)
+    return (first, second) if first != second else (calibrations[0].name, calibrations[1].name)
 
 
-def in_words(found: Comparison, arms: Sequence[Calibration]) -> str:
+def in_words(found: Difference, calibrations: Sequence[Calibration]) -> str:
     """What moved, in sentences."""
     lines = []
     if not found.same_robot:
-        first, second = (arm.robot.name for arm in arms)
+        first, second = (calibration.robot.name for calibration in calibrations)
         lines.append(
             f"these are different robots ({first} and {second}): before any calibration they are "
             f"{number(found.robots_apart_mm)} mm rms apart, after the best base and tool; what "

@@ -44,11 +44,11 @@ def compensate(
     from kinacc.deployment.compensate import compensate as joints_for
     from kinacc.progress import reporting
 
-    arm = choice.calibration_of(folder, model, robot, config, session)
-    given = target_poses.poses(arm, poses, pose, near_deg, program, frame, point)
+    calibration = choice.calibration_of(folder, model, robot, config, session)
+    given = target_poses.poses(calibration, poses, pose, near_deg, program, frame, point)
     with reporting("compensate", bar=True):
-        found = joints_for(arm, given.pose, given.joints, given.directions, frame, point)
-    answer = target_poses.compensated(arm, given, found, frame, point, program is not None)
+        found = joints_for(calibration, given.pose, given.joints, given.directions, frame, point)
+    answer = target_poses.compensated(calibration, given, found, frame, point, program is not None)
     out.deliver(answer)
     rows.say_unused(given)
     rows.end_where_missing(found.q_rad, "joints")

@@ -228,7 +228,7 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     return found, "the only shipped robot that fits the readings"
 
 
-def _tried(guess: Guess, arm, name: str) -> tuple[Guess, Report]:
+def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report]:
     """The guess held against the readings: what was assumed and contradicts them is set right."""
     from kinacc.checks import check
     from kinacc.errors import InputError, Problem
@@ -236,14 +236,14 @@ def _tried(guess: Guess, arm, name: str) -> tuple[Guess, Report]:
     from kinacc.measurements.reader import read
     from kinacc.progress import reporting
 
-    if arm.dh.joints != guess.joints:
-        what = f"{arm.name} has {arm.dh.joints} joints, the file {guess.joints}"
+    if robot.dh.joints != guess.joints:
+        what = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"
         raise InputError(Problem("--robot", what))
     with reporting(f"init {name}", bar=True) as progress:
         for _ in range(3):
-            reading = read(guess.section, arm, strict=False)
+            reading = read(guess.section, robot, strict=False)
             layout = Layout.of(guess.section)
-            report = check.check(reading, layout, arm, name, guess.section["path"], progress)
+            report = check.check(reading, layout, robot, name, guess.section["path"], progress)
             settings = _contradicted(guess, report)
             if not settings:
                 break

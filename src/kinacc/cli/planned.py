@@ -31,7 +31,7 @@ _SEED = 0
 
 
 @dataclass(frozen=True)
-class Question:
+class PoseTask:
     """Candidates (n, k) of reported joints with their labels, and what is wanted of them."""
 
     robot: Robot
@@ -45,17 +45,17 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Answer:
+class PosePlan:
     """The poses in driving order (N,), rows of the candidates; ``moves`` (N,) leads to each."""
 
     information: Information
-    plan: exchange.Plan
+    plan: exchange.ChosenPoses
     order: np.ndarray
     moves: np.ndarray
     unordered: float
 
 
-def question(given: Mapping) -> Question:
+def question(given: Mapping) -> PoseTask:
     """The question of the command's options. Raises InputError listing what is wrong."""
     if given["dataset"] is None and given["robot"] is None:
         raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
@@ -98,12 +98,12 @@ def question(given: Mapping) -> Question:
         inside = settings.inside if space is None else inside_box(space)
         joints = candidates.spread(robot, given["drawn"], box, inside, tool)
         label = np.arange(1, len(joints) + 1)
-    return Question(
+    return PoseTask(
         robot, joints, label, experiment, given["count"], given["index"], given["metric"], start
     )
 
 
-def answer(asked: Question, progress: Callable | None = None) -> Answer:
+def answer(asked: PoseTask, progress: Callable | None = None) -> PosePlan:
     """Choose the poses and the order."""
     told = information(asked.robot, asked.joints, asked.experiment)
     if told.rank == 0:
@@ -115,10 +115,10 @@ def answer(asked: Question, progress: Callable | None = None) -> Answer:
     path = travel.order(distance)
     moves = distance[path[:-1], path[1:]]
     plain = travel.length(distance, np.arange(len(path)))
-    return Answer(told, plan, chosen[path[1:] - 1], moves, plain)
+    return PosePlan(told, plan, chosen[path[1:] - 1], moves, plain)
 
 
-def as_sheet(asked: Question, found: Answer) -> Sheet:
+def as_sheet(asked: PoseTask, found: PosePlan) -> Sheet:
     """One row per pose, in driving order."""
     facts = {
         "robot": asked.robot.name,
@@ -144,7 +144,7 @@ def as_sheet(asked: Question, found: Answer) -> Sheet:
     return Sheet(title, facts, fields)
 
 
-def in_words(asked: Question, found: Answer) -> str:
+def in_words(asked: PoseTask, found: PosePlan) -> str:
     """What was reached, and what no candidate can tell."""
     told, plan = found.information, found.plan
     lines = [
@@ -161,7 +161,7 @@ def in_words(asked: Question, found: Answer) -> str:
     return "\n".join(lines)
 
 
-def drawn(asked: Question, found: Answer, progress: Callable | None = None) -> Figure:
+def drawn(asked: PoseTask, found: PosePlan, progress: Callable | None = None) -> Figure:
     """Index against number of poses, with random sets beside it."""
     from kinacc.figures import planned_poses
 

@@ -41,10 +41,10 @@ def predict(
     from kinacc.deployment.predict import predict as poses_at
     from kinacc.progress import reporting
 
-    arm = choice.calibration_of(folder, model, robot, config, session)
-    given = tables.given_joints(arm.robot, joints, joints_deg, joints_rad)
+    calibration = choice.calibration_of(folder, model, robot, config, session)
+    given = tables.given_joints(calibration.robot, joints, joints_deg, joints_rad)
     with reporting("predict", bar=True) as progress:
-        found = poses_at(arm, given.joints, given.directions, frame, point, progress)
-    out.deliver(tables.predicted(arm, given, found, frame, point))
+        found = poses_at(calibration, given.joints, given.directions, frame, point, progress)
+    out.deliver(tables.predicted(calibration, given, found, frame, point))
     rows.say_unused(given)
     rows.end_where_missing(found.pose.position_mm, "a pose")

@@ -63,7 +63,7 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
     table = open_table(path)
     table = _answered(table, names, "joints") if joints else table
     table = _answered(table, ["x", "y", "z"], "a pose") if pose else table
-    reader = Reader(table)
+    reader = Quantities(table)
     q_rad = reader.group(names, [LENGTH if each else ANGLE for each in slides], joints)
     if any(f"q{len(slides) + 1}_{unit}" in table.columns for unit in (*ANGLE, *LENGTH)):
         what = f"has a joint q{len(slides) + 1}, {robot.name} has {len(slides)} joints"
@@ -136,7 +136,7 @@ def require_within_limits(robot: Robot, given: Rows, where: str, what: str = "Jo
         raise InputError(problems, f"{what} outside the robot's limits")
 
 
-class Reader:
+class Quantities:
     """Quantities of a table by name and unit; ``problems`` and the columns ``used`` grow.
 
     ``cells``: where what is wrong with single cells is noted; they are NaN then.

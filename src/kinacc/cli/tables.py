@@ -36,16 +36,17 @@ def given_joints(
 
 
 def predicted(
-    arm: Calibration, given: Rows, found: Prediction, frame: str, point: str | None
+    calibration: Calibration, given: Rows, found: Prediction, frame: str, point: str | None
 ) -> Sheet:
     """The sheet of ``kinacc predict``."""
     std = found.std * np.array([1.0, 1.0, 1.0, _MRAD, _MRAD, _MRAD])
     by = "standard deviation by the covariance of the fitted parameters"
     seen = "movement per mm or mrad of displacement along directions the calibration cannot see"
-    left = f"rms of what the model left of {arm.residual.subset if arm.residual else 'no'} poses"
+    subset = calibration.residual.subset if calibration.residual else "no"
+    left = f"rms of what the model left of {subset} poses"
     fields = [
         Field("row", given.label, "", "the file's pose, or its line"),
-        *joint_fields(arm.robot.dh.prismatic, given.joints),
+        *joint_fields(calibration.robot.dh.prismatic, given.joints),
         *pose_fields(found.pose, frame),
         *(Field(f"std_{axis}_mm", std[:, i], "mm", by, False) for i, axis in enumerate("xyz")),
         *(
@@ -58,19 +59,21 @@ def predicted(
         Field("unexplained_mrad", _MRAD * found.residual_rad, "mrad", left, False),
         Field("undetermined_mm", found.blind_mm, "mm per mm or mrad", seen),
         Field("undetermined_mrad", _MRAD * found.blind_rad, "mrad per mm or mrad", seen, False),
-        Field("status", _where(arm, found.outside), "", "whether the data cover these joints"),
+        Field(
+            "status", _where(calibration, found.outside), "", "whether the data cover these joints"
+        ),
     ]
-    point = point or arm.default_point
-    title = f"{arm.name}: {point} in the {frame} frame by the {arm.choice} model"
-    return Sheet(title, facts(arm, frame, point), fields)
+    point = point or calibration.default_point
+    title = f"{calibration.name}: {point} in the {frame} frame by the {calibration.choice} model"
+    return Sheet(title, facts(calibration, frame, point), fields)
 
 
-def facts(arm: Calibration, frame: str, point: str) -> dict[str, object]:
+def facts(calibration: Calibration, frame: str, point: str) -> dict[str, object]:
     """What all rows of an answer have in common."""
     return {
-        "calibration": arm.name,
-        "robot": arm.robot.name,
-        "model": arm.choice,
+        "calibration": calibration.name,
+        "robot": calibration.robot.name,
+        "model": calibration.choice,
         "frame": frame,
         "point": point,
     }
@@ -105,8 +108,8 @@ def joints_in_words(outside: np.ndarray) -> str:
     return f"joint{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"
 
 
-def _where(arm: Calibration, outside: np.ndarray) -> np.ndarray:
-    said = "extrapolated" if arm.model.domain is None else "no prediction"
+def _where(calibration: Calibration, outside: np.ndarray) -> np.ndarray:
+    said = "extrapolated" if calibration.model.domain is None else "no prediction"
     words = [
         f"{said}: {joints_in_words(row)} outside the range the data cover" if row.any() else "ok"
         for row in outside

@@ -11,7 +11,7 @@ from kinacc.cli.rows import Rows
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.cli.tables import facts, joint_fields, joints_in_words, pose_fields
 from kinacc.deployment.compensate import Compensation, programmed
-from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, Status
+from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, PoseStatus
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, rotation_from_quaternion
@@ -22,7 +22,7 @@ _NUMBERS = "7 numbers: x, y, z in mm, then a unit quaternion w, x, y, z"
 
 
 def poses(
-    arm: Calibration,
+    calibration: Calibration,
     path: str | None,
     texts: tuple[str, ...],
     near_deg: str | None,
@@ -40,27 +40,27 @@ def poses(
         raise InputError(Problem("what is wanted", what, "a file of poses, --pose, or --program"))
     near = None
     if near_deg is not None:
-        near = rows.of_arguments((near_deg,), "deg", arm.robot, "--near-deg")
+        near = rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")
     if program is not None:
         if frame != "base":
             what = "a program speaks of the robot's own base"
             raise InputError(Problem("--frame", what, "base"))
-        given = rows.read(program, arm.robot)
-        given = replace(given, pose=programmed(arm, given.joints, point))
+        given = rows.read(program, calibration.robot)
+        given = replace(given, pose=programmed(calibration, given.joints, point))
     elif path is not None:
-        given = rows.read(path, arm.robot, joints=False, pose=True)
+        given = rows.read(path, calibration.robot, joints=False, pose=True)
     else:
         pose = _of_arguments(texts)
         given = Rows(len(texts), np.arange(1, len(texts) + 1), None, None, pose, ())
     if given.joints is None and near is not None:
         given = replace(given, joints=np.broadcast_to(near, (given.count, near.shape[1])))
     if given.joints is not None:
-        rows.require_within_limits(arm.robot, given, program or path or "--near-deg")
+        rows.require_within_limits(calibration.robot, given, program or path or "--near-deg")
     return given
 
 
 def compensated(
-    arm: Calibration,
+    calibration: Calibration,
     given: Rows,
     found: Compensation,
     frame: str,
@@ -68,13 +68,15 @@ def compensated(
     is_program: bool = False,
 ) -> Sheet:
     """The sheet of ``kinacc compensate``; ``is_program``: the near joints are a program's."""
-    angular = np.where(arm.robot.dh.prismatic, np.nan, np.rad2deg(np.abs(found.change)))
+    angular = np.where(calibration.robot.dh.prismatic, np.nan, np.rad2deg(np.abs(found.change)))
     largest = np.max(np.nan_to_num(angular, nan=-1.0), axis=1)
-    point = point or arm.default_point
+    point = point or calibration.default_point
     fields = [
         Field("row", given.label, "", "the file's pose, or its line"),
-        *joint_fields(arm.robot.dh.prismatic, found.q_rad),
-        Field("status", _words(arm, found, is_program), "", "why there are joints, or none"),
+        *joint_fields(calibration.robot.dh.prismatic, found.q_rad),
+        Field(
+            "status", _words(calibration, found, is_program), "", "why there are joints, or none"
+        ),
         Field("solver_residual_mm", found.position_error_mm, "mm", "of the search for the joints"),
         Field(
             "orientation_error_mrad",
@@ -90,11 +92,12 @@ def compensated(
         ),
         *(replace(each, on_screen=False) for each in pose_fields(given.pose, frame)),
     ]
-    title = f"{arm.name}: joints for the {point} in the {frame} frame by the {arm.choice} model"
-    return Sheet(title, facts(arm, frame, point), fields)
+    model = calibration.choice
+    title = f"{calibration.name}: joints for the {point} in the {frame} frame by the {model} model"
+    return Sheet(title, facts(calibration, frame, point), fields)
 
 
-def _words(arm: Calibration, found: Compensation, is_program: bool) -> np.ndarray:
+def _words(calibration: Calibration, found: Compensation, is_program: bool) -> np.ndarray:
     words = []
     for row, status in enumerate(found.status):
         joints = joints_in_words(found.offending[row]) if found.offending[row].any() else ""
@@ -104,27 +107,26 @@ def _words(arm: Calibration, found: Compensation, is_program: bool) -> np.ndarra
             left += f" and {np.rad2deg(off_rad):.3g} deg"
         beyond = f" ({joints} outside the range the data cover)" if joints else ""
         said = {
-            Status.CONVERGED: "converged",
-            Status.EXTRAPOLATED: f"converged, extrapolated: {joints} outside the data's range",
-            Status.OTHER_POSTURE: f"converged in another posture than the nearest{beyond}",
-            Status.OUTSIDE_LIMITS: f"no joints: {joints} would be outside the limits",
-            Status.OUTSIDE_RANGE: f"no joints: {joints} would be outside the data's range",
-            Status.NOT_REACHED: f"no joints: not reached{left}",
-        }[Status(status)]
-        if status <= Status.OTHER_POSTURE:
-            said += _remarks(arm, found, row, is_program)
+            PoseStatus.CONVERGED: "converged",
+            PoseStatus.EXTRAPOLATED: f"converged, extrapolated: {joints} outside the data's range",
+            PoseStatus.OTHER_POSTURE: f"converged in another posture than the nearest{beyond}",
+            PoseStatus.OUTSIDE_LIMITS: f"no joints: {joints} would be outside the limits",
+            PoseStatus.OUTSIDE_RANGE: f"no joints: {joints} would be outside the data's range",
+            PoseStatus.NOT_REACHED: f"no joints: not reached{left}",
+        }[PoseStatus(status)]
+        if status <= PoseStatus.OTHER_POSTURE:
+            said += _remarks(calibration, found, row, is_program)
         words.append(said)
     return np.array(words, dtype=object)
 
 
-def _remarks(arm: Calibration, found: Compensation, row: int, is_program: bool) -> str:
+def _remarks(calibration: Calibration, found: Compensation, row: int, is_program: bool) -> str:
     """What a person should know before the joints are used."""
     said, off_rad = "", found.rotation_error_rad[row]
     if off_rad > ROTATION_TOLERANCE_RAD:
-        said += (
-            f", turned {1e3 * off_rad:.3g} mrad away: {arm.robot.dh.joints} axes reach no nearer"
-        )
-    far = (np.abs(found.change[row]) > _FAR_FROM_PROGRAM_RAD) & ~arm.robot.dh.prismatic
+        axes = calibration.robot.dh.joints
+        said += f", turned {1e3 * off_rad:.3g} mrad away: {axes} axes reach no nearer"
+    far = (np.abs(found.change[row]) > _FAR_FROM_PROGRAM_RAD) & ~calibration.robot.dh.prismatic
     if is_program and far.any():
         said += f", {joints_in_words(far)} far from the program: a singular or another posture"
     return said

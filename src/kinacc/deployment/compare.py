@@ -61,7 +61,7 @@ class Shift(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Difference:
     """Two calibrations side by side.
 
     ``parameters`` is None unless both are DH tables. ``statistic`` is the squared distance in the
@@ -87,7 +87,7 @@ def compare(
     second: Calibration,
     q_rad: np.ndarray,
     rotation_weight_mm_per_rad: float,
-) -> Comparison:
+) -> Difference:
     """What moved from ``first`` to ``second``, over reported joints ``q_rad`` (n, k), rad and mm.
 
     Raises InputError where the two are of different kinds of arm.
@@ -98,18 +98,19 @@ def compare(
         parameters = _parameters(first, second)
         test = _test(first, second)
     before, after = (
-        arm.pose(JointState(arm.robot.dh_joints(q_rad)), "base", FLANGE) for arm in (first, second)
+        each.pose(JointState(each.robot.dh_joints(q_rad)), "base", FLANGE)
+        for each in (first, second)
     )
     plain = _difference(before, after)
     slopes = _frame_slopes(before)
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
     aligned = _aligned(before, after, weights)
-    chance = [_scatter(arm, q_rad) for arm in (first, second)]
+    chance = [_scatter(calibration, q_rad) for calibration in (first, second)]
     known = all(each is not None for each in chance)
     scatter = np.concatenate(chance, axis=2) if known else None
     left = None if scatter is None else _without_frames(scatter, slopes, weights)
     apart_mm = _robots_apart(first, second, q_rad, weights)
-    return Comparison(
+    return Difference(
         parameters,
         *test,
         _shift(plain, scatter),
@@ -137,7 +138,7 @@ def _robots_apart(
     first: Calibration, second: Calibration, q_rad: np.ndarray, weights: np.ndarray
 ) -> float:
     """Rms distance (mm) of the arms before calibration, after the best base and tool."""
-    before, after = (robots.forward(arm.robot, q_rad) for arm in (first, second))
+    before, after = (robots.forward(calibration.robot, q_rad) for calibration in (first, second))
     return _rms(np.linalg.norm(_aligned(before, after, weights)[:, :3], axis=1))
 
 
@@ -148,8 +149,8 @@ def _length(model: DHModel) -> float:
 
 def _parameters(first: Calibration, second: Calibration) -> Parameters:
     names = first.model.parameter_names
-    values = [dh.to_vector(arm.model.table) for arm in (first, second)]
-    free = [_free(arm) for arm in (first, second)]
+    values = [dh.to_vector(calibration.model.table) for calibration in (first, second)]
+    free = [_free(calibration) for calibration in (first, second)]
     units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
     differ = np.abs(values[1] - values[0]) > ROUNDING * units
     shown = [
@@ -158,8 +159,8 @@ def _parameters(first: Calibration, second: Calibration) -> Parameters:
         if any(name in each for each in free) or differ[number]
     ]
     variance, blind = np.zeros((2, len(names))), np.zeros((2, len(names)), dtype=bool)
-    for row, arm in enumerate((first, second)):
-        variance[row], blind[row] = _deviations(arm, names)
+    for row, calibration in enumerate((first, second)):
+        variance[row], blind[row] = _deviations(calibration, names)
     difference = values[1] - values[0]
     std = np.sqrt(variance.sum(axis=0))
     std[blind.any(axis=0)] = np.nan
@@ -171,25 +172,25 @@ def _parameters(first: Calibration, second: Calibration) -> Parameters:
     return Parameters(tuple(names[i] for i in shown), *columns, where)
 
 
-def _free(arm: Calibration) -> set[str]:
-    return set(arm.known.names) if arm.known else set()
+def _free(calibration: Calibration) -> set[str]:
+    return set(calibration.known.names) if calibration.known else set()
 
 
-def _deviations(arm: Calibration, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+def _deviations(calibration: Calibration, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Variances (P,), NaN without a covariance and 0 where held, and which are undetermined."""
-    if arm.known is None:
+    if calibration.known is None:
         return np.full(len(names), np.nan), np.zeros(len(names), dtype=bool)
-    place = {name: number for number, name in enumerate(arm.known.names)}
-    touched = np.sum(_unit(arm) ** 2, axis=0) > _TOUCHED
-    diagonal = np.diag(arm.known.covariance)
+    place = {name: number for number, name in enumerate(calibration.known.names)}
+    touched = np.sum(_unit(calibration) ** 2, axis=0) > _TOUCHED
+    diagonal = np.diag(calibration.known.covariance)
     chosen = [place.get(name) for name in names]
     variance = np.array([0.0 if i is None else diagonal[i] for i in chosen])
     return variance, np.array([i is not None and bool(touched[i]) for i in chosen])
 
 
-def _unit(arm: Calibration) -> np.ndarray:
+def _unit(calibration: Calibration) -> np.ndarray:
     """Undetermined directions (m, P) of unit length in mm and mrad."""
-    directions = arm.known.undetermined
+    directions = calibration.known.undetermined
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
@@ -201,14 +202,14 @@ def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
     units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
     difference = (dh.to_vector(second.model.table) - dh.to_vector(first.model.table)) / units
     total, blind = np.zeros((len(names), len(names))), []
-    for arm in (first, second):
-        pick = np.zeros((len(names), len(arm.known.names)))
-        place = {name: number for number, name in enumerate(arm.known.names)}
+    for calibration in (first, second):
+        pick = np.zeros((len(names), len(calibration.known.names)))
+        place = {name: number for number, name in enumerate(calibration.known.names)}
         for row, name in enumerate(names):
             if name in place:
                 pick[row, place[name]] = 1.0
-        total += pick @ arm.known.covariance @ pick.T / np.outer(units, units)
-        blind.append(arm.known.undetermined @ pick.T)
+        total += pick @ calibration.known.covariance @ pick.T / np.outer(units, units)
+        blind.append(calibration.known.undetermined @ pick.T)
     held = np.eye(len(names))[np.diag(total) == 0.0]
     _, values, right = np.linalg.svd(np.concatenate([*blind, held]))
     lost = int(np.sum(values > _SPAN * max(1.0, values.max(initial=0.0))))
@@ -254,11 +255,12 @@ def _aligned(before: Pose, after: Pose, weights: np.ndarray) -> np.ndarray:
     return _difference(before, moved)
 
 
-def _scatter(arm: Calibration, q_rad: np.ndarray) -> np.ndarray | None:
+def _scatter(calibration: Calibration, q_rad: np.ndarray) -> np.ndarray | None:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fit."""
-    if arm.known is None:
+    if calibration.known is None:
         return None
-    return sensitivity(arm, JointState(arm.robot.dh_joints(q_rad)), "base", FLANGE) @ arm.root
+    at = JointState(calibration.robot.dh_joints(q_rad))
+    return sensitivity(calibration, at, "base", FLANGE) @ calibration.root
 
 
 def _without_frames(scatter: np.ndarray, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from kinacc.deployment.postures import (
     SAME_RAD,
     Goals,
     Judged,
-    Status,
+    PoseStatus,
     within_each,
 )
 from kinacc.deployment.record import Calibration
@@ -110,19 +110,19 @@ class _Best:
     @classmethod
     def none(cls, count: int, joints: int, given: bool) -> _Best:
         far = np.full(count, np.inf)
-        status = np.full(count, Status.NOT_REACHED)
+        status = np.full(count, PoseStatus.NOT_REACHED)
         blank = np.full((count, joints), np.nan)
         return cls(blank, status, far.copy(), far.copy(), far.copy(), far.copy(), given)
 
     def settled(self) -> np.ndarray:
         """True (n,) where no other posture can be better, as they are offered nearest first."""
         if not self.given:
-            return self.status == Status.CONVERGED
-        return (self.status <= Status.EXTRAPOLATED) & (self.movement <= SAME_POSTURE_RAD)
+            return self.status == PoseStatus.CONVERGED
+        return (self.status <= PoseStatus.EXTRAPOLATED) & (self.movement <= SAME_POSTURE_RAD)
 
     def offer(self, found: Judged, rows: np.ndarray) -> None:
         """Keep what is better: usable before not, then near before far, then what is left."""
-        hit = found.status != Status.NOT_REACHED
+        hit = found.status != PoseStatus.NOT_REACHED
         self.nearest[rows] = np.where(
             hit, np.minimum(self.nearest[rows], found.movement), self.nearest[rows]
         )
@@ -137,21 +137,23 @@ class _Best:
         self.movement[chosen] = found.movement[better]
 
     def _cost(self, status: np.ndarray, movement: np.ndarray, off_mm: np.ndarray) -> np.ndarray:
-        missed = status == Status.NOT_REACHED
+        missed = status == PoseStatus.NOT_REACHED
         within = np.where(missed, np.minimum(off_mm, 1e8), np.minimum(movement, 99.0))
-        usable = status <= Status.EXTRAPOLATED
-        within = within + np.where((status == Status.EXTRAPOLATED) & (not self.given), 200.0, 0.0)
+        usable = status <= PoseStatus.EXTRAPOLATED
+        within = within + np.where(
+            (status == PoseStatus.EXTRAPOLATED) & (not self.given), 200.0, 0.0
+        )
         return np.where(missed, 1e6, np.where(usable, 0.0, 1e3)) + within
 
 
 def _outcome(calibration: Calibration, best: _Best, near: np.ndarray, given: bool) -> Compensation:
     status = best.status.copy()
-    other = (status <= Status.EXTRAPOLATED) & (best.movement > best.nearest + SAME_RAD) & given
-    status[other] = Status.OTHER_POSTURE
+    other = (status <= PoseStatus.EXTRAPOLATED) & (best.movement > best.nearest + SAME_RAD) & given
+    status[other] = PoseStatus.OTHER_POSTURE
     reported = limits.reported_joints(calibration.robot, best.q_dh)
-    said = status <= Status.OTHER_POSTURE
+    said = status <= PoseStatus.OTHER_POSTURE
     outside = np.where(
-        (status == Status.OUTSIDE_LIMITS)[:, None],
+        (status == PoseStatus.OUTSIDE_LIMITS)[:, None],
         ~within_each(calibration, reported),
         calibration.outside_range(best.q_dh),
     )
@@ -161,6 +163,6 @@ def _outcome(calibration: Calibration, best: _Best, near: np.ndarray, given: boo
         status,
         best.off_mm,
         best.angle_rad,
-        outside & (status != Status.NOT_REACHED)[:, None],
+        outside & (status != PoseStatus.NOT_REACHED)[:, None],
         q_rad - near if given else np.full(q_rad.shape, np.nan),
     )

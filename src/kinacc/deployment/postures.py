@@ -28,7 +28,7 @@ _NEAR_START_MM = 1.0  # a posture of the plain arm, as a start on the calibrated
 _STARTS, _FEW_STARTS = 48, 16  # of the search where an arm has no list of branches
 
 
-class Status(IntEnum):
+class PoseStatus(IntEnum):
     """What became of a wanted pose; joints are given for the first three."""
 
     CONVERGED = 0
@@ -91,7 +91,7 @@ class Goals:
         beyond_limits = ~within_each(calibration, reported, reach).all(axis=1)
         beyond_range = calibration.outside_range(start, reach).any(axis=1) & self.is_bounded
         hopeless = beyond_limits | beyond_range
-        status = np.where(beyond_limits, Status.OUTSIDE_LIMITS, Status.OUTSIDE_RANGE)
+        status = np.where(beyond_limits, PoseStatus.OUTSIDE_LIMITS, PoseStatus.OUTSIDE_RANGE)
         unknown = np.full(count, np.nan)
         found = Judged(start.copy(), status, unknown, unknown.copy(), self._movement(start, rows))
         worth = np.flatnonzero(~hopeless)
@@ -114,11 +114,11 @@ class Goals:
         hit = (off <= POSITION_TOLERANCE_MM) & (angle <= self.turn_tolerance_rad)
         reported = limits.reported_joints(calibration.robot, q_dh)
         covered = ~calibration.outside_range(q_dh).any(axis=1)
-        beyond = Status.OUTSIDE_RANGE if self.is_bounded else Status.EXTRAPOLATED
-        status = np.where(covered, Status.CONVERGED, beyond)
+        beyond = PoseStatus.OUTSIDE_RANGE if self.is_bounded else PoseStatus.EXTRAPOLATED
+        status = np.where(covered, PoseStatus.CONVERGED, beyond)
         inside = within_each(calibration, reported).all(axis=1)
-        status = np.where(inside, status, Status.OUTSIDE_LIMITS)
-        status = np.where(hit, status, Status.NOT_REACHED)
+        status = np.where(inside, status, PoseStatus.OUTSIDE_LIMITS)
+        status = np.where(hit, status, PoseStatus.NOT_REACHED)
         return Judged(q_dh, status, off, angle, self._movement(q_dh, rows))
 
     def postures(self, rows: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

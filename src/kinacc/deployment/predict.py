@@ -107,10 +107,10 @@ def sensitivity(
     columns, numbers = np.array(chosen, dtype=int).reshape(-1, 2).T
     slopes[:, :, columns] = calibration.model.parameter_jacobian(at)[:, :, numbers]
     # A turn of the last frame swings the point: w x arm = -[arm] w.
-    arm = (end.rotation @ carried.position_mm[:, None])[..., 0]
-    slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
+    lever_mm = (end.rotation @ carried.position_mm[:, None])[..., 0]
+    slopes[:, :3] -= skew(lever_mm) @ slopes[:, 3:]
     if name != FLANGE:
-        _fill(slopes, place, name, end.rotation, np.zeros_like(arm))
+        _fill(slopes, place, name, end.rotation, np.zeros_like(lever_mm))
     slopes[:, :3] = origin.rotation @ slopes[:, :3]
     slopes[:, 3:] = origin.rotation @ slopes[:, 3:]
     if frame == "instrument" or calibration.anchor is not None:
@@ -126,7 +126,7 @@ def _fill(
     place: dict[str, int],
     name: str,
     turned: np.ndarray,
-    arm: np.ndarray,
+    lever_mm: np.ndarray,
 ) -> None:
     """Columns of the motions of a frame: shifts (n, 3) ``turned``, turns swinging ``arm``."""
     for axis, motion in enumerate(MOTIONS):
@@ -137,5 +137,5 @@ def _fill(
         if axis < 3:
             slopes[:, :3, column] = along
         else:
-            slopes[:, :3, column] = np.cross(along, arm)
+            slopes[:, :3, column] = np.cross(along, lever_mm)
             slopes[:, 3:, column] = along

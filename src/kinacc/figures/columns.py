@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 
-Table = Mapping[str, np.ndarray]
 
-
-def require(table: Table, names: Iterable[str], where: str) -> None:
+def require(table: Columns, names: Iterable[str], where: str) -> None:
     """Raise InputError naming every column of ``names`` that the table lacks."""
     lacking = [name for name in names if name not in table]
     if lacking:
@@ -23,7 +22,7 @@ def require(table: Table, names: Iterable[str], where: str) -> None:
         )
 
 
-def floats(table: Table, name: str) -> np.ndarray:
+def floats(table: Columns, name: str) -> np.ndarray:
     """Return a column as float64 with nulls as NaN."""
     values = np.asarray(table[name])
     if values.dtype == object:
@@ -31,11 +30,11 @@ def floats(table: Table, name: str) -> np.ndarray:
     return values.astype(np.float64)
 
 
-def texts(table: Table, name: str) -> np.ndarray:
+def texts(table: Columns, name: str) -> np.ndarray:
     """Return a column as an object array of strings, nulls as the empty string."""
     return np.array(["" if v is None else str(v) for v in table[name]], dtype=object)
 
 
-def rows(table: Table, keep: np.ndarray) -> dict[str, np.ndarray]:
+def rows(table: Columns, keep: np.ndarray) -> dict[str, np.ndarray]:
     """Return the rows where ``keep`` holds."""
     return {name: np.asarray(column)[keep] for name, column in table.items()}

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinacc.calibration.uncertainty import is_angle
-from kinacc.deployment.compare import ROUNDING, Comparison, Parameters, Shift
+from kinacc.deployment.compare import ROUNDING, Difference, Parameters, Shift
 from kinacc.figures import style
 
 _FAR = 3.0  # standard deviations
@@ -16,7 +16,7 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-def draw(found: Comparison, first: str, second: str) -> Figure:
+def draw(found: Difference, first: str, second: str) -> Figure:
     """Draw a comparison; ``first`` and ``second`` name the calibrations."""
     parameters = found.parameters
     rows = len(parameters.names) if parameters else 0
@@ -101,7 +101,7 @@ def _unit(name: str) -> str:
     return "mrad" if is_angle(name) else "mm"
 
 
-def _shifts(ax: Axes, found: Comparison) -> None:
+def _shifts(ax: Axes, found: Difference) -> None:
     _curve(ax, found.as_they_stand, "as they stand", style.ORANGE, "-")
     _curve(ax, found.apart_from_frames, "after best base and tool", style.GREEN, (0, (4, 1.5)))
     ax.set(xlabel="Change of flange position (mm)", ylabel="Share of poses", ylim=(0.0, 1.02))

@@ -14,9 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
-from kinacc.figures.columns import Table, floats, require
+from kinacc.figures.columns import floats, require
 
 COLUMNS = (
     "slice_deg",
@@ -42,7 +43,7 @@ DEFAULT_CELL_MM = 25.0
 
 
 @dataclass(frozen=True)
-class Layout:
+class Panels:
     """Sizes in inches: panels of equal scale side by side, a colour bar at the right."""
 
     columns: int
@@ -82,7 +83,7 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
     return draw(inputs["accuracy_map"], dataset=settings.get("dataset"))
 
 
-def draw(accuracy_map: Table, *, dataset: str | None = None) -> Figure:
+def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     """Draw ``accuracy_map``: a column per slice, position above orientation.
 
     One colour scale per row; unreachable cells are hatched, and those reached in some but not all
@@ -128,18 +129,18 @@ def draw(accuracy_map: Table, *, dataset: str | None = None) -> Figure:
 
 def _layout(
     count: int, r_edges: np.ndarray, h_edges: np.ndarray, named: bool, wordy: bool
-) -> Layout:
+) -> Panels:
     """Fit ``count`` panels into the column width, at the same scale in both directions.
 
     ``named`` leaves room for the data set's name, ``wordy`` for three entries in the legend.
     """
     wide = count > 2
     width = style.DOUBLE_COLUMN_IN if wide else style.SINGLE_COLUMN_IN
-    free = width - Layout.left - Layout.right - count * Layout.gap
+    free = width - Panels.left - Panels.right - count * Panels.gap
     ratio = float(np.ptp(h_edges) / np.ptp(r_edges))
     panel_w = min(max(free / count, 0.5), 3.2 / ratio)
-    foot = Layout.foot + (0.0 if wide or not wordy else 0.17)
-    return Layout(count, panel_w, panel_w * ratio, name_h=0.17 if named else 0.0, foot=foot)
+    foot = Panels.foot + (0.0 if wide or not wordy else 0.17)
+    return Panels(count, panel_w, panel_w * ratio, name_h=0.17 if named else 0.0, foot=foot)
 
 
 def _edges(levels: np.ndarray) -> np.ndarray:
@@ -204,7 +205,7 @@ def _largest(ax: Axes, radii: np.ndarray, heights: np.ndarray, grid: np.ndarray,
 
 
 def _words(
-    figure: Figure, layout: Layout, unreached: bool, partly: bool, dataset: str | None
+    figure: Figure, layout: Panels, unreached: bool, partly: bool, dataset: str | None
 ) -> None:
     """Write axis names, the legend and the data set's name into the margins."""
     left, right = layout.left / layout.width, 1 - (layout.right + layout.gap) / layout.width

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kinacc.artifacts.columns import Columns
 from kinacc.figures import style, truth
-from kinacc.figures.columns import Table, floats, require, texts
+from kinacc.figures.columns import floats, require, texts
 
 COLUMNS = ("assessor", "noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm", "repetitions")
 UM_PER_MM = 1000.0
@@ -22,7 +23,7 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
 
 
 def draw(
-    summary: Table,
+    summary: Columns,
     *,
     true_accuracy_mm: float | None = None,
     noisy_truth: bool = False,
@@ -77,7 +78,7 @@ def draw(
 
 
 def _assessor(
-    ax: Axes, summary: Table, mine: np.ndarray, x_um: np.ndarray, colour: str, marker: str
+    ax: Axes, summary: Columns, mine: np.ndarray, x_um: np.ndarray, colour: str, marker: str
 ) -> float | None:
     """Draw one assessor; return the height of its rightmost mean, None where it has none."""
     mean, low, high = (floats(summary, c)[mine] for c in ("mean_mm", "min_mm", "max_mm"))
@@ -113,7 +114,7 @@ def _label_lines(ax: Axes, labels: list[tuple[float, str, str]]) -> None:
         style.outside_label(ax, place, words, colour)
 
 
-def _repetitions(summary: Table) -> str:
+def _repetitions(summary: Columns) -> str:
     counts = floats(summary, "repetitions")
     counts = counts[np.isfinite(counts)]
     if not counts.size:

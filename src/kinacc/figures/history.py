@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style, truth
-from kinacc.figures.columns import Table, floats, require, rows, texts
+from kinacc.figures.columns import floats, require, rows, texts
 
 COLUMNS = (
     "noise_mm",
@@ -34,7 +35,7 @@ def run(inputs: Mapping, settings: Mapping, example: str) -> Figure:
 
 
 def draw(
-    histories: Table,
+    histories: Columns,
     *,
     example: str,
     true_accuracy_mm: float | None = None,
@@ -74,7 +75,7 @@ def draw(
     return figure
 
 
-def _sorted(histories: Table, example: str) -> dict[str, np.ndarray]:
+def _sorted(histories: Columns, example: str) -> dict[str, np.ndarray]:
     """Return the columns of one example in the order of its iterations."""
     require(histories, ("example", *COLUMNS), "histories")
     names = texts(histories, "example")
@@ -96,7 +97,7 @@ def resampled(point: np.ndarray) -> np.ndarray:
     return again
 
 
-def verdict(values: Table) -> str:
+def verdict(values: Columns) -> str:
     """State bound, noise, threshold and outcome in one line."""
     eta, noise, alpha = (values[name][0] for name in ("eta_mm", "noise_mm", "alpha"))
     final = values["rejection_probability"][-1]
@@ -106,7 +107,7 @@ def verdict(values: Table) -> str:
 
 def _magnitudes(
     ax: Axes,
-    values: Table,
+    values: Columns,
     again: np.ndarray,
     true_accuracy_mm: float | None,
     noisy_truth: bool,
@@ -158,7 +159,7 @@ def _legend(figure: Figure, top: Axes, bottom: Axes, noisy_truth: bool) -> None:
 
 
 def _mark_largest(
-    axes: tuple[Axes, Axes], values: Table, true_accuracy_mm: float, noisy_truth: bool
+    axes: tuple[Axes, Axes], values: Columns, true_accuracy_mm: float, noisy_truth: bool
 ) -> str:
     """Mark the iteration that first measures the point with the largest true error, in words."""
     words = "largest “true” error*" if noisy_truth else "largest true error"
@@ -170,7 +171,7 @@ def _mark_largest(
     return f"{words} first measured at k = {k[0]:.0f} (dotted)"
 
 
-def _unmet(histories: Table, example: str) -> str:
+def _unmet(histories: Columns, example: str) -> str:
     """Say by which lesser rule the simulation was chosen, where the rule itself was not met."""
     if "rule" not in histories or "rule_met" not in histories:
         return ""
@@ -180,7 +181,7 @@ def _unmet(histories: Table, example: str) -> str:
     return "\n" + fill(f"shown: {texts(histories, 'rule')[mine]}", 56)
 
 
-def _probability(ax: Axes, values: Table, again: np.ndarray) -> None:
+def _probability(ax: Axes, values: Columns, again: np.ndarray) -> None:
     k, p = values["iteration"], values["rejection_probability"]
     for mask, marker, colour, label in (
         (~again, "o", style.PURPLE, "probability at new point"),

@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
-from kinacc.figures.columns import Table, floats, require, texts
+from kinacc.figures.columns import floats, require, texts
 
 COLUMNS = ("assessor", "target", "field", "candidates", "noise_mm", "budget")
 UM_PER_MM = 1000.0
@@ -26,7 +27,7 @@ QUANTITIES = {
 
 
 def draw(
-    cells: Table, quantity: str, candidates: int, budget: int, known: Sequence[str] = ()
+    cells: Columns, quantity: str, candidates: int, budget: int, known: Sequence[str] = ()
 ) -> Figure:
     """Draw one quantity of ``tournament_cells`` for one candidate count and budget.
 
@@ -76,7 +77,7 @@ def _looks(names: set[str]) -> dict[str, tuple[str, str, str]]:
     return looks
 
 
-def _chosen(cells: Table, column: str, targets, candidates: int, budget: int) -> np.ndarray:
+def _chosen(cells: Columns, column: str, targets, candidates: int, budget: int) -> np.ndarray:
     """Rows to show: of every assessor those about the first of the targets it has values for."""
     fits = (floats(cells, "candidates") <= candidates) & (floats(cells, "budget") == budget)
     # A field with fewer points than asked for takes part with all it has.
@@ -93,7 +94,7 @@ def _chosen(cells: Table, column: str, targets, candidates: int, budget: int) ->
     return chosen
 
 
-def _largest_of_its_field(cells: Table, candidates: int) -> np.ndarray:
+def _largest_of_its_field(cells: Columns, candidates: int) -> np.ndarray:
     fields, counts = texts(cells, "field"), floats(cells, "candidates")
     largest = {
         name: counts[(fields == name) & (counts <= candidates)].max(initial=-1)
@@ -102,7 +103,7 @@ def _largest_of_its_field(cells: Table, candidates: int) -> np.ndarray:
     return counts == np.array([largest[name] for name in fields])
 
 
-def _panel(ax: Axes, cells: Table, column: str, mine, shown: list[str], looks: dict) -> None:
+def _panel(ax: Axes, cells: Columns, column: str, mine, shown: list[str], looks: dict) -> None:
     names, fields, values = texts(cells, "assessor"), texts(cells, "field"), floats(cells, column)
     width = 0.7 / max(len(looks), 1)
     for index, (name, (words, colour, marker)) in enumerate(looks.items()):

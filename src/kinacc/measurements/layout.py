@@ -119,7 +119,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundColumns:
     """Every column that is used. ``single`` holds pose, repeat, target, session, temperature."""
 
     joints: tuple[Place, ...]
@@ -138,7 +138,7 @@ class Found:
 
 def find(
     table: RawTable, layout: Layout, prismatic: np.ndarray, problems: list[Problem]
-) -> Found | None:
+) -> FoundColumns | None:
     """Columns of every quantity; None where one is missing, which is added to ``problems``.
 
     ``prismatic`` (k,) marks joints whose position is a length.
@@ -158,7 +158,7 @@ def find(
     finder.refuse_unknown_columns()
     if len(problems) > before:
         return None
-    found = Found(
+    found = FoundColumns(
         joints,
         commanded,
         {joint: place for joint, place in directions.items() if place},
@@ -344,7 +344,7 @@ class _Finder:
                 what = f"is not there, but measurements.file.columns maps {name} to it"
                 self._problem(foreign, what, listed(self.table))
 
-    def refuse_shared_columns(self, found: Found) -> None:
+    def refuse_shared_columns(self, found: FoundColumns) -> None:
         """A column that is taken for two measured quantities, as a slip in a mapping makes it."""
         measured = [*found.joints, *found.commanded, *found.directions.values()]
         measured += [place for target in found.targets for place in target.places()]

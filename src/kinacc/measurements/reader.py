@@ -11,7 +11,7 @@ from kinacc.artifacts.columns import Columns, texts
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
-from kinacc.measurements.layout import STD, TOOL, Found, Layout, Place, Target, find
+from kinacc.measurements.layout import STD, TOOL, FoundColumns, Layout, Place, Target, find
 from kinacc.measurements.orientation import quaternions, rotation_std
 from kinacc.measurements.table import RawTable, load, numbers
 
@@ -27,7 +27,7 @@ _LARGEST_WHOLE = 2.0**53  # beyond, neighbours are the same number
 
 
 @dataclass(frozen=True)
-class Reading:
+class MeasuredFile:
     """What a file holds.
 
     ``columns`` of the measurements artefact but fold and subset, one row per reading of a target;
@@ -48,7 +48,7 @@ class Reading:
         return [*unused, *self.notes]
 
 
-def read(section: Mapping, robot: Robot, strict: bool = True) -> Reading:
+def read(section: Mapping, robot: Robot, strict: bool = True) -> MeasuredFile:
     """Measurements of the file that ``section`` (``measurements.file``) names.
 
     ``strict``: values that cannot be meant (joints outside their limits, metres taken for
@@ -62,7 +62,7 @@ def read(section: Mapping, robot: Robot, strict: bool = True) -> Reading:
     return convert(table.select(used), Layout.of(section), robot, strict)
 
 
-def read_excluded(section: Mapping, robot: Robot) -> tuple[Reading | None, list[Problem]]:
+def read_excluded(section: Mapping, robot: Robot) -> tuple[MeasuredFile | None, list[Problem]]:
     """The rows that ``section`` excludes, as far as they can be read, and what of them cannot.
 
     None where no row can be. Raises InputError where the file itself cannot be read.
@@ -106,7 +106,7 @@ def _loaded(section: Mapping) -> RawTable:
     return table
 
 
-def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> Reading:
+def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> MeasuredFile:
     """Measurements of a table as read; see ``read``. Raises InputError listing every problem."""
     problems: list[Problem] = []
     title = f"{table.path} cannot be used"
@@ -148,7 +148,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
         problems += faults.scale_problems(table, columns, robot)
     refuse(problems, title)
     notes = [f"nothing was measured in {table.rows_in_words(np.flatnonzero(nothing))}"]
-    return Reading(
+    return MeasuredFile(
         columns,
         found.unused(table),
         tuple(notes if nothing.any() else ()),
@@ -241,7 +241,7 @@ def _in_reading_order(std: np.ndarray, layout: Layout) -> np.ndarray:
     return std[:, ["xyz".index(axis) for axis in axes]]
 
 
-def _directions(table: RawTable, found: Found, joints: int, problems) -> np.ndarray:
+def _directions(table: RawTable, found: FoundColumns, joints: int, problems) -> np.ndarray:
     """Travel directions (n, k), 0 where the file says nothing."""
     s = np.zeros((len(table), joints), dtype=np.int8)
     for joint, place in found.directions.items():
@@ -254,7 +254,7 @@ def _directions(table: RawTable, found: Found, joints: int, problems) -> np.ndar
     return s
 
 
-def _numbered(table: RawTable, found: Found, problems) -> Columns:
+def _numbered(table: RawTable, found: FoundColumns, problems) -> Columns:
     """Pose, repeat, session and temperature (n,); without poses every row is one of its own."""
     count = len(table)
     shared = {

@@ -31,10 +31,10 @@ def configurations(robot: Robot, poses: int) -> np.ndarray:
     A longer plan begins with the shorter one.
     """
     rng = np.random.default_rng(_PLAN_SEED)
-    arm = closed_form.recognise(robot.dh)
+    form = closed_form.recognise(robot.dh)
     found = np.empty((0, 6))
     while len(found) < poses:
-        q_rad, reached = closed_form.solve(arm, _poses(rng), BRANCHES)
+        q_rad, reached = closed_form.solve(form, _poses(rng), BRANCHES)
         rows, branch = np.arange(_BLOCK), rng.integers(0, len(BRANCHES), _BLOCK)
         chosen, good = q_rad[rows, branch], reached[rows, branch]
         good &= np.all((chosen >= robot.q_min_rad) & (chosen <= robot.q_max_rad), axis=1)

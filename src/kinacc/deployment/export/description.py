@@ -19,35 +19,39 @@ CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
 SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a joint slides"
 
 
-def robot_name(arm: Calibration) -> str:
+def robot_name(calibration: Calibration) -> str:
     """Name of the calibrated arm."""
-    own = arm.name if arm.name.startswith(arm.robot.name) else f"{arm.robot.name}_{arm.name}"
+    own = (
+        calibration.name
+        if calibration.name.startswith(calibration.robot.name)
+        else f"{calibration.robot.name}_{calibration.name}"
+    )
     return f"{own}_calibrated"
 
 
-def robot_yaml(arm: Calibration) -> str:
+def robot_yaml(calibration: Calibration) -> str:
     """A robot file that ``kinacc.kinematics.robot.load`` reads back to the same arm, bit by bit."""
-    robot = arm.robot
+    robot = calibration.robot
     tool = robot.tool
-    if TOOL in arm.targets:
-        tool = compose(invert(robot.flange), arm.targets[TOOL])
+    if TOOL in calibration.targets:
+        tool = compose(invert(robot.flange), calibration.targets[TOOL])
     calibrated = replace(
         robot,
-        name=robot_name(arm),
-        source=f"calibrated from {robot.name} with data set {arm.name}",
+        name=robot_name(calibration),
+        source=f"calibrated from {robot.name} with data set {calibration.name}",
         date="",
-        dh=_dh_of(arm),
+        dh=_dh_of(calibration),
         tool=tool,
     )
     heading = (
-        f"{robot.name} as calibrated by data set {arm.name} ({arm.choice} model).",
+        f"{robot.name} as calibrated by data set {calibration.name} ({calibration.choice} model).",
         f"{CONVENTION}; angles in rad, lengths in mm.",
     )
     return as_yaml(calibrated, heading)
 
 
 def robot_json(
-    arm: Calibration,
+    calibration: Calibration,
     std: np.ndarray,
     nominal: DHModel,
     undetermined: Sequence[str] | None,
@@ -58,7 +62,7 @@ def robot_json(
     ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined; ``undetermined`` says in sentences
     what the poses leave open, None where nobody asked.
     """
-    dh = _dh_of(arm)
+    dh = _dh_of(calibration)
     joints = []
     for joint in range(dh.joints):
         row: dict[str, object] = {
@@ -71,20 +75,20 @@ def robot_json(
             row[f"nominal_{name}"] = float(getattr(nominal, name)[joint])
             row[f"std_{name}"] = _number(std[joint, column])
         joints.append(row)
-    left = arm.residual
+    left = calibration.residual
     content = {
-        "name": robot_name(arm),
-        "robot": arm.robot.name,
-        "calibration": arm.name,
+        "name": robot_name(calibration),
+        "robot": calibration.robot.name,
+        "calibration": calibration.name,
         "convention": CONVENTION + (f"; {SLIDING}" if dh.prismatic.any() else ""),
         "units": {"length": "mm", "angle": "rad", "quaternion": "w, x, y, z"},
         "joints": joints,
-        "joint_map": arm.robot.joint_map.tolist(),
-        "first_dh_frame_in_base": _frame_record(arm.robot.base),
-        "flange_in_last_dh_frame": _frame_record(arm.robot.flange),
-        "base_in_instrument": _frame_record(arm.base),
+        "joint_map": calibration.robot.joint_map.tolist(),
+        "first_dh_frame_in_base": _frame_record(calibration.robot.base),
+        "flange_in_last_dh_frame": _frame_record(calibration.robot.flange),
+        "base_in_instrument": _frame_record(calibration.base),
         "targets_in_last_dh_frame": {
-            name: _frame_record(pose) for name, pose in arm.targets.items()
+            name: _frame_record(pose) for name, pose in calibration.targets.items()
         },
         "residual": left
         and {
@@ -98,9 +102,9 @@ def robot_json(
     return json.dumps(content, indent=1) + "\n"
 
 
-def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
+def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> str:
     """One row per joint: fitted values, their standard deviations and the nominal values."""
-    dh, out = _dh_of(arm), io.StringIO()
+    dh, out = _dh_of(calibration), io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     names = [name.replace("_rad", "_deg") for name in PARAMETERS]
     writer.writerow(
@@ -124,10 +128,10 @@ def robot_csv(arm: Calibration, std: np.ndarray, nominal: DHModel) -> str:
     return out.getvalue()
 
 
-def _dh_of(arm: Calibration) -> DHModel:
-    if arm.model.table is None:
-        raise TypeError(f"a {arm.choice} model has no DH table: choose dh")
-    return arm.model.table
+def _dh_of(calibration: Calibration) -> DHModel:
+    if calibration.model.table is None:
+        raise TypeError(f"a {calibration.choice} model has no DH table: choose dh")
+    return calibration.model.table
 
 
 def _kind(dh: DHModel, joint: int) -> str:

@@ -18,7 +18,7 @@ _MOST_DECIMALS = 6
 
 
 @dataclass(frozen=True)
-class Table:
+class PrintedTable:
     """A caption, headers with their units, rows of text, and notes under the table."""
 
     name: str
@@ -30,7 +30,7 @@ class Table:
 
 def paper_tables(
     residuals: Columns, fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str] = ()
-) -> list[Table]:
+) -> list[PrintedTable]:
     """Tables of a data set from its ``residuals`` and ``dh_model``; ``nominal`` as ``dh_model``.
 
     ``unseen``: what the poses leave open, in sentences, as a note to the DH parameters.
@@ -47,7 +47,7 @@ def paper_tables(
     ]
 
 
-def markdown(tables: Sequence[Table]) -> str:
+def markdown(tables: Sequence[PrintedTable]) -> str:
     """The tables as Markdown."""
     parts = []
     for table in tables:
@@ -60,7 +60,7 @@ def markdown(tables: Sequence[Table]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def latex(tables: Sequence[Table]) -> str:
+def latex(tables: Sequence[PrintedTable]) -> str:
     """The tables as LaTeX (packages booktabs and amsmath), one ``table`` environment each."""
     parts = []
     for table in tables:
@@ -97,7 +97,7 @@ def with_deviation(value: float, std: float) -> str:
     return f"{value:.{decimals}f} ± {std:.{decimals}f}"
 
 
-def _residual_table(columns: Columns, comparison: str, name: str, caption: str) -> Table:
+def _residual_table(columns: Columns, comparison: str, name: str, caption: str) -> PrintedTable:
     pooled = np.isnan(np.asarray(columns["fold"], dtype=float))
     ours = pooled & (np.asarray(columns["comparison"]) == comparison)
     rows = []
@@ -108,10 +108,10 @@ def _residual_table(columns: Columns, comparison: str, name: str, caption: str) 
             rows.append([f"{quantity}, {words}", str(int(columns["n"][row])), *figures])
     heads = [("", ""), ("points", ""), *((head, "") for _, head in _FIGURES)]
     note = "99 %: quantile of a gamma distribution fitted to the magnitudes."
-    return Table(name, caption, heads, rows, [note])
+    return PrintedTable(name, caption, heads, rows, [note])
 
 
-def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str]) -> Table:
+def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str]) -> PrintedTable:
     order = np.argsort(fitted["joint"], kind="stable")
     shown = [each for each in PARAMETERS if each != "beta_rad" or np.any(fitted[each] != 0.0)]
     heads = {
@@ -139,7 +139,7 @@ def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str
             "† shares a direction the poses do not determine; along it the value is nominal."
         )
     notes += [f"Left open by the poses: {'; '.join(unseen)}."] if unseen else []
-    return Table(
+    return PrintedTable(
         "dh_parameters",
         f"DH parameters, {name}",
         [("joint", ""), *(heads[each] for each in shown)],

@@ -12,12 +12,22 @@ import numpy as np
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.deployment.export import links
 from kinacc.deployment.export.description import robot_name
 from kinacc.deployment.record import TOOL, Calibration
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, invert, rotation_y, rotation_z
+from kinacc.geometry import (
+    IDENTITY,
+    Pose,
+    compose,
+    exp_so3,
+    invert,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
 from kinacc.kinematics import dh as _dh
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between
 
 _M_PER_MM = 1e-3
@@ -25,7 +35,7 @@ _SAME_ARM_MM = 1e-3  # how far a file's nominal arm may be from the robot's
 _PROBES = 24
 
 
-def generated(arm: Calibration, dh_joints: bool = False) -> str:
+def generated(calibration: Calibration, dh_joints: bool = False) -> str:
     """A URDF of the calibrated DH chain: base_link, link_1 .. link_k, flange and tool.
 
     Joints are those the controller reports, or with ``dh_joints`` those of the DH table. Raises
@@ -33,13 +43,13 @@ def generated(arm: Calibration, dh_joints: bool = False) -> str:
     """
     from lxml import etree
 
-    robot, dh = arm.robot, arm.model
+    robot, dh = calibration.robot, calibration.model
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
-    senses = np.ones(dh.joints) if dh_joints else links.signs(robot)
-    frames, end = links.origins(dh)
+    senses = np.ones(dh.joints) if dh_joints else _signs(robot)
+    frames, end = _origins(dh)
     frames[0] = compose(robot.base, frames[0])
-    root = etree.Element("robot", name=_name(robot_name(arm)))
-    about = f"calibrated from {robot.name} with data set {arm.name}"
+    root = etree.Element("robot", name=_name(robot_name(calibration)))
+    about = f"calibrated from {robot.name} with data set {calibration.name}"
     about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
     root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
     etree.SubElement(root, "link", name="base_link")
@@ -65,15 +75,15 @@ def generated(arm: Calibration, dh_joints: bool = False) -> str:
     etree.SubElement(root, "link", name="flange")
     flange = compose(end, robot.flange)
     _joint(root, "flange_fixed", "fixed", last, "flange", flange)
-    if TOOL in arm.targets:
+    if TOOL in calibration.targets:
         etree.SubElement(root, "link", name="tool")
-        tool = compose(invert(robot.flange), arm.targets[TOOL])
+        tool = compose(invert(robot.flange), calibration.targets[TOOL])
         _joint(root, "tool_fixed", "fixed", "flange", "tool", tool)
     return _written(root)
 
 
 def corrected(
-    arm: Calibration,
+    calibration: Calibration,
     path: str | Path,
     base_link: str | None = None,
     tip_link: str | None = None,
@@ -90,11 +100,11 @@ def corrected(
     path = Path(path)
     chain = joints_between(path, base_link, tip_link)
     moving = [joint for joint in chain if joint.kind in MOVING]
-    base, tip = _ends_in_file(arm, chain, path)
+    base, tip = _ends_in_file(calibration, chain, path)
     fixed, tail = _fixed_parts(chain)
     at_zero = _link_frames(chain)
-    plain, _ = links.origins(arm.robot.dh)
-    better, end = links.origins(arm.model)
+    plain, _ = _origins(calibration.robot.dh)
+    better, end = _origins(calibration.model)
     frame, anchors = base, []
     for origin, there in zip(plain, at_zero, strict=True):
         frame = compose(frame, origin)
@@ -118,14 +128,14 @@ def corrected(
     return etree.tostring(tree, encoding="unicode") + "\n"
 
 
-def _ends_in_file(arm: Calibration, chain: list[Joint], path: Path) -> tuple[Pose, Pose]:
+def _ends_in_file(calibration: Calibration, chain: list[Joint], path: Path) -> tuple[Pose, Pose]:
     """First DH frame in the file's base link, and its tip link in the last DH frame."""
-    robot = arm.robot
+    robot = calibration.robot
     count = sum(joint.kind in MOVING for joint in chain)
     if count != robot.dh.joints:
         what = f"its chain has {count} moving joints, {robot.name} has {robot.dh.joints}"
         raise InputError(Problem(str(path), what))
-    links.signs(robot)  # coupled joints have no URDF
+    _signs(robot)  # coupled joints have no URDF
     rng = np.random.default_rng(0)
     low, high = np.maximum(robot.q_min_rad, -3.0e3), np.minimum(robot.q_max_rad, 3.0e3)
     q_rad = low + rng.uniform(0.0, 1.0, (_PROBES, len(low))) * (high - low)
@@ -238,3 +248,36 @@ def _written(root) -> str:
     etree.indent(root)
     head = '<?xml version="1.0"?>\n'
     return head + etree.tostring(root, encoding="unicode") + "\n"
+
+
+def _origins(dh: DHModel) -> tuple[list[Pose], Pose]:
+    """The chain cut at its axes: k joints in the links before them, the last DH frame in its link.
+
+    Link i is what follows joint i: it turns about (or slides along) the z axis of its origin, so
+    the arm is ``origin_1 Rz(q_1) origin_2 Rz(q_2) .. end``.
+    """
+    found, before = [], IDENTITY
+    for joint in range(dh.joints):
+        turn = Pose(rotation_z(dh.theta_offset_rad[joint]), np.zeros(3))
+        found.append(compose(before, turn))
+        tilt = rotation_x(dh.alpha_rad[joint]) @ rotation_y(dh.beta_rad[joint])
+        before = Pose(tilt, np.array([dh.a_mm[joint], 0.0, dh.d_mm[joint]]))
+    return found, before
+
+
+def _signs(robot: Robot) -> np.ndarray:
+    """Sense (k,) in which reported joints turn the DH axes.
+
+    Raises InputError where reported joints are coupled or scaled, which no chain of single joints
+    can express.
+    """
+    diagonal = np.diag(robot.joint_map)
+    if np.array_equal(robot.joint_map, np.diag(diagonal)) and (np.abs(diagonal) == 1.0).all():
+        return diagonal
+    problem = Problem(
+        f"robot {robot.name}",
+        "reports joints that are coupled or scaled, which a URDF cannot say",
+        "every reported joint turns one axis, by its own angle",
+        "export with the joints of the DH table instead (--dh-joints)",
+    )
+    raise InputError(problem)

@@ -16,7 +16,7 @@ _LOST = 1e-13  # of the largest eigenvalue: what rounding leaves of a direction 
 _MOST_SWEEPS = 100
 
 
-class Plan(NamedTuple):
+class ChosenPoses(NamedTuple):
     """Candidates chosen (N,), the index of the set, and the number of swaps that led to it;
     ``path`` (N,) is the index after each addition, before any swap."""
 
@@ -31,7 +31,7 @@ def choose(
     count: int,
     index: str = "O1",
     progress: Callable[[Iterable[int], str], Iterable[int]] | None = None,
-) -> Plan:
+) -> ChosenPoses:
     """``count`` of n candidates with ``rows`` (n, m, r) that maximise an observability index.
 
     Poses are added one by one, each the best there is; then every chosen pose in turn is swapped
@@ -50,7 +50,7 @@ def choose(
         more = _exchange(rows, other, index, progress)
         if _value(index, rows, other) > _value(index, rows, chosen) * (1.0 + _BETTER):
             chosen, swaps = other, more
-    return Plan(np.array(chosen), _value(index, rows, chosen), swaps, path)
+    return ChosenPoses(np.array(chosen), _value(index, rows, chosen), swaps, path)
 
 
 def _added(rows: np.ndarray, count: int, index: str, progress) -> tuple[list[int], np.ndarray]:

@@ -58,7 +58,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Columns:
+class NamedColumns:
     """Names of ``measurements.file.columns`` and the columns they mean.
 
     ``joints`` q1 ..; ``commanded`` the same as commanded, may be empty; ``targets`` by name, each a
@@ -87,7 +87,7 @@ def recognise(
     values: Values | None = None,
     take: Sequence[str] = (),
     turned: bool = True,
-) -> Columns:
+) -> NamedColumns:
     """What the columns of these names hold; no joints or no targets where none were found.
 
     ``values`` gives a column's numbers (n,), NaN where it has none. ``take``: columns whose groups
@@ -108,7 +108,7 @@ def recognise(
     used = {name.column for target in targets.values() for name in target.values()}
     used |= {name.column for group in (joints, commanded) if group for name in _all(group)}
     single = _singles(name for name in names if name.column not in used)
-    return Columns(
+    return NamedColumns(
         _all(joints),
         _all(commanded),
         targets,

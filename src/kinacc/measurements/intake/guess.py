@@ -13,7 +13,7 @@ import numpy as np
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name, name_of
 from kinacc.measurements.intake import columns, text
-from kinacc.measurements.intake.columns import Columns
+from kinacc.measurements.intake.columns import NamedColumns
 from kinacc.measurements.layout import TOOL, Layout, find
 from kinacc.measurements.table import RawTable, numbers
 
@@ -32,7 +32,7 @@ class Guess:
 
     section: dict[str, Any]
     table: RawTable
-    found: Columns
+    found: NamedColumns
     assumed: dict[str, str] = field(default_factory=dict)
     stated: dict[str, tuple[str, str]] = field(default_factory=dict)
 
@@ -135,7 +135,7 @@ def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Gue
     return Guess(section, table, found, sizes.assumed, sizes.stated)
 
 
-def _refuse(path: str, table: RawTable, found: Columns, take: Sequence[str]) -> None:
+def _refuse(path: str, table: RawTable, found: NamedColumns, take: Sequence[str]) -> None:
     problems = []
     by_hand = "or write the data set by hand (docs/configuration.md)"
     for column in take:
@@ -209,7 +209,7 @@ class _Units:
 
 
 def _mapping(
-    path: str, found: Columns, joint_unit: str, length_unit: str, angle_unit: str, problems
+    path: str, found: NamedColumns, joint_unit: str, length_unit: str, angle_unit: str, problems
 ) -> dict[str, str]:
     """Our names and the file's, of every column that is read."""
     mapping: dict[str, str] = {}

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +50,7 @@ class DatasetReport:
             "name": self.name,
             "ok": not self.problems,
             "checked": list(self.checked),
-            "problems": [_plain(problem) for problem in self.problems],
+            "problems": [asdict(problem) for problem in self.problems],
             "notes": list(self.notes),
         }
 
@@ -83,7 +82,7 @@ class Report:
         return {
             "ok": self.ok,
             "folder": self.folder,
-            "problems": [_plain(problem) for problem in self.problems],
+            "problems": [asdict(problem) for problem in self.problems],
             "advice": self.advice,
             "datasets": [each.to_dict() for each in self.datasets],
         }
@@ -259,18 +258,6 @@ def check_campaign(folder: Path) -> DatasetReport:
     return DatasetReport(folder.name, tuple(checked), tuple(problems), advice=advice)
 
 
-def main(
-    folder: str,
-    as_json: bool = False,
-    plan: Plan | None = None,
-    configs: Sequence[str] = (),
-) -> int:
-    """Print what is found in a results folder; the exit code."""
-    report = check_results(folder, plan, configs)
-    print(json.dumps(report.to_dict(), indent=2) if as_json else report)
-    return report.exit_code
-
-
 def _tables_there(folder: Path) -> Iterator[tuple[str, Path]]:
     """Every table of the contract that is in the folder, parts included."""
     for name in ARTEFACTS:
@@ -338,12 +325,3 @@ def _leftovers(folder: Path) -> list[Path]:
 
 def _placed(folder: Path, problem: Problem) -> Problem:
     return Problem(f"{folder}/{problem.where}", problem.what, problem.allowed, problem.fix)
-
-
-def _plain(problem: Problem) -> dict[str, str]:
-    return {
-        "where": problem.where,
-        "what": problem.what,
-        "allowed": problem.allowed,
-        "fix": problem.fix,
-    }
