@@ -26,7 +26,7 @@ except InputError as error:
     raise WorkflowError(str(error)) from None
 for dataset in plan.datasets:
     for stage, reason in plan.left_out(dataset).items():
-        if not STAGES[stage].measured:
+        if not STAGES[stage].measured and not STAGES[stage].fits:
             logger.info(f"{dataset}: {stage} is left out, {reason}")
 
 

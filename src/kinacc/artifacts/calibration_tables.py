@@ -30,6 +30,7 @@ from kinacc.artifacts.columns import (
     unstated,
     whole,
 )
+from kinacc.artifacts.covariance_tables import DH_COVARIANCE, DH_IDENTIFIED, VEC_COVARIANCE
 
 
 def _position(of: str, nullable: bool = False) -> tuple[Column, ...]:
@@ -235,4 +236,19 @@ RESIDUALS = Artefact(
         magnitude("gamma99", "see unit", "99 % quantile of a fitted gamma distribution", 1e5, True),
     ),
     ("comparison", "subset", "fold", "quantity"),
+)
+ALL = (
+    MEASUREMENTS,
+    VEC_MODEL,
+    VEC_FRAMES,
+    VEC_FIT,
+    VEC_ORDERS,
+    DH_MODEL,
+    FRAMES,
+    DH_FIT,
+    VEC_COVARIANCE,
+    DH_COVARIANCE,
+    DH_IDENTIFIED,
+    RESIDUALS,
+    POSE_ERRORS,
 )
