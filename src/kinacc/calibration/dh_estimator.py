@@ -105,7 +105,7 @@ class DHEstimator(Estimator):
         """How the fit went, and which parameters the observations determine."""
         told = identified.parameters(fitted, known, observations)
         return {
-            "dh_fit": tables.dh_fit_columns(fitted, known),
+            "dh_fit": tables.fit_columns("dh_fit", fitted, known),
             "dh_identified": tables.identified_columns(told, known),
         }
 

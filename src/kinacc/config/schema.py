@@ -162,7 +162,9 @@ def _key(name: str, content: Mapping[str, Any]) -> Key:
         if each in fields:
             fields[each] = tuple(fields[each])
     if "fields" in fields:
-        fields["fields"] = tuple(_key(each, about) for each, about in fields["fields"].items())
+        inside = fields["fields"].items()
+        blank = {"default": None, "about": ""}
+        fields["fields"] = tuple(_key(each, blank | content) for each, content in inside)
     return Key(name=name, **fields)
 
 
