@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kinacc.artifacts.allowed import (
     COMPARISONS,
     ERRORS,
@@ -88,6 +90,18 @@ _FIT_COLUMNS = (
     real("value", "see unit", "the value", nullable=True),
     text("unit", "unit of the value; 1 for a pure number"),
 )
+_PAYLOAD = tuple(
+    replace(column, may_be_absent=True)
+    for column in unstated(
+        (
+            real("payload_kg", "kg", "mass of what the last DH frame carries", 0.0, 1e4),
+            *(
+                real(f"payload_{axis}_mm", "mm", f"{axis} of its centre, last DH frame", -1e4, 1e4)
+                for axis in "xyz"
+            ),
+        )
+    )
+)
 _STATED_BY_FILES = (
     text("session", "session with a base frame of its own; null for one alone"),
     *(magnitude(f"std_{axis}_mm", "mm", f"standard deviation of {axis}_mm", 1e3) for axis in "xyz"),
@@ -120,6 +134,7 @@ MEASUREMENTS = Artefact(
         text("subset", "train (used by the delivered fits) or validation (held out)", SUBSETS),
         whole("fold", "fold in which the row is held out; null without folds", nullable=True),
         *unstated(_STATED_BY_FILES),
+        *_PAYLOAD,
     ),
     ("pose", "target", "repeat"),
 )

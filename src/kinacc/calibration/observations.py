@@ -8,11 +8,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from kinacc.geometry import Pose, rotation_from_quaternion
-from kinacc.kinematics.model import JointState
+from kinacc.kinematics.model import PAYLOAD_COLUMNS, JointState
 from kinacc.kinematics.robot import Robot
 
 TOOL = "tool"
-PAYLOAD = ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm")
 
 
 @dataclass(frozen=True)
@@ -135,8 +134,8 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
     session_names = tuple(dict.fromkeys(sessions))
     session_index = {name: number for number, name in enumerate(session_names)}
     payload = None
-    if PAYLOAD[0] in columns:
-        payload = np.stack([np.asarray(columns[name], float) for name in PAYLOAD], axis=1)
+    if PAYLOAD_COLUMNS[0] in columns:
+        payload = np.stack([np.asarray(columns[name], float) for name in PAYLOAD_COLUMNS], axis=1)
     return Observations(
         q_rad=robot.dh_joints(reported),
         s=s,

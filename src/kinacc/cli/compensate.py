@@ -48,7 +48,9 @@ def compensate(
     arm = choice.calibration_of(folder, model, robot, config, session)
     given = target_poses.poses(arm, poses, pose, near_deg, program, frame, point)
     with reporting("compensate", bar=True):
-        found = joints_for(arm, given.pose, given.joints, given.directions, frame, point)
+        found = joints_for(
+            arm, given.pose, given.joints, given.directions, frame, point, given.payload
+        )
     answer = target_poses.compensated(arm, given, found, frame, point, program is not None)
     choice.deliver(answer, output, as_json, force)
     rows.say_unused(given)

@@ -45,7 +45,7 @@ def predict(
     arm = choice.calibration_of(folder, model, robot, config, session)
     given = tables.given_joints(arm.robot, joints, joints_deg, joints_rad)
     with reporting("predict", bar=True) as progress:
-        found = poses_at(arm, given.joints, given.directions, frame, point, progress)
+        found = poses_at(arm, given.joints, given.directions, frame, point, progress, given.payload)
     choice.deliver(tables.predicted(arm, given, found, frame, point), output, as_json, force)
     rows.say_unused(given)
     rows.say_missing(found.pose.position_mm)

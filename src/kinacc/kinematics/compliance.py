@@ -18,7 +18,7 @@ import numpy as np
 from kinacc.geometry import Pose
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
-from kinacc.kinematics.model import JointState
+from kinacc.kinematics.model import PAYLOAD_COLUMNS, JointState
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 COMPLIANCE, LEVER = "compliance_rad_per_nm", "lever_coefficient_rad_per_mm"
@@ -26,7 +26,6 @@ COEFFICIENTS = (COMPLIANCE, LEVER)
 _NM_PER_KG_MM = STANDARD_GRAVITY * 1e-3
 _LINK = ("link_mass_kg", "link_x_mm", "link_y_mm", "link_z_mm")
 _GRAVITY = ("gravity_x", "gravity_y", "gravity_z")
-_PAYLOAD = ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm")
 _TURNS = np.array([True, False, False, True, True])  # of PARAMETERS: others shift
 
 
@@ -109,7 +108,7 @@ class ComplianceModel:
         for kind, name in enumerate(COEFFICIENTS):
             columns |= {name: self.coefficients[:, kind], f"std_{name}": own_std[:, kind]}
         columns |= {name: self.links[:, i] for i, name in enumerate(_LINK)}
-        stated = zip((*_GRAVITY, *_PAYLOAD), (*self.gravity, *self.payload), strict=True)
+        stated = zip((*_GRAVITY, *PAYLOAD_COLUMNS), (*self.gravity, *self.payload), strict=True)
         return columns | {name: np.full(self.joints, value) for name, value in stated}
 
     @classmethod
@@ -129,7 +128,7 @@ class ComplianceModel:
             coefficients[:, 1],
             of(_GRAVITY)[0],
             of(_LINK),
-            of(_PAYLOAD)[0],
+            of(PAYLOAD_COLUMNS)[0],
         )
 
     def _moments(self, at: JointState) -> Iterator[_Moments]:
