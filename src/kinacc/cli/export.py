@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST
 from kinacc.cli import choice
 
 FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
@@ -15,6 +16,13 @@ FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 @click.option(
     "--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]"
 )
+@click.option(
+    "--model",
+    type=click.Choice(list(ERROR_MODELS)),
+    default=PLAINEST,
+    show_default=True,
+    help="Model to write; one that is no DH table goes into json alone.",
+)
 @click.option("--name", help="Name of the files. [the data set's]")
 @click.option("--urdf", type=click.Path(), help="A URDF whose origins are corrected.")
 @click.option("--base-link", help="Link of that file the arm starts at. [its root]")
@@ -25,10 +33,10 @@ FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 @click.option("--json", "as_json", is_flag=True, help="List the files as JSON.")
 @click.option("--force", is_flag=True, help="Replace files that are there.")
 def export(
-    folder, target, formats, name, urdf, base_link, tip_link, dh_joints, robot, config, as_json,
-    force,
+    folder, target, formats, model, name, urdf, base_link, tip_link, dh_joints, robot, config,
+    as_json, force,
 ) -> None:  # fmt: skip
-    """Write the calibrated DH model of FOLDER, a results folder, for other programs.
+    """Write a calibrated model of FOLDER, a results folder, for other programs.
 
     \b
     yaml      a robot file kinacc reads again
@@ -45,10 +53,10 @@ def export(
       kinacc export results/mh180 --to exported
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --to exported
     """
-    from kinacc.deployment.export.files import contents, note, write
+    from kinacc.deployment.export.files import CARRY_ALL, contents, note, write
     from kinacc.errors import InputError, Problem
 
-    wanted = formats or FORMATS
+    wanted = formats or (FORMATS if model == PLAINEST else CARRY_ALL)
     about_urdf = {"--base-link": base_link, "--tip-link": tip_link}
     problems = [
         Problem(option, "is given without a file of yours", fix="give --urdf as well")
@@ -67,6 +75,7 @@ def export(
         urdf,
         (base_link, tip_link),
         dh_joints,
+        model,
     )
     paths = write(made, target, force)
     if as_json:
@@ -75,6 +84,6 @@ def export(
         click.echo(json.dumps({"files": paths}, indent=1))
     else:
         click.echo("\n".join(paths))
-    said = note(folder)
+    said = note(folder) if model == PLAINEST else ""
     if said:
         click.echo(said, err=True)
