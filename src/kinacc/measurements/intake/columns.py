@@ -98,7 +98,8 @@ def recognise(
     ``values`` gives a column's numbers (n,), NaN where it has none. ``take``: columns whose groups
     are read whatever their names say. ``turned``: orientations are wanted.
     """
-    choice = _Choice(groups.found(names, values), values, frozenset(take))
+    no_load = [name for name in names if not _of_payload(name)]
+    choice = _Choice(groups.found(no_load, values), values, frozenset(take))
     choice.off = any(groups.is_deviation(name) for name in names)
     joints = choice.joints()
     points = choice.points(joints)
