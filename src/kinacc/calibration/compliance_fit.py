@@ -62,19 +62,21 @@ class ComplianceEstimator(Estimator):
         section = calibration["compliance"]
         gravity = np.array(section["gravity"], dtype=float)
         payload = _body(section["payload"])
-        links = np.array([_body(each) for each in section["links"]]) if section["links"] else None
+        links = np.full((arm.dh.joints, 4), np.nan)
+        if section["links"]:
+            links = np.array([_body(each) for each in section["links"]])
         coefficients = np.full((arm.dh.joints, 2), np.nan)
         bent = np.array(section["joints"]) - 1
-        if links is None:
+        if not section["links"]:
             coefficients[bent, 1] = 0.0
-        if links is not None or _load_changes(every, payload):
+        if section["links"] or _load_changes(every, payload):
             coefficients[bent, 0] = 0.0
         model = ComplianceModel(
             arm.dh,
             coefficients[:, 0],
             coefficients[:, 1],
             gravity / np.linalg.norm(gravity),
-            compliance.bodies_of(arm.dh.joints, links),
+            links,
             payload,
         )
         return cls(Common.of(calibration, arm), DHEstimator.of(calibration, arm, every), model)

@@ -9,7 +9,7 @@ arm as commanded: bending does not change the levers, to first order.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple, Self
 
@@ -68,11 +68,7 @@ class ComplianceModel:
 
     def pose(self, at: JointState) -> Pose:
         """Poses (n, ...) of the bent arm."""
-        return _dh.forward(self.dh, at.q_rad + self.turns(at))
-
-    def turns(self, at: JointState) -> np.ndarray:
-        """Angles (n, k) by which joints give way, rad."""
-        return np.sum(self.moments(at) * np.nan_to_num(self.coefficients), axis=2)
+        return _dh.forward(self.dh, self._bent(at, self._moments(at)))
 
     def moments(self, at: JointState) -> np.ndarray:
         """What bends the joints (n, k, 2): moments of known masses, N m, and levers, mm."""
@@ -80,16 +76,17 @@ class ComplianceModel:
 
     def joint_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        slopes = self._turn_slopes(list(self._moments(at)))
+        moments = self._moments(at)
+        slopes = self._turn_slopes(moments)
         joint = np.where(self.dh.prismatic, PARAMETERS.index("d_mm"), 0)
         by_joint = slopes[:, :, np.arange(self.joints), joint]
-        bent = _dh.joint_jacobian(self.dh, at.q_rad + self.turns(at))
+        bent = _dh.joint_jacobian(self.dh, self._bent(at, moments))
         return bent + bent @ by_joint
 
     def parameter_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, P) of ``pose`` in the parameters."""
-        moments = list(self._moments(at))
-        q_rad = at.q_rad + self.turns(at)
+        moments = self._moments(at)
+        q_rad = self._bent(at, moments)
         bent = _dh.joint_jacobian(self.dh, q_rad)
         of_dh = _dh.parameter_jacobian(self.dh, q_rad).reshape(len(at), 6, -1)
         of_dh = of_dh + bent @ self._turn_slopes(moments).reshape(len(at), self.joints, -1)
@@ -131,8 +128,13 @@ class ComplianceModel:
             of(PAYLOAD_COLUMNS)[0],
         )
 
-    def _moments(self, at: JointState) -> Iterator[_Moments]:
-        """Moments (N m) of known masses, then levers (mm) of a unit weight at the last origin."""
+    def _bent(self, at: JointState, moments: Sequence[_Moments]) -> np.ndarray:
+        """Joints (n, k) with the angles by which they give way."""
+        values = np.stack([each.values for each in moments], axis=2)
+        return at.q_rad + np.sum(values * np.nan_to_num(self.coefficients), axis=2)
+
+    def _moments(self, at: JointState) -> tuple[_Moments, _Moments]:
+        """Moments (N m) of known masses, and levers (mm) of a unit weight at the last origin."""
         frames = _dh.chain(self.dh, at.q_rad)
         own = np.broadcast_to(self.payload, (len(at), 4))
         payload = own if at.payload is None else np.where(np.isnan(at.payload), own, at.payload)
@@ -145,13 +147,16 @@ class ComplianceModel:
         weighted = mass[..., None] * place
         weighted[:, -1] += payload[:, :1] * load
         mass[:, -1] += payload[:, 0]
-        yield _Moments.of(self, frames, _NM_PER_KG_MM * mass, _NM_PER_KG_MM * weighted)
         unit = np.zeros(count)
         unit[:, -1] = 1.0
-        yield _Moments.of(self, frames, unit, unit[..., None] * frames.position_mm[:, 1:])
+        at_end = unit[..., None] * frames.position_mm[:, 1:]
+        return (
+            _Moments.of(self, frames, _NM_PER_KG_MM * mass, _NM_PER_KG_MM * weighted),
+            _Moments.of(self, frames, unit, at_end),
+        )
 
-    def _turn_slopes(self, moments: list[_Moments]) -> np.ndarray:
-        """Derivatives (n, k, k, 5) of ``turns`` in the DH parameters."""
+    def _turn_slopes(self, moments: Sequence[_Moments]) -> np.ndarray:
+        """Derivatives (n, k, k, 5) of the angles of each joint in the DH parameters."""
         known = np.nan_to_num(self.coefficients)
         count = len(moments[0].values)
         total = np.zeros((count, self.joints, self.joints, len(PARAMETERS)))
@@ -159,11 +164,6 @@ class ComplianceModel:
             if known[:, kind].any():
                 total += each.slopes() * known[:, kind, None, None]
         return total
-
-
-def bodies_of(joints: int, links: np.ndarray | None) -> np.ndarray:
-    """``links`` (k, 4) of a model, NaN where nothing is stated of them."""
-    return np.full((joints, 4), np.nan) if links is None else np.asarray(links, dtype=float)
 
 
 def to_vector(model: ComplianceModel) -> np.ndarray:
@@ -187,8 +187,9 @@ def with_vector(model: ComplianceModel, vector: np.ndarray) -> ComplianceModel:
 class _Moments(NamedTuple):
     """Moments of weights about every joint, and what their slopes are made of.
 
-    ``weight`` (n, k) beyond each joint and its first moment ``weighted`` (n, k, 3); ``values``
-    (n, k); ``axis`` and ``origin`` (n, k, 3) of the joints; ``frames`` of the whole chain.
+    ``weight`` (n, k) beyond each joint and its first moment ``weighted`` (n, k, 3); ``axis`` (n, k,
+    3) of the joints; ``arm`` (n, k, 3) axis x lever x weight, of which ``values`` (n, k) are the
+    part along gravity; ``frames`` of the whole chain.
     """
 
     model: ComplianceModel
