@@ -72,7 +72,9 @@ class SmallResults:
         self.tables[artefact] = self.tables[artefact] | columns
         names = [name for name, stage in STAGES.items() if not stage.is_figure]
         for name in names[names.index(stage_name) :]:
-            if not STAGES[name].on_request and not STAGES[name].measured:
+            if STAGES[name].on_request or STAGES[name].measured:
+                continue
+            if set(STAGES[name].outputs) <= set(self.tables):
                 self.save(name)
 
 

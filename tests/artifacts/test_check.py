@@ -13,6 +13,7 @@ from command_line import call
 from small_results import SmallResults
 
 from kinacc.artifacts import provenance, store
+from kinacc.artifacts.error_models import ALWAYS
 from kinacc.workflow.catalogue import STAGES
 from kinacc.workflow.plan import planned
 from kinacc.workflow.verification import check, rules
@@ -22,6 +23,7 @@ ON_EVERY_RUN = [
     name
     for stage in STAGES.values()
     if not (stage.is_figure or stage.scattered or stage.on_request or stage.measured)
+    and stage.fits in ("", *ALWAYS)
     for name in stage.outputs
 ]
 

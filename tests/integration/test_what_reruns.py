@@ -77,6 +77,8 @@ def test_one_value_of_the_configuration(project, change, reruns):
             "study/histories",
             {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")},
         ),
+        ("kinematics/compliance", {}),  # no data set here asks for that model
+        ("calibration/compliance_fit", {}),
         ("calibration/vec_fit", None),
         ("geometry", None),
     ],

@@ -10,7 +10,7 @@ import pytest
 from kinacc.artifacts.error_models import ERROR_MODELS
 from kinacc.calibration.uncertainty import scale_of
 from kinacc.geometry import log_so3
-from kinacc.kinematics import dh, robot, vec
+from kinacc.kinematics import compliance, dh, robot, vec
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.tables import of_kind
 
@@ -37,8 +37,22 @@ def vec_example():
     )
 
 
-EXAMPLES = {"dh": dh_example, "vec": vec_example}
-VECTORS = {"dh": dh, "vec": vec}
+def compliance_example():
+    """Joints of both kinds, of none and of one, below known links and a payload, on a slope."""
+    rng, nothing = np.random.default_rng(4), np.nan
+    links = np.hstack([rng.uniform(5.0, 300.0, (6, 1)), rng.uniform(-300.0, 300.0, (6, 3))])
+    return compliance.ComplianceModel(
+        dh_example(),
+        np.array([1e-6, 2e-6, 3e-6, nothing, nothing, 2e-5]),
+        np.array([nothing, 1e-6, nothing, 2e-6, nothing, nothing]),
+        np.array([0.6, 0.0, -0.8]),
+        links,
+        np.array([30.0, 10.0, -20.0, 150.0]),
+    )
+
+
+EXAMPLES = {"dh": dh_example, "vec": vec_example, "compliance": compliance_example}
+VECTORS = {"dh": dh, "vec": vec, "compliance": compliance}
 
 
 @pytest.fixture(params=ERROR_MODELS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kinacc.artifacts.allowed import (
     COMPARISONS,
     ERRORS,
@@ -30,6 +32,7 @@ from kinacc.artifacts.columns import (
     unstated,
     whole,
 )
+from kinacc.artifacts.covariance_tables import DH_COVARIANCE, DH_IDENTIFIED, VEC_COVARIANCE
 
 
 def _position(of: str, nullable: bool = False) -> tuple[Column, ...]:
@@ -87,6 +90,18 @@ _FIT_COLUMNS = (
     real("value", "see unit", "the value", nullable=True),
     text("unit", "unit of the value; 1 for a pure number"),
 )
+_PAYLOAD = tuple(
+    replace(column, may_be_absent=True)
+    for column in unstated(
+        (
+            real("payload_kg", "kg", "mass of what the last DH frame carries", 0.0, 1e4),
+            *(
+                real(f"payload_{axis}_mm", "mm", f"{axis} of its centre, last DH frame", -1e4, 1e4)
+                for axis in "xyz"
+            ),
+        )
+    )
+)
 _STATED_BY_FILES = (
     text("session", "session with a base frame of its own; null for one alone"),
     *(magnitude(f"std_{axis}_mm", "mm", f"standard deviation of {axis}_mm", 1e3) for axis in "xyz"),
@@ -119,6 +134,7 @@ MEASUREMENTS = Artefact(
         text("subset", "train (used by the delivered fits) or validation (held out)", SUBSETS),
         whole("fold", "fold in which the row is held out; null without folds", nullable=True),
         *unstated(_STATED_BY_FILES),
+        *_PAYLOAD,
     ),
     ("pose", "target", "repeat"),
 )
@@ -235,4 +251,95 @@ RESIDUALS = Artefact(
         magnitude("gamma99", "see unit", "99 % quantile of a fitted gamma distribution", 1e5, True),
     ),
     ("comparison", "subset", "fold", "quantity"),
+)
+_BODY = ("mass of", "x of the centre of", "y of the centre of", "z of the centre of")
+_COEFFICIENTS = (
+    ("compliance_rad_per_nm", "rad/(N m)", "turn of the joint by a moment of gravity about it"),
+    (
+        "lever_coefficient_rad_per_mm",
+        "rad/mm",
+        "turn by the lever of the last origin: the product of a weight and the compliance",
+    ),
+)
+COMPLIANCE_MODEL = Artefact(
+    "compliance_model",
+    "Fitted DH arm whose joints turn further under gravity, by compliance times moment (masses "
+    "known) and coefficient times lever (masses unknown: only the product can be seen).",
+    (
+        *DH_MODEL.columns,
+        *(
+            column
+            for name, unit, meaning in _COEFFICIENTS
+            for column in (
+                real(name, unit, f"{meaning}, null where not fitted", -1.0, 1.0, True),
+                magnitude(
+                    f"std_{name}",
+                    unit,
+                    f"standard deviation of {name}, null if undetermined or not fitted",
+                    1e4,
+                    True,
+                ),
+            )
+        ),
+        *(
+            real(name, unit, f"{meaning} the link, DH frame; null if not stated", low, 1e4, True)
+            for name, unit, meaning, low in zip(
+                ("link_mass_kg", "link_x_mm", "link_y_mm", "link_z_mm"),
+                ("kg", "mm", "mm", "mm"),
+                _BODY,
+                (0.0, -1e4, -1e4, -1e4),
+                strict=True,
+            )
+        ),
+        *(
+            real(f"gravity_{axis}", "1", f"{axis} of gravity's direction, first DH frame", -1, 1)
+            for axis in "xyz"
+        ),
+        *(
+            real(name, unit, f"{meaning} the payload where a row states none", low, 1e4)
+            for name, unit, meaning, low in zip(
+                ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm"),
+                ("kg", "mm", "mm", "mm"),
+                _BODY,
+                (0.0, -1e4, -1e4, -1e4),
+                strict=True,
+            )
+        ),
+    ),
+    ("joint",),
+)
+COMPLIANCE_FRAMES = Artefact(
+    "compliance_frames", "Frames estimated with the compliance model.", _FRAME_COLUMNS, _FRAME_KEY
+)
+COMPLIANCE_FIT = Artefact(
+    "compliance_fit",
+    "How the compliance fit went: rank, singular values, truncation, iterations, parameters.",
+    _FIT_COLUMNS,
+    ("quantity", "number", "parameter"),
+)
+COMPLIANCE_COVARIANCE = Artefact(
+    "compliance_covariance",
+    "Covariance of DH parameters, coefficients and their frames in the directions the poses "
+    "determine; the others are the undetermined_direction rows of compliance_fit.",
+    DH_COVARIANCE.columns,
+    DH_COVARIANCE.key,
+)
+ALL = (
+    MEASUREMENTS,
+    VEC_MODEL,
+    VEC_FRAMES,
+    VEC_FIT,
+    VEC_ORDERS,
+    DH_MODEL,
+    FRAMES,
+    DH_FIT,
+    VEC_COVARIANCE,
+    DH_COVARIANCE,
+    DH_IDENTIFIED,
+    COMPLIANCE_MODEL,
+    COMPLIANCE_FRAMES,
+    COMPLIANCE_FIT,
+    COMPLIANCE_COVARIANCE,
+    RESIDUALS,
+    POSE_ERRORS,
 )

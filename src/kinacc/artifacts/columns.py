@@ -21,7 +21,7 @@ class Column:
     ``kind`` is float, int, int8 or text. ``unit`` is empty for text and names, "1" for pure
     numbers. ``low`` and ``high`` bound what is physically possible, both included; ``choices`` or
     ``pattern`` bound what a text may say. An ``optional`` column is null throughout where a table
-    does not state it.
+    does not state it; one that ``may_be_absent`` is not in the file then.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Column:
     choices: tuple[str | int, ...] = ()
     pattern: str = ""
     optional: bool = False
+    may_be_absent: bool = False
 
     @property
     def per_joint(self) -> bool:
@@ -61,6 +62,8 @@ class Column:
             parts.append(f"at most {self.high:g}")
         if self.nullable:
             parts += ["null"] if parts else ["any", "null"]
+        if self.may_be_absent:
+            parts.append("absent")
         return " or ".join(parts)
 
 
@@ -78,6 +81,12 @@ class Artefact:
     def file_name(self) -> str:
         """Name of the table's file inside a data set's folder."""
         return f"{self.name}.parquet"
+
+    def in_file(self, joints: int, names: Iterable[str]) -> tuple[Column, ...]:
+        """The columns a file has that is given those of these ``names``."""
+        given = set(names)
+        every = self.for_joints(joints)
+        return tuple(each for each in every if not each.may_be_absent or each.name in given)
 
     def for_joints(self, joints: int) -> tuple[Column, ...]:
         """The columns of an arm with this many joints, in file order."""

@@ -34,6 +34,11 @@ ERROR_MODELS = {
         "kinacc.calibration.dh_estimator:DHEstimator",
         ("vec", MEASURED),
     ),
+    "compliance": Kind(
+        "kinacc.kinematics.compliance:ComplianceModel",
+        "kinacc.calibration.compliance_fit:ComplianceEstimator",
+        asked_by="joints",
+    ),
     "vec": Kind(
         "kinacc.kinematics.vec:VECModel",
         "kinacc.calibration.vec_estimator:VECEstimator",

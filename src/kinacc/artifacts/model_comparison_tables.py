@@ -18,9 +18,9 @@ from kinacc.artifacts.columns import (
 
 MODEL_SELECTION = Artefact(
     "model_selection",
-    "The model selected on held-out rows: VEC where it takes off the squared position error of DH "
+    "The model selected on held-out rows: DH, unless another takes off its squared position error "
     "more than two standard errors (paired by configuration) and rms and mean of folds fall too; "
-    "DH otherwise, and where nothing was held out.",
+    "of several the one of the lowest rms. DH where nothing was held out.",
     (
         text("model", "the model", SELECTABLE),
         whole("selected", "1 = selected", 0, 1),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -53,9 +53,17 @@ def artefact_named(name: str) -> Artefact:
 
 
 def arrow_schema(
-    artefact: str, joints: int = 0, provenance: Mapping[str, object] | None = None
+    artefact: str,
+    joints: int = 0,
+    provenance: Mapping[str, object] | None = None,
+    given: Iterable[str] | None = None,
 ) -> pa.Schema:
-    """Arrow schema of an artefact for an arm of ``joints`` joints, unit and meaning included."""
+    """Arrow schema of an artefact for an arm of ``joints`` joints, unit and meaning included.
+
+    ``given``: names of columns there are, where some may be absent.
+    """
+    contract = artefact_named(artefact)
+    columns = contract.for_joints(joints) if given is None else contract.in_file(joints, given)
     fields = [
         pa.field(
             column.name,
@@ -63,7 +71,7 @@ def arrow_schema(
             nullable=column.nullable,
             metadata={"unit": column.unit, "meaning": column.meaning},
         )
-        for column in artefact_named(artefact).for_joints(joints)
+        for column in columns
     ]
     metadata = None if provenance is None else {k: str(provenance[k]) for k in PROVENANCE_KEYS}
     return pa.schema(fields, metadata)
@@ -86,8 +94,8 @@ def to_table(
         problems.append(
             Problem(where, f"speaks of {joints} joints", f"q1.. of {JOINTS_MIN} to {JOINTS_MAX}")
         )
-    wanted = contract.for_joints(joints)
-    names = [column.name for column in wanted]
+    names = [column.name for column in contract.for_joints(joints)]
+    wanted = contract.in_file(joints, columns)
     problems += [
         Problem(f"{where}, column {name}", "not in the contract", ", ".join(names))
         for name in columns
@@ -109,7 +117,7 @@ def to_table(
     if not problems and len(set(lengths.values())) > 1:
         problems.append(Problem(where, f"columns of different lengths: {lengths}"))
     refuse(problems, f"{artefact} does not fit its contract")
-    return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance))
+    return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance, columns))
 
 
 def write(

@@ -105,7 +105,7 @@ class DHEstimator(Estimator):
         told = identified.parameters(fitted, known)
         left_open = identified.left_open(fitted, known, observations)
         return {
-            "dh_fit": tables.dh_fit_columns(fitted, known),
+            "dh_fit": tables.fit_columns("dh_fit", fitted, known),
             "dh_identified": tables.identified_columns(told, left_open, known),
         }
 

@@ -79,28 +79,24 @@ def fit(
     start = start or nominal
     held = dh.to_vector(nominal)
     mask = free.ravel()
-    require_enough(observations, int(mask.sum()), "DH fit", DH_FIX)
-    coords = _frame_coordinates(observations, start, frames, frame_terms)
-    flange = flange_model(nominal, free)
-    require_enough(observations, coords.size + flange.size, "DH fit", DH_FIX)
-    system = _system(observations, flange, coords, rotation_weight_mm_per_rad)
-    scale = np.concatenate([_units(coords.is_angle()), _units(np.tile(_ANGLES, len(free))[mask])])
-    expected, frame_std = np.zeros(coords.size), np.full(coords.size, np.inf)
-    if isinstance(coords, ConstrainedFrames):
-        expected, frame_std = coords.known()
-    arm_std = np.full(mask.sum(), np.inf) if std is None else std.ravel()[mask]
-    task = reweighted.Task(
-        system=system,
-        start=np.concatenate([np.zeros(coords.size), dh.to_vector(start)[mask]]),
-        nominal=np.concatenate([expected, held[mask]]),
-        prior_std=np.concatenate([frame_std, arm_std]),
-        scale=scale,
-        threshold=threshold,
-        frames=coords.size,
-        name="DH fit",
-        is_rotation=observations.is_rotation if observations.has_rotation.any() else None,
+    unknowns = Unknowns(
+        "DH fit",
+        flange_model(nominal, free),
+        start=dh.to_vector(start)[mask],
+        nominal=held[mask],
+        prior_std=np.full(mask.sum(), np.inf) if std is None else std.ravel()[mask],
+        scale=scales(free),
     )
-    solution, weights = reweighted.minimise(task, observations, loss)
+    coords, solution, weights = solved(
+        observations,
+        unknowns,
+        start,
+        rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
+        threshold=threshold,
+        frames=frames,
+        frame_terms=frame_terms,
+        loss=loss,
+    )
     vector, found = held.copy(), np.full(held.size, np.nan)
     vector[mask] = solution.x[coords.size :]
     found[mask] = solution.std[coords.size :]
@@ -114,6 +110,58 @@ def fit(
         weights=weights,
         prior_std=np.full(free.shape, np.inf) if std is None else np.where(free, std, np.inf),
     )
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Free parameters (P,) of a model: how they move it, where they start, and what is known.
+
+    ``nominal``: where they stay without data and what priors expect; ``prior_std``: inf for none;
+    ``scale``: displacements that count as much as one mm. ``name`` is that of the fit.
+    """
+
+    name: str
+    flange: FlangeModel
+    start: np.ndarray
+    nominal: np.ndarray
+    prior_std: np.ndarray
+    scale: np.ndarray
+
+
+def solved(
+    observations: Observations,
+    unknowns: Unknowns,
+    start: DHModel,
+    *,
+    rotation_weight_mm_per_rad: float,
+    threshold: float,
+    frames: Frames | None,
+    frame_terms: FrameTerms | None,
+    loss: str,
+) -> tuple[FrameCoordinates | ConstrainedFrames, Solution, Weights | None]:
+    """Frames and ``unknowns`` closest to ``observations``, as ``fit`` does it.
+
+    Estimated frames start where the arm ``start`` has them.
+    """
+    name, flange = unknowns.name, unknowns.flange
+    require_enough(observations, flange.size, name, DH_FIX)
+    coords = _frame_coordinates(observations, start, frames, frame_terms)
+    require_enough(observations, coords.size + flange.size, name, DH_FIX)
+    expected, frame_std = np.zeros(coords.size), np.full(coords.size, np.inf)
+    if isinstance(coords, ConstrainedFrames):
+        expected, frame_std = coords.known()
+    task = reweighted.Task(
+        system=_system(observations, flange, coords, rotation_weight_mm_per_rad),
+        start=np.concatenate([np.zeros(coords.size), unknowns.start]),
+        nominal=np.concatenate([expected, unknowns.nominal]),
+        prior_std=np.concatenate([frame_std, unknowns.prior_std]),
+        scale=np.concatenate([_units(coords.is_angle()), unknowns.scale]),
+        threshold=threshold,
+        frames=coords.size,
+        name=name,
+        is_rotation=observations.is_rotation if observations.has_rotation.any() else None,
+    )
+    return coords, *reweighted.minimise(task, observations, loss)
 
 
 def fit_frames(
@@ -172,8 +220,7 @@ def unseen_anywhere(fit: DHFit, observations: Observations, threshold: float) ->
     seen = _everywhere(fit, observations)
     flange = flange_model(fit.model, fit.free)
     system = _system(seen, flange, fit.coordinates, UNSEEN_WEIGHT)
-    mask = np.tile(_ANGLES, len(fit.free))[fit.free.ravel()]
-    scale = np.concatenate([_units(fit.coordinates.is_angle()), _units(mask)])
+    scale = np.concatenate([_units(fit.coordinates.is_angle()), scales(fit.free)])
     return unseen(system, fit.solution.x, scale, fit.coordinates.size, threshold)
 
 
@@ -224,6 +271,11 @@ def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
         lambda x, at: model(x).pose(at),
         lambda x, at: model(x).parameter_jacobian(at)[:, :, mask],
     )
+
+
+def scales(free: np.ndarray) -> np.ndarray:
+    """Displacements of the ``free`` (k, 5) DH parameters that count as one mm."""
+    return _units(np.tile(_ANGLES, len(free))[free.ravel()])
 
 
 def _units(is_angle: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
@@ -133,6 +133,13 @@ class Estimator:
     def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings; ``every``: all observations of the data set."""
         raise NotImplementedError
+
+    @classmethod
+    def contradictions(
+        cls, calibration: Mapping, arm: Robot
+    ) -> Iterator[tuple[tuple[str, ...], str, str]]:
+        """Keys of its section that cannot be for ``arm``, what is wrong, and what is allowed."""
+        yield from ()
 
     @property
     def size(self) -> int:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from kinacc.geometry import Pose, rotation_from_quaternion
-from kinacc.kinematics.model import JointState
+from kinacc.kinematics.model import PAYLOAD_COLUMNS, JointState
 from kinacc.kinematics.robot import Robot
 
 TOOL = "tool"
@@ -22,7 +22,8 @@ class Observations:
     ``position_mm`` (n, 3) and ``rotation`` (n, 3, 3) in the instrument's frame, a rotation of NaN
     where only the position was measured; ``pose``, ``target`` (index into ``target_names``),
     ``repeat`` and ``fold`` (n,) integers, fold -1 where no fold is assigned; ``session`` (n,) index
-    into ``session_names``, each with a base frame of its own (one session where not given).
+    into ``session_names``, each with a base frame of its own (one session where not given);
+    ``payload`` (n, 4): mass in kg and centre in the last DH frame in mm, NaN where not stated.
     """
 
     q_rad: np.ndarray
@@ -36,10 +37,13 @@ class Observations:
     target_names: tuple[str, ...] = (TOOL,)
     session: np.ndarray | None = None
     session_names: tuple[str | None, ...] = (None,)
+    payload: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.session is None:
             object.__setattr__(self, "session", np.zeros(len(self.q_rad), dtype=np.int64))
+        if self.payload is None:
+            object.__setattr__(self, "payload", np.full((len(self.q_rad), 4), np.nan))
 
     def __len__(self) -> int:
         return len(self.q_rad)
@@ -52,7 +56,7 @@ class Observations:
     @property
     def at(self) -> JointState:
         """How the arm stood."""
-        return JointState(self.q_rad, self.s)
+        return JointState(self.q_rad, self.s, self.payload)
 
     @property
     def has_rotation(self) -> np.ndarray:
@@ -129,6 +133,9 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
     sessions = columns.get("session", np.full(len(names), None))
     session_names = tuple(dict.fromkeys(sessions))
     session_index = {name: number for number, name in enumerate(session_names)}
+    payload = None
+    if PAYLOAD_COLUMNS[0] in columns:
+        payload = np.stack([np.asarray(columns[name], float) for name in PAYLOAD_COLUMNS], axis=1)
     return Observations(
         q_rad=robot.dh_joints(reported),
         s=s,
@@ -141,4 +148,5 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
         target_names=target_names,
         session=np.array([session_index[name] for name in sessions], dtype=np.int64),
         session_names=session_names,
+        payload=payload,
     )

@@ -70,7 +70,7 @@ class Solution:
     where one of them reaches a parameter. ``cost`` is the sum of squared residuals,
     ``degrees_of_freedom`` their number less the (effective) number of fitted parameters,
     ``last_step`` the largest last change in units of ``scale``. ``spectrum`` is None where a prior
-    made it needless; see ``spectrum``.
+    made it needless; see ``spectrum``. ``scale`` (P,) are the units of ``undetermined``.
     """
 
     x: np.ndarray
@@ -85,6 +85,7 @@ class Solution:
     converged: bool
     spectrum: Spectrum | None = None
     undetermined: np.ndarray | None = None
+    scale: np.ndarray | None = None
 
 
 def spectrum(

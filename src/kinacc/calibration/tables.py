@@ -100,8 +100,8 @@ def chosen_order(columns: Mapping, fold: int | None) -> tuple[int, float, float]
     )
 
 
-def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
-    """``dh_fit``: figures of the fit, singular values, directions the data do not determine."""
+def fit_columns(name: str, fit: DHFit, uncertainty: Uncertainty) -> Columns:
+    """``dh_fit`` or its like: figures, singular values, directions the data do not determine."""
     rows = [*_solution_rows(fit.solution), *_spectrum_rows(fit.solution.spectrum)]
     if fit.weights is not None:
         rows += [
@@ -114,7 +114,7 @@ def dh_fit_columns(fit: DHFit, uncertainty: Uncertainty) -> Columns:
             ("undetermined_direction", number, name, value, scaled_unit(name))
             for name, value in zip(uncertainty.names, direction, strict=True)
         ]
-    return columns_of("dh_fit", rows)
+    return columns_of(name, rows)
 
 
 def identified_columns(

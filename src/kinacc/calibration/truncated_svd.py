@@ -104,6 +104,7 @@ def minimise_truncated(
         converged=True,
         spectrum=split.others.spectrum,
         undetermined=told.undetermined(),
+        scale=scale,
     )
 
 

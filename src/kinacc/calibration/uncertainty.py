@@ -11,12 +11,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import compress
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD, DHFit
+from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
 from kinacc.calibration.truncated_svd import TOUCH_SQUARED
-from kinacc.calibration.vec_fit import VECFit
+
+if TYPE_CHECKING:
+    from kinacc.calibration.models import Fitted
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class Uncertainty:
         return np.sum(self.undetermined**2, axis=0) <= TOUCH_SQUARED
 
 
-def of_fit(fit: DHFit | VECFit, target_names: tuple[str, ...]) -> Uncertainty:
+def of_fit(fit: Fitted, target_names: tuple[str, ...]) -> Uncertainty:
     """Uncertainty of base and targets if estimated, then of the parameters that took part."""
     names, change = _named(fit, target_names)
     undetermined = np.zeros((0, len(names)))
@@ -83,15 +86,13 @@ def _unit(name: str) -> tuple[str, float]:
 
 
 def named_directions(
-    fit: DHFit, target_names: tuple[str, ...], directions: np.ndarray
+    fit: Fitted, target_names: tuple[str, ...], directions: np.ndarray
 ) -> np.ndarray:
     """Directions (m, P) of a fit's own coordinates, in units of its scale, as of its names."""
     return _directions(fit, directions, *_named(fit, target_names))
 
 
-def _named(
-    fit: DHFit | VECFit, target_names: tuple[str, ...]
-) -> tuple[tuple[str, ...], np.ndarray]:
+def _named(fit: Fitted, target_names: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     """Names of motions and parameters, and their derivative in the fit's own coordinates."""
     free = list(compress(fit.model.parameter_names, fit.free.ravel()))
     frames, moving = fit.coordinates.size, fit.coordinates.motion_names(target_names)
@@ -103,13 +104,9 @@ def _named(
 
 
 def _directions(
-    fit: DHFit | VECFit, directions: np.ndarray, names: tuple[str, ...], change: np.ndarray
+    fit: Fitted, directions: np.ndarray, names: tuple[str, ...], change: np.ndarray
 ) -> np.ndarray:
-    # The fit's own scale has the same units: frame coordinates are mm and rad as well.
-    free = names[len(names) - (change.shape[1] - fit.coordinates.size) :]
-    frames = np.where(fit.coordinates.is_angle(), ANGLE_UNIT_RAD, 1.0)
-    own = np.concatenate([frames, _units(free)])
-    return (directions * own) @ change.T / _units(names)
+    return (directions * fit.solution.scale) @ change.T / _units(names)
 
 
 def _units(names: tuple[str, ...]) -> np.ndarray:

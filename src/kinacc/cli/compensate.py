@@ -47,7 +47,9 @@ def compensate(
     calibration = choice.calibration_of(folder, model, robot, config, session)
     given = target_poses.poses(calibration, poses, pose, near_deg, program, frame, point)
     with reporting("compensate", bar=True):
-        found = joints_for(calibration, given.pose, given.joints, given.directions, frame, point)
+        found = joints_for(
+            calibration, given.pose, given.joints, given.directions, frame, point, given.payload
+        )
     answer = target_poses.compensated(calibration, given, found, frame, point, program is not None)
     out.deliver(answer)
     rows.say_unused(given)

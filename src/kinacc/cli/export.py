@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import answers
@@ -15,6 +16,12 @@ FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 @click.argument("folder", type=click.Path())
 @option("--out", "target", type=click.Path(), default=".", help="Folder.")
 @option("--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]")
+@option(
+    "--model",
+    type=click.Choice(list(ERROR_MODELS)),
+    default=PLAINEST,
+    help="Model to write; one that is no DH table goes into json alone.",
+)
 @option("--name", help="Name of the files. [the data set's]")
 @option("--urdf", type=click.Path(), help="A URDF whose origins are corrected.")
 @option("--base-link", help="Link of that file the arm starts at. [its root]")
@@ -24,9 +31,9 @@ FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 @choice.NAMING
 @answers("List the files as JSON.", force="Replace files that are there.")
 def export(
-    folder, target, formats, name, urdf, base_link, tip_link, dh_joints, robot, config, out
+    folder, target, formats, model, name, urdf, base_link, tip_link, dh_joints, robot, config, out
 ) -> None:
-    """Write the calibrated DH model of FOLDER, a results folder, for other programs.
+    """Write a calibrated model of FOLDER, a results folder, for other programs.
 
     \b
     yaml      a robot file kinacc reads again
@@ -43,10 +50,10 @@ def export(
       kinacc export results/mh180 --out exported
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --out exported
     """
-    from kinacc.deployment.export.files import contents, note, write
+    from kinacc.deployment.export.files import CARRY_ALL, contents, note, write
     from kinacc.errors import Problem, refuse
 
-    wanted = formats or FORMATS
+    wanted = formats or (FORMATS if model == PLAINEST else CARRY_ALL)
     about_urdf = {"--base-link": base_link, "--tip-link": tip_link}
     problems = [
         Problem(option, "is given without a file of yours", fix="give --urdf as well")
@@ -64,9 +71,10 @@ def export(
         urdf,
         (base_link, tip_link),
         dh_joints,
+        model,
     )
     paths = write(made, target, out.force)
     out.say({"files": paths}, "\n".join(paths))
-    said = note(folder)
+    said = note(folder) if model == PLAINEST else ""
     if said:
         click.echo(said, err=True)

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import click
 
-from kinacc.artifacts.allowed import SELECTABLE
+from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL, PLAINEST
 from kinacc.cli.output import Output, answers, plain
 
-IF_THERE = ("data_check", "excluded_rows")
+IF_THERE = ("data_check", "excluded_rows", "compliance_model")
 TABLES = ("residuals", "model_selection", "dh_identified", "vec_model", "worst_rows")
-_MODELS = ("nominal", *SELECTABLE)
+_MODELS = (NOMINAL, *ERROR_MODELS)
+_LEVER = "lever_coefficient_rad_per_mm"
 _FIGURES = ("n", "rms", "mean", "max")
 _SUBSETS = ("train", "validation")
 _WORST = 5
@@ -59,6 +60,8 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
     from kinacc.workflow.stages import data_check
 
     excluded = tables.get("excluded_rows")
+    compared = {str(name) for name in tables["residuals"]["comparison"]}
+    models = [model for model in _MODELS if f"{model}_vs_measured" in compared]
     choice, told = tables["model_selection"], tables["dh_identified"]
     selected = next(
         str(name) for name, yes in zip(choice["model"], choice["selected"], strict=True) if yes
@@ -72,7 +75,7 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
         "vec_order": int(max(tables["vec_model"]["order"])),
         "position_error_mm": {
             model: {subset: _errors(tables["residuals"], model, subset) for subset in _SUBSETS}
-            for model in _MODELS
+            for model in models
         },
         "parameters": {
             status: [
@@ -88,8 +91,31 @@ def summary(tables: Mapping[str, Mapping]) -> dict:
         "excluded": None if excluded is None else _excluded(excluded, selected),
         "position_error_with_excluded_mm": None
         if excluded is None
-        else {model: _with_excluded(tables["residuals"], excluded, model) for model in _MODELS},
+        else {model: _with_excluded(tables["residuals"], excluded, model) for model in models},
+        "gains_mm2": _gains(choice),
+        "bending": _bending(tables.get("compliance_model", {})),
     }
+
+
+def _gains(choice: Mapping) -> dict[str, dict]:
+    """Squared error that each model takes off that of the plainest one, and its standard error."""
+    columns = (choice[name] for name in ("model", "gain_mm2", "gain_std_error_mm2"))
+    return {
+        str(model): {"gain": plain(gain), "std_error": plain(error)}
+        for model, gain, error in zip(*columns, strict=True)
+        if model != PLAINEST
+    }
+
+
+def _bending(table: Mapping) -> list[dict]:
+    """Fitted coefficients of joints that bend, each with its standard deviation."""
+    names = ("compliance_rad_per_nm", "lever_coefficient_rad_per_mm")
+    return [
+        {"joint": int(joint)}
+        | {each: plain(table[each][row]) for name in names for each in (name, f"std_{name}")}
+        for row, joint in enumerate(table.get("joint", ()))
+        if any(table[name][row] == table[name][row] for name in names)
+    ]
 
 
 def _errors(table: Mapping, model: str, subset: str) -> dict | None:
@@ -176,6 +202,8 @@ def in_words(name: str, answer: Mapping) -> str:
     count = {status: len(names) for status, names in answer["parameters"].items()}
     listed = ", ".join(f"{number} {status}" for status, number in count.items())
     lines += ["", f"parameters of the DH fit: {listed}"]
+    if answer["bending"]:
+        lines += ["", "joints that bend under gravity:", *_bending_in_words(answer["bending"])]
     if answer["undetermined"]:
         lines.append("what the poses that were fitted leave open:")
         lines += [f"  - {text}" for text in answer["undetermined"]]
@@ -189,13 +217,41 @@ def in_words(name: str, answer: Mapping) -> str:
     return "\n".join(lines)
 
 
+def _bending_in_words(bending: list[Mapping]) -> list[str]:
+    lines, products = [], []
+    for each in bending:
+        for name, per in (("compliance_rad_per_nm", "N m"), (_LEVER, "mm of lever")):
+            if each[name] is None:
+                continue
+            std = each[f"std_{name}"]
+            sure = "(not determined)" if std is None else f"+- {1e6 * std:.3g}"
+            lines.append(f"  joint {each['joint']}: {1e6 * each[name]:.4g} {sure} urad per {per}")
+        if each[_LEVER] is not None:
+            products.append(str(each["joint"]))
+    if products:
+        alone = all(each["compliance_rad_per_nm"] is None for each in bending)
+        load = ", and for the load that was measured" if alone else " of what the arm itself weighs"
+        lines.append(
+            f"  Masses are not stated: of joint {', '.join(products)} only the product of weight "
+            f"and compliance can be seen{load}."
+        )
+    return lines
+
+
 def _why(answer: Mapping) -> str:
-    gain, error = answer["gain_of_vec_mm2"], answer["gain_std_error_mm2"]
-    if gain is None:
-        return ": nothing was held out to judge the VEC model by"
-    change = f"{abs(gain):.4f} mm^2 {'less' if gain > 0 else 'more'}"
-    if error is None:
-        return f": with VEC the squared error of held-out rows is {change}"
-    change = change.replace(" mm^2", f" +- {error:.4f} mm^2")
-    need = "VEC has to be less by more than two standard errors"
-    return f": with VEC the squared error of held-out rows is {change}; {need}"
+    gains = {
+        name.upper() if name == "vec" else name: of for name, of in answer["gains_mm2"].items()
+    }
+    names = " and ".join(gains)
+    if any(each["gain"] is None for each in gains.values()):
+        return f": nothing was held out to judge the {names} model by"
+    told = []
+    for name, each in gains.items():
+        sure = "" if each["std_error"] is None else f" +- {each['std_error']:.4f}"
+        what = "" if told else "the squared error of held-out rows is "
+        less = "less" if each["gain"] > 0 else "more"
+        told.append(f"with {name} {what}{abs(each['gain']):.4f}{sure} mm^2 {less}")
+    if any(each["std_error"] is None for each in gains.values()):
+        return f": {', '.join(told)}"
+    one = names if len(gains) == 1 else "another model than DH"
+    return f": {', '.join(told)}; {one} has to be less by more than two standard errors"

@@ -44,7 +44,9 @@ def predict(
     calibration = choice.calibration_of(folder, model, robot, config, session)
     given = tables.given_joints(calibration.robot, joints, joints_deg, joints_rad)
     with reporting("predict", bar=True) as progress:
-        found = poses_at(calibration, given.joints, given.directions, frame, point, progress)
+        found = poses_at(
+            calibration, given.joints, given.directions, frame, point, progress, given.payload
+        )
     out.deliver(tables.predicted(calibration, given, found, frame, point))
     rows.say_unused(given)
     rows.end_where_missing(found.pose.position_mm, "a pose")

@@ -17,6 +17,8 @@ from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.layout import (
     ANGLE,
     LENGTH,
+    MASS,
+    PAYLOAD,
     PURE,
     ROUNDED_MM,
     ROUNDED_RAD,
@@ -35,7 +37,8 @@ _HEAD = 1_000_000  # characters of a line looked at
 @dataclass(frozen=True)
 class Rows:
     """What a file holds: ``joints`` (n, k) reported joints (rad, mm), ``directions`` (n, k) of
-    travel, wanted ``pose`` (n, ...) in mm; each None where the file has no such columns.
+    travel, wanted ``pose`` (n, ...) in mm, ``payload`` (n, 4) in kg and mm; each None where the
+    file has no such columns.
 
     ``label`` (n,) is the file's ``pose`` column, or the line a row stands on.
     """
@@ -46,6 +49,7 @@ class Rows:
     directions: np.ndarray | None
     pose: Pose | None
     unused: tuple[str, ...]
+    payload: np.ndarray | None = None
 
 
 def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False) -> Rows:
@@ -70,13 +74,14 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
         reader.problems.append(Problem(table.path, what))
     directions = reader.directions(len(slides))
     wanted = reader.pose() if pose else None
+    payload = reader.payload()
     label = table.line
     if "pose" in table.columns:
         reader.used.add("pose")
         label = np.array([str(cell) for cell in table.columns["pose"]], dtype=object)
     refuse(reader.problems, f"{table.path} cannot be used")
     unused = tuple(name for name in table.columns if name not in reader.used)
-    return Rows(len(table), label, q_rad, directions, wanted, unused)
+    return Rows(len(table), label, q_rad, directions, wanted, unused, payload)
 
 
 def _answered(table: RawTable, names: list[str], what: str) -> RawTable:
@@ -194,6 +199,19 @@ class Quantities:
             where = f"{self.table.path}: columns s1 .. s{joints}"
             self.problems.append(Problem(where, "a value is no direction", "-1, 0 or 1"))
         return None if s is None else s.astype(np.int8)
+
+    def payload(self) -> np.ndarray | None:
+        mass = self.group([PAYLOAD[0]], [MASS], False)
+        centre = self.group(list(PAYLOAD[1:]), [LENGTH] * 3, False)
+        if mass is None:
+            if centre is not None:
+                where = f"{self.table.path}: column payload_kg"
+                self.problems.append(Problem(where, "is missing beside the payload's centre"))
+            return None
+        if (mass < 0.0).any():
+            where = f"{self.table.path}: column payload_kg"
+            self.problems.append(Problem(where, "a mass is negative", "0 or above"))
+        return np.hstack([mass, np.zeros((len(mass), 3)) if centre is None else centre])
 
     def pose(self) -> Pose | None:
         position = self.group(["x", "y", "z"], [LENGTH] * 3, True)

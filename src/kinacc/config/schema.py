@@ -10,7 +10,7 @@ from typing import Any
 
 DATASET_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]*"  # with - first it would read as an option
 KINDS: tuple[str, ...] = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair")
-KINDS += ("pairs", "names", "parameters", "rows")
+KINDS += ("pairs", "names", "parameters", "rows", "records")
 NUMERIC = {
     "int": "a whole number",
     "float": "a number",
@@ -20,7 +20,7 @@ NUMERIC = {
     "pairs": "a list of pairs [smaller, larger]",
 }
 _KEY_FIELDS: tuple[str, ...] = ("kind", "default", "unit", "low", "high", "open_ends")
-_KEY_FIELDS += ("choices", "length", "behind", "nullable", "execution", "about")
+_KEY_FIELDS += ("choices", "length", "behind", "fields", "nullable", "execution", "about")
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Key:
     choices: tuple[str, ...] = ()
     behind: tuple[str, ...] = ()
     length: tuple[int, int] = (0, 100_000)
+    fields: tuple[Key, ...] = ()
     nullable: bool = False
     execution: bool = False
 
@@ -57,6 +58,9 @@ class Key:
             parts.append("a list of {lines: [8, 12], reason: ..}")
         elif self.kind == "texts" and self.choices:
             parts.append("a list of " + ", ".join(self.choices))
+        elif self.kind == "records":
+            inside = ", ".join(f"{each.name}: {each.allowed}" for each in self.fields)
+            parts.append(f"a list of {{{inside}}}")
         elif self.choices:
             parts.append(
                 ", ".join(repr(word) if not word.strip() else word for word in self.choices)
@@ -162,6 +166,10 @@ def _key(name: str, content: Mapping[str, Any]) -> Key:
     for each in ("choices", "behind", "length"):
         if each in fields:
             fields[each] = tuple(fields[each])
+    if "fields" in fields:
+        inside = fields["fields"].items()
+        blank = {"default": None, "about": ""}
+        fields["fields"] = tuple(_key(each, blank | content) for each, content in inside)
     return Key(name=name, **fields)
 
 

@@ -277,6 +277,29 @@ def _rows(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     return items, []
 
 
+def _records(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
+    if not isinstance(value, list):
+        return _refuse(key, path, place, f"{shown(value)} is not a list")
+    fewest, most = key.length
+    if not fewest <= len(value) <= most:
+        return _refuse(key, path, place, f"has {len(value)} items")
+    wanted = [field.name for field in key.fields]
+    items: list[dict[str, Any]] = []
+    problems: list[Problem] = []
+    for number, each in enumerate(value):
+        here = (*path, number)
+        if not isinstance(each, dict) or set(each) != set(wanted):
+            what = f"{shown(each)} does not give {' and '.join(wanted)}"
+            problems += _refuse(key, here, place, what)[1]
+            continue
+        found = {}
+        for field in key.fields:
+            found[field.name], wrong = check(field, each[field.name], (*here, field.name), place)
+            problems += wrong
+        items.append(found)
+    return (INVALID if problems else items), problems
+
+
 def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     from kinacc.config import parameter_rules
 
@@ -301,4 +324,5 @@ _CHECKS: dict[str, Check] = {
     "names": _names,
     "parameters": _parameters,
     "rows": _rows,
+    "records": _records,
 }

@@ -50,13 +50,14 @@ def compensate(
     s: np.ndarray | None = None,
     frame: str = "base",
     point: str | None = None,
+    payload: np.ndarray | None = None,
 ) -> Compensation:
     """Joints at which ``calibration`` puts ``point`` at ``wanted`` (n, ...) in ``frame``.
 
     Of all postures within the joint limits the one nearest to ``near_rad`` (n, k) or (k,),
     reported joints, is taken; where that is not given, the one nearest to zero among those the
     data cover. The largest joint movement counts. ``s`` (n, k): directions the joints will travel
-    in, for a VEC model that knows them.
+    in, for a VEC model that knows them; ``payload`` (n, 4) as in a ``JointState``.
     Raises InputError for an unknown frame or point, and for poses that are no numbers.
     """
     _require_numbers(wanted)
@@ -66,7 +67,7 @@ def compensate(
     given = near_rad is not None
     near = np.zeros(robot.dh.joints) if near_rad is None else np.atleast_2d(near_rad)
     near = np.broadcast_to(near, (count, robot.dh.joints))
-    like = JointState(robot.dh_joints(near), None if s is None else np.asarray(s))
+    like = JointState(robot.dh_joints(near), None if s is None else np.asarray(s), payload)
     arm = Goals(calibration, goal, near, like, carried)
     best = _Best.none(count, robot.dh.joints, given)
     if given:

@@ -46,15 +46,16 @@ def predict(
     frame: str = "base",
     point: str | None = None,
     progress: Callable[[Iterable[int], str], Iterable[int]] | None = None,
+    payload: np.ndarray | None = None,
 ) -> Prediction:
     """Poses of ``point`` in ``frame`` (base, instrument) at reported joints (n, k), rad and mm.
 
-    ``s`` (n, k): travel directions, unknown where not given. ``point``: a target by name or
-    ``flange``; the tool where not given. Raises InputError for an unknown frame or point.
+    ``s`` (n, k): travel directions, unknown where not given; ``payload`` (n, 4) as in a
+    ``JointState``. ``point``: a target by name or ``flange``; the tool where not given. Raises
+    InputError for an unknown frame or point.
     """
-    at = JointState(
-        calibration.robot.dh_joints(np.atleast_2d(q_rad)), None if s is None else np.asarray(s)
-    )
+    q_rad = calibration.robot.dh_joints(np.atleast_2d(q_rad))
+    at = JointState(q_rad, None if s is None else np.asarray(s), payload)
     count, outside = len(at), calibration.outside_range(at.q_rad)
     silent = outside.any(axis=1) & (calibration.model.domain is not None)
     said = np.flatnonzero(~silent)

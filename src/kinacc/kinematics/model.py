@@ -13,6 +13,9 @@ from kinacc.geometry import Pose
 if TYPE_CHECKING:
     from kinacc.kinematics.dh import DHModel
 
+# A state's payload, as tables name it.
+PAYLOAD_COLUMNS = ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm")
+
 
 @dataclass(frozen=True)
 class JointState:

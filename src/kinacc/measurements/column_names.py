@@ -127,6 +127,7 @@ UNITS = {
     **dict.fromkeys(("milimetros", "millimetri"), "mm"),
     **dict.fromkeys(("m", "meter", "metre", "meters", "metres", "metros", "metri"), "m"),
     **dict.fromkeys(("c", "°c", "celsius"), "C"),
+    **dict.fromkeys(("kg", "kgs", "kilogram", "kilograms", "kilogramm", "kilogramme"), "kg"),
     # Known, and read by nothing: who states them must not be taken for someone who states none.
     **dict.fromkeys(("cm", "centimeter", "centimetre"), "cm"),
     **dict.fromkeys(("um", "μm", "micron", "microns", "micrometer", "micrometre"), "µm"),
@@ -135,7 +136,7 @@ UNITS = {
     **dict.fromkeys(("rev", "revs", "turn", "turns", "count", "counts", "tick", "ticks"), "?"),
     **dict.fromkeys(("pulse", "pulses", "nm", "dm", "km", "feet", "mil", "mils", "°f"), "?"),
 }
-READ = ("deg", "rad", "mm", "m", "C")  # units that are read
+READ = ("deg", "rad", "mm", "m", "C", "kg")  # units that are read
 KNOWN = frozenset((*UNITS, *UNITS.values())) - {"?"}
 _ONLY_LAST = ("m", "c", "turn", "count", "nm")  # words of another meaning elsewhere
 _BRACKET = re.compile(r"[\[({<]\s*([^\[({<\])}>]*?)\s*[\])}>]")

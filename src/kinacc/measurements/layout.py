@@ -1,8 +1,9 @@
 """How a file states its measurements: which column holds which quantity, in which unit.
 
 A quantity of a row is ``q1``, ``q1_cmd`` (as commanded), ``s1``, ``pose``, ``repeat``, ``target``,
-``session`` or ``temperature``. A quantity of a target is ``x``, ``rx``, ``qw``, ``std_x``,
-``cov_xy`` and the like, alone or behind the target's name (``mA_x``). A column of the file carries
+``session``, ``temperature``, ``payload`` or ``payload_x``. A quantity of a target is ``x``, ``rx``,
+``qw``, ``std_x``, ``cov_xy`` and the like, alone or behind the target's name (``mA_x``). A column
+of the file carries
 the unit in its name (``q1_deg``, ``mA_x_mm``), or is mapped to our name and then has the layout's
 unit. A name that says another unit than the layout is refused, and a point that its name calls
 nominal, a deviation or an uncertainty is read only where ``targets`` or ``columns`` name it.
@@ -30,9 +31,11 @@ LENGTH = {"mm": 1.0, "m": 1000.0}
 ROUNDED_RAD, ROUNDED_MM = 1e-6, 1e-3
 AREA = {"mm2": 1.0, "m2": 1.0e6}
 CELSIUS = {"c": 1.0, "C": 1.0}
+MASS = {"kg": 1.0}
 PURE = {"": 1.0}
 
 POSITION = ("x", "y", "z")
+PAYLOAD = ("payload", "payload_x", "payload_y", "payload_z")
 STD = ("std_x", "std_y", "std_z")
 STD_TURN = ("std_rx", "std_ry", "std_rz")
 COVARIANCE = ("cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz")
@@ -120,17 +123,21 @@ class Target:
 
 @dataclass(frozen=True)
 class FoundColumns:
-    """Every column that is used. ``single`` holds pose, repeat, target, session, temperature."""
+    """Every column that is used. ``single`` holds pose, repeat, target, session, temperature.
+
+    ``payload``: mass and, where the file has it, the three coordinates of its centre.
+    """
 
     joints: tuple[Place, ...]
     commanded: tuple[Place, ...]
     directions: Mapping[int, Place]
     targets: tuple[Target, ...]
     single: Mapping[str, Place]
+    payload: tuple[Place, ...] = ()
 
     def unused(self, table: RawTable) -> tuple[str, ...]:
         """Columns of the file that hold nothing that was recognised."""
-        used = {place.column for place in (*self.joints, *self.commanded)}
+        used = {place.column for place in (*self.joints, *self.commanded, *self.payload)}
         used |= {place.column for place in (*self.directions.values(), *self.single.values())}
         used |= {place.column for target in self.targets for place in target.places()}
         return tuple(name for name in table.columns if name not in used)
@@ -153,6 +160,7 @@ def find(
     single["temperature"] = finder.any("temperature", CELSIUS, "C") or finder.any(
         "temp", CELSIUS, "C"
     )
+    payload = finder.payload()
     names = finder.targets()
     targets = tuple(finder.target(name, alone=len(names) == 1) for name in names)
     finder.refuse_unknown_columns()
@@ -164,6 +172,7 @@ def find(
         {joint: place for joint, place in directions.items() if place},
         targets,
         {name: place for name, place in single.items() if place},
+        payload,
     )
     finder.refuse_shared_columns(found)
     return found if len(problems) == before else None
@@ -326,6 +335,14 @@ class _Finder:
             self._problem(", ".join(missing), "is missing beside " + _with(names, missing, prefix))
         return ()
 
+    def payload(self) -> tuple[Place, ...]:
+        """Columns of mass and centre of what is carried; none where the file does not say."""
+        mass = self.any(PAYLOAD[0], MASS, "kg")
+        centre = self._all("", PAYLOAD[1:], LENGTH, self.layout.length_unit)
+        if centre and not mass:
+            self._problem("payload_kg", "is missing beside the centre of the payload")
+        return (mass, *centre) if mass else ()
+
     def refuse_spare_joint(self, joints: int) -> None:
         spare = f"q{joints + 1}"
         if spare in self.layout.columns or any(
@@ -348,6 +365,7 @@ class _Finder:
         """A column that is taken for two measured quantities, as a slip in a mapping makes it."""
         measured = [*found.joints, *found.commanded, *found.directions.values()]
         measured += [place for target in found.targets for place in target.places()]
+        measured += found.payload
         count = Counter(place.column for place in measured)
         for column in (each for each in count if count[each] > 1):
             mapped = [name for name, own in self.layout.columns.items() if own == column]
@@ -371,6 +389,8 @@ def split(name: str) -> tuple[str, str]:
     """Target (may be empty) and quantity of a name such as std_x or mA_std_x; empty if neither."""
     if name in _TARGET_QUANTITIES:
         return "", name
+    if name in PAYLOAD:
+        return "", ""
     # The longest quantity counts: mA_std_x is no x of a target named mA_std.
     ends = [each for each in _TARGET_QUANTITIES if name.endswith(f"_{each}")]
     if not ends:

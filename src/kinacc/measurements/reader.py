@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns, texts
 from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
 from kinacc.measurements.layout import STD, TOOL, FoundColumns, Layout, Place, Target, find
@@ -118,6 +119,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     commanded = _stacked(table, found.commanded, problems, gaps=True) if found.commanded else None
     shared = _numbered(table, found, problems)
     s = _directions(table, found, len(found.joints), problems)
+    payload = _payload(table, found.payload, problems)
     parts = [_target(table, target, layout, problems) for target in found.targets]
     if not parts:
         problems.append(
@@ -136,6 +138,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     if "target" in shared:
         columns["target"] = shared["target"][order]
     columns["row"] = table.line[order]
+    columns |= {name: values[order] for name, values in payload.items()}
     turns = np.concatenate([part["turns"][part["there"]] for part in parts])
     by_row = np.argsort(order, kind="stable")
     columns = {name: values[by_row] for name, values in columns.items()}
@@ -252,6 +255,24 @@ def _directions(table: RawTable, found: FoundColumns, joints: int, problems) -> 
             problems.append(Problem(where, f"{values[bad[0]]:g}", "-1, 0 or 1"))
         s[:, joint] = np.where(np.isin(values, (-1, 0, 1)), values, 0)
     return s
+
+
+def _payload(table: RawTable, places: tuple[Place, ...], problems) -> Columns:
+    """Mass and centre (n,) of what is carried, NaN in rows that do not say; none without places.
+
+    The centre is that of the last DH frame where the file states a mass alone.
+    """
+    if not places:
+        return {}
+    _empty(table, places, problems)
+    values = _stacked(table, places, problems, gaps=True)
+    bad = np.flatnonzero(values[:, 0] < 0.0)
+    if bad.size:
+        where = f"{table.path}: column {places[0].column}, {table.rows_in_words(bad)}"
+        problems.append(Problem(where, f"a mass of {values[bad[0], 0]:g} kg", "0 or above"))
+    if len(places) == 1:
+        values = np.hstack([values, np.where(np.isnan(values), np.nan, 0.0).repeat(3, axis=1)])
+    return dict(zip(PAYLOAD_COLUMNS, values.T, strict=True))
 
 
 def _numbered(table: RawTable, found: FoundColumns, problems) -> Columns:

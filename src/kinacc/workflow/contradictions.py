@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from kinacc.artifacts.error_models import ALWAYS, ESTIMATORS, asked_for, loaded
 from kinacc.config import load as configuration
 from kinacc.config.parameter_rules import JOINTS, rules, strangers
 from kinacc.config.validate import ROBOTS
@@ -146,7 +147,9 @@ def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Ite
     told = rules(section["parameters"], JOINTS)[0]
     ranges = (("calibration", "vec", "joint_range"), ("evaluation", "joint_box", "joints_deg"))
     given = {keys: full[keys[0]][keys[1]][keys[2]] for keys in ranges}
-    if not hayati and not told and not any(isinstance(pairs, list) for pairs in given.values()):
+    further = [kind for kind in asked_for(full["calibration"]) if kind not in ALWAYS]
+    boxes = any(isinstance(pairs, list) for pairs in given.values())
+    if not hayati and not told and not boxes and not further:
         return
     from kinacc.kinematics.robot import load, shipped
 
@@ -159,6 +162,10 @@ def _arm(robot: str, full: Mapping[str, Any], place: Place, folder: Path) -> Ite
     if beyond:
         what = f"{robot} has no joint {', '.join(map(str, beyond))}"
         yield Problem(place("calibration", "dh", "hayati_joints"), what, f"1 to {joints}")
+    for kind in further:
+        estimator = loaded(ESTIMATORS[kind])
+        for keys, what, allowed in estimator.contradictions(full["calibration"], arm):
+            yield Problem(place("calibration", kind, *keys), what, allowed)
     for rule, what, allowed in strangers(told, joints):
         yield Problem(place("calibration", "dh", "parameters", rule.name), what, allowed)
     for keys, pairs in given.items():

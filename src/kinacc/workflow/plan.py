@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from kinacc.artifacts.error_models import ERROR_MODELS, asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, TOURNAMENT, Stage, maker_of
@@ -131,6 +132,9 @@ class Plan:
         else:
             made_here = (name for name, stage in STAGES.items() if stage.measured)
             reasons |= dict.fromkeys(made_here, "the measurements are synthetic")
+        for name, stage in STAGES.items():
+            if stage.fits and stage.fits not in asked_for(config["calibration"]):
+                reasons[name] = f"calibration.{stage.fits} asks for no such model"
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
     def targets(
@@ -404,13 +408,22 @@ def _read_words(values: object) -> object:
 
 
 def _in_use(config: dict) -> dict:
-    """The configuration without the source of measurements that is not used, or an empty list."""
+    """The configuration without what it does not use.
+
+    That is the other source of measurements, an empty list, and models nobody asks for.
+    """
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
     if "file" in measurements and not measurements["file"]["exclude"]:
         file = {k: v for k, v in measurements["file"].items() if k != "exclude"}
         measurements = {**measurements, "file": file}
-    return {**config, "measurements": measurements}
+    calibration, asked = config["calibration"], asked_for(config["calibration"])
+    calibration = {
+        name: section
+        for name, section in calibration.items()
+        if name in asked or name not in ERROR_MODELS
+    }
+    return {**config, "measurements": measurements, "calibration": calibration}
 
 
 def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:

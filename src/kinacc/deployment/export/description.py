@@ -56,13 +56,15 @@ def robot_json(
     nominal: DHModel,
     undetermined: Sequence[str] | None,
     provenance: Mapping[str, str],
+    table: Mapping[str, np.ndarray] | None = None,
 ) -> str:
     """Everything the calibration says of the arm: parameters, deviations, frames, residuals.
 
     ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined; ``undetermined`` says in sentences
-    what the poses leave open, None where nobody asked.
+    what the poses leave open, None where nobody asked. ``table``: the columns of a model that says
+    more than DH parameters, which then are those of the arm its errors act on.
     """
-    dh = _dh_of(calibration)
+    dh = calibration.model.dh
     joints = []
     for joint in range(dh.joints):
         row: dict[str, object] = {
@@ -99,6 +101,9 @@ def robot_json(
         "undetermined": None if undetermined is None else list(undetermined),
         "provenance": dict(provenance),
     }
+    if table is not None:
+        rows = {name: [_cell(each) for each in values] for name, values in table.items()}
+        content |= {"error_model": calibration.choice, "error_model_table": rows}
     return json.dumps(content, indent=1) + "\n"
 
 
@@ -132,6 +137,12 @@ def _dh_of(calibration: Calibration) -> DHModel:
     if calibration.model.table is None:
         raise TypeError(f"a {calibration.choice} model has no DH table: choose dh")
     return calibration.model.table
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str) or value is None:
+        return value
+    return int(value) if isinstance(value, np.integer) else _number(float(value))
 
 
 def _kind(dh: DHModel, joint: int) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.atomic import replacing
+from kinacc.artifacts.error_models import PLAINEST
 from kinacc.calibration import blind_words
 from kinacc.config import names
 from kinacc.deployment import folder as results
@@ -17,6 +18,7 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
 
+CARRY_ALL = ("json",)  # formats for models that are no table of DH parameters
 _ENDINGS = {
     "yaml": ".yaml",
     "json": ".json",
@@ -35,8 +37,9 @@ def contents(
     urdf_file: Path | str | None = None,
     links: tuple[str | None, str | None] = (None, None),
     dh_joints: bool = False,
+    model: str = PLAINEST,
 ) -> dict[str, str]:
-    """File names and their text for the calibrated DH model of a results folder.
+    """File names and their text for a calibrated model of a results folder.
 
     Raises InputError for what cannot be exported.
     """
@@ -47,17 +50,26 @@ def contents(
         problems = names.not_of_a_file("--name", name)
     refuse(problems, "Nothing was written")
     found = results.read_tables(folder)
-    arm = results.calibration(found, robot, "dh", dataset)
-    std = _deviations(found["dh_model"])
-    told = found.get("dh_identified")
+    arm = results.calibration(found, robot, model, dataset)
+    if arm.model.table is None:
+        what, fix = f"cannot carry a {model} model", f"or give --model {PLAINEST}"
+        problems = [
+            Problem(f"--format {each}", what, ", ".join(CARRY_ALL), fix)
+            for each in dict.fromkeys(formats)
+            if each not in CARRY_ALL
+        ]
+        refuse(problems, "Nothing was written")
+    std = _deviations(found[f"{model}_model"], arm.model.joints)
+    told = found.get(f"{model}_identified")
     unseen = None if told is None else blind_words.listed(told)
     made = {}
     for each in dict.fromkeys(formats):
         if each == "yaml":
             text = description.robot_yaml(arm)
         elif each == "json":
-            marks = store.read_metadata(Path(folder) / "dh_model.parquet")
-            text = description.robot_json(arm, std, robot.dh, unseen, marks)
+            marks = store.read_metadata(Path(folder) / f"{model}_model.parquet")
+            own = None if arm.model.table is not None else found[f"{model}_model"]
+            text = description.robot_json(arm, std, robot.dh, unseen, marks, own)
         elif each == "csv":
             text = description.robot_csv(arm, std, robot.dh)
         elif each == "urdf" and urdf_file is not None:
@@ -74,8 +86,8 @@ def note(folder: Path | str) -> str:
     """What a DH model leaves out where another model was selected; empty where it was not."""
     found = results.read_tables(folder)
     selected = results.selected_model(found)
-    dh, other = (results.residual(found, each) for each in ("dh", selected))
-    if selected == "dh" or dh is None or other is None:
+    dh, other = (results.residual(found, each) for each in (PLAINEST, selected))
+    if selected == PLAINEST or dh is None or other is None:
         return ""
     return (
         f"note: the {selected} model was selected ({other.position_mm:.3f} mm rms of "
@@ -107,8 +119,10 @@ def _tables(found: Mapping, robot: Robot, dataset: str, unseen: Sequence[str], f
     return (tables.markdown if form == "markdown" else tables.latex)(made)
 
 
-def _deviations(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Standard deviations (k, 5), by joint, as ``dh.PARAMETERS``."""
+def _deviations(columns: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
+    """Standard deviations (k, 5), by joint, as ``dh.PARAMETERS``; NaN where it has none of them."""
+    if f"std_{PARAMETERS[0]}" not in columns:
+        return np.full((joints, len(PARAMETERS)), np.nan)
     order = np.argsort(columns["joint"], kind="stable")
     return np.stack(
         [np.asarray(columns[f"std_{name}"], dtype=float)[order] for name in PARAMETERS], axis=1

@@ -42,6 +42,10 @@ _SINGLE = {
     "target": {"target", "marker", "reflector", "smr"},
     "temperature": {"temp", "temperature"},
 }
+# Payload, as people write it; a mass has to state kg, which a charge of a battery does not.
+_PAYLOAD = {"payload", "nutzlast", "traglast", "zuladung", "charge", "carga", "carico"}
+_WEIGHT = {"mass", "masse", "masa", "massa", "weight", "gewicht", "poids", "peso", "utile", "util"}
+_CENTRE = {"cog", "cg", "com", "centre", "center", "schwerpunkt", "of", "gravity", "mass", "pos"}
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,8 @@ class NamedColumns:
 
     ``joints`` q1 ..; ``commanded`` the same as commanded, may be empty; ``targets`` by name, each a
     mapping of x, rx, qw, quat1, std_x and the like; ``turn`` kind and convention of the
-    orientations as their names have it; ``single`` pose, repeat, session, target, temperature.
+    orientations as their names have it; ``single`` pose, repeat, session, target, temperature,
+    payload, payload_x and so on.
     ``aside``: groups that are not read, and why; ``questions``: what has to be asked first.
     """
 
@@ -93,7 +98,8 @@ def recognise(
     ``values`` gives a column's numbers (n,), NaN where it has none. ``take``: columns whose groups
     are read whatever their names say. ``turned``: orientations are wanted.
     """
-    choice = _Choice(groups.found(names, values), values, frozenset(take))
+    no_load = [name for name in names if not _of_payload(name)]
+    choice = _Choice(groups.found(no_load, values), values, frozenset(take))
     choice.off = any(groups.is_deviation(name) for name in names)
     joints = choice.joints()
     points = choice.points(joints)
@@ -377,4 +383,18 @@ def _singles(names) -> dict[str, Name]:
                 if quantity == "temperature" and each.unit not in ("", "C"):
                     continue
                 found.setdefault(quantity, each)
+        if quantity := _of_payload(each):
+            found.setdefault(quantity, each)
     return found
+
+
+def _of_payload(name: Name) -> str:
+    """payload or payload_x .. where the name says so and states its unit; else nothing."""
+    words = {*name.words}
+    rest = words - _PAYLOAD - _WEIGHT
+    if words & _PAYLOAD and not rest and name.unit == "kg":
+        return "payload"
+    axis = "".join(rest - _CENTRE)
+    if words & _PAYLOAD and axis in ("x", "y", "z") and name.unit in _LENGTHS:
+        return f"payload_{axis}"
+    return ""

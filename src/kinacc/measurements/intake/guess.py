@@ -233,5 +233,6 @@ def _mapping(
             unit = "" if quantity[0] == "q" else angle_unit if turned else length_unit
             put(f"{prefix}{quantity}", name, unit)
     for quantity, name in found.single.items():
-        put(quantity, name, "")
+        unit = length_unit if quantity.startswith("payload_") else ""
+        put(quantity, name, unit)
     return mapping

@@ -14,6 +14,7 @@ import numpy as np
 from kinacc.artifacts import campaign_tables, store, tournament_tables
 from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
 from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
@@ -190,10 +191,11 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         except InputError:
             continue
     left_out = _left_out(folder, marks, tables, plan)
+    told = {n: r for n, r in left_out.items() if not (STAGES[n].measured or STAGES[n].fits)}
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
         f"{reason}"
-        for reason in dict.fromkeys(r for n, r in left_out.items() if not STAGES[n].measured)
+        for reason in dict.fromkeys(told.values())
     ]
     found += _missing(folder, left_out)
     for name, picture in _pictures(folder, plan, left_out):
@@ -272,7 +274,8 @@ def _left_out(folder: Path, marks: dict, tables: dict, plan: Plan | None) -> dic
     """Stages the data set rightly does without, each with the reason."""
     if plan is not None:
         return dict(plan.left_out(folder.name))
-    return _without_file(folder, tables) | _without_map(folder, marks)
+    without = _without_file(folder, tables) | _without_map(folder, marks)
+    return without | _without_models(folder, tables)
 
 
 def _without_file(folder: Path, tables: dict) -> dict[str, str]:
@@ -284,6 +287,17 @@ def _without_file(folder: Path, tables: dict) -> dict[str, str]:
     if not (folder / "excluded_rows.parquet").exists():
         return {"excluded_rows": "no row is excluded"}
     return {}
+
+
+def _without_models(folder: Path, tables: dict) -> dict[str, str]:
+    """Stages of models that a data set may ask for and of which nothing here knows."""
+    known = {str(model) for model in tables.get("frames", {}).get("model", ())}
+    return {
+        name: "no such model was asked for"
+        for name, stage in STAGES.items()
+        if stage.fits and stage.fits not in (*ALWAYS, *known)
+        if not any((folder / f"{each}.parquet").exists() for each in stage.outputs)
+    }
 
 
 def _without_map(folder: Path, marks: dict) -> dict[str, str]:

@@ -37,7 +37,7 @@ def _structure(path: Path, artefact: Artefact, schema) -> list[Problem]:
     joints = joint_count(artefact, schema.names)
     if artefact.has_joints and not JOINTS_MIN <= joints <= JOINTS_MAX:
         return [Problem(str(path), f"{joints} joints", f"{JOINTS_MIN} to {JOINTS_MAX} joints")]
-    expected = store.arrow_schema(artefact.name, joints)
+    expected = store.arrow_schema(artefact.name, joints, given=schema.names)
     problems = [
         Problem(f"{path}, column {name}", "not in the contract", ", ".join(expected.names))
         for name in schema.names

@@ -1,0 +1,171 @@
+"""A model that a data set may ask for: part of its plan, hashes and answers where it does."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from command_line import call
+
+from kinacc.config.schema import defaults
+from kinacc.errors import InputError
+from kinacc.geometry import log_so3
+from kinacc.kinematics import robot
+from kinacc.kinematics.compliance import ComplianceModel
+from kinacc.kinematics.model import JointState
+from kinacc.workflow.plan import planned
+
+COUNT, LOAD = 90, np.array([60.0, 20.0, -10.0, 150.0])
+ARM = robot.load("mh180")
+SOFT = np.array([np.nan, 1e-6, 2e-6, np.nan, np.nan, np.nan])
+
+
+def bent_arm():
+    weight = np.full(6, np.nan)
+    weight[1:3] = 1.5e-6, 0.8e-6
+    links = np.full((6, 4), np.nan)
+    return ComplianceModel(ARM.dh, SOFT, weight, np.array([0.0, 0.0, -1.0]), links, np.zeros(4))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A data set whose rows carry nothing or a load, run up to the comparison of its models."""
+    base = tmp_path_factory.mktemp("bent")
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-1.0, 1.0, (COUNT, 6))
+    payload = np.where(rng.random((COUNT, 1)) < 0.5, LOAD, np.zeros(4))
+    seen = bent_arm().pose(JointState(q @ ARM.joint_map.T, None, payload)).position_mm
+    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm", "Nutzlast [kg]"]
+    names += [f"payload_{axis}_mm" for axis in "xyz"]
+    rows = np.hstack([np.rad2deg(q), seen + 0.01 * rng.normal(size=seen.shape), payload])
+    np.savetxt(base / "rows.csv", rows, "%.12g", ",", header=",".join(names), comments="")
+    (base / "set.yaml").write_text(f"""
+datasets:
+  bent:
+    robot: mh180
+    measurements:
+      source: file
+      folds: 3
+      file:
+        path: {json.dumps(str(base / "rows.csv"))}
+        orientation: {{kind: none}}
+        columns: {{payload: "Nutzlast [kg]"}}
+    calibration:
+      vec: {{order: 1}}
+      dh: {{fit_to: measurements}}
+      compliance: {{joints: [2, 3]}}
+""")
+    for stage in ("measurements", "data_check", "vec", "compliance", "dh", "residuals"):
+        done = call("run", stage, "--config", base / "set.yaml", "--results", base / "results")
+        assert done.exit_code == 0, done.output
+    return base / "results" / "bent"
+
+
+def test_fitted_says_how_joints_bend_and_that_only_products_are_seen(folder):
+    answer = json.loads(call("fitted", folder, "--json").output)
+    assert answer["selected"] == "compliance"
+    assert list(answer["position_error_mm"]) == ["nominal", "dh", "compliance", "vec"]
+    found = np.array([each["compliance_rad_per_nm"] for each in answer["bending"]])
+    std = np.array([each["std_compliance_rad_per_nm"] for each in answer["bending"]])
+    assert [each["joint"] for each in answer["bending"]] == [2, 3]
+    assert np.all(np.abs(found - SOFT[1:3]) < 4.0 * std)
+    assert "product of weight and compliance" in call("fitted", folder).output
+
+
+def test_predictions_depend_on_what_is_carried(folder, tmp_path):
+    q = np.random.default_rng(1).uniform(-0.8, 0.8, (4, 6))
+    names = [f"q{i}_rad" for i in range(1, 7)] + ["payload_kg", "payload_x_mm"]
+    names += ["payload_y_mm", "payload_z_mm"]
+    for name, load in (("empty", np.zeros(4)), ("loaded", LOAD)):
+        rows = np.hstack([q, np.tile(load, (4, 1))])
+        path = tmp_path / f"{name}.csv"
+        np.savetxt(path, rows, "%.12g", ",", header=",".join(names), comments="")
+        answer = json.loads(call("predict", folder, path, "--json").output)
+        seen = np.array([[row[f"{axis}_mm"] for axis in "xyz"] for row in answer["rows"]])
+        at = JointState(q @ ARM.joint_map.T, None, np.tile(load, (4, 1)))
+        assert np.abs(seen - bent_arm().pose(at).position_mm).max() < 0.05
+
+
+def test_compensation_comes_back_to_the_pose_with_the_load_of_each_row(folder):
+    from kinacc.deployment import folder as results
+    from kinacc.deployment.compensate import compensate
+
+    arm = results.calibration(results.read_tables(folder), results.recorded_robot(folder))
+    assert arm.choice == "compliance"
+    q = np.random.default_rng(2).uniform(-0.8, 0.8, (4, 6))
+    payload = np.array([[0.0, 0, 0, 0], LOAD, LOAD / 2.0, [np.nan] * 4])
+    at = JointState(q @ ARM.joint_map.T, None, payload)
+    found = compensate(arm, arm.pose(at), q, payload=payload)
+    np.testing.assert_allclose(found.q_rad, q, atol=1e-8)
+    other = compensate(arm, arm.pose(at), q)
+    assert np.abs(other.q_rad - q)[1].max() > 1e-5
+    again = arm.pose(JointState(found.q_rad @ ARM.joint_map.T, None, payload))
+    turned = again.rotation @ np.swapaxes(arm.pose(at).rotation, 1, 2)
+    assert np.abs(log_so3(turned)).max() < 1e-6
+
+
+def test_a_format_that_cannot_carry_the_model_says_so(folder, tmp_path):
+    done = call("export", folder, "--model", "compliance", "--format", "urdf", "--to", tmp_path)
+    assert done.exit_code != 0
+    assert "cannot carry a compliance model" in done.output
+    assert not list(tmp_path.iterdir())
+    done = call("export", folder, "--model", "compliance", "--to", tmp_path)
+    assert done.exit_code == 0, done.output
+    (path,) = tmp_path.iterdir()
+    table = json.loads(path.read_text())["error_model_table"]
+    columns = {name: np.array(values, dtype=float) for name, values in table.items()}
+    model = ComplianceModel.from_columns(columns, ARM.dh.prismatic)
+    answer = json.loads(call("fitted", folder, "--json").output)
+    assert model.compliance_rad_per_nm[1] == answer["bending"][0]["compliance_rad_per_nm"]
+
+
+def test_a_folder_with_all_models_is_as_the_contract_says(folder):
+    config = folder.parents[1] / "set.yaml"
+    said = call("check-results", folder, "--config", config).output
+    problems = [line for line in said.splitlines() if line.startswith("  - ")]
+    not_run = (": missing; made by", "/figures/")
+    assert not [line for line in problems if not any(each in line for each in not_run)], said
+
+
+def plan_of(tmp_path, text):
+    (tmp_path / "a.yaml").write_text(f"datasets: {{arm: {{robot: mh180}}}}\n{text}")
+    return planned([tmp_path / "a.yaml"])
+
+
+def test_nobody_asks_and_nothing_is_planned_read_or_hashed(tmp_path):
+    plan = plan_of(tmp_path, "")
+    assert "compliance" not in plan.stages("arm")
+    assert not any("compliance" in path for path in plan.targets("arm"))
+    for name in plan.stages("arm"):
+        job = plan.job(name, "arm", plan.part_names(name, "arm")[0])
+        assert not any("compliance" in each for each in (*job.inputs, *job.uses))
+    kept = {*defaults()["calibration"]} - {"compliance"}
+    assert set(plan.settings("residuals", "arm")["calibration"]) == kept
+
+
+def test_who_asks_gets_the_stage_and_depends_on_the_model(tmp_path):
+    plan = plan_of(tmp_path, "calibration: {compliance: {joints: [2]}}")
+    assert "compliance_model" in plan.inputs("residuals", "arm")
+    assert "compliance_frames" in plan.inputs("dh", "arm")
+    used = plan.job("residuals", "arm").uses
+    assert "kinacc.artifacts.error_models:MODELS[compliance]" in used
+    assert "kinacc.artifacts.error_models:ESTIMATORS[compliance]" in used
+    assert not any("compliance" in each for each in plan.job("vec", "arm").uses)
+
+
+def test_everything_wrong_with_the_settings_is_said_at_once(tmp_path):
+    text = "{joints: [2, 7], gravity: [0, 0, 0], links: [{mass_kg: 1, centre_mm: [0, 0, 0]}]}"
+    with pytest.raises(InputError) as raised:
+        plan_of(tmp_path, f"calibration: {{compliance: {text}}}")
+    said = str(raised.value)
+    for words in ("mh180 has no joint 7", "has no direction", "1 links for the 6 joints"):
+        assert words in said
+    with pytest.raises(InputError, match=r"-3\.0 is out of range"):
+        plan_of(
+            tmp_path,
+            "calibration: {compliance: {joints: [2], "
+            "links: [{mass_kg: -3.0, centre_mm: [0, 0, 0]}]}}",
+        )
+    with pytest.raises(InputError, match="does not give mass_kg and centre_mm"):
+        plan_of(tmp_path, "calibration: {compliance: {joints: [2], links: [{mass_kg: 3.0}]}}")
