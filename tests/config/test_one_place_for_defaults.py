@@ -24,6 +24,9 @@ PACKAGE = Path(__file__).parents[2] / "src" / "kinacc"
 ALIASES = {"threshold": "truncation", "hayati": "hayati_joints", "parts": "chunks"}
 # (file, name): why it is no second default or range of a key.
 OTHERS = {
+    ("artifacts/store.py", "joints"): "how many an arm has, not which of them bend",
+    ("workflow/verification/conformity.py", "joints"): "how many an arm has, not which bend",
+    ("cli/planned.py", "joints"): "a joint of the arm at hand",
     ("assess/adaptive.py", "measurements"): "the budget of a campaign, which may be larger",
     (
         "calibration/dh_fit.py",

@@ -7,6 +7,7 @@ import pytest
 from command_line import call
 
 from kinacc.artifacts import store
+from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
@@ -29,11 +30,9 @@ def written(tmp_path, names, rows):
 
 
 def section(path, **columns):
-    turn = {"kind": "none", "convention": "XYZ", "unit": "deg"}
-    return {
-        "path": str(path), "delimiter": ",", "decimal": ".", "joint_unit": "deg",
-        "length_unit": "mm", "orientation": turn, "columns": columns,
-    }  # fmt: skip
+    file = defaults()["measurements"]["file"]
+    turn = {**file["orientation"], "kind": "none"}
+    return {**file, "path": str(path), "orientation": turn, "columns": columns}
 
 
 def test_mass_and_centre_of_every_row(tmp_path):
