@@ -72,7 +72,7 @@ def results(name: str, count: int = 80, seed: int = 3) -> dict:
         "vec_model": vec_found.model.to_columns(vec_found.std),
         "dh_model": dh_found.model.to_columns(dh_found.std.ravel()),
         "frames": tables.frames_columns(of, ("tool",)),
-        "dh_fit": tables.dh_fit_columns(dh_found, known),
+        "dh_fit": tables.fit_columns("dh_fit", dh_found, known),
         "dh_covariance": tables.covariance_columns(known),
         "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found, ("tool",))),
         "residuals": _residuals(seen, of, dh_found.model, vec_found.model),

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from kinacc.artifacts.error_models import FITTED
+from kinacc.artifacts.error_models import ALWAYS
 from kinacc.workflow.stages import (
     accuracy_map,
     assessment_points,
@@ -22,7 +22,7 @@ from kinacc.workflow.stages import (
 # Named one by one, so that whatever runs stages in memory depends on their code.
 RUNS = {
     "measurements": measurements.run,
-    **{kind: partial(error_model.run, kind=kind) for kind in FITTED},
+    **{kind: partial(error_model.run, kind=kind) for kind in ALWAYS},
     "residuals": residuals.run,
     "accuracy_map": accuracy_map.run,
     "assessment_points": assessment_points.run,
