@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.calibration.uncertainty import unit_of
 from kinacc.cli import choice, rows
 from kinacc.cli.sheet import Field, Sheet, number
 from kinacc.deployment.compare import Difference, Shift, require_alike
@@ -84,13 +85,16 @@ def answer(found: Difference, calibrations: Sequence[Calibration], poses: int) -
     each = found.parameters
     fields = []
     if each is not None:
-        angle = np.array([name.endswith("_rad") for name in each.names])
-        scale = np.where(angle, 1e3, 1.0)
-        names = [name.rpartition("_")[0] for name in each.names]
-        unit = np.where(angle, "mrad", "mm").astype(object)
+        units = [unit_of(name) for name in each.names]
+        names = [
+            name.rpartition("_")[0] if unit in ("rad", "mm") else name
+            for name, unit in zip(each.names, units, strict=True)
+        ]
+        scale = np.where(np.array(units) == "rad", 1e3, 1.0)
+        unit = np.array([{"rad": "mrad"}.get(unit, unit) for unit in units], dtype=object)
         fields = [
-            Field("parameter", np.array(names, dtype=object), "", "joint and DH parameter"),
-            Field("unit", unit, "", "unit of the row: lengths in mm, angles in mrad"),
+            Field("parameter", np.array(names, dtype=object), "", "joint and parameter"),
+            Field("unit", unit, "", "unit of the row"),
             Field("first", each.first * scale, "see unit", calibrations[0].name),
             Field("second", each.second * scale, "see unit", calibrations[1].name),
             Field("difference", each.difference * scale, "see unit", "second minus first"),

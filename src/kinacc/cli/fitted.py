@@ -230,7 +230,9 @@ def _bending_in_words(bending: list[Mapping]) -> list[str]:
             products.append(str(each["joint"]))
     if products:
         alone = all(each["compliance_rad_per_nm"] is None for each in bending)
-        load = ", and for the load that was measured" if alone else " of what the arm itself weighs"
+        load = (
+            ", and for the payload that was measured" if alone else " of what the arm itself weighs"
+        )
         lines.append(
             f"  Masses are not stated: of joint {', '.join(products)} only the product of weight "
             f"and compliance can be seen{load}."

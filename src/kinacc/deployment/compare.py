@@ -13,17 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from kinacc.calibration.uncertainty import is_angle
+from kinacc.calibration.uncertainty import scale_of
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.errors import Problem, refuse
 from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
-from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 
-_MRAD = 1e-3
 _SPAN = 1e-3  # directions closer than this are one
 _TOUCHED = 1e-4  # as in the fits: 1 % of a parameter in a direction nobody sees
 _STEPS = 8
@@ -94,7 +92,7 @@ def compare(
     """
     require_alike(first, second)
     parameters, test = None, (np.nan, 0, np.nan)
-    if first.model.table is not None and second.model.table is not None:
+    if first.model.comparable is not None and second.model.comparable is not None:
         parameters = _parameters(first, second)
         test = _test(first, second)
     before, after = (
@@ -149,9 +147,9 @@ def _length(model: DHModel) -> float:
 
 def _parameters(first: Calibration, second: Calibration) -> Parameters:
     names = first.model.parameter_names
-    values = [dh.to_vector(calibration.model.table) for calibration in (first, second)]
+    values = [calibration.model.comparable for calibration in (first, second)]
     free = [_free(calibration) for calibration in (first, second)]
-    units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
+    units = np.array([scale_of(name) for name in names])
     differ = np.abs(values[1] - values[0]) > ROUNDING * units
     shown = [
         number
@@ -199,8 +197,8 @@ def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
     if first.known is None or second.known is None:
         return np.nan, 0, np.nan
     names = first.model.parameter_names
-    units = np.where([is_angle(name) for name in names], _MRAD, 1.0)
-    difference = (dh.to_vector(second.model.table) - dh.to_vector(first.model.table)) / units
+    units = np.array([scale_of(name) for name in names])
+    difference = (second.model.comparable - first.model.comparable) / units
     total, blind = np.zeros((len(names), len(names))), []
     for calibration in (first, second):
         pick = np.zeros((len(names), len(calibration.known.names)))

@@ -60,6 +60,11 @@ class ComplianceModel:
         return np.stack([self.compliance_rad_per_nm, self.lever_coefficient_rad_per_mm], axis=1)
 
     @property
+    def comparable(self) -> np.ndarray:
+        """All parameters (P,), ordered as ``to_vector``."""
+        return to_vector(self)
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names (P,) ordered as ``to_vector``: of the DH arm, then j2.compliance_rad_per_nm, .."""
         places = np.argwhere(np.isfinite(self.coefficients))

@@ -64,6 +64,11 @@ class DHModel:
     table = dh
 
     @property
+    def comparable(self) -> np.ndarray:
+        """All parameters (5k,), ordered as ``to_vector``."""
+        return to_vector(self)
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names (5k,) ordered as ``to_vector``: j1.theta_offset_rad, ..."""
         return tuple(f"j{i}.{name}" for i in range(1, self.joints + 1) for name in PARAMETERS)

@@ -79,6 +79,10 @@ class ErrorModel(Protocol):
     def parameter_names(self) -> tuple[str, ...]:
         """Names (P,) in the order of ``parameter_jacobian``: j1.d_mm, j1.delta_x.0 and the like."""
 
+    @property
+    def comparable(self) -> np.ndarray | None:
+        """Values (P,) by ``parameter_names`` that two fits may be compared by, if there are."""
+
     def pose(self, at: JointState) -> Pose:
         """Poses (n, ...)."""
 

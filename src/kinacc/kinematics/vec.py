@@ -63,6 +63,10 @@ class VECModel:
         return self.q_min_rad, self.q_max_rad
 
     @property
+    def comparable(self) -> None:
+        """None: constants of neighbouring joints can take each other's place."""
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names (P,) of the coefficients, ordered as ``to_vector``: j1.delta_x.0, ..."""
         joints, orders = range(1, self.joints + 1), range(self.order + 1)
