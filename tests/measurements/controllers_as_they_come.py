@@ -82,6 +82,18 @@ def rtde_recording_alone(folder: Path) -> Measured:
     return truth(path, "ur10", np.degrees(actual), {}, questions=asked, readable=False)
 
 
+def pendant_poses_as_measured(folder: Path) -> Measured:
+    """Positions copied from the pendant: the controller's own kinematics under innocent names."""
+    done = campaign("ur10", 6)
+    tip = (tool_poses(np.radians(done.joints_deg))[:, :3] * 1000).round(2)
+    names = ["Pose", *(f"Joint {i} (deg)" for i in range(1, 7)), "X (mm)", "Y (mm)", "Z (mm)"]
+    rows = beside(column(NUMBERS), cells(done.joints_deg, 6), cells(tip, 2))
+    path = save(folder / "poses.csv", joined([names, *rows], ","))
+    said = r"own (forward )?kinematics|nominal arm|computed|not (a )?measure"
+    asked = frozenset({"measurement"})
+    return truth(path, "ur10", done.joints_deg, tip, questions=asked, readable=False, says=said)
+
+
 def rtde_recording_and_tracker(folder: Path) -> Measured:
     """A recording at 8 Hz through motion and rest, a tracker whose clock is 37.4 s ahead."""
     done, target, actual = rtde_joints()

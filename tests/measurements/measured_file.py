@@ -19,7 +19,8 @@ class Measured:
     reading; `rotations` (n, 3, 3) of the first target or None; `std_mm` per target (n, 3) where
     stated. `questions`: what the file leaves open. `must_ask`: the same, where neither the file
     nor the numbers can answer. `any_frame`: the reader chooses the axes (angles and distance).
-    A file from which nothing can be read rightly without an answer has `readable` False.
+    `says`: what the answer has to mention, as a regular expression. Where `readable` is False the
+    file may be refused: it lacks something, or nobody would blame a reader for saying no.
     """
 
     files: tuple[Path, ...]
@@ -32,6 +33,7 @@ class Measured:
     must_ask: frozenset[str] = frozenset()
     any_frame: bool = False
     readable: bool = True
+    says: str = ""
     no_reading: frozenset[int] = field(default=frozenset())
 
 
@@ -78,6 +80,16 @@ def grouped(value: float, decimals: int) -> str:
 def grouped_german(value: float, decimals: int) -> str:
     """A number with points between thousands and a decimal comma."""
     return grouped(value, decimals).translate(str.maketrans(",.", ".,"))
+
+
+def grouped_french(value: float, decimals: int) -> str:
+    """A number with hard blanks between thousands and a decimal comma."""
+    return grouped(value, decimals).translate(str.maketrans(",.", "\u00a0,"))
+
+
+def grouped_swiss(value: float, decimals: int) -> str:
+    """A number with apostrophes between thousands."""
+    return grouped(value, decimals).replace(",", "'")
 
 
 def true_minus(value: float, decimals: int) -> str:

@@ -1,8 +1,9 @@
-"""What the command line makes of a measured file: right, asked, refused, wrong or crashed.
+"""What the command line makes of a measured file: right, partial, asked, refused, wrong, crashed.
 
 A file is read right where every reading that was made, and no other, arrives with its joints,
 position, orientation and standard deviation, under one target per reflector and one pose per
-configuration, and the described robot reaches the points.
+configuration, and the described robot reaches the points. It is partial where what arrived is true
+and something is left out, or a suspicion is named and the arm left as it was.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from measurements.measured_file import Measured
 from measurements.simulated_arms import flange
 from scipy.spatial.transform import Rotation
 
-RIGHT, ASKED, REFUSED, WRONG, CRASHED = "right", "asked", "refused", "wrong", "crashed"
+RIGHT, PARTIAL, ASKED = "right", "partial", "asked"
+REFUSED, WRONG, CRASHED = "refused", "wrong", "crashed"
 RELATIVE = 1e-6
+ROBOT, LEFT_OUT = "the robot as described", "are left out"
 REACHED_MM = 15.0  # DH errors leave 1 to 3 mm; a wrong sign, unit or coupling leaves hundreds
 
 # Words by which a message shows that it asks what the file leaves open.
@@ -38,6 +41,7 @@ WORDS = {
     "pulses": r"pulse",
     "quaternion order": r"quaternion|scalar|orientation",
     "reflector radius": r"radi(us|i)",
+    "sheet": r"sheet",
     "sigma": r"sigma|standard deviation|\bk ?= ?[12]|coverage",
 }
 GIVEN = {"--robot", "--yes", "--json", "--out", "--name", "--help", "--force"}
@@ -61,10 +65,13 @@ def score(measured: Measured, folder: Path) -> Score:
     read = call("run", "measurements", "--config", folder / "n.yaml", "--results", folder / "r")
     if read.exit_code != 0:
         return _not_read(measured, read, "run", asked=False)
-    wrong = _difference(measured, folder / "r" / "n")
-    if wrong:
-        return Score(WRONG, wrong, False)
-    return Score(RIGHT, "", True)
+    wrong = difference(measured, folder / "r" / "n")
+    if not wrong and not re.search(measured.says, described.output + read.output, re.IGNORECASE):
+        return Score(PARTIAL if measured.readable else WRONG, "does not say so", False)
+    if not wrong:
+        return Score(RIGHT, "", True)
+    told = ROBOT in wrong and re.search(r"joint_(coupling|sign|zero)", described.output)
+    return Score(PARTIAL if told or LEFT_OUT in wrong else WRONG, wrong, False)
 
 
 def _not_read(measured: Measured, result: object, command: str, asked: bool = True) -> Score:
@@ -103,7 +110,7 @@ def expected(measured: Measured) -> pd.DataFrame:
     return pd.concat(frames).dropna(subset=["x_mm"]) if frames else pd.DataFrame()
 
 
-def _difference(measured: Measured, results: Path) -> str:
+def difference(measured: Measured, results: Path) -> str:
     """What is wrong with the readings as they arrived, or nothing."""
     found = pd.read_parquet(results / "measurements.parquet")
     true = expected(measured)
@@ -171,7 +178,7 @@ def _rotations_wrong(measured: Measured, true: pd.DataFrame, found: pd.DataFrame
     if measured.rotations is None:
         return "" if np.isnan(quaternions).all() else "orientations that were not measured"
     if np.isnan(quaternions).any():
-        return "orientations are left out"
+        return f"orientations {LEFT_OUT}"
     seen = Rotation.from_quat(quaternions).as_matrix()
     wanted = measured.rotations[true["reading"]]
     return "" if np.allclose(seen, wanted, atol=RELATIVE) else "orientations differ"
@@ -183,7 +190,7 @@ def _deviations_wrong(measured: Measured, true: pd.DataFrame, found: pd.DataFram
     read = found[names].to_numpy(float)
     if np.isnan(read).all():
         lost = measured.std_mm is not None and not measured.must_ask
-        return "standard deviations are left out" if lost else ""
+        return f"standard deviations {LEFT_OUT}" if lost else ""
     if measured.must_ask:
         return "standard deviations taken without asking how many of them"
     if measured.std_mm is None:
@@ -200,8 +207,8 @@ def _robot_wrong(found: pd.DataFrame, joints: list[str], results: Path) -> str:
     )
     mapped = np.array(arm.get("joint_map") or np.diag([row.get("sign", 1) for row in arm["dh"]]))
     turned, moved = flange(rows, first[joints].to_numpy(float) @ mapped.T)
-    off = _reach_mm(turned, moved, first[["x_mm", "y_mm", "z_mm"]].to_numpy(float))
-    return "" if off < REACHED_MM else f"the robot as described misses the points by {off:.0f} mm"
+    off = reach_mm(turned, moved, first[["x_mm", "y_mm", "z_mm"]].to_numpy(float))
+    return "" if off < REACHED_MM else f"{ROBOT} misses the points by {off:.0f} mm"
 
 
 def _number(row: dict[str, float], key: str) -> float:
@@ -210,7 +217,7 @@ def _number(row: dict[str, float], key: str) -> float:
     return next((row[key + unit] * by for unit, by in factors.items() if key + unit in row), 0.0)
 
 
-def _reach_mm(turned: np.ndarray, moved: np.ndarray, seen: np.ndarray) -> float:
+def reach_mm(turned: np.ndarray, moved: np.ndarray, seen: np.ndarray) -> float:
     """Rms distance of the points from the arm's, over every base and place of the target."""
     target = np.zeros(3)
     for _ in range(60):

@@ -18,7 +18,9 @@ from measurements.measured_file import (
     comma,
     euler,
     grouped,
+    grouped_french,
     grouped_german,
+    grouped_swiss,
     joined,
     quaternions,
     save,
@@ -52,16 +54,18 @@ def german_decimal_commas(folder: Path) -> Measured:
 
 
 def german_latin1(folder: Path) -> Measured:
-    """Latin-1 with umlauts above the names, tabs, decimal commas, units in round brackets."""
+    """Latin-1, a title with umlauts, tabs, decimal commas; nominal, actual and deviation."""
     joints, points = one_point("fanuc_uncoupled")
+    off = np.random.default_rng(8).normal(scale=0.5, size=points.shape).round(3)
     names = [
         "Nr.",
         *(f"Gelenk {i} (Grad)" for i in range(1, 7)),
-        *(f"Messgröße {axis} (mm)" for axis in "XYZ"),
+        *(f"{word} {axis} (mm)" for word in ("Soll", "Ist", "Abw.") for axis in "XYZ"),
         "Prüfer",
     ]
+    measured = np.hstack([points - off, points, off])
     rows = beside(
-        column(NUMBERS), cells(joints, 3, comma), cells(points, 3, comma), column(["Jürgen"] * 40)
+        column(NUMBERS), cells(joints, 3, comma), cells(measured, 3, comma), column(["Jürgen"] * 40)
     )
     lines = ["Prüfprotokoll Roboter, Halle 3", "", *joined([names, *rows], "\t")]
     path = save(folder / "pruefung.txt", lines, encoding="latin-1", newline="\r\n")
@@ -144,6 +148,33 @@ def thousands_german(folder: Path) -> Measured:
     return truth(path, "mh180", joints, points)
 
 
+def thousands_swiss(folder: Path) -> Measured:
+    """Apostrophes between thousands, a decimal point."""
+    joints, points = one_point("fanuc_uncoupled")
+    names = [f"A{i} [Grad]" for i in range(1, 7)] + [f"{axis}-Ist [mm]" for axis in "XYZ"]
+    rows = beside(cells(joints, 3), cells(points, 3, grouped_swiss))
+    return truth(save(folder / "ch.csv", joined([names, *rows], ";")), FANUC, joints, points)
+
+
+def quoted_decimal_commas(folder: Path) -> Measured:
+    """Commas between cells and within numbers: every cell in quotes."""
+    joints, points = one_point("ur10")
+    names = ["Pose", *(f"J{i} [deg]" for i in range(1, 7)), "X [mm]", "Y [mm]", "Z [mm]"]
+    rows = beside(column(NUMBERS), cells(joints, 3, comma), cells(points, 3, comma))
+    quoted = [[f'"{cell}"' for cell in row] for row in [names, *rows]]
+    return truth(save(folder / "database.csv", joined(quoted, ",")), "ur10", joints, points)
+
+
+def inches(folder: Path) -> Measured:
+    """Positions in inches, as their names say."""
+    done = campaign("fanuc_uncoupled")
+    written = (done.points_mm[0] / 25.4).round(5)
+    names = [f"J{i} (deg)" for i in range(1, 7)] + ["X (in)", "Y (in)", "Z (in)"]
+    lines = joined([names, *beside(cells(done.joints_deg, 3), cells(written, 5))], ",")
+    path = save(folder / "imperial.csv", lines)
+    return truth(path, FANUC, done.joints_deg, written * 25.4, readable=False)
+
+
 def typographic_minus(folder: Path) -> Measured:
     """U+2212 instead of the hyphen, as copied from a report."""
     joints, points = one_point("irb120")
@@ -187,13 +218,16 @@ def metres_and_radians_unsaid(folder: Path) -> Measured:
 
 
 def french(folder: Path) -> Measured:
-    """French names in code page 1252, decimal commas; the deviation stands beside the point."""
+    """French names in code page 1252, hard blanks between thousands, decimal commas; deviations."""
     joints, points = one_point("fanuc_uncoupled")
     names = ["N° point", *(f"Axe {i} (°)" for i in range(1, 7))]
     names += [f"{axis} mesuré (mm)" for axis in "XYZ"] + [f"Écart {axis} (mm)" for axis in "XYZ"]
     off = np.random.default_rng(5).normal(scale=0.6, size=points.shape)
     rows = beside(
-        column(NUMBERS), cells(joints, 3, comma), cells(points, 3, comma), cells(off, 3, comma)
+        column(NUMBERS),
+        cells(joints, 3, comma),
+        cells(points, 3, grouped_french),
+        cells(off, 3, comma),
     )
     ends = ["Moyenne", *[""] * 9, *cells([off.mean(0)], 3, comma)[0]]
     lines = ["Relevé laser du 12/03/2024", *joined([names, *rows, ends], ";")]
@@ -283,7 +317,8 @@ def yaskawa_axes(folder: Path) -> Measured:
         ],
         "\t",
     )
-    return truth(save(folder / "gp180.txt", lines), "mh180", done.joints_deg, points)
+    path = save(folder / "gp180.txt", lines)
+    return truth(path, "mh180", done.joints_deg, points, says=r"round|0\.01")
 
 
 def unnamed_euler_angles(folder: Path) -> Measured:
@@ -372,3 +407,36 @@ def reflector_changed_halfway(folder: Path) -> Measured:
     }
     asked = frozenset({"reflector radius"})
     return truth(path, FANUC, done.joints_deg, targets, questions=asked)
+
+
+def workbook_with_a_sheet_each(folder: Path) -> Measured:
+    """Joints on one sheet and the tracker's points on another, under the names of the points."""
+    joints, points = one_point("ur10")
+    book = openpyxl.Workbook()
+    robot = book.active
+    robot.title = "Robot"
+    robot.append(["Point", *(f"J{i} (deg)" for i in range(1, 7))])
+    tracker = book.create_sheet("Tracker")
+    tracker.append(["Point", "X (mm)", "Y (mm)", "Z (mm)"])
+    for i in range(40):
+        robot.append([f"P{i + 1}", *joints[i].tolist()])
+        tracker.append([f"P{40 - i}", *points[39 - i].tolist()])
+    path = folder / "campaign.xlsx"
+    book.save(path)
+    return truth(path, "ur10", joints, points)
+
+
+def workbook_of_two_runs(folder: Path) -> Measured:
+    """A cold and a warm run of the same poses, each complete on its sheet: which one, or both?"""
+    done = repeated("irb120", 32, 2)
+    points = done.points_mm[0].round(3)
+    book = openpyxl.Workbook()
+    for run, title in enumerate(("Run 1 cold", "Run 2 warm")):
+        sheet = book.active if run == 0 else book.create_sheet()
+        sheet.title = title
+        sheet.append([*(f"J{i} (deg)" for i in range(1, 7)), "X (mm)", "Y (mm)", "Z (mm)"])
+        for row in np.hstack([done.joints_deg, points])[run::2].tolist():
+            sheet.append(row)
+    path = folder / "runs.xlsx"
+    book.save(path)
+    return truth(path, "irb120", done.joints_deg, points, questions=frozenset({"sheet"}))

@@ -220,7 +220,7 @@ def joined_by_number(folder: Path) -> Measured:
         save(folder / "tracker.csv", lines),
     )
     lost = set(range(40)) - set(seen)
-    return truth(files, "ur10", joints, points, missing=lost)
+    return truth(files, "ur10", joints, points, missing=lost, says=r"90[12]|unmatched|without")
 
 
 def joined_by_time(folder: Path) -> Measured:
