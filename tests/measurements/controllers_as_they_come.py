@@ -82,6 +82,18 @@ def rtde_recording_alone(folder: Path) -> Measured:
     return truth(path, "ur10", np.degrees(actual), {}, questions=asked, readable=False)
 
 
+def script_lists(folder: Path) -> Measured:
+    """Lists as a program prints them: joints in rad, the controller's pose; then the point."""
+    done, _, actual = rtde_joints()
+    points = done.points_mm[0].round(4)
+    lines = ["point;get_actual_joint_positions;get_actual_tcp_pose;x_mm;y_mm;z_mm"]
+    for i, pose in enumerate(tool_poses(actual)):
+        joints = ", ".join(f"{value:.9f}" for value in actual[i])
+        own = ", ".join(f"{value:.6f}" for value in pose)
+        lines.append(";".join([f"P{i + 1}", f"[{joints}]", f"p[{own}]", *cells(points[[i]], 4)[0]]))
+    return truth(save(folder / "textmsg.log", lines), "ur10", np.degrees(actual), points)
+
+
 def pendant_poses_as_measured(folder: Path) -> Measured:
     """Positions copied from the pendant: the controller's own kinematics under innocent names."""
     done = campaign("ur10", 6)
@@ -127,7 +139,7 @@ def rtde_recording_and_tracker(folder: Path) -> Measured:
 
 
 def fanuc_program(folder: Path) -> Measured:
-    """A teach pendant program with joint positions; joint 3 counts against the horizontal."""
+    """A program of joint positions, a track as second group; joint 3 against the horizontal."""
     joints, points = one_point("fanuc")
     lines = ["/PROG  CALIB01", "/ATTR", "OWNER\t\t= MNEDITOR;", 'COMMENT\t\t= "tracker";']
     lines += ["DEFAULT_GROUP\t= 1,*,*,*,*;", "/APPL", "/MN"]
@@ -144,6 +156,9 @@ def fanuc_program(folder: Path) -> Measured:
             "\tUF : 0, UT : 1,\t",
             f"\t{first},",
             f"\t{last}",
+            "   GP2:",
+            "\tUF : 0, UT : 1,\t",
+            "\tJ1=     0.000  mm",
             "};",
         ]
     labels = [f"P{i}" for i in NUMBERS]

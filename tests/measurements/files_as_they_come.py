@@ -9,7 +9,12 @@ from __future__ import annotations
 from inspect import getmembers, isfunction
 from types import ModuleType
 
-from measurements import controllers_as_they_come, tables_as_they_come, trackers_as_they_come
+from measurements import (
+    controllers_as_they_come,
+    tables_as_they_come,
+    trackers_as_they_come,
+    workbooks_as_they_come,
+)
 from measurements.measured_file import Measured, Writer
 
 __all__ = ["FILES", "Measured"]
@@ -26,6 +31,11 @@ def _writers(module: ModuleType) -> dict[str, Writer]:
 
 FILES: dict[str, Writer] = {
     name: made
-    for module in (tables_as_they_come, trackers_as_they_come, controllers_as_they_come)
+    for module in (
+        tables_as_they_come,
+        workbooks_as_they_come,
+        trackers_as_they_come,
+        controllers_as_they_come,
+    )
     for name, made in _writers(module).items()
 }

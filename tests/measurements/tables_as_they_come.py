@@ -5,11 +5,9 @@ Each function writes one file into a folder and returns what is true of it.
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
-import openpyxl
 from measurements.measured_file import (
     Measured,
     beside,
@@ -246,52 +244,6 @@ def spanish(folder: Path) -> Measured:
     return truth(path, FANUC, joints, points)
 
 
-def italian_workbook(folder: Path) -> Measured:
-    """A workbook with Italian names, one title row, numbers as numbers."""
-    joints, points = one_point("irb120")
-    book = openpyxl.Workbook()
-    sheet = book.active
-    sheet.title = "Misure"
-    sheet.append(["Calibrazione robot, 14 marzo"])
-    sheet.append(["Punto", *(f"Asse {i} [gradi]" for i in range(1, 7)), *"XYZ", "unità: mm"])
-    for number, row in enumerate(np.hstack([joints, points]).tolist(), 1):
-        sheet.append([number, *row])
-    path = folder / "misure.xlsx"
-    book.save(path)
-    return truth(path, "irb120", joints, points)
-
-
-def workbook_with_cover_sheet(folder: Path) -> Measured:
-    """A cover sheet, title rows, units under the names, dates, three reflectors, a summary."""
-    done = campaign("ur10")
-    points = done.points_mm.round(4)
-    book = openpyxl.Workbook()
-    cover = book.active
-    cover.title = "Deckblatt"
-    for row in (["Kunde", "Muster GmbH"], ["Roboter", "UR10"], ["Datum", datetime(2024, 5, 3)]):
-        cover.append(row)
-    sheet = book.create_sheet("Messdaten")
-    sheet.append(["Kalibrierung UR10, Zelle 4"])
-    sheet.append([])
-    sheet.append(
-        ["Pose", "Datum", *(f"Achse {i}" for i in range(1, 7))]
-        + [f"Reflektor {i} {axis}" for i in "ABC" for axis in "XYZ"]
-    )
-    sheet.append(["", "", *["°"] * 6, *["mm"] * 9])
-    start = datetime(2024, 5, 3, 9, 15)
-    table = np.hstack([done.joints_deg, *points]).tolist()
-    for number, row in enumerate(table):
-        sheet.append([number + 1, start + timedelta(seconds=41 * number), *row])
-    sheet.append(["Mittelwert", None, *np.mean(table, axis=0).tolist()])
-    summary = book.create_sheet("Auswertung")
-    summary.append(["Achse", "Mittel", "Max"])
-    summary.append([1, 0.31, 0.77])
-    path = folder / "UR10 Zelle 4.xlsx"
-    book.save(path)
-    targets = {name: points[i] for i, name in enumerate("ABC")}
-    return truth(path, "ur10", done.joints_deg, targets)
-
-
 def japanese(folder: Path) -> Measured:
     """Japanese names in code page 932."""
     joints, points = one_point("mh180")
@@ -409,34 +361,10 @@ def reflector_changed_halfway(folder: Path) -> Measured:
     return truth(path, FANUC, done.joints_deg, targets, questions=asked)
 
 
-def workbook_with_a_sheet_each(folder: Path) -> Measured:
-    """Joints on one sheet and the tracker's points on another, under the names of the points."""
-    joints, points = one_point("ur10")
-    book = openpyxl.Workbook()
-    robot = book.active
-    robot.title = "Robot"
-    robot.append(["Point", *(f"J{i} (deg)" for i in range(1, 7))])
-    tracker = book.create_sheet("Tracker")
-    tracker.append(["Point", "X (mm)", "Y (mm)", "Z (mm)"])
-    for i in range(40):
-        robot.append([f"P{i + 1}", *joints[i].tolist()])
-        tracker.append([f"P{40 - i}", *points[39 - i].tolist()])
-    path = folder / "campaign.xlsx"
-    book.save(path)
-    return truth(path, "ur10", joints, points)
-
-
-def workbook_of_two_runs(folder: Path) -> Measured:
-    """A cold and a warm run of the same poses, each complete on its sheet: which one, or both?"""
-    done = repeated("irb120", 32, 2)
-    points = done.points_mm[0].round(3)
-    book = openpyxl.Workbook()
-    for run, title in enumerate(("Run 1 cold", "Run 2 warm")):
-        sheet = book.active if run == 0 else book.create_sheet()
-        sheet.title = title
-        sheet.append([*(f"J{i} (deg)" for i in range(1, 7)), "X (mm)", "Y (mm)", "Z (mm)"])
-        for row in np.hstack([done.joints_deg, points])[run::2].tolist():
-            sheet.append(row)
-    path = folder / "runs.xlsx"
-    book.save(path)
-    return truth(path, "irb120", done.joints_deg, points, questions=frozenset({"sheet"}))
+def names_again_midway(folder: Path) -> Measured:
+    """The logger was started again: its names stand in the middle too; commas end the lines."""
+    joints, points = one_point("irb120")
+    names = [*(f"joint_{i}_deg" for i in range(1, 7)), "meas_x_mm", "meas_y_mm", "meas_z_mm", ""]
+    rows = beside(cells(joints, 3), cells(points, 3), [[""]] * 40)
+    lines = joined([names, *rows[:17], [], names, *rows[17:]], ",")
+    return truth(save(folder / "logger.csv", lines), "irb120", joints, points)

@@ -220,7 +220,9 @@ def joined_by_number(folder: Path) -> Measured:
         save(folder / "tracker.csv", lines),
     )
     lost = set(range(40)) - set(seen)
-    return truth(files, "ur10", joints, points, missing=lost, says=r"90[12]|unmatched|without")
+    return truth(
+        files, "ur10", joints, points, missing=lost, says=r"90[12]|unmatched|not matched|no partner"
+    )
 
 
 def joined_by_time(folder: Path) -> Measured:
@@ -260,6 +262,24 @@ def times_destroyed_by_a_spreadsheet(folder: Path) -> Measured:
     files = (save(folder / "robot.csv", robot), save(folder / "tracker.csv", tracker))
     asked = frozenset({"key"})
     return truth(files, "ur10", joints, points, questions=asked, must_ask=asked, readable=False)
+
+
+def times_shown_as_minutes(folder: Path) -> Measured:
+    """Both files went through a spreadsheet that shows `07:41.5`: two hours and a half, no hour."""
+    joints, points = one_point("irb120")
+    seconds = np.cumsum(np.random.default_rng(10).uniform(180, 270, 40))
+    shown = [f"{int(s // 60) % 60:02d}:{s % 60:04.1f}" for s in seconds]
+    late = [f"{int(s // 60) % 60:02d}:{s % 60:04.1f}" for s in seconds + 1.3]
+    order = text_order(late)
+    names = ["Time", *(f"J{i} (deg)" for i in range(1, 7))]
+    rows = beside(column(shown), cells(joints, 3))
+    seen = beside(column(late[i] for i in order), cells(points[order], 3))
+    files = (
+        save(folder / "robot.csv", joined([names, *rows], ",")),
+        save(folder / "tracker.csv", joined([["Time", "X (mm)", "Y (mm)", "Z (mm)"], *seen], ",")),
+    )
+    asked = frozenset({"key"})
+    return truth(files, "irb120", joints, points, questions=asked, readable=False)
 
 
 def tracker_points_alone(folder: Path) -> Measured:
