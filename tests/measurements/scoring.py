@@ -33,6 +33,7 @@ WORDS = {
     "clock": r"clock|time",
     "euler convention": r"euler|convention|orientation",
     "horizontal angle": r"clockwise|horizontal|\bHz\b",
+    "inches": r"inch|\(in\)",
     "joint unit": r"joint.*(unit|deg|rad)",
     "joints": r"joint",
     "key": r"\bkey\b|\btimes?\b|time stamp|order",
@@ -66,7 +67,8 @@ def score(measured: Measured, folder: Path) -> Score:
     if read.exit_code != 0:
         return _not_read(measured, read, "run", asked=False)
     wrong = difference(measured, folder / "r" / "n")
-    if not wrong and not re.search(measured.says, described.output + read.output, re.IGNORECASE):
+    said = _without_paths(described.output + read.output, measured)
+    if not wrong and not re.search(measured.says, said, re.IGNORECASE):
         return Score(PARTIAL if measured.readable else WRONG, "does not say so", False)
     if not wrong:
         return Score(RIGHT, "", True)
@@ -76,16 +78,23 @@ def score(measured: Measured, folder: Path) -> Score:
 
 def _not_read(measured: Measured, result: object, command: str, asked: bool = True) -> Score:
     """Asked, refused or crashed, by exit code and message."""
-    said = " ".join(result.output.split())
+    said = _without_paths(" ".join(result.output.split()), measured)
     if result.exit_code != 2:
         crash = repr(result.exception) if result.exception else said
         return Score(CRASHED, f"{command}, exit code {result.exit_code}: {crash[:150]}", False)
     reason = f"{command}: {said[:150]}"
+    to_the_point = any(re.search(WORDS[q], said, re.IGNORECASE) for q in measured.questions)
     named = set(re.findall(r"--[a-z][a-z-]+", said)) & options() - GIVEN
     if not (asked and named):
-        return Score(REFUSED, reason, not measured.readable)
-    open_ = [q for q in measured.questions if re.search(WORDS[q], said, re.IGNORECASE)]
-    return Score(ASKED, f"{', '.join(sorted(named))}: {reason}", bool(open_))
+        return Score(REFUSED, reason, to_the_point and not measured.readable)
+    return Score(ASKED, f"{', '.join(sorted(named))}: {reason}", to_the_point)
+
+
+def _without_paths(said: str, measured: Measured) -> str:
+    """A message without the names of files, whose words are not the reader's."""
+    for path in measured.files:
+        said = said.replace(str(path), "FILE").replace(path.name, "FILE")
+    return said.replace(str(measured.files[0].parent), "FOLDER")
 
 
 @cache
@@ -189,8 +198,7 @@ def _deviations_wrong(measured: Measured, true: pd.DataFrame, found: pd.DataFram
     names = ["std_x_mm", "std_y_mm", "std_z_mm"]
     read = found[names].to_numpy(float)
     if np.isnan(read).all():
-        lost = measured.std_mm is not None and not measured.must_ask
-        return f"standard deviations {LEFT_OUT}" if lost else ""
+        return f"standard deviations {LEFT_OUT}" if measured.std_mm is not None else ""
     if measured.must_ask:
         return "standard deviations taken without asking how many of them"
     if measured.std_mm is None:

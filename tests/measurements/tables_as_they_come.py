@@ -170,7 +170,8 @@ def inches(folder: Path) -> Measured:
     names = [f"J{i} (deg)" for i in range(1, 7)] + ["X (in)", "Y (in)", "Z (in)"]
     lines = joined([names, *beside(cells(done.joints_deg, 3), cells(written, 5))], ",")
     path = save(folder / "imperial.csv", lines)
-    return truth(path, FANUC, done.joints_deg, written * 25.4, readable=False)
+    asked = frozenset({"inches"})
+    return truth(path, FANUC, done.joints_deg, written * 25.4, questions=asked, readable=False)
 
 
 def typographic_minus(folder: Path) -> Measured:
@@ -270,7 +271,7 @@ def yaskawa_axes(folder: Path) -> Measured:
         "\t",
     )
     path = save(folder / "gp180.txt", lines)
-    return truth(path, "mh180", done.joints_deg, points, says=r"round|0\.01")
+    return truth(path, "mh180", done.joints_deg, points, says=r"\bround")
 
 
 def unnamed_euler_angles(folder: Path) -> Measured:

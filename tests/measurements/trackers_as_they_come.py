@@ -5,6 +5,7 @@ Each function writes one or two files into a folder and returns what is true of 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -221,8 +222,19 @@ def joined_by_number(folder: Path) -> Measured:
     )
     lost = set(range(40)) - set(seen)
     return truth(
-        files, "ur10", joints, points, missing=lost, says=r"90[12]|unmatched|not matched|no partner"
+        files,
+        "ur10",
+        joints,
+        points,
+        missing=lost,
+        says=r"\b90[12]\b|unmatched|not matched|no partner",
     )
+
+
+def tracker_file_named_first(folder: Path) -> Measured:
+    """The same two files, typed in the other order."""
+    done = joined_by_number(folder)
+    return replace(done, files=done.files[::-1])
 
 
 def joined_by_time(folder: Path) -> Measured:
