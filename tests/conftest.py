@@ -48,6 +48,7 @@ SLOW = (
     "figures/test_figure_stages.py",
     "figures/test_figures.py",
     "kinematics/inverse/test_any_arm.py",
+    "measurements/test_files_as_they_come.py",
     "measurements/test_what_files_hold.py",
     "study/tournament/test_tournament.py",
     "synthetic/test_accepted.py",
