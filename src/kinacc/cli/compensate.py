@@ -53,7 +53,7 @@ def compensate(
         )
     answer = target_poses.compensated(arm, given, found, frame, point, program is not None)
     choice.deliver(answer, output, as_json, force)
-    rows.say_unused(given)
+    rows.say_unused(given, arm)
     missed = int((found.q_rad != found.q_rad).any(axis=1).sum())
     if missed:
         click.echo(f"{missed} of {len(given.label)} poses have no joints: see status", err=True)

@@ -47,5 +47,5 @@ def predict(
     with reporting("predict", bar=True) as progress:
         found = poses_at(arm, given.joints, given.directions, frame, point, progress, given.payload)
     choice.deliver(tables.predicted(arm, given, found, frame, point), output, as_json, force)
-    rows.say_unused(given)
+    rows.say_unused(given, arm)
     rows.say_missing(found.pose.position_mm)

@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from kinacc.measurements.layout import (
 )
 from kinacc.measurements.table import RawTable, load, numbers
 from kinacc.measurements.written_numbers import numbers_of
+
+if TYPE_CHECKING:
+    from kinacc.deployment.record import Calibration
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
@@ -297,12 +301,15 @@ def _with_units(table: RawTable) -> RawTable:
     return replace(table, columns={called(name): each for name, each in table.columns.items()})
 
 
-def say_unused(given: Rows) -> None:
+def say_unused(given: Rows, arm: Calibration) -> None:
     """Name the columns of a file that were not used, on the error stream."""
-    if given.unused:
-        import sys
+    import sys
 
+    if given.unused:
         print(f"not used: {', '.join(given.unused)}", file=sys.stderr)
+    if given.payload is not None and not arm.model.knows_loads:
+        what = f"the {arm.choice} model was fitted without loads that change"
+        print(f"not used: payload; {what}", file=sys.stderr)
 
 
 def say_missing(position_mm: np.ndarray) -> None:
