@@ -151,6 +151,17 @@ def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     assert "j1.compliance_rad_per_nm" in set(columns["parameter"])
 
 
+def test_a_weight_on_the_axis_of_its_joint_spoils_nothing():
+    """Its moment is rounding, which is no unit to measure its compliance by."""
+    found = fitted(measured(SOFT), joints=(2, 3, 6))  # the last link's centre is on axis 6
+    plain = fitted(measured(SOFT))
+    assert found.solution.spectrum.rank == plain.solution.spectrum.rank
+    assert np.isnan(found.std[-1])
+    np.testing.assert_allclose(
+        found.model.compliance_rad_per_nm[1:3], plain.model.compliance_rad_per_nm[1:3], rtol=1e-4
+    )
+
+
 def test_an_arm_on_a_wall_turns_about_its_first_axis():
     model = ComplianceModel(
         ARM.dh, np.array([1e-6, *[np.nan] * 5]), np.full(6, np.nan), np.array([0.0, -1.0, 0.0]),

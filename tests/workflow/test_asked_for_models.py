@@ -85,6 +85,8 @@ def test_predictions_depend_on_what_is_carried(folder, tmp_path):
         seen = np.array([[row[f"{axis}_mm"] for axis in "xyz"] for row in answer["rows"]])
         at = JointState(q @ ARM.joint_map.T, None, np.tile(load, (4, 1)))
         assert np.abs(seen - bent_arm().pose(at).position_mm).max() < 0.05
+        done = call("predict", folder, path, "--model", "dh")
+        assert "not used: payload; the dh model was fitted without loads" in done.output
 
 
 def test_compensation_comes_back_to_the_pose_with_the_load_of_each_row(folder):

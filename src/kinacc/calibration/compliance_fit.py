@@ -24,6 +24,8 @@ from kinacc.kinematics import compliance
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.robot import Robot
 
+_NO_MOMENT = 1e-6  # N m, or mm of lever: far above rounding, far below what bends a joint
+
 
 @dataclass(frozen=True)
 class ComplianceFit:
@@ -184,4 +186,4 @@ def _scales(nominal: ComplianceModel, observations: Observations) -> np.ndarray:
     names = nominal.parameter_names[len(nominal.dh.parameter_names) :]
     plain = np.array([scale_of(name) for name in names])
     own = rms[np.isfinite(nominal.coefficients)]
-    return np.divide(ANGLE_UNIT_RAD, own, out=plain, where=own > 0.0)
+    return np.divide(ANGLE_UNIT_RAD, own, out=plain, where=own > _NO_MOMENT)

@@ -52,5 +52,5 @@ def compensate(
         )
     answer = target_poses.compensated(calibration, given, found, frame, point, program is not None)
     out.deliver(answer)
-    rows.say_unused(given)
+    rows.say_unused(given, calibration)
     rows.end_where_missing(found.q_rad, "joints")

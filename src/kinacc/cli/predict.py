@@ -48,5 +48,5 @@ def predict(
             calibration, given.joints, given.directions, frame, point, progress, given.payload
         )
     out.deliver(tables.predicted(calibration, given, found, frame, point))
-    rows.say_unused(given)
+    rows.say_unused(given, calibration)
     rows.end_where_missing(found.pose.position_mm, "a pose")

@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -28,6 +29,9 @@ from kinacc.measurements.layout import (
     names_of,
 )
 from kinacc.measurements.table import RawTable, load, numbers, numbers_of
+
+if TYPE_CHECKING:
+    from kinacc.deployment.record import Calibration
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
@@ -303,10 +307,13 @@ def _with_units(table: RawTable) -> RawTable:
     return replace(table, columns={called(name): each for name, each in table.columns.items()})
 
 
-def say_unused(given: Rows) -> None:
+def say_unused(given: Rows, calibration: Calibration) -> None:
     """Name the columns of a file that were not used, on the error stream."""
     if given.unused:
         click.echo(f"not used: {', '.join(given.unused)}", err=True)
+    if given.payload is not None and not calibration.model.knows_loads:
+        what = f"the {calibration.choice} model was fitted without loads that change"
+        click.echo(f"not used: payload; {what}", err=True)
 
 
 def end_where_missing(answers: np.ndarray, what: str) -> None:

@@ -55,6 +55,11 @@ class ComplianceModel:
         return self.dh.joints
 
     @property
+    def knows_loads(self) -> bool:
+        """Whether a compliance was fitted; a lever's coefficient holds for the load measured."""
+        return bool(np.isfinite(self.compliance_rad_per_nm).any())
+
+    @property
     def coefficients(self) -> np.ndarray:
         """Both kinds of coefficients (k, 2) as ``COEFFICIENTS``, NaN where there is none."""
         return np.stack([self.compliance_rad_per_nm, self.lever_coefficient_rad_per_mm], axis=1)

@@ -41,6 +41,7 @@ class DHModel:
 
     kind: ClassVar[str] = "dh"
     domain: ClassVar[None] = None
+    knows_loads: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.prismatic is None:

@@ -76,6 +76,10 @@ class ErrorModel(Protocol):
         """DH joints (k,), (k,) beyond which the model says nothing; None: it may extrapolate."""
 
     @property
+    def knows_loads(self) -> bool:
+        """Whether poses depend on the payload of a state."""
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names (P,) in the order of ``parameter_jacobian``: j1.d_mm, j1.delta_x.0 and the like."""
 

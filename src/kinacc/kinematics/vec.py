@@ -40,6 +40,7 @@ class VECModel:
 
     kind: ClassVar[str] = "vec"
     table: ClassVar[None] = None
+    knows_loads: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         for field in fields(self)[1:]:
