@@ -1,4 +1,4 @@
-"""``kinacc fitted``: what the fits of a results folder are worth."""
+"""``kinacc fitted``: what the calibration in a results folder is worth."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 
 from kinacc.artifacts.allowed import SELECTABLE
+from kinacc.artifacts.error_models import ALWAYS, NOMINAL
 
-IF_THERE = ("data_check", "excluded_rows")
-TABLES = ("residuals", "model_selection", "dh_identified", "vec_model", "worst_rows")
-_MODELS = ("nominal", *SELECTABLE)
+_FURTHER = (*(f"{kind}_model" for kind in ALWAYS), "residuals", "worst_rows")
+_MODELS = (NOMINAL, *SELECTABLE)
 _FIGURES = ("n", "rms", "mean", "max")
 _SUBSETS = ("train", "validation")
 _WORST = 5
@@ -19,80 +19,97 @@ _WORST = 5
 
 @click.command("fitted")
 @click.argument("folder", type=click.Path())
+@click.option("--all", "whole", is_flag=True, help="Leave nothing out.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
-def fitted(folder: str, as_json: bool) -> None:
-    """Say what the fits of FOLDER, a results folder of a data set, are worth.
+def fitted(folder: str, whole: bool, as_json: bool) -> None:
+    """Say what the calibration in FOLDER, the results of a data set, is worth.
 
-    Position errors of rows that trained and of rows held out, the model these select, what the
-    poses could not tell apart, and the rows the selected model fits worst.
+    Half a page: the data and what is wrong with them, errors at held-out poses before and after,
+    the model these select, where it is valid, what the poses could not tell apart, and the bound on
+    the largest error if there is a campaign. With --all training errors, every statement and the
+    rows with the largest errors too.
 
     \b
     Example:
       kinacc fitted results/ur10_b
+      kinacc fitted results/ur10_b --all
       kinacc fitted results/ur10_b --json
     """
-    answer = summary(read(Path(folder)))
+    from kinacc.workflow.answer import answer
+
     if as_json:
         import json
 
-        click.echo(json.dumps(answer, indent=2))
-    else:
-        click.echo(in_words(Path(folder).name, answer))
+        click.echo(json.dumps(summary(folder), indent=2))
+        return
+    tables = read(folder, whole)
+    lines = answer(folder, tables, whole)
+    click.echo("\n".join([*lines, *(_further(tables) if whole else [])]))
 
 
-def read(folder: Path) -> dict[str, dict]:
-    """The tables needed. Raises InputError naming all that are missing."""
-    from kinacc.artifacts import store
-    from kinacc.errors import Problem, refuse
+def read(folder: Path | str, whole: bool = True) -> dict[str, dict]:
+    """The tables needed, for all there is to tell or for half a page.
 
-    paths = {name: folder / f"{name}.parquet" for name in TABLES}
-    missing = [
-        Problem(str(path), "no such file", fix="run the workflow first")
-        for path in paths.values()
-        if not path.is_file()
-    ]
-    refuse(missing, f"{folder} holds no fits")
-    more = {name: folder / f"{name}.parquet" for name in IF_THERE}
-    paths |= {name: path for name, path in more.items() if path.is_file()}
-    return {name: store.read(path) for name, path in paths.items()}
+    Raises InputError naming all that are missing.
+    """
+    from kinacc.calibration.summary import TABLES
+    from kinacc.workflow import answer
+
+    return answer.read(folder, (*TABLES, *(_FURTHER if whole else ())))
 
 
-def summary(tables: Mapping[str, Mapping]) -> dict:
+def summary(folder: Path | str) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
     from kinacc.calibration import blind_words
-    from kinacc.workflow.stages import data_check
+    from kinacc.calibration.summary import findings, of, selected
+    from kinacc.workflow.answer import campaign_of, facts_of
 
+    tables = read(folder)
+    facts, bound = facts_of(tables), campaign_of(folder).assessed
     excluded = tables.get("excluded_rows")
     choice, told = tables["model_selection"], tables["dh_identified"]
-    selected = next(
-        str(name) for name, yes in zip(choice["model"], choice["selected"], strict=True) if yes
-    )
+    best = selected(choice)
     gain = choice["gain_mm2"][list(choice["model"]).index("vec")]
     error = choice["gain_std_error_mm2"][list(choice["model"]).index("vec")]
     return {
-        "selected": selected,
+        "selected": best,
         "gain_of_vec_mm2": _plain(gain),
         "gain_std_error_mm2": _plain(error),
         "vec_order": int(max(tables["vec_model"]["order"])),
         "position_error_mm": {
             model: {subset: _errors(tables["residuals"], model, subset) for subset in _SUBSETS}
             for model in _MODELS
+            if model in (NOMINAL, *choice["model"])
         },
-        "parameters": {
-            status: [
-                str(p)
-                for p, s in zip(told["parameter"], told["status"], strict=True)
-                if s == status
-            ]
-            for status in dict.fromkeys(str(each) for each in told["status"])
+        **{
+            topic: {
+                item: {name: _plain(each.value) for name, each in known.items()}
+                for item, known in of(facts, topic).items()
+            }
+            for topic in ("held_out_error", "range")
         },
+        "parameters": _statuses(told),
         "undetermined": blind_words.listed(told),
-        "worst_rows": _worst(tables["worst_rows"], selected),
-        "data": data_check.in_words(tables["data_check"]) if "data_check" in tables else [],
-        "excluded": None if excluded is None else _excluded(excluded, selected),
+        "worst_rows": _worst(tables["worst_rows"], best),
+        "data": findings(tables["data_check"]) if "data_check" in tables else [],
+        "excluded": None if excluded is None else _excluded(excluded, best),
         "position_error_with_excluded_mm": None
         if excluded is None
-        else {model: _with_excluded(tables["residuals"], excluded, model) for model in _MODELS},
+        else {
+            model: _with_excluded(tables["residuals"], excluded, model)
+            for model in _MODELS
+            if model in (NOMINAL, *choice["model"])
+        },
+        "largest_error": None if bound is None else bound.as_facts(),
+    }
+
+
+def _statuses(told: Mapping) -> dict[str, list[str]]:
+    """Parameters of the DH fit by what the poses say of them."""
+    pairs = [(str(p), str(s)) for p, s in zip(told["parameter"], told["status"], strict=True)]
+    return {
+        status: [parameter for parameter, each in pairs if each == status]
+        for status in dict.fromkeys(each for _, each in pairs)
     }
 
 
@@ -106,17 +123,11 @@ def _errors(table: Mapping, model: str, subset: str) -> dict | None:
 
 def _excluded(table: Mapping, model: str) -> list[dict]:
     """The rows of one model, each with its error: null where it could not be read."""
-    import numpy as np
+    from kinacc.calibration.summary import excluded_errors
 
-    size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
-    rows = np.flatnonzero(table["comparison"] == f"{model}_vs_measured")
     return [
-        {
-            "line": int(table["line"][row]),
-            "reason": str(table["reason"][row]),
-            "error_mm": _plain(size[row]),
-        }
-        for row in rows[np.argsort(table["line"][rows], kind="stable")]
+        {"line": line, "reason": reason, "error_mm": _plain(error)}
+        for line, reason, error in excluded_errors(table, model)
     ]
 
 
@@ -163,47 +174,21 @@ def _plain(value: float) -> float | None:
     return None if value != value else float(value)
 
 
-def in_words(name: str, answer: Mapping) -> str:
-    """The summary for people."""
-    lines = [f"{name}: {answer['selected']} is selected{_why(answer)}", ""]
-    lines.append("position error, mm    training rms   held out: rms     mean      max")
-    for model, of in answer["position_error_mm"].items():
-        called = f"vec (order {answer['vec_order']})" if model == "vec" else model
-        train, out = (of[subset] or {} for subset in _SUBSETS)
-        figures = [train.get("rms"), *(out.get(each) for each in ("rms", "mean", "max"))]
-        shown = ["       -" if each is None else f"{each:8.3f}" for each in figures]
-        lines.append(f"{called:20} {shown[0]:>13}   {shown[1]:>13} {shown[2]} {shown[3]}")
-        if more := (answer["position_error_with_excluded_mm"] or {}).get(model):
-            shown = [f"{more[each]:8.3f}" for each in _FIGURES[1:]]
-            lines.append(f"  with excluded rows {'':13}   {shown[0]:>13} {shown[1]} {shown[2]}")
-    if answer["excluded"]:
-        lines += ["", "rows excluded by the configuration:"]
-        for each in answer["excluded"]:
-            error = "" if each["error_mm"] is None else f", {each['error_mm']:.3f} mm"
-            lines.append(f"  line {each['line']}{error}: {each['reason']}")
-    count = {status: len(names) for status, names in answer["parameters"].items()}
-    listed = ", ".join(f"{number} {status}" for status, number in count.items())
-    lines += ["", f"parameters of the DH fit: {listed}"]
-    if answer["undetermined"]:
-        lines.append("what the poses that were fitted leave open:")
-        lines += [f"  - {text}" for text in answer["undetermined"]]
-    lines += ["", f"largest position errors ({answer['selected']}):"]
-    for row in answer["worst_rows"]:
+def _further(tables: Mapping[str, Mapping]) -> list[str]:
+    """What does not stand on the half page."""
+    from kinacc.calibration.summary import selected
+    from kinacc.calibration.summary_words import counted, model_name, paragraph
+
+    best = selected(tables["model_selection"])
+    statuses = [f"{len(each)} {name}" for name, each in _statuses(tables["dh_identified"]).items()]
+    worst = []
+    for row in _worst(tables["worst_rows"], best):
         where = f"row {row['row']}" if row["line"] is None else f"line {row['line']:.0f}"
-        lines.append(f"  {where}, pose {row['pose']}, {row['target']}: {row['error_mm']:.3f} mm")
-    if answer["data"]:
-        lines += ["", "what the check of the data found:"]
-        lines += [f"  - {text}" for text in answer["data"]]
-    return "\n".join(lines)
-
-
-def _why(answer: Mapping) -> str:
-    gain, error = answer["gain_of_vec_mm2"], answer["gain_std_error_mm2"]
-    if gain is None:
-        return ": nothing was held out to judge the VEC model by"
-    change = f"{abs(gain):.4f} mm^2 {'less' if gain > 0 else 'more'}"
-    if error is None:
-        return f": with VEC the squared error of held-out rows is {change}"
-    change = change.replace(" mm^2", f" +- {error:.4f} mm^2")
-    need = "VEC has to be less by more than two standard errors"
-    return f": with VEC the squared error of held-out rows is {change}; {need}"
+        worst.append(f"{where}, pose {row['pose']}, {row['target']}: {row['error_mm']:.3f} mm")
+    return [
+        *paragraph("parameters", [f"of the DH fit: {', '.join(statuses)}"]),
+        *paragraph(
+            "worst rows",
+            [f"the {counted(len(worst), 'row')} that {model_name(best)} is farthest from:", *worst],
+        ),
+    ]

@@ -190,6 +190,20 @@ STAGES: dict[str, Stage] = {
             measured=True,
         ),
         Stage(
+            "summary",
+            "summing up what the calibration is worth",
+            (
+                "measurements",
+                "robot",
+                *(f"{kind}_model" for kind in ALWAYS),
+                "dh_identified",
+                "pose_errors",
+                "model_selection",
+            ),
+            ("summary",),
+            optional=("data_check", "excluded_rows", *_FURTHER),
+        ),
+        Stage(
             "accuracy_map",
             "mapping the largest error over the slices of the evaluation space (Fig. 3)",
             _MODELS,
@@ -363,7 +377,15 @@ STAGES: dict[str, Stage] = {
 }
 
 # The stages of a calibration; maps, the study of assessors and the paper's claims go on from there.
-CALIBRATION = ("measurements", "data_check", "vec", "dh", "residuals", "excluded_rows")
+CALIBRATION = (
+    "measurements",
+    "data_check",
+    "vec",
+    "dh",
+    "residuals",
+    "excluded_rows",
+    "summary",
+)
 
 
 def maker_of(artefact: str) -> Stage:
