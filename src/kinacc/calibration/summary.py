@@ -14,7 +14,7 @@ from kinacc.calibration import blind_words
 from kinacc.kinematics.robot import Robot
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
-TABLES = ("measurements", "robot", "dh_identified", "pose_errors", "model_selection")
+TABLES = ("measurements", "robot", "frames", "dh_identified", "pose_errors", "model_selection")
 _ORDER = (NOMINAL, *SELECTABLE)  # the plainest first
 _STATISTICS = ("n", "mean", "quantile_99", "largest")
 
@@ -37,6 +37,7 @@ def facts(tables: Mapping[str, Columns], robot: Robot) -> list[Fact]:
     """
     return [
         *_data(tables["measurements"], robot),
+        *_frames(tables["frames"]),
         *_findings(tables.get("data_check")),
         *_errors(tables["pose_errors"]),
         *_selection(tables),
@@ -80,6 +81,15 @@ def _data(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
     yield Fact("robot", robot.name, "name", text=robot.name)
     yield Fact("data", "measurements", "source", text=source)
     yield from (Fact("data", "measurements", name, n, "1") for name, n in counts.items())
+
+
+def _frames(table: Mapping) -> Iterator[Fact]:
+    """Whether base and tool were fitted: then every model has its own."""
+    places = np.stack([table[name] for name in ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz")], axis=1)
+    own = np.asarray(table["model"]) == NOMINAL
+    first = np.asarray(table["model"]) == np.asarray(table["model"])[~own][0]
+    fitted = not np.array_equal(places[own], places[first])
+    yield Fact("robot", "base and tool", "fitted", float(fitted), "1")
 
 
 def _findings(table: Mapping | None) -> Iterator[Fact]:

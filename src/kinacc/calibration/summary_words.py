@@ -11,7 +11,7 @@ from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 
 WIDTH = 100
 MARGIN = 17  # where the text of a paragraph begins
-_MOST = 3  # findings, excluded rows, sentences that are told
+_MOST, _LINES = 3, 5  # findings, excluded rows, sentences that are told, and lines they may take
 _JOINTS_PER_LINE, _JOINT_WIDTH = 3, 27
 _KEPT = "\u00a0"  # a space that no line is broken at
 _FIGURES = ("mean", "quantile_99", "largest")
@@ -29,7 +29,7 @@ def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str
         *paragraph("check", _checked(facts, most, more)),
         *paragraph("excluded", _excluded(facts, most, more)),
         *_errors(facts, whole),
-        *paragraph("selected", [_why(of(facts, "selection"))]),
+        *paragraph("selected", _selected(facts)),
         *paragraph("valid where", _range(of(facts, "range"))),
         *paragraph("undetermined", _undetermined(facts, most, more)),
     ]
@@ -37,13 +37,7 @@ def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str
 
 def paragraph(name: str, texts: Iterable[str]) -> list[str]:
     """Texts under a name at the left, each on lines of its own; commands are not broken."""
-    lines: list[str] = []
-    for text in texts:
-        room = WIDTH - MARGIN
-        wrapped = [text]
-        if not text.startswith("kinacc "):
-            wrapped = textwrap.wrap(text, room, subsequent_indent="  ", break_on_hyphens=False)
-        lines += [line.replace(_KEPT, " ") for line in wrapped]
+    lines = [line for text in texts for line in _wrapped(text)]
     heads = [name, *[""] * len(lines)]
     return [f"{head:{MARGIN}}{line}" for head, line in zip(heads, lines, strict=False)]
 
@@ -101,17 +95,28 @@ def _table(
     chosen = of(facts, "selection")
     rows = next(iter(errors.values()))["n"].value
     head = f"{name} ({where}; {counted(rows, 'row')})"
-    lines = [f"{head:60}{'mean':>10}{f'{LARGE_SHARE:.0%}':>10}{'largest':>10}"]
+    lines = [f"{head:57}{'mean':>10}{f'{LARGE_SHARE:.0%}':>10}{'largest':>10}"]
     for model, figures in errors.items():
         called = model_name(model)
         if model == NOMINAL:
-            called = "nominal, with base and tool fitted"
+            fitted = of(facts, "robot")["base and tool"]["fitted"].value
+            called = "nominal, with base and tool fitted" if fitted else "nominal"
         elif "order" in chosen[model]:
             called += f", order {chosen[model]['order'].value:.0f}"
         mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
         shown = "".join(f"{figures[each].value:10.3f}" for each in _FIGURES)
-        lines.append(f"{'':4}{called:56}{shown}{mark}".rstrip())
+        lines.append(f"{'':4}{called:53}{shown}{mark}".rstrip())
     return lines
+
+
+def _selected(facts: Sequence[Fact]) -> list[str]:
+    """Why the selected model is selected, and a warning where the nominal one is nearer."""
+    models, held_out = of(facts, "selection"), of(facts, "held_out_error")
+    best = next(model for model, known in models.items() if known["selected"].value)
+    if not held_out or held_out[best]["mean"].value < held_out[NOMINAL]["mean"].value:
+        return [_why(models)]
+    text = f"{model_name(best)} is no nearer to held-out poses than the nominal model is"
+    return [_why(models), f"{text}: measure more poses, or correct the data"]
 
 
 def _why(models: Mapping[str, Mapping[str, Fact]]) -> str:
@@ -179,7 +184,24 @@ def _undetermined(facts: Sequence[Fact], most: int | None, more: str) -> list[st
 
 
 def _first(texts: list[str], most: int | None, more: str) -> list[str]:
-    """The first ``most`` texts, and where the others are."""
-    if most is None or len(texts) <= most:
+    """The first ``most`` texts, fewer where they are long, and where the others are."""
+    if most is None:
         return texts
-    return [*texts[:most], f"and {len(texts) - most} more: {more}"]
+    told = [
+        text for i, text in enumerate(texts[:most]) if not i or _lines(texts[: i + 1]) <= _LINES
+    ]
+    left = len(texts) - len(told)
+    return [*told, f"and {left} more: {more}"] if left else told
+
+
+def _lines(texts: Iterable[str]) -> int:
+    return sum(len(_wrapped(text)) for text in texts)
+
+
+def _wrapped(text: str) -> list[str]:
+    """The lines of a text; a command is not broken."""
+    if text.startswith("kinacc "):
+        return [text]
+    room = WIDTH - MARGIN
+    lines = textwrap.wrap(text, room, subsequent_indent="  ", break_on_hyphens=False)
+    return [line.replace(_KEPT, " ") for line in lines]

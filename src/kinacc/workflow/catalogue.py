@@ -195,7 +195,7 @@ STAGES: dict[str, Stage] = {
             (
                 "measurements",
                 "robot",
-                *(f"{kind}_model" for kind in ALWAYS),
+                *_MODELS,
                 "dh_identified",
                 "pose_errors",
                 "model_selection",
