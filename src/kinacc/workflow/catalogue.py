@@ -224,7 +224,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "assessment_points",
-            "choosing the operating points of the study and their true errors",
+            "choosing the operating points of the study and their errors",
             ("measurements", *_MODELS, "pose_errors"),
             ("assessment_points",),
             ("robot", "evaluation"),
@@ -289,19 +289,19 @@ STAGES: dict[str, Stage] = {
             "fig4",
             "drawing Fig. 4, assessed accuracy against noise",
             ("study_summary", "assessment_points"),
-            ("dataset", "evaluation.space"),
+            ("dataset", "evaluation.space", "measurements.source"),
         ),
         _figure(
             "fig5",
             "drawing Fig. 5, a model that is invalidated",
             ("histories", "assessment_points"),
-            ("dataset", "evaluation.space"),
+            ("dataset", "evaluation.space", "measurements.source"),
         ),
         _figure(
             "fig6",
             "drawing Fig. 6, a model that cannot be invalidated",
             ("histories", "assessment_points"),
-            ("dataset", "evaluation.space"),
+            ("dataset", "evaluation.space", "measurements.source"),
         ),
         Stage(
             "claims",
