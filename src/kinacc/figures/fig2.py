@@ -243,7 +243,7 @@ def _tick_step(low: float, high: float, widest: float) -> float:
     """Return the largest round step up to ``widest`` with at least three ticks in the range."""
     step = widest
     while np.floor(high / step) - np.ceil(low / step) < 2:
-        step = _round_step(0.45 * step)  # the next smaller one of 1, 2, 5
+        step = _round_step(step / 2.6)  # the next smaller one of 1, 2, 5
     return step
 
 
