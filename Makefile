@@ -24,7 +24,8 @@ KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
 
 reproduce: $(KINACC)
-	@$(PY) -m snakemake --cores $(CORES)
+	@$(PY) -m snakemake --cores $(CORES) --no-hooks
+	@$(PY) -m kinacc fitted results/mh180
 
 robustness: $(KINACC)
 	@$(PY) -m snakemake --cores $(CORES) robustness

@@ -80,6 +80,14 @@ class SmallResults:
 
 def small_tables() -> dict[str, dict]:
     tables = {**_measured(), **_models(), **_residuals(), **_map(), **_study()}
+    tables["summary"] = {
+        "topic": ["data", "data"],
+        "item": ["measurements", "measurements"],
+        "statistic": ["source", "readings"],
+        "value": [np.nan, 4.0],
+        "unit": [None, "1"],
+        "text": ["synthetic", None],
+    }
     tables["claims"] = {
         "claim": ["table_1.mean", "spread_even"],
         "statement": ["The mean is 0.705 mm.", "The spread is even about the mean."],

@@ -53,7 +53,7 @@ def test_fitted_says_what_the_fits_are_worth(folder, tmp_path):
     assert len(answer["worst_rows"]) == 5
     missing = call("fitted", tmp_path)
     assert missing.exit_code == 2
-    assert missing.output.count("no such file") == 5
+    assert missing.output.count("no such file") == 6
 
 
 def test_predict_and_compensate_undo_each_other(folder, tmp_path):

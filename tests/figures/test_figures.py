@@ -178,7 +178,7 @@ def test_fig4_takes_the_truth_from_the_summary_where_it_is_not_given():
 
 
 def test_fig4_says_that_a_measured_truth_contains_noise():
-    figure = fig4.draw(tables.study_summary(), true_accuracy_mm=1.2, noisy_truth=True)
+    figure = fig4.draw(tables.study_summary(), true_accuracy_mm=1.2, taken_as_true=truth.FOOTNOTE)
     assert "instrument's noise" in said(figure)
     assert "“True” accuracy*" in said(figure)
     assert problems(figure) == []
@@ -267,7 +267,7 @@ def test_history_sorts_by_iteration():
 
 
 def test_history_with_a_measured_truth_says_so():
-    figure = draw(tables.history(), true_accuracy_mm=0.906, noisy_truth=True)
+    figure = draw(tables.history(), true_accuracy_mm=0.906, taken_as_true=truth.FOOTNOTE)
     assert "instrument's noise" in said(figure)
     assert "“true” error*" in said(figure)
     assert problems(figure) == []
@@ -299,10 +299,35 @@ def test_true_accuracy_is_the_largest_true_error():
     assert known(assessment_points={"true_error_mm": np.array([])}) is None
 
 
-def test_only_measured_configurations_have_a_noisy_truth():
-    assert truth.known({}, {"evaluation": {"space": "measured"}})["noisy_truth"]
-    assert not truth.known({}, {"evaluation": {"space": "cylinder"}})["noisy_truth"]
-    assert not truth.known({}, {})["noisy_truth"]
+def test_only_the_synthetic_arm_has_a_truth_that_is_known():
+    def footnote(space, source):
+        settings = {"evaluation": {"space": space}, "measurements": {"source": source}}
+        return truth.known({}, settings)["taken_as_true"]
+
+    assert footnote("cylinder", "synthetic") is None
+    assert "noise" in footnote("measured", "file")
+    assert "VEC minus DH" in footnote("cylinder", "file")
+
+
+def test_every_axis_of_the_arm_has_at_least_three_ticks_and_the_picture_a_legend():
+    model = robot.load("mh180").dh
+    q_rad = np.random.default_rng(1).uniform(-0.05, 0.05, (30, 6))
+    figure = fig2.draw(model, q_rad, measured=True)
+    (ax,) = figure.axes
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        low, high = axis.get_view_interval()
+        ticks = axis.get_major_locator()()
+        assert sum(low <= tick <= high for tick in ticks) >= 3
+    words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert any("30 measured poses" in each for each in words)
+    assert any("arm" in each for each in words)
+
+
+def test_a_slice_of_the_map_says_what_its_angle_is_about():
+    figure = fig3.draw(tables.accuracy_map())
+    words = " ".join(text.get_text() for text in figure.texts)
+    assert "about the robot's first axis" in " ".join(words.split())
+    assert "DH to VEC" in words
 
 
 def test_boxes_see_an_overlap():

@@ -79,7 +79,7 @@ def figure_cut(project):
 
 
 def claims_without_units(project):
-    path = "results/own/claims.parquet"
+    path = "results/mh180/claims.parquet"
     rewrite(project, path, lambda table: table.replace_schema_metadata(None))
 
 

@@ -8,9 +8,15 @@ from kinacc.workflow.catalogue import STAGES
 
 FIGURES = {stage.name for stage in STAGES.values() if stage.is_figure}
 AFTER_POINTS = {"study_chunk", "study", "histories", "claims"} | (FIGURES - {"fig1", "fig3"})
-AFTER_DH = {"residuals", "accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS
+AFTER_DH = {"residuals", "summary", "accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS
 ALL = {"measurements", "vec", "dh", "fig1"} | AFTER_DH
-WITHOUT_MAP = {"accuracy_map", "fig3"}
+NOT_OWN = {"accuracy_map", "fig3", "claims"}  # a measured arm has neither a map here nor claims
+
+
+def both(stages):
+    """Stages of the synthetic arm and, as far as it has them, of the measured one."""
+    found = {"mh180": stages, "own": stages - NOT_OWN}
+    return {name: each for name, each in found.items() if each}
 
 
 def test_nothing_changed(project):
@@ -33,11 +39,11 @@ def test_a_comment_in_the_configuration(project):
         ("map: {grid_mm: 200}", {"mh180": {"accuracy_map", "fig3", "claims"}}),
         (
             "study: {noise_mm: [0.1, 0.2]}",
-            {name: {"study_chunk", "study", "fig4", "claims"} for name in ("mh180", "own")},
+            both({"study_chunk", "study", "fig4", "claims"}),
         ),
         (
             "histories: {noise_mm: 0.2}",
-            {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")},
+            both({"histories", "fig5", "fig6", "claims"}),
         ),
         (
             "datasets: {mh180: {calibration: {vec: {order: 3}}}}",
@@ -53,7 +59,7 @@ def test_a_comment_in_the_configuration(project):
         ),
         (
             "datasets: {own: {evaluation: {points: 11}}}",
-            {"own": AFTER_POINTS | {"assessment_points"}},
+            {"own": (AFTER_POINTS | {"assessment_points"}) - NOT_OWN},
         ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -71,11 +77,11 @@ def test_one_value_of_the_configuration(project, change, reruns):
             {"mh180": {"accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS},
         ),
         ("figures/fig4", {"mh180": {"fig4"}, "own": {"fig4"}}),
-        ("figures/save", {"mh180": FIGURES, "own": FIGURES - {"fig3"}}),
-        ("study/claims/numbers", {"mh180": {"claims"}, "own": {"claims"}}),
+        ("figures/save", both(FIGURES)),
+        ("study/claims/numbers", both({"claims"})),
         (
             "study/histories",
-            {name: {"histories", "fig5", "fig6", "claims"} for name in ("mh180", "own")},
+            both({"histories", "fig5", "fig6", "claims"}),
         ),
         ("kinematics/compliance", {}),  # no data set here asks for that model
         ("calibration/compliance_fit", {}),
@@ -112,7 +118,7 @@ def test_one_row_of_a_file_of_measurements(project):
     fields[6] = f"{float(fields[6]) + 0.01:.9f}"
     lines[7] = ",".join(fields)
     path.write_text("\n".join(lines) + "\n")
-    assert project.to_do() == {"own": (ALL | {"data_check"}) - WITHOUT_MAP - {"fig1"}}
+    assert project.to_do() == {"own": (ALL | {"data_check"}) - NOT_OWN - {"fig1"}}
 
 
 def test_a_file_of_measurements_saved_again_unchanged(project):
@@ -126,7 +132,7 @@ def test_a_robot_file(project):
     reads = {"measurements", "vec", "dh", "residuals", "assessment_points", "fig2"}
     found = project.to_do()
     assert found["mh180"] == reads | {"accuracy_map"} | AFTER_DH
-    assert found["own"] == (reads | {"data_check"} | AFTER_DH) - WITHOUT_MAP
+    assert found["own"] == (reads | {"data_check"} | AFTER_DH) - NOT_OWN
 
 
 def test_the_file_of_another_robot(project):

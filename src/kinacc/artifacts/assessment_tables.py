@@ -98,12 +98,17 @@ ACCURACY_MAP = Artefact(
 )
 ASSESSMENT_POINTS = Artefact(
     "assessment_points",
-    "Operating points of the study with their true errors.",
+    "Operating points of the study with their operating-point errors.",
     (
         whole("point", "number of the operating point, from 0"),
         *JOINTS,
         *error_vector("VEC minus DH position of the tool (measured minus DH on measured data)"),
-        magnitude("true_error_mm", "mm", "magnitude of the error vector", ERROR_MM),
+        magnitude(
+            "true_error_mm",
+            "mm",
+            "operating-point error, the magnitude of the vector; the study takes it as the truth",
+            ERROR_MM,
+        ),
     ),
     ("point",),
 )

@@ -20,6 +20,7 @@ from kinacc.artifacts import (
     data_check_tables,
     model_comparison_tables,
     robot_table,
+    summary_table,
     tournament_tables,
 )
 from kinacc.artifacts.columns import Artefact, Columns, joint_count, texts
@@ -36,6 +37,7 @@ ARTEFACTS: dict[str, Artefact] = {
         model_comparison_tables.MODEL_SELECTION,
         model_comparison_tables.JOINT_BIAS,
         model_comparison_tables.WORST_ROWS,
+        summary_table.SUMMARY,
         assessment_tables.ACCURACY_MAP,
         assessment_tables.ASSESSMENT_POINTS,
         assessment_tables.STUDY_CHUNK,

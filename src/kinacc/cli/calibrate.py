@@ -17,6 +17,8 @@ from kinacc.cli.choice import CONFIG
 if TYPE_CHECKING:
     from kinacc.workflow.plan import Plan
 
+# Made by a study, perhaps of an earlier calibration.
+STUDIED = ("accuracy_map", "assessment_points", "claims")
 WORDS = {"ignore_unknown_options": True}
 CORES = click.option(
     "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
@@ -41,25 +43,21 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc calibrate tracker.yaml
       kinacc calibrate tracker.yaml -- --dry-run
     """
-    from kinacc.cli.fitted import in_words, read, summary
+    from kinacc.cli.fitted import summary
+    from kinacc.workflow.answer import answer, read
 
     configs, plan = carried_out("calibration", words, cores, default=None)
     if plan is None:
         return
-    answers = {name: summary(read(Path(plan.results) / name)) for name in plan.datasets}
+    folders = {name: f"{plan.results}/{name}" for name in plan.datasets}
     if as_json:
+        answers = {name: summary(folder) for name, folder in folders.items()}
         click.echo(json.dumps(answers, indent=2))
         return
-    for dataset, answer in answers.items():
-        click.echo(f"\n{in_words(dataset, answer)}")
-    first = f"{plan.results}/{next(iter(plan.datasets))}"
-    campaign = ["campaign", "start", "check", "--calibration", first, "--noise-mm", "NOISE"]
-    click.echo(
-        "\nnext:\n"
-        f"  {shlex.join(['kinacc', 'predict', first])} --help\n"
-        f"  {shlex.join(['kinacc', *campaign])}   # how large is the largest error?\n"
-        f"  {shlex.join(['kinacc', 'study', *configs])}   # maps and the study of assessors"
-    )
+    more = shlex.join(["kinacc", "study", *configs])
+    for folder in folders.values():
+        tables = {name: table for name, table in read(folder).items() if name not in STUDIED}
+        click.echo("\n".join(["", *answer(folder, tables, following=[more])]))
 
 
 def carried_out(
@@ -90,6 +88,7 @@ def carried_out(
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores or os.cpu_count() or 1), "--configfile", *configs]
     command += more or ["--quiet", "all"]  # stages say how far they are, and what goes wrong
+    command += ["--no-hooks"]  # what a run ends with is said by the command
     done = subprocess.run([*command, "--", target], env=os.environ | ONE_THREAD, check=False)
     if done.returncode:
         raise SystemExit(done.returncode)

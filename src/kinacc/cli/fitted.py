@@ -1,4 +1,4 @@
-"""``kinacc fitted``: what the fits of a results folder are worth."""
+"""``kinacc fitted``: what the calibration in a results folder is worth."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from pathlib import Path
 
 import click
 
-from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL, PLAINEST
+from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, NOMINAL, PLAINEST
 from kinacc.cli.output import Output, answers, plain
 
-IF_THERE = ("data_check", "excluded_rows", "compliance_model")
-TABLES = ("residuals", "model_selection", "dh_identified", "vec_model", "worst_rows")
+_FURTHER = (*(f"{kind}_model" for kind in ALWAYS), "residuals", "worst_rows")
 _MODELS = (NOMINAL, *ERROR_MODELS)
-_LEVER = "lever_coefficient_rad_per_mm"
 _FIGURES = ("n", "rms", "mean", "max")
 _SUBSETS = ("train", "validation")
 _WORST = 5
@@ -21,79 +19,88 @@ _WORST = 5
 
 @click.command("fitted")
 @click.argument("folder", type=click.Path())
+@click.option("--all", "whole", is_flag=True, help="Leave nothing out.")
 @answers("Print JSON instead of text.")
-def fitted(folder: str, out: Output) -> None:
-    """Say what the fits of FOLDER, a results folder of a data set, are worth.
+def fitted(folder: str, whole: bool, out: Output) -> None:
+    """Say what the calibration in FOLDER, the results of a data set, is worth.
 
-    Position errors of rows that trained and of rows held out, the model these select, what the
-    poses could not tell apart, and the rows the selected model fits worst.
+    Half a page: the data and what is wrong with them, errors at held-out poses before and after,
+    the model these select, where it is valid, what the poses could not tell apart, and the bound on
+    the largest error if there is a campaign. With --all training errors, every statement and the
+    rows with the largest errors too.
 
     \b
     Example:
       kinacc fitted results/ur10_b
+      kinacc fitted results/ur10_b --all
       kinacc fitted results/ur10_b --json
     """
-    answer = summary(read(Path(folder)))
-    out.say(answer, in_words(Path(folder).name, answer))
+    from kinacc.workflow.answer import answer
+
+    if out.as_json:
+        out.say(summary(folder), "")
+        return
+    tables = read(folder, whole)
+    lines = answer(folder, tables, whole)
+    click.echo("\n".join([*lines, *(_further(tables) if whole else [])]))
 
 
-def read(folder: Path) -> dict[str, dict]:
-    """The tables needed. Raises InputError naming all that are missing."""
-    from kinacc.artifacts import store
-    from kinacc.errors import Problem, refuse
+def read(folder: Path | str, whole: bool = True) -> dict[str, dict]:
+    """The tables needed, for all there is to tell or for half a page.
 
-    paths = {name: folder / f"{name}.parquet" for name in TABLES}
-    missing = [
-        Problem(str(path), "no such file", fix="run the workflow first")
-        for path in paths.values()
-        if not path.is_file()
-    ]
-    refuse(missing, f"{folder} holds no fits")
-    more = {name: folder / f"{name}.parquet" for name in IF_THERE}
-    paths |= {name: path for name, path in more.items() if path.is_file()}
-    return {name: store.read(path) for name, path in paths.items()}
+    Raises InputError naming all that are missing.
+    """
+    from kinacc.calibration.summary import TABLES
+    from kinacc.workflow import answer
+
+    return answer.read(folder, (*TABLES, *(_FURTHER if whole else ())))
 
 
-def summary(tables: Mapping[str, Mapping]) -> dict:
+def summary(folder: Path | str) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
     from kinacc.calibration import blind_words
-    from kinacc.workflow.stages import data_check
+    from kinacc.calibration.summary import bending, findings, of, selected
+    from kinacc.workflow.answer import campaign_of, facts_of
 
+    tables = read(folder)
+    facts, bound = facts_of(tables), campaign_of(folder).assessed
     excluded = tables.get("excluded_rows")
-    compared = {str(name) for name in tables["residuals"]["comparison"]}
-    models = [model for model in _MODELS if f"{model}_vs_measured" in compared]
     choice, told = tables["model_selection"], tables["dh_identified"]
-    selected = next(
-        str(name) for name, yes in zip(choice["model"], choice["selected"], strict=True) if yes
-    )
+    best = selected(choice)
     gain = choice["gain_mm2"][list(choice["model"]).index("vec")]
     error = choice["gain_std_error_mm2"][list(choice["model"]).index("vec")]
     return {
-        "selected": selected,
+        "selected": best,
         "gain_of_vec_mm2": plain(gain),
         "gain_std_error_mm2": plain(error),
         "vec_order": int(max(tables["vec_model"]["order"])),
         "position_error_mm": {
             model: {subset: _errors(tables["residuals"], model, subset) for subset in _SUBSETS}
-            for model in models
+            for model in _MODELS
+            if model in (NOMINAL, *choice["model"])
         },
-        "parameters": {
-            status: [
-                str(p)
-                for p, s in zip(told["parameter"], told["status"], strict=True)
-                if s == status
-            ]
-            for status in dict.fromkeys(str(each) for each in told["status"])
+        **{
+            topic: {
+                item: {name: plain(each.value) for name, each in known.items()}
+                for item, known in of(facts, topic).items()
+            }
+            for topic in ("held_out_error", "range")
         },
+        "parameters": _statuses(told),
         "undetermined": blind_words.listed(told),
-        "worst_rows": _worst(tables["worst_rows"], selected),
-        "data": data_check.in_words(tables["data_check"]) if "data_check" in tables else [],
-        "excluded": None if excluded is None else _excluded(excluded, selected),
+        "worst_rows": _worst(tables["worst_rows"], best),
+        "data": findings(tables["data_check"]) if "data_check" in tables else [],
+        "excluded": None if excluded is None else _excluded(excluded, best),
         "position_error_with_excluded_mm": None
         if excluded is None
-        else {model: _with_excluded(tables["residuals"], excluded, model) for model in models},
+        else {
+            model: _with_excluded(tables["residuals"], excluded, model)
+            for model in _MODELS
+            if model in (NOMINAL, *choice["model"])
+        },
         "gains_mm2": _gains(choice),
-        "bending": _bending(tables.get("compliance_model", {})),
+        "bending": bending(tables.get("compliance_model")),
+        "largest_error": None if bound is None else bound.as_facts(),
     }
 
 
@@ -107,15 +114,13 @@ def _gains(choice: Mapping) -> dict[str, dict]:
     }
 
 
-def _bending(table: Mapping) -> list[dict]:
-    """Fitted coefficients of joints that bend, each with its standard deviation."""
-    names = ("compliance_rad_per_nm", "lever_coefficient_rad_per_mm")
-    return [
-        {"joint": int(joint)}
-        | {each: plain(table[each][row]) for name in names for each in (name, f"std_{name}")}
-        for row, joint in enumerate(table.get("joint", ()))
-        if any(table[name][row] == table[name][row] for name in names)
-    ]
+def _statuses(told: Mapping) -> dict[str, list[str]]:
+    """Parameters of the DH fit by what the poses say of them."""
+    pairs = [(str(p), str(s)) for p, s in zip(told["parameter"], told["status"], strict=True)]
+    return {
+        status: [parameter for parameter, each in pairs if each == status]
+        for status in dict.fromkeys(each for _, each in pairs)
+    }
 
 
 def _errors(table: Mapping, model: str, subset: str) -> dict | None:
@@ -128,17 +133,11 @@ def _errors(table: Mapping, model: str, subset: str) -> dict | None:
 
 def _excluded(table: Mapping, model: str) -> list[dict]:
     """The rows of one model, each with its error: null where it could not be read."""
-    import numpy as np
+    from kinacc.calibration.summary import excluded_errors
 
-    size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
-    rows = np.flatnonzero(table["comparison"] == f"{model}_vs_measured")
     return [
-        {
-            "line": int(table["line"][row]),
-            "reason": str(table["reason"][row]),
-            "error_mm": plain(size[row]),
-        }
-        for row in rows[np.argsort(table["line"][rows], kind="stable")]
+        {"line": line, "reason": reason, "error_mm": plain(error)}
+        for line, reason, error in excluded_errors(table, model)
     ]
 
 
@@ -181,79 +180,21 @@ def _worst(table: Mapping, model: str) -> list[dict]:
     ]
 
 
-def in_words(name: str, answer: Mapping) -> str:
-    """The summary for people."""
-    lines = [f"{name}: {answer['selected']} is selected{_why(answer)}", ""]
-    lines.append("position error, mm    training rms   held out: rms     mean      max")
-    for model, of in answer["position_error_mm"].items():
-        called = f"vec (order {answer['vec_order']})" if model == "vec" else model
-        train, out = (of[subset] or {} for subset in _SUBSETS)
-        figures = [train.get("rms"), *(out.get(each) for each in ("rms", "mean", "max"))]
-        shown = ["       -" if each is None else f"{each:8.3f}" for each in figures]
-        lines.append(f"{called:20} {shown[0]:>13}   {shown[1]:>13} {shown[2]} {shown[3]}")
-        if more := (answer["position_error_with_excluded_mm"] or {}).get(model):
-            shown = [f"{more[each]:8.3f}" for each in _FIGURES[1:]]
-            lines.append(f"  with excluded rows {'':13}   {shown[0]:>13} {shown[1]} {shown[2]}")
-    if answer["excluded"]:
-        lines += ["", "rows excluded by the configuration:"]
-        for each in answer["excluded"]:
-            error = "" if each["error_mm"] is None else f", {each['error_mm']:.3f} mm"
-            lines.append(f"  line {each['line']}{error}: {each['reason']}")
-    count = {status: len(names) for status, names in answer["parameters"].items()}
-    listed = ", ".join(f"{number} {status}" for status, number in count.items())
-    lines += ["", f"parameters of the DH fit: {listed}"]
-    if answer["bending"]:
-        lines += ["", "joints that bend under gravity:", *_bending_in_words(answer["bending"])]
-    if answer["undetermined"]:
-        lines.append("what the poses that were fitted leave open:")
-        lines += [f"  - {text}" for text in answer["undetermined"]]
-    lines += ["", f"largest position errors ({answer['selected']}):"]
-    for row in answer["worst_rows"]:
+def _further(tables: Mapping[str, Mapping]) -> list[str]:
+    """What does not stand on the half page."""
+    from kinacc.calibration.summary import selected
+    from kinacc.calibration.summary_words import counted, model_name, paragraph
+
+    best = selected(tables["model_selection"])
+    statuses = [f"{len(each)} {name}" for name, each in _statuses(tables["dh_identified"]).items()]
+    worst = []
+    for row in _worst(tables["worst_rows"], best):
         where = f"row {row['row']}" if row["line"] is None else f"line {row['line']:.0f}"
-        lines.append(f"  {where}, pose {row['pose']}, {row['target']}: {row['error_mm']:.3f} mm")
-    if answer["data"]:
-        lines += ["", "what the check of the data found:"]
-        lines += [f"  - {text}" for text in answer["data"]]
-    return "\n".join(lines)
-
-
-def _bending_in_words(bending: list[Mapping]) -> list[str]:
-    lines, products = [], []
-    for each in bending:
-        for name, per in (("compliance_rad_per_nm", "N m"), (_LEVER, "mm of lever")):
-            if each[name] is None:
-                continue
-            std = each[f"std_{name}"]
-            sure = "(not determined)" if std is None else f"+- {1e6 * std:.3g}"
-            lines.append(f"  joint {each['joint']}: {1e6 * each[name]:.4g} {sure} urad per {per}")
-        if each[_LEVER] is not None:
-            products.append(str(each["joint"]))
-    if products:
-        alone = all(each["compliance_rad_per_nm"] is None for each in bending)
-        load = (
-            ", and for the payload that was measured" if alone else " of what the arm itself weighs"
-        )
-        lines.append(
-            f"  Masses are not stated: of joint {', '.join(products)} only the product of weight "
-            f"and compliance can be seen{load}."
-        )
-    return lines
-
-
-def _why(answer: Mapping) -> str:
-    gains = {
-        name.upper() if name == "vec" else name: of for name, of in answer["gains_mm2"].items()
-    }
-    names = " and ".join(gains)
-    if any(each["gain"] is None for each in gains.values()):
-        return f": nothing was held out to judge the {names} model by"
-    told = []
-    for name, each in gains.items():
-        sure = "" if each["std_error"] is None else f" +- {each['std_error']:.4f}"
-        what = "" if told else "the squared error of held-out rows is "
-        less = "less" if each["gain"] > 0 else "more"
-        told.append(f"with {name} {what}{abs(each['gain']):.4f}{sure} mm^2 {less}")
-    if any(each["std_error"] is None for each in gains.values()):
-        return f": {', '.join(told)}"
-    one = names if len(gains) == 1 else "another model than DH"
-    return f": {', '.join(told)}; {one} has to be less by more than two standard errors"
+        worst.append(f"{where}, pose {row['pose']}, {row['target']}: {row['error_mm']:.3f} mm")
+    return [
+        *paragraph("parameters", [f"of the DH fit: {', '.join(statuses)}"]),
+        *paragraph(
+            "worst rows",
+            [f"the {counted(len(worst), 'row')} that {model_name(best)} is farthest from:", *worst],
+        ),
+    ]

@@ -26,6 +26,7 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study tracker.yaml
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
+    from kinacc.workflow.answer import answer, read
     from kinacc.workflow.verification.mending import SNAKEFILE
 
     paper = SNAKEFILE.parent / "config.yaml"
@@ -35,8 +36,9 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps({"results": [f"{plan.results}/{name}" for name in plan.datasets]}))
         return
-    for dataset in plan.datasets:
-        click.echo(f"{dataset}: tables and figures are in {plan.results}/{dataset}")
     options = [word for name in configs for word in ("--config", name)]
     check = shlex.join(["kinacc", "check-results", plan.results, *options])
-    click.echo(f"next:\n  {check}")
+    for dataset in plan.datasets:
+        folder = f"{plan.results}/{dataset}"
+        lines = answer(folder, read(folder), following=[check])
+        click.echo("\n".join(["", *lines, f"tables and figures are in {folder}"]))

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import Axes3D, proj3d
@@ -21,6 +23,7 @@ from kinacc.kinematics import dh, tables
 from kinacc.kinematics import robot as robots
 
 SIDES = 16  # of the prisms that stand for links and joints
+LEGEND_IN = 0.34  # height of the legend below the axes
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
 LINK, JOINT = "#f2a93b", "#5b6470"
 LIGHT = np.array([0.3, -0.6, 0.74])
@@ -38,6 +41,7 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
         robot.dh_joints(reported),
         tool_mm=_tool_mm(inputs.get("frames"), evaluation, robot),
         cylinder=evaluation["cylinder"] if evaluation["space"] == "cylinder" else None,
+        measured=evaluation["space"] == "measured",
         dataset=settings.get("dataset"),
     )
 
@@ -60,6 +64,7 @@ def draw(
     *,
     tool_mm: np.ndarray | None = None,
     cylinder: Mapping[str, Any] | None = None,
+    measured: bool = False,
     dataset: str | None = None,
 ) -> Figure:
     """Draw the operating points and the arm at the one nearest to their middle, in mm.
@@ -67,7 +72,8 @@ def draw(
     ``q_rad`` (n, k) are the DH joint angles of the points, ``tool_mm`` (3,) the tool centre point
     in the flange frame; ``cylinder`` is the evaluation space as a sector about the axis of joint 1
     with ``inner_radius_mm``, ``radial_span_mm``, ``bottom_mm``, ``height_mm`` and ``angle_deg``
-    (two values). Everything is in the robot base frame. Raises InputError without a point.
+    (two values); ``measured``: the points are poses that were measured. Everything is in the robot
+    base frame. Raises InputError without a point.
     """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
     q_rad = q_rad[np.isfinite(q_rad).all(axis=1)]
@@ -77,7 +83,7 @@ def draw(
     flange = dh.forward(model, q_rad)
     points_mm = flange.position_mm + flange.rotation @ tool_mm
     with style.house():
-        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.2, arranged=False)
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.2 + LEGEND_IN, arranged=False)
         ax: Axes3D = figure.add_axes((-0.06, 0.03, 1.06, 1.0), projection="3d")
         ax.computed_zorder = False
         ax.set_autoscale_on(False)
@@ -92,9 +98,24 @@ def draw(
         seen.append(_arm(ax, model, posture, tool_mm))
         _first_axis(ax, min(part[:, 2].min() for part in seen))
         _frame_axes(ax, np.concatenate(seen))
-        _fill(figure, ax, top_in=0.2 if dataset else 0.04)
+        _fill(figure, ax, top_in=0.2 if dataset else 0.04, foot_in=LEGEND_IN)
+        _legend(figure, len(points_mm), measured, cylinder is not None)
         style.name_dataset(figure, dataset)
     return figure
+
+
+def _legend(figure: Figure, points: int, measured: bool, space: bool) -> None:
+    """Say below the axes what is drawn."""
+    what = "measured poses of the study" if measured else "operating points"
+    handles: list[Any] = [
+        Line2D([], [], ls="", marker="o", ms=3.0, mew=0, color=style.BLUE),
+        Patch(facecolor=LINK),
+    ]
+    names = [f"tool at {points} {what}", "arm at a point in their middle"]
+    if space:
+        handles.append(Patch(facecolor=style.SKY, alpha=0.4, edgecolor=style.BLUE))
+        names.append("evaluation space")
+    figure.legend(handles, names, loc="lower left", ncols=2 if space else 1)
 
 
 def _prism(begin: np.ndarray, end: np.ndarray, radius: float, colour: str):
@@ -211,11 +232,19 @@ def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
     ax.set_zlabel("z (mm)", labelpad=1)
     ax.tick_params(pad=-2, labelsize=style.SMALL_PT)
     ax.tick_params(axis="z", pad=2)
-    step = _round_step((high - low).max() / 5)
-    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+    widest = _round_step((high - low).max() / 5)
+    for axis, first, last in zip((ax.xaxis, ax.yaxis, ax.zaxis), low, high, strict=True):
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
         axis._axinfo["grid"].update(color="#e3e3e3", linewidth=0.5)
-        axis.set_major_locator(MultipleLocator(step))
+        axis.set_major_locator(MultipleLocator(_tick_step(first, last, widest)))
+
+
+def _tick_step(low: float, high: float, widest: float) -> float:
+    """Return the largest round step up to ``widest`` with at least three ticks in the range."""
+    step = widest
+    while np.floor(high / step) - np.ceil(low / step) < 2:
+        step = _round_step(step / 2.6)  # the next smaller one of 1, 2, 5
+    return step
 
 
 def _round_step(least: float) -> float:
@@ -224,13 +253,15 @@ def _round_step(least: float) -> float:
     return float(next(m * power for m in (1, 2, 5, 10) if m * power >= least))
 
 
-def _fill(figure: Figure, ax: Axes3D, top_in: float, margin_in: float = 0.04) -> None:
+def _fill(
+    figure: Figure, ax: Axes3D, top_in: float, foot_in: float, margin_in: float = 0.04
+) -> None:
     """Scale and move the axes until what they draw just fills the figure.
 
     Text keeps its size while the axes grow, so one step does not suffice; two do.
     """
     size = np.array(figure.get_size_inches())
-    low, high = np.full(2, margin_in) / size, 1 - np.array([margin_in, top_in]) / size
+    low, high = np.array([margin_in, foot_in]) / size, 1 - np.array([margin_in, top_in]) / size
     for _ in range(2):
         figure.draw_without_rendering()
         drawn = _drawn(figure, ax)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ UNREACHED: dict[str, Any] = {
 }
 PARTLY: dict[str, Any] = {"marker": ".", "ms": 1.6, "mew": 0, "mfc": "white", "ls": ""}
 RING: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "none", "ls": ""}
+HEAD = "Map error, DH to VEC, in radial slices at these angles about the robot's first axis"
 DEFAULT_CELL_MM = 25.0
 
 
@@ -53,7 +55,7 @@ class Panels:
     left: float = 0.62
     right: float = 0.72
     gap: float = 0.1
-    head: float = 0.4
+    head: float = 0.56
     between: float = 0.3
     foot: float = 0.68
 
@@ -218,6 +220,14 @@ def _words(
         (left + right) / 2,
         (layout.foot - 0.31) / layout.height,
         "Radius (mm)",
+        ha="center",
+        va="center",
+        fontsize=style.TEXT_PT,
+    )
+    figure.text(
+        (left + right) / 2,
+        1 - (layout.name_h + 0.12) / layout.height,
+        HEAD if layout.columns > 2 else fill(HEAD, 44),
         ha="center",
         va="center",
         fontsize=style.TEXT_PT,

@@ -26,13 +26,13 @@ def draw(
     summary: Columns,
     *,
     true_accuracy_mm: float | None = None,
-    noisy_truth: bool = False,
+    taken_as_true: str | None = None,
     dataset: str | None = None,
 ) -> Figure:
     """Draw ``study_summary``: means joined by lines, bars from the smallest to the largest.
 
     ``true_accuracy_mm`` is the true accuracy; without it, it is taken from ``mean_mm - bias_mm``.
-    ``noisy_truth`` says that the truth contains the instrument's noise.
+    ``taken_as_true``: footnote where the truth is not known; what the study took for it.
     Raises InputError where a column is missing.
     """
     require(summary, COLUMNS, "study_summary")
@@ -57,7 +57,7 @@ def draw(
                 labels.append((last, fill(words, 13), colour))
         if true_accuracy_mm is not None:
             ax.axhline(true_accuracy_mm, color=style.INK, lw=1, ls=(0, (4, 2)), zorder=1)
-            words = "“True” accuracy*" if noisy_truth else "True accuracy"
+            words = "“True” accuracy*" if taken_as_true else "True accuracy"
             labels.append((true_accuracy_mm, f"{words}\n{true_accuracy_mm:.3f} mm", style.INK))
         ax.set(xlabel=r"Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
         ax.set_xticks(levels if levels.size <= 8 else levels[:: -(-levels.size // 8)])
@@ -68,9 +68,9 @@ def draw(
         ax.grid(axis="x", visible=False)
         _label_lines(ax, labels)
         ax.set_title(_repetitions(summary), loc="left", color=style.MUTED, fontsize=style.SMALL_PT)
-        if noisy_truth:
+        if taken_as_true:
             figure.supxlabel(
-                truth.FOOTNOTE,
+                taken_as_true,
                 fontsize=style.SMALL_PT, color=style.MUTED, x=0.01, ha="left",
             )  # fmt: skip
         style.name_dataset(figure, dataset)

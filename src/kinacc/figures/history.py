@@ -39,7 +39,7 @@ def draw(
     *,
     example: str,
     true_accuracy_mm: float | None = None,
-    noisy_truth: bool = False,
+    taken_as_true: str | None = None,
     dataset: str | None = None,
 ) -> Figure:
     """Draw one example of ``histories``.
@@ -48,21 +48,21 @@ def draw(
     the bound eta and the true accuracy (largest true error of all operating points, visited or
     not); a dotted line where the largest is first measured. Below: rejection
     probability and its threshold alpha.
-    ``noisy_truth`` says that the truth contains the instrument's noise.
+    ``taken_as_true``: footnote where the truth is not known; what the study took for it.
     Raises InputError where a column is missing or there is no row.
     """
     values = _sorted(histories, example)
     again = resampled(values["point"])
     with style.house():
-        height = 4.0 + LINE_IN * (bool(dataset) + noisy_truth)
+        height = 4.0 + LINE_IN * (bool(dataset) + bool(taken_as_true))
         figure = style.new_figure(style.SINGLE_COLUMN_IN, height)
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(1.35, 1))
-        _magnitudes(top, values, again, true_accuracy_mm, noisy_truth)
+        _magnitudes(top, values, again, true_accuracy_mm, taken_as_true)
         _probability(bottom, values, again)
-        _legend(figure, top, bottom, noisy_truth)
+        _legend(figure, top, bottom, taken_as_true)
         title = verdict(values)
         if true_accuracy_mm is not None:
-            title += "\n" + _mark_largest((top, bottom), values, true_accuracy_mm, noisy_truth)
+            title += "\n" + _mark_largest((top, bottom), values, true_accuracy_mm, taken_as_true)
         title += _unmet(histories, example)
         top.set_title(title, loc="left", fontsize=style.SMALL_PT, linespacing=1.3)
         bottom.set_xlabel("Iteration k")
@@ -110,11 +110,11 @@ def _magnitudes(
     values: Columns,
     again: np.ndarray,
     true_accuracy_mm: float | None,
-    noisy_truth: bool,
+    taken_as_true: str | None,
 ) -> None:
     k = values["iteration"]
-    label = "“true” error*" if noisy_truth else "true error"
-    accuracy = "“true” accuracy*" if noisy_truth else "true accuracy"
+    label = "“true” error*" if taken_as_true else "true error"
+    accuracy = "“true” accuracy*" if taken_as_true else "true accuracy"
     ax.step(k, values["true_mm"], where="mid", color="#9a9a9a", lw=0.6, label=label, zorder=2)
     ax.plot(
         k[~again], values["measured_mm"][~again], ls="", marker="o", ms=2.4, mew=0,
@@ -138,7 +138,7 @@ def _magnitudes(
     ax.grid(axis="x", visible=False)
 
 
-def _legend(figure: Figure, top: Axes, bottom: Axes, noisy_truth: bool) -> None:
+def _legend(figure: Figure, top: Axes, bottom: Axes, taken_as_true: str | None) -> None:
     """Name what both panels show below them, where it covers no point."""
     handles, names = (
         above + below
@@ -153,16 +153,16 @@ def _legend(figure: Figure, top: Axes, bottom: Axes, noisy_truth: bool) -> None:
         ncols=2,
         alignment="left",
         markerscale=1.6,
-        title=truth.FOOTNOTE if noisy_truth else None,
+        title=taken_as_true,
         title_fontproperties={"size": style.SMALL_PT},
     )
 
 
 def _mark_largest(
-    axes: tuple[Axes, Axes], values: Columns, true_accuracy_mm: float, noisy_truth: bool
+    axes: tuple[Axes, Axes], values: Columns, true_accuracy_mm: float, taken_as_true: str | None
 ) -> str:
     """Mark the iteration that first measures the point with the largest true error, in words."""
-    words = "largest “true” error*" if noisy_truth else "largest true error"
+    words = "largest “true” error*" if taken_as_true else "largest true error"
     k = values["iteration"][np.isclose(values["true_mm"], true_accuracy_mm, rtol=0, atol=1e-9)]
     if not k.size:
         return f"{words} not measured"

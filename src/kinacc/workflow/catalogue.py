@@ -209,6 +209,20 @@ STAGES: dict[str, Stage] = {
             measured=True,
         ),
         Stage(
+            "summary",
+            "summing up what the calibration is worth",
+            (
+                "measurements",
+                "robot",
+                *_MODELS,
+                "dh_identified",
+                "pose_errors",
+                "model_selection",
+            ),
+            ("summary",),
+            optional=("data_check", "excluded_rows", *_FURTHER),
+        ),
+        Stage(
             "accuracy_map",
             "mapping the largest error over the slices of the evaluation space (Fig. 3)",
             _MODELS,
@@ -229,7 +243,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "assessment_points",
-            "choosing the operating points of the study and their true errors",
+            "choosing the operating points of the study and their errors",
             ("measurements", *_MODELS, "pose_errors"),
             ("assessment_points",),
             ("robot", "evaluation"),
@@ -294,19 +308,19 @@ STAGES: dict[str, Stage] = {
             "fig4",
             "drawing Fig. 4, assessed accuracy against noise",
             ("study_summary", "assessment_points"),
-            ("dataset", "evaluation.space"),
+            ("dataset", "evaluation.space", "measurements.source"),
         ),
         _figure(
             "fig5",
             "drawing Fig. 5, a model that is invalidated",
             ("histories", "assessment_points"),
-            ("dataset", "evaluation.space"),
+            ("dataset", "evaluation.space", "measurements.source"),
         ),
         _figure(
             "fig6",
             "drawing Fig. 6, a model that cannot be invalidated",
             ("histories", "assessment_points"),
-            ("dataset", "evaluation.space"),
+            ("dataset", "evaluation.space", "measurements.source"),
         ),
         Stage(
             "claims",
@@ -382,7 +396,15 @@ STAGES: dict[str, Stage] = {
 }
 
 # The stages of a calibration; maps, the study of assessors and the paper's claims go on from there.
-CALIBRATION = ("measurements", "data_check", "vec", "dh", "residuals", "excluded_rows")
+CALIBRATION = (
+    "measurements",
+    "data_check",
+    "vec",
+    "dh",
+    "residuals",
+    "excluded_rows",
+    "summary",
+)
 
 
 def maker_of(artefact: str) -> Stage:

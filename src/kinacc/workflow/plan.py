@@ -125,6 +125,7 @@ class Plan:
             for name in ("accuracy_map", "fig3"):
                 reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
         if config["measurements"]["source"] != "synthetic":
+            reasons["claims"] = "the paper's claims are about the paper's arm"
             for name in ("robustness_chunk", "robustness_table"):
                 reasons[name] = "no further draws of a measured arm"
             if "exclude" not in config["measurements"]["file"]:
@@ -215,20 +216,17 @@ class Plan:
                 )
         refuse(problems)
 
-    def remarks(self) -> list[str]:
-        """What whoever started a run should know of its data at the end, a line each."""
-        told = []
-        for dataset in self.datasets:
-            path = self._table("data_check", dataset)
-            if "data_check" in self.left_out(dataset) or not os.path.exists(path):
-                continue
-            from kinacc.artifacts.store import read
-            from kinacc.workflow.stages.data_check import in_words
+    def remarks(self, dataset: str) -> list[str]:
+        """What the check found in a data set's file, a line each."""
+        path = self._table("data_check", dataset)
+        if "data_check" in self.left_out(dataset) or not os.path.exists(path):
+            return []
+        from kinacc.artifacts.store import read
+        from kinacc.calibration.summary import findings
 
-            found = in_words(read(path))
-            told += [f"{dataset}: the check of the data found:"] if found else []
-            told += [f"  - {words}" for words in found]
-        return told
+        found = findings(read(path))
+        told = [f"{dataset}: the check of the data found:"] if found else []
+        return told + [f"  - {words}" for words in found]
 
     def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
         """Files a stage leaves: artefact -> path, or picture format -> path."""

@@ -10,7 +10,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.checks import check, few_poses
 from kinacc.checks.report import Report
-from kinacc.checks.suspicion import NOTE, Suspicion
+from kinacc.checks.suspicion import Suspicion
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot
 from kinacc.measurements.layout import Layout
@@ -45,17 +45,6 @@ def examined(settings: Mapping, dataset: str, progress: Progress) -> Report:
     few = few_poses.found(reading.columns, arm, settings["calibration"])
     accepted = settings["data_check"]["accept"]
     return replace(report, suspicions=(*report.suspicions, *few), accepted=dict(accepted))
-
-
-def in_words(table: Mapping) -> list[str]:
-    """Findings of a ``data_check`` table, a line each, the gravest first."""
-    order = sorted(range(len(table["finding"])), key=lambda i: table["level"][i] == NOTE)
-    return [
-        f"{table['finding'][i]}: {table['what'][i]}"
-        + (f" ({table['lines'][i]})" if table["lines"][i] else "")
-        + (f"; accepted: {table['accepted'][i]}" if table["accepted"][i] else "")
-        for i in order
-    ]
 
 
 def _problem(path: str, each: Suspicion) -> Problem:

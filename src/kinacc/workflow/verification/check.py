@@ -176,7 +176,10 @@ def _is_dataset(folder: Path) -> bool:
 def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
     """Check the folder of one data set; see :func:`check_results`."""
     checked, found, tables, marks = [], [], {}, {}
+    behind = _left_behind(folder, plan)
     for name, path in _tables_there(folder):
+        if name in behind:
+            continue
         checked.append(str(path))
         is_part = path.parent != folder
         doubt = Doubt(maker_of(name).name, path.stem if is_part else None)
@@ -197,6 +200,7 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         f"{reason}"
         for reason in dict.fromkeys(told.values())
     ]
+    notes += [f"{folder / name}.parquet: left from before, {why}" for name, why in behind.items()]
     found += _missing(folder, left_out)
     for name, picture in _pictures(folder, plan, left_out):
         checked += [str(picture)] if picture.exists() else []
@@ -270,11 +274,32 @@ def _tables_there(folder: Path) -> Iterator[tuple[str, Path]]:
             yield from ((name, Path(part)) for part in own)
 
 
+def _left_behind(folder: Path, plan: Plan | None) -> dict[str, str]:
+    """Tables that the data set does without now, each with the reason."""
+    left_out = _of_paper_alone(folder) if plan is None else plan.left_out(folder.name)
+    return {
+        name: reason
+        for stage, reason in left_out.items()
+        for name in STAGES[stage].outputs
+        if (folder / f"{name}.parquet").is_file()
+    }
+
+
+def _of_paper_alone(folder: Path) -> dict[str, str]:
+    """Stages that only the paper's arm goes through, where the folder is of a measured arm."""
+    path = folder / "measurements.parquet"
+    with suppress(InputError):
+        if path.is_file() and np.isfinite(store.read(path).get("row", np.nan)).any():
+            return {"claims": "the paper's claims are about the paper's arm"}
+    return {}
+
+
 def _left_out(folder: Path, marks: dict, tables: dict, plan: Plan | None) -> dict[str, str]:
     """Stages the data set rightly does without, each with the reason."""
     if plan is not None:
         return dict(plan.left_out(folder.name))
-    without = _without_file(folder, tables) | _without_map(folder, marks)
+    own = _of_paper_alone(folder)
+    without = _without_file(folder, tables) | own | _without_map(folder, marks, "claims" in own)
     return without | _without_models(folder, tables)
 
 
@@ -300,10 +325,14 @@ def _without_models(folder: Path, tables: dict) -> dict[str, str]:
     }
 
 
-def _without_map(folder: Path, marks: dict) -> dict[str, str]:
+def _without_map(folder: Path, marks: dict, no_claims: bool) -> dict[str, str]:
     drawn = any((folder / FIGURE_FOLDER / f"fig3.{kind}").exists() for kind in FORMATS)
     if drawn or (folder / "accuracy_map.parquet").exists():
         return {}
+    if no_claims:  # the one table that would tell whether there was a map
+        return dict.fromkeys(
+            ("accuracy_map", "fig3"), "there is no map; --config tells if it lacks"
+        )
     if not made_without(folder, "accuracy_map", marks):
         return {}
     return dict.fromkeys(("accuracy_map", "fig3"), "the claims were made without a map")

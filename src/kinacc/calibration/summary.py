@@ -1,0 +1,204 @@
+"""What a calibration is worth, as facts: data, errors, selection, range, what is left open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from kinacc.artifacts.allowed import FINDING_LEVELS, SELECTABLE
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
+from kinacc.calibration import blind_words
+from kinacc.kinematics.robot import Robot
+
+LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
+TABLES = ("measurements", "robot", "frames", "dh_identified", "pose_errors", "model_selection")
+_ORDER = (NOMINAL, *SELECTABLE)  # the plainest first
+_BENDING = {
+    "compliance_rad_per_nm": "rad/(N m)",
+    "std_compliance_rad_per_nm": "rad/(N m)",
+    "lever_coefficient_rad_per_mm": "rad/mm",
+    "std_lever_coefficient_rad_per_mm": "rad/mm",
+}
+_STATISTICS = ("n", "mean", "quantile_99", "largest")
+
+
+class Fact(NamedTuple):
+    """One row of ``summary``; a number with its unit, or a text."""
+
+    topic: str
+    item: str
+    statistic: str
+    value: float = np.nan
+    unit: str | None = None
+    text: str | None = None
+
+
+def facts(tables: Mapping[str, Columns], robot: Robot) -> list[Fact]:
+    """Everything ``summary`` holds of the tables ``TABLES`` and, where there, of models and data.
+
+    ``robot``: the one the tables were made with.
+    """
+    return [
+        *_data(tables["measurements"], robot),
+        *_frames(tables["frames"]),
+        *_findings(tables.get("data_check")),
+        *_errors(tables["pose_errors"]),
+        *_selection(tables),
+        *(
+            Fact("bending", f"joint {each['joint']}", name, float(each[name]), unit)
+            for each in bending(tables.get("compliance_model"))
+            for name, unit in _BENDING.items()
+            if each[name] is not None
+        ),
+        *_excluded(tables.get("excluded_rows"), selected(tables["model_selection"])),
+        *_range(tables["measurements"], robot),
+        *(
+            Fact("undetermined", str(number), "statement", text=text)
+            for number, text in enumerate(blind_words.listed(tables["dh_identified"]), 1)
+        ),
+    ]
+
+
+def selected(choice: Mapping) -> str:
+    """The model that a ``model_selection`` table says is selected."""
+    return next(
+        str(name) for name, yes in zip(choice["model"], choice["selected"], strict=True) if yes
+    )
+
+
+def bending(table: Mapping | None) -> list[dict]:
+    """Coefficients of every joint that bends by a ``compliance_model``, None where not fitted."""
+    rows = range(len(table["joint"])) if table is not None else ()
+    found = []
+    for row in rows:
+        values = {name: float(table[name][row]) for name in _BENDING}
+        if any(np.isfinite(value) for value in values.values()):
+            known = {name: value if np.isfinite(value) else None for name, value in values.items()}
+            found.append({"joint": int(table["joint"][row]), **known})
+    return found
+
+
+def findings(table: Mapping) -> list[str]:
+    """Findings of a ``data_check`` table in words, the gravest first."""
+    return [each.text for each in _findings(table) if each.text]
+
+
+def excluded_errors(table: Mapping, model: str) -> list[tuple[int, str, float]]:
+    """Line, reason and position error in mm of every row left out; NaN where it has none."""
+    size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
+    rows = np.flatnonzero(table["comparison"] == Comparison(MEASURED, model).name)
+    rows = rows[np.argsort(table["line"][rows], kind="stable")]
+    return [(int(table["line"][i]), str(table["reason"][i]), float(size[i])) for i in rows]
+
+
+def _data(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
+    rows = np.asarray(measurements.get("row", [np.nan]), dtype=float)
+    source = "file" if np.isfinite(rows).any() else "synthetic"
+    counts = {
+        "readings": len(measurements["pose"]),
+        "poses": len(np.unique(measurements["pose"])),
+        "targets": len(np.unique(np.asarray(measurements["target"]).astype(str))),
+    }
+    yield Fact("robot", robot.name, "name", text=robot.name)
+    yield Fact("data", "measurements", "source", text=source)
+    yield from (Fact("data", "measurements", name, n, "1") for name, n in counts.items())
+
+
+def _frames(table: Mapping) -> Iterator[Fact]:
+    """Whether base and tool were fitted: then every model has its own."""
+    places = np.stack([table[name] for name in ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz")], axis=1)
+    own = np.asarray(table["model"]) == NOMINAL
+    first = np.asarray(table["model"]) == np.asarray(table["model"])[~own][0]
+    fitted = not np.array_equal(places[own], places[first])
+    yield Fact("robot", "base and tool", "fitted", float(fitted), "1")
+
+
+def _findings(table: Mapping | None) -> Iterator[Fact]:
+    if table is None:
+        return
+    note = FINDING_LEVELS[-1]
+    order = sorted(range(len(table["finding"])), key=lambda i: table["level"][i] == note)
+    for i in order:
+        text = f"{table['finding'][i]}: {table['what'][i]}"
+        text += f" ({table['lines'][i]})" if table["lines"][i] else ""
+        text += f"; accepted: {table['accepted'][i]}" if table["accepted"][i] else ""
+        count = float(table["rows"][i])
+        yield Fact("check", str(table["finding"][i]), str(table["level"][i]), count, "1", text)
+    yield Fact("check", "data_check", "findings", float(len(order)), "1")
+
+
+def _errors(table: Mapping) -> Iterator[Fact]:
+    """Statistics of every comparison; held out at rows that every model was tried on."""
+    comparison, estimate = (np.asarray(table[name]) for name in ("comparison", "estimate"))
+    sizes = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
+    populations = {
+        "cross_validated": ("held_out_error", "held_out_model_difference"),
+        "train": ("training_error", "model_difference"),
+    }
+    for kind, topics in populations.items():
+        of_kind = {
+            each: np.flatnonzero((comparison == each.name) & (estimate == kind))
+            for each in sorted(COMPARISONS, key=lambda each: _ORDER.index(each.model))
+        }
+        there = {each: rows for each, rows in of_kind.items() if len(rows)}
+        if not there:
+            continue
+        common = set.intersection(*(set(table["row"][rows]) for rows in there.values()))
+        for each, rows in there.items():
+            size = sizes[rows[np.isin(table["row"][rows], list(common))]]
+            measured = each.reference == MEASURED
+            item = each.model if measured else each.name
+            for name, value in zip(_STATISTICS, _statistics(size), strict=True):
+                unit = "1" if name == "n" else "mm"
+                yield Fact(topics[0 if measured else 1], item, name, value, unit)
+
+
+def _statistics(size: np.ndarray) -> tuple[float, ...]:
+    """Number, mean, empirical 99 % quantile and largest of magnitudes (n,)."""
+    quantile = np.quantile(size, LARGE_SHARE)
+    return float(len(size)), float(size.mean()), float(quantile), float(size.max())
+
+
+def _selection(tables: Mapping) -> Iterator[Fact]:
+    choice = tables["model_selection"]
+    for i, name in enumerate(map(str, choice["model"])):
+        yield Fact("selection", name, "selected", float(choice["selected"][i]), "1")
+        yield Fact("selection", name, "held_out_rms", float(choice["held_out_rms_mm"][i]), "mm")
+        yield Fact("selection", name, "gain", float(choice["gain_mm2"][i]), "mm^2")
+        error = float(choice["gain_std_error_mm2"][i])
+        yield Fact("selection", name, "gain_std_error", error, "mm^2")
+        order = tables.get(f"{name}_model", {}).get("order")
+        if order is not None:
+            yield Fact("selection", name, "order", float(np.max(order)), "1")
+
+
+def _excluded(table: Mapping | None, model: str) -> Iterator[Fact]:
+    for line, reason, error in [] if table is None else excluded_errors(table, model):
+        unit = "mm" if np.isfinite(error) else None
+        yield Fact("excluded_rows", f"line {line}", "error", error, unit, reason)
+
+
+def _range(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
+    """Range of each reported joint that the poses cover, and its share of the joint's travel."""
+    for joint in range(len(robot.q_min_rad)):
+        slides = bool(robot.dh.prismatic[joint])
+        scale, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
+        reported = np.asarray(measurements[f"q{joint + 1}"], dtype=float)
+        low, high = reported.min(), reported.max()
+        share = (high - low) / (robot.q_max_rad[joint] - robot.q_min_rad[joint])
+        item = f"joint {joint + 1}"
+        yield Fact("range", item, "low", float(scale * low), unit)
+        yield Fact("range", item, "high", float(scale * high), unit)
+        yield Fact("range", item, "share", float(share), "1")
+
+
+def of(found: Iterable[Fact], topic: str) -> dict[str, dict[str, Fact]]:
+    """Facts on one topic by item and statistic, in their order."""
+    chosen: dict[str, dict[str, Fact]] = {}
+    for each in found:
+        if each.topic == topic:
+            chosen.setdefault(each.item, {})[each.statistic] = each
+    return chosen

@@ -1,0 +1,229 @@
+"""What a calibration is worth, in the lines of half a page."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+
+from kinacc.artifacts.error_models import NOMINAL, PLAINEST
+from kinacc.calibration.model_comparison import STANDARD_ERRORS
+from kinacc.calibration.summary import LARGE_SHARE, Fact, of
+
+WIDTH = 100
+MARGIN = 17  # where the text of a paragraph begins
+_MOST, _LINES = 3, 5  # findings, excluded rows, sentences that are told, and lines they may take
+_JOINTS_PER_LINE, _JOINT_WIDTH = 3, 27
+_KEPT = "\u00a0"  # a space that no line is broken at
+_FIGURES = ("mean", "quantile_99", "largest")
+_COMPLIANCE, _LEVER = "compliance_rad_per_nm", "lever_coefficient_rad_per_mm"
+_NUMBERS = {2.0: "two"}
+
+
+def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str]:
+    """The facts in lines of at most WIDTH characters.
+
+    ``more``: the command that tells all of it; ``whole``: tell all of it.
+    """
+    most = None if whole else _MOST
+    return [
+        *paragraph("data", _data(facts)),
+        *paragraph("check", _checked(facts, most, more)),
+        *paragraph("excluded", _excluded(facts, most, more)),
+        *_errors(facts, whole),
+        *paragraph("selected", _selected(facts)),
+        *paragraph("bending", _bending(of(facts, "bending"))),
+        *paragraph("valid where", _range(of(facts, "range"))),
+        *paragraph("undetermined", _undetermined(facts, most, more)),
+    ]
+
+
+def paragraph(name: str, texts: Iterable[str]) -> list[str]:
+    """Texts under a name at the left, each on lines of its own; commands are not broken."""
+    lines = [line for text in texts for line in _wrapped(text)]
+    heads = [name, *[""] * len(lines)]
+    return [f"{head:{MARGIN}}{line}" for head, line in zip(heads, lines, strict=False)]
+
+
+def model_name(model: str) -> str:
+    """A model as people write it: DH, VEC."""
+    return model if len(model) > 3 else model.upper()
+
+
+def counted(number: float, noun: str) -> str:
+    """``1 pose``, ``2 poses``."""
+    return f"{number:.0f} {noun}{'' if number == 1 else 's'}"
+
+
+def _data(facts: Sequence[Fact]) -> list[str]:
+    data = of(facts, "data")["measurements"]
+    number = {name: each.value for name, each in data.items()}
+    of_what = "a synthetic arm" if data["source"].text == "synthetic" else "a measured arm"
+    robot = next(iter(of(facts, "robot")))
+    targets = counted(number["targets"], "target")
+    poses = counted(number["poses"], "pose")
+    return [f"{counted(number['readings'], 'reading')} of {targets} at {poses}: {robot}, {of_what}"]
+
+
+def _checked(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
+    found = [each for each in facts if each.topic == "check"]
+    if not found:
+        return []
+    return _first([each.text for each in found if each.text], most, more) or ["nothing suspicious"]
+
+
+def _excluded(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
+    told = []
+    for each in facts:
+        if each.topic == "excluded_rows":
+            error = "" if each.unit is None else f", {each.value:.3f} mm"
+            told.append(f"{each.item}{error}: {each.text}")
+    return _first(told, most, more)
+
+
+def _errors(facts: Sequence[Fact], whole: bool) -> list[str]:
+    """Tables of errors, each of one population."""
+    held_out, trained = of(facts, "held_out_error"), of(facts, "training_error")
+    lines = []
+    if held_out:
+        lines += _table(facts, "held-out error, mm", "poses no fit had seen", held_out)
+    if trained and (whole or not held_out):
+        lines += _table(facts, "training error, mm", "poses that were fitted", trained)
+    return lines
+
+
+def _table(
+    facts: Sequence[Fact], name: str, where: str, errors: Mapping[str, Mapping[str, Fact]]
+) -> list[str]:
+    chosen = of(facts, "selection")
+    rows = next(iter(errors.values()))["n"].value
+    head = f"{name} ({where}; {counted(rows, 'row')})"
+    lines = [f"{head:57}{'mean':>10}{f'{LARGE_SHARE:.0%}':>10}{'largest':>10}"]
+    for model, figures in errors.items():
+        called = model_name(model)
+        if model == NOMINAL:
+            fitted = of(facts, "robot")["base and tool"]["fitted"].value
+            called = "nominal, with base and tool fitted" if fitted else "nominal"
+        elif "order" in chosen[model]:
+            called += f", order {chosen[model]['order'].value:.0f}"
+        mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
+        shown = "".join(f"{figures[each].value:10.3f}" for each in _FIGURES)
+        lines.append(f"{'':4}{called:53}{shown}{mark}".rstrip())
+    return lines
+
+
+def _selected(facts: Sequence[Fact]) -> list[str]:
+    """Why the selected model is selected, and a warning where the nominal one is nearer."""
+    models, held_out = of(facts, "selection"), of(facts, "held_out_error")
+    best = next(model for model, known in models.items() if known["selected"].value)
+    if not held_out or held_out[best]["mean"].value < held_out[NOMINAL]["mean"].value:
+        return [_why(models)]
+    text = f"{model_name(best)} is no nearer to held-out poses than the nominal model is"
+    return [_why(models), f"{text}: measure more poses, or correct the data"]
+
+
+def _why(models: Mapping[str, Mapping[str, Fact]]) -> str:
+    """Why the selected model is selected, in a sentence."""
+    number = {
+        model: {name: each.value for name, each in known.items()} for model, known in models.items()
+    }
+    choice = next(model for model, known in number.items() if known["selected"])
+    others = [model for model in number if model != choice]
+    if not others:
+        return f"{model_name(choice)} is the only model"
+    if any(known["gain"] != known["gain"] for known in number.values()):
+        listed = " and ".join(map(model_name, others))
+        return f"{model_name(choice)} is selected: no pose was held out to judge {listed} by"
+    if choice != PLAINEST:
+        change = _change(number[choice])
+        told = (
+            f"on held-out poses its squared error is {change} than that of {model_name(PLAINEST)}"
+        )
+        more = "; no other model has less" if len(others) > 1 else ""
+        return f"{model_name(choice)} is selected: {told}, more than {_needed()}{more}"
+    told = "; ".join(
+        f"with {model_name(each)} it is {_change(number[each])}{_not_enough(number[each])}"
+        for each in others
+    )
+    told = told.replace("it is", "the squared error of held-out poses is", 1)
+    return f"{model_name(choice)} is selected: {told}"
+
+
+def _change(known: Mapping[str, float]) -> str:
+    """How much higher or lower the squared error is than that of the plainest model."""
+    gain, error = abs(known["gain"]), known["gain_std_error"]
+    form = ".3f" if min(gain, error) >= 0.001 else ".2g"
+    spread = "" if error != error else f" +- {error:{form}}"
+    number = f"{gain:{form}}{spread} mm^2".replace(" ", _KEPT)
+    return f"{'lower' if known['gain'] > 0 else 'higher'} by {number}"
+
+
+def _not_enough(known: Mapping[str, float]) -> str:
+    if known["gain"] <= 0:
+        return ""
+    if known["gain"] > STANDARD_ERRORS * known["gain_std_error"]:
+        return ", but its rms over all rows or over folds is not"
+    return f", no more than {_needed()}"
+
+
+def _needed() -> str:
+    return f"{_NUMBERS.get(STANDARD_ERRORS, f'{STANDARD_ERRORS:g}')} standard errors"
+
+
+def _bending(joints: Mapping[str, Mapping[str, Fact]]) -> list[str]:
+    """Coefficients of joints that bend under gravity, and what cannot be told of them."""
+    lines, products = [], []
+    for joint, known in joints.items():
+        for name, per in ((_COMPLIANCE, "N m"), (_LEVER, "mm of lever")):
+            if name in known:
+                std = known.get(f"std_{name}")
+                sure = "(not determined)" if std is None else f"+- {1e6 * std.value:.3g}"
+                lines.append(f"{joint}: {1e6 * known[name].value:.4g} {sure} urad per {per}")
+        products += [joint.removeprefix("joint ")] if _LEVER in known else []
+    if products:
+        alone = not any(_COMPLIANCE in known for known in joints.values())
+        load = ", and for the payload that was measured" if alone else " of the arm's own weight"
+        lines.append(
+            f"masses are not stated: of joint {', '.join(products)} only the product of weight and "
+            f"compliance can be seen{load}"
+        )
+    return lines
+
+
+def _range(joints: Mapping[str, Mapping[str, Fact]]) -> list[str]:
+    told = [
+        f"{name.replace('joint ', 'J')} {known['low'].value:.0f} to {known['high'].value:.0f} "
+        f"{known['low'].unit} ({known['share'].value:.0%})".ljust(_JOINT_WIDTH)
+        for name, known in joints.items()
+    ]
+    lines = [told[i : i + _JOINTS_PER_LINE] for i in range(0, len(told), _JOINTS_PER_LINE)]
+    head = "the models were tried only where the poses are (share of each joint's range):"
+    return [head, *("".join(line).rstrip().replace(" ", _KEPT) for line in lines)]
+
+
+def _undetermined(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
+    told = [each.text for each in facts if each.topic == "undetermined"]
+    return _first(told, most, more) or ["nothing: the poses determine every parameter"]
+
+
+def _first(texts: list[str], most: int | None, more: str) -> list[str]:
+    """The first ``most`` texts, fewer where they are long, and where the others are."""
+    if most is None:
+        return texts
+    told = [
+        text for i, text in enumerate(texts[:most]) if not i or _lines(texts[: i + 1]) <= _LINES
+    ]
+    left = len(texts) - len(told)
+    return [*told, f"and {left} more: {more}"] if left else told
+
+
+def _lines(texts: Iterable[str]) -> int:
+    return sum(len(_wrapped(text)) for text in texts)
+
+
+def _wrapped(text: str) -> list[str]:
+    """The lines of a text; a command is not broken."""
+    if text.startswith("kinacc "):
+        return [text]
+    room = WIDTH - MARGIN
+    lines = textwrap.wrap(text, room, subsequent_indent="  ", break_on_hyphens=False)
+    return [line.replace(_KEPT, " ") for line in lines]

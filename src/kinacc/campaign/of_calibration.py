@@ -1,0 +1,132 @@
+"""What campaigns say of the largest error of one calibration."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
+from kinacc.calibration.summary_words import model_name
+from kinacc.campaign import folder, instrument, words
+from kinacc.campaign.journal import JOURNAL, PLAN
+from kinacc.campaign.state import State
+from kinacc.deployment import folder as results
+from kinacc.errors import InputError
+from kinacc.kinematics.model import JointState
+
+_ORDER = (CANDIDATES, *(each for each in reversed(TARGETS) if each != CANDIDATES))
+_SAME_MM = 1e-6  # modelled positions that differ by less are of one model
+
+
+@dataclass(frozen=True)
+class Assessed:
+    """A campaign at its place, how it stands, and what it says: of all candidates if it can."""
+
+    place: Path
+    state: State
+    said: Statement | None
+
+    @property
+    def next_command(self) -> str:
+        """What goes on with the campaign, or ends it."""
+        going = self.state.asked is not None
+        return shlex.join(["kinacc", "campaign", "next" if going else "report", str(self.place)])
+
+    def in_words(self) -> list[str]:
+        """The bound, what it is about, and from what."""
+        plan, state = self.state.plan, self.state
+        noise = ", ".join(f"{each.name} {instrument.noise(each)}" for each in plan.instruments)
+        budget = plan.assessor.measurements
+        return [
+            words.statement(self.said, state) if self.said else "Nothing can be said yet.",
+            f"campaign {self.place}: {model_name(plan.about['model'])} model, "
+            f"{len(plan.points) - len(state.left_out)} candidates ({plan.about['candidates']}), "
+            f"noise {noise}, {state.taken} of {budget} readings",
+        ]
+
+    def as_facts(self) -> dict[str, object]:
+        """The same for a machine; None where nothing is said."""
+        plan, said = self.state.plan, self.said or Statement(CANDIDATES)
+        numbers = {"lower_mm": said.lower_mm, "upper_mm": said.upper_mm}
+        numbers |= {"confidence": said.confidence}
+        return {
+            "campaign": str(self.place),
+            "model": plan.about["model"],
+            "target": said.target,
+            **{name: None if value != value else value for name, value in numbers.items()},
+            "candidates": len(plan.points) - len(self.state.left_out),
+            "readings": self.state.taken,
+            "noise": {each.name: instrument.noise(each) for each in plan.instruments},
+        }
+
+
+@dataclass(frozen=True)
+class Sought:
+    """The campaign of a calibration, if there is one, and what stood in the way of others."""
+
+    assessed: Assessed | None
+    remarks: tuple[str, ...] = ()
+
+
+def sought(calibration: Path, places: Iterable[Path]) -> Sought:
+    """The campaign of the results folder ``calibration`` in ``places``, the one read last.
+
+    Campaigns keep where their model saw the candidates, so that one begun before the arm was
+    calibrated anew is told from one that speaks of the models now there.
+    """
+    remarks = []
+    name = calibration.resolve().name
+    found = sorted(set(_named(places, name)), key=_last_reading, reverse=True)
+    for number, place in enumerate(found, 1):
+        try:
+            opened = folder.open_(place)
+            if not _is_of(opened.plan, calibration):
+                remarks.append(f"campaign {place} was begun with another calibration of {name}")
+                continue
+            state = opened.state()
+        except InputError:
+            remarks.append(f"campaign {place} cannot be read: kinacc campaign status {place}")
+            continue
+        if others := [str(each) for each in found[number:]]:
+            remarks.append(f"there are older campaigns: {', '.join(others)}")
+        said = sorted(state.statements(), key=lambda each: _ORDER.index(each.target))
+        return Sought(Assessed(place, state, said[0] if said else None), tuple(remarks))
+    return Sought(None, tuple(remarks))
+
+
+def _named(places: Iterable[Path], name: str) -> Iterator[Path]:
+    """Folders in ``places`` with a campaign of a calibration of that name."""
+    for place in places:
+        for plan in sorted(place.glob(f"*/{PLAN}")):
+            try:
+                about = json.loads(plan.read_bytes())["about"]
+                if about["calibration"] == name:
+                    yield plan.parent
+            except (OSError, ValueError, LookupError, TypeError, RecursionError):
+                continue  # no campaign, or one that cannot say whose it is
+
+
+def _last_reading(place: Path) -> float:
+    """Time of the last reading; of the plan where there is none."""
+    journal = place / JOURNAL
+    return (journal if journal.is_file() else place / PLAN).stat().st_mtime
+
+
+def _is_of(plan, calibration: Path) -> bool:
+    """Whether the model the campaign judges is the one that the results folder holds now."""
+    robot = results.recorded_robot(calibration)
+    if robot is None or len(robot.q_min_rad) != plan.points.joints.shape[1]:
+        return False
+    tables = results.read_tables(calibration)
+    try:
+        arm = results.calibration(tables, robot, plan.about["model"], plan.about["calibration"])
+        at = JointState(robot.dh_joints(plan.points.joints), plan.points.directions)
+        seen = arm.pose(at, "base", plan.about["point"]).position_mm
+    except InputError:
+        return False  # the model or the target is not there any more
+    return bool(np.abs(seen - plan.points.modelled_mm).max() < _SAME_MM)

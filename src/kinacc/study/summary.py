@@ -1,0 +1,53 @@
+"""What a study found, in few lines: differences of two models by population, claims counted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.artifacts.allowed import VERDICTS
+
+_VERDICTS = dict(zip(VERDICTS, ("agree", "differ", "cannot be compared"), strict=True))
+
+
+def differences(
+    points: Mapping, measurements: Mapping, accuracy_map: Mapping | None = None
+) -> list[str]:
+    """The largest errors of the map and of the operating points, each population in a line."""
+    lines = []
+    if accuracy_map is not None:
+        largest = accuracy_map["position_max_mm"]
+        cells = np.isfinite(largest)
+        if cells.any():
+            where = f"over the evaluation space ({cells.sum()} cells)"
+            lines.append(f"map error: at most {largest[cells].max():.3f} mm {where}, DH to VEC")
+    error, count = float(np.max(points["true_error_mm"])), len(points["point"])
+    told = f"operating-point error: at most {error:.3f} mm at the {count} points of the study"
+    if _are_measured(points, measurements):
+        return [
+            *lines,
+            f"{told}: measured poses, so it is a held-out error of DH, of mean readings",
+        ]
+    return [*lines, f"{told}, DH to VEC"]
+
+
+def _are_measured(points: Mapping, measurements: Mapping) -> bool:
+    """Whether every operating point is at joints that were measured."""
+    names = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
+    measured = set(zip(*(np.asarray(measurements[name]).tolist() for name in names), strict=True))
+    wanted = zip(*(np.asarray(points[name]).tolist() for name in names), strict=True)
+    return all(each in measured for each in wanted)
+
+
+def claims_counted(claims: Mapping) -> str:
+    """How many of the paper's claims have which verdict."""
+    verdicts = list(claims["verdict"])
+    told = ", ".join(f"{verdicts.count(name)} {words}" for name, words in _VERDICTS.items())
+    return f"of {len(verdicts)} claims {told}"
+
+
+def claims_that_differ(claims: Mapping) -> list[str]:
+    """Ids of the claims that the results contradict."""
+    pairs = zip(claims["claim"], claims["verdict"], strict=True)
+    return [str(claim) for claim, verdict in pairs if verdict == VERDICTS[1]]

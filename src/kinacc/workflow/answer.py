@@ -1,0 +1,145 @@
+"""What a run ends with: half a page on what the calibration of a data set is worth."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+from kinacc.artifacts import store
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import ERROR_MODELS
+from kinacc.calibration import summary
+from kinacc.calibration.summary import Fact, of
+from kinacc.calibration.summary_words import half_page, model_name, paragraph
+from kinacc.campaign import of_calibration
+from kinacc.campaign.of_calibration import Sought
+from kinacc.errors import Problem, refuse
+from kinacc.kinematics import robot
+from kinacc.study.summary import claims_counted, claims_that_differ, differences
+from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES
+from kinacc.workflow.plan import Plan
+
+IF_THERE = (
+    *(f"{kind}_model" for kind in ERROR_MODELS),
+    *("data_check", "excluded_rows", "accuracy_map", "assessment_points", "claims"),
+)
+Tables = Mapping[str, Columns]
+
+
+def read(folder: Path | str, needed: Collection[str] = summary.TABLES) -> dict[str, Columns]:
+    """The tables an answer is made from. Raises InputError naming all ``needed`` ones missing."""
+    folder = Path(folder)
+    refuse(
+        [
+            Problem(str(folder / f"{name}.parquet"), "no such file", fix="run the workflow first")
+            for name in needed
+            if not (folder / f"{name}.parquet").is_file()
+        ],
+        f"{folder} holds no calibration that is complete",
+    )
+    paths = {name: folder / f"{name}.parquet" for name in dict.fromkeys((*needed, *IF_THERE))}
+    return {name: store.read(path) for name, path in paths.items() if path.is_file()}
+
+
+def facts_of(tables: Tables) -> list[Fact]:
+    """The facts of ``summary`` from the tables of a results folder."""
+    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    return summary.facts(tables, arm)
+
+
+def campaign_of(folder: Path | str) -> Sought:
+    """The campaign of a results folder, sought beside it, beside all results, and here."""
+    folder = Path(folder)
+    within = folder.absolute().parent
+    near = {within.resolve(): folder.parent, within.parent.resolve(): folder.parent / ".."}
+    return of_calibration.sought(folder, [*(near | {Path.cwd(): Path()}).values()])
+
+
+def answer(
+    folder: Path | str, tables: Tables, whole: bool = False, following: Sequence[str] = ()
+) -> list[str]:
+    """The half page on a results folder; with the paper's claims first where it has them.
+
+    ``whole`` leaves nothing out; ``following`` are commands to name beside the next ones.
+    """
+    folder = Path(folder)
+    facts = facts_of(tables)
+    more = shlex.join(["kinacc", "fitted", str(folder), "--all"])
+    lines = [f"{folder.resolve().name}: what its calibration is worth"]
+    lines += half_page(facts, more, whole)
+    lines += paragraph("other errors", _other_errors(facts, tables, whole))
+    bound = campaign_of(folder)
+    lines += paragraph("largest error", _bound(bound, folder))
+    commands = [] if bound.assessed is None else [bound.assessed.next_command]
+    commands += [*following, shlex.join(["kinacc", "predict", str(folder), "--help"])]
+    lines += paragraph("next", commands)
+    return [*_claims(folder, facts, tables), *lines]
+
+
+def last_words(plan: Plan, made: Collection[str]) -> list[str]:
+    """What a run says at its end, which was about the files ``made``, up to date ones included.
+
+    Of data sets whose summary was not asked for, only what the check of the data found.
+    """
+    lines: list[str] = []
+    for dataset in plan.datasets:
+        if plan.outputs("summary", dataset)["summary"] in made:
+            folder = Path(plan.results) / dataset
+            tables = read(folder)
+            if plan.outputs("claims", dataset)["claims"] not in made:
+                tables.pop("claims", None)
+            lines += ["", *answer(folder, tables)]
+        else:
+            lines += plan.remarks(dataset)
+    return lines
+
+
+def _other_errors(facts: Sequence[Fact], tables: Tables, whole: bool) -> list[str]:
+    """Populations beside held-out and training errors, a line each."""
+    points, synthetic = tables.get("assessment_points"), _is_synthetic(facts)
+    lines = []
+    if whole or (points is not None and synthetic):
+        populations = {
+            "model_difference": "at the poses that were fitted",
+            "held_out_model_difference": "at held-out poses, models fitted without them",
+        }
+        for topic, where in populations.items():
+            for item, known in of(facts, topic).items():
+                pair = " to ".join(map(model_name, item.split("_vs_")))
+                called = topic.replace("_", " ").replace("held out", "held-out")
+                lines.append(f"{called}: at most {known['largest'].value:.3f} mm {where}, {pair}")
+    if points is not None:
+        lines += differences(points, tables["measurements"], tables.get("accuracy_map"))
+    return lines
+
+
+def _is_synthetic(facts: Sequence[Fact]) -> bool:
+    return of(facts, "data")["measurements"]["source"].text == "synthetic"
+
+
+def _bound(bound: Sought, folder: Path) -> list[str]:
+    if bound.assessed is not None:
+        return [*bound.assessed.in_words(), *bound.remarks]
+    name = "check" if not Path("check").exists() else f"check_{folder.resolve().name}"
+    words = ["kinacc", "campaign", "start", name, "--calibration", str(folder)]
+    return [
+        *bound.remarks,
+        "not assessed; a campaign bounds it (NOISE: standard deviation of one reading, mm):",
+        f"{shlex.join(words)} --noise-mm NOISE",
+    ]
+
+
+def _claims(folder: Path, facts: Sequence[Fact], tables: Tables) -> list[str]:
+    """What became of the paper's claims, where they are held to these results."""
+    if "claims" not in tables or not _is_synthetic(facts):
+        return []
+    claims, figures = tables["claims"], [each.name for each in STAGES.values() if each.is_figure]
+    pictures = f"{folder}/{FIGURE_FOLDER}: {figures[0]} to {figures[-1]}"
+    return [
+        f"{folder.resolve().name}: the paper reproduced",
+        *paragraph("claims", [claims_counted(claims), f"{folder}/claims.parquet has each of them"]),
+        *paragraph("differ", [", ".join(claims_that_differ(claims))]),
+        *paragraph("figures", [pictures]),
+        "",
+    ]

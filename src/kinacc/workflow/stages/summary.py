@@ -1,0 +1,16 @@
+"""Sum up what the calibration of a data set is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
+from kinacc.calibration import summary
+from kinacc.kinematics import robot
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+    """``summary``: the facts of a half page, one a row."""
+    arm = robot.of_text(str(inputs["robot"]["description"][0]), "robot.parquet")
+    return {"summary": columns_of("summary", summary.facts(inputs, arm))}

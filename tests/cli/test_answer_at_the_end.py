@@ -1,0 +1,231 @@
+"""What a run ends with, as an engineer reads it: half a page, and the same facts in a table."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from command_line import call, small_study
+
+from kinacc.artifacts import store
+from kinacc.kinematics import robot
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Results of a small synthetic study, up to its summary."""
+    base = tmp_path_factory.mktemp("study")
+    folder = small_study(base)
+    config, results = base / "small.yaml", folder.parent
+    done = call("run", "summary", "--config", config, "--results", results)
+    assert done.exit_code == 0, done.output
+    return folder
+
+
+@pytest.fixture
+def folder(study, tmp_path, monkeypatch):
+    """A copy of the results, in a folder that is the current one."""
+    shutil.copytree(study, tmp_path / "results" / "mh180")
+    monkeypatch.chdir(tmp_path)
+    return "results/mh180"
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """Results of a measured arm with one joint that hardly moves, and a file with an outlier."""
+    base = tmp_path_factory.mktemp("own")
+    arm = robot.load("irb120")
+    draw = np.random.default_rng(0)
+    q = draw.uniform(-1.0, 1.0, (60, 6))
+    q[:, 0] *= 0.05
+    place = robot.forward(arm, q).position_mm + draw.normal(0.0, 0.05, (60, 3))
+    place[17, 0] += 6.0
+    lines = [",".join([*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])]
+    lines += [",".join(f"{value:.9f}" for value in row) for row in np.hstack([q, place])]
+    (base / "own.csv").write_text("\n".join(lines) + "\n")
+    (base / "own.yaml").write_text(
+        "measurements: {folds: 4}\ndatasets:\n  own:\n"
+        "    calibration: {base_and_tool: estimated, vec: {order: 1}, dh: {fit_to: measurements}}\n"
+        "    robot: irb120\n    evaluation: {space: measured}\n"
+        "    data_check: {accept: {outliers: left in on purpose, few_poses: a test}}\n"
+        "    measurements: {source: file, file: {path: own.csv, orientation: {kind: none}}}\n"
+    )
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
+        words = ("--config", base / "own.yaml", "--results", base / "results")
+        done = call("run", stage, *words)
+        assert done.exit_code == 0, done.output
+    return base / "results" / "own"
+
+
+def shown(*words):
+    done = call("fitted", *words)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+def figures_of(page, model):
+    """Mean, 99 % and largest of a model's line."""
+    (line,) = re.findall(rf"^    {model}\b.*$", page, re.M)
+    return [float(each) for each in re.findall(r"\d+\.\d{3}", line)]
+
+
+def test_errors_before_and_after_are_of_the_same_held_out_rows(folder):
+    page = shown(folder)
+    table = store.read(f"{folder}/pose_errors.parquet")
+    rows = {}
+    for model in ("nominal", "DH", "VEC"):
+        own = table["comparison"] == f"{model.lower()}_vs_measured"
+        own &= table["estimate"] == "cross_validated"
+        rows[model] = table["row"][own]
+        size = np.linalg.norm([table[f"e{axis}_mm"][own] for axis in "xyz"], axis=0)
+        wanted = size.mean(), np.quantile(size, 0.99), size.max()
+        assert figures_of(page, model) == pytest.approx(wanted, abs=6e-4)
+    assert np.array_equal(rows["nominal"], rows["DH"])
+    assert f"{len(rows['DH'])} rows" in page
+    assert page.count("<- selected") == 1
+    assert "held-out error" in page
+    assert "training error" not in page
+
+
+def test_nominal_says_whether_base_and_tool_were_fitted(folder, measured):
+    assert "nominal, with base and tool fitted" in shown(measured)
+    assert "base and tool" not in shown(folder)
+
+
+def test_the_page_is_half_a_page(folder, measured):
+    # The second is of poor data: what is wrong with them takes some lines more.
+    for each, most in ((folder, 25), (measured, 28)):
+        lines = shown(each).splitlines()
+        assert len(lines) <= most, "\n".join(lines)
+        prose = [line for line in lines if "kinacc " not in line]
+        assert max(map(len, prose)) <= 100, max(prose, key=len)
+
+
+def test_why_the_model_is_selected_is_one_sentence(folder):
+    choice = store.read(f"{folder}/model_selection.parquet")
+    vec = list(choice["model"]).index("vec")
+    text = " ".join(shown(folder).split())
+    gain, error = abs(choice["gain_mm2"][vec]), choice["gain_std_error_mm2"][vec]
+    assert f"by {gain:.3f} +- {error:.3f} mm^2" in text
+    name = "VEC" if choice["selected"][vec] else "DH"
+    assert f"{name} is selected: " in text
+    assert "two standard errors" in text or "higher by" in text
+
+
+def test_a_calibration_that_is_worse_than_none_says_so(folder, measured):
+    page = " ".join(shown(measured).split())
+    assert figures_of(shown(measured), "nominal")[0] < figures_of(shown(measured), "DH")[0]
+    assert "no nearer to held-out poses than the nominal model" in page
+    assert "no nearer" not in shown(folder)
+
+
+def test_the_table_holds_the_facts_of_the_page(folder):
+    table = pq.read_table(f"{folder}/summary.parquet").to_pylist()
+    value = {(row["topic"], row["item"], row["statistic"]): row["value"] for row in table}
+    page = shown(folder)
+    for model in ("nominal", "DH", "VEC"):
+        wanted = [
+            value["held_out_error", model.lower(), name]
+            for name in ("mean", "quantile_99", "largest")
+        ]
+        assert figures_of(page, model) == pytest.approx(wanted, abs=6e-4)
+    answer = json.loads(shown(folder, "--json"))
+    assert answer["held_out_error"]["dh"]["largest"] == value["held_out_error", "dh", "largest"]
+    units = {row["unit"] for row in table if row["topic"] == "held_out_error"}
+    assert units == {"1", "mm"}
+
+
+def test_what_is_wrong_with_the_data_stands_beside_them(measured):
+    page = shown(measured)
+    assert "60 readings of 1 target at 60 poses: irb120, a measured arm" in page
+    assert "line 19" in page
+    assert "accepted: left in on purpose" in " ".join(page.split())
+    assert "nothing suspicious" not in page
+
+
+def test_where_the_calibration_is_valid_is_said_joint_by_joint(measured):
+    rows = pq.read_table(measured / "summary.parquet").to_pylist()
+    share = {
+        row["item"]: row["value"]
+        for row in rows
+        if row["topic"] == "range" and row["statistic"] == "share"
+    }
+    arm = robot.load("irb120")
+    q = store.read(measured / "measurements.parquet")
+    for joint in range(6):
+        travel = arm.q_max_rad[joint] - arm.q_min_rad[joint]
+        wanted = np.ptp(q[f"q{joint + 1}"]) / travel
+        assert share[f"joint {joint + 1}"] == pytest.approx(wanted)
+        assert f"({wanted:.0%})" in shown(measured)
+    assert share["joint 1"] < 0.03
+
+
+def test_what_is_left_open_is_short_and_the_rest_one_command_away(measured):
+    said = json.loads(shown(measured, "--json"))["undetermined"]
+    page, whole = (" ".join(shown(*words).split()) for words in ((measured,), (measured, "--all")))
+    told = [each for each in said if each in page]
+    assert 1 <= len(told) <= 3 < len(said)
+    assert told == said[: len(told)]
+    assert f"and {len(said) - len(told)} more: kinacc fitted {measured} --all" in page
+    assert all(each in whole for each in said)
+    assert "training error" in whole
+
+
+def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
+    page = shown(folder)
+    assert "not assessed" in page
+    (command,) = re.findall(r"kinacc (campaign start .*) --noise-mm NOISE$", page, re.M)
+    done = call(*command.split(), "--noise-mm", 0.05, "--budget", 5, "--drawn", 5)
+    assert done.exit_code == 0, done.output
+
+
+def campaign(folder, place, readings, noise=0.05):
+    """A campaign of five candidates beside the results, so many of its readings taken."""
+    words = ("--model", "dh", "--drawn", 5, "--budget", 8, "--noise-mm", noise)
+    begun = call("campaign", "start", place, "--calibration", folder, *words)
+    assert begun.exit_code == 0, begun.output
+    for number in range(readings):
+        row = json.loads(call("campaign", "next", place, "--json").stdout)["rows"][0]
+        at = ",".join(str(row[f"expected_{axis}_mm"] + 0.01 * number) for axis in "xyz")
+        assert call("campaign", "record", place, f"--position-mm={at}").exit_code == 0
+
+
+def test_the_bound_of_a_campaign_beside_the_results_is_told(folder):
+    campaign(folder, "my check", 8)
+    page = " ".join(shown(folder).split())
+    status = call("campaign", "status", "my check", "--simulations", 0).output
+    (statement,) = (line for line in status.splitlines() if "all 5 candidates" in line)
+    assert statement in page
+    for words in ("DH model, 5 candidates", "0.05 mm per axis", "8 of 8 readings", "95%"):
+        assert words in page, words
+    assert "not assessed" not in page
+    assert "kinacc campaign report 'my check'" in page
+    bound = json.loads(shown(folder, "--json"))["largest_error"]
+    assert bound["campaign"] == "my check"
+    assert f"{bound['upper_mm']:.3f} mm" in statement
+
+
+def test_a_campaign_of_an_earlier_calibration_bounds_nothing_now(folder):
+    campaign(folder, "old", 8)
+    path = f"{folder}/dh_model.parquet"
+    table = store.read(path)
+    table["a_mm"] = table["a_mm"] + 0.01
+    store.write(path, "dh_model", table, store.read_metadata(path))
+    page = " ".join(shown(folder).split())
+    assert "campaign old was begun with another calibration of mh180" in page
+    assert "not assessed" in page
+    assert json.loads(shown(folder, "--json"))["largest_error"] is None
+
+
+def test_a_campaign_that_cannot_be_read_does_not_hide_the_answer(folder):
+    campaign(folder, "check", 2)
+    with open("check/readings.jsonl", "r+") as journal:
+        text = journal.read().replace("position_mm", "position_nm", 1)
+        journal.seek(0)
+        journal.write(text)
+    page = shown(folder)
+    assert "campaign check cannot be read" in page
+    assert "not assessed" in page
+    assert "kinacc campaign start check_mh180 " in page  # that one is in the way
