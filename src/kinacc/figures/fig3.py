@@ -224,11 +224,11 @@ def _words(
         fontsize=style.TEXT_PT,
     )
     figure.text(
-        (left + right) / 2,
-        1 - (layout.name_h + 0.12) / layout.height,
-        HEAD if layout.columns > 2 else fill(HEAD, 44),
+        0.5,
+        1 - (layout.name_h + 0.03) / layout.height,
+        HEAD if layout.columns > 2 else fill(HEAD, 46),
         ha="center",
-        va="center",
+        va="top",
         fontsize=style.TEXT_PT,
     )
     handles: list[Any] = [Line2D([], [], **RING, mec=style.INK, mew=0.9)]
