@@ -29,12 +29,15 @@ def test_a_run_up_to_one_table_says_nothing_of_tables_it_did_not_ask_for(project
 
 def test_claims_that_an_earlier_version_left_are_no_fault_of_a_measured_arm(project):
     shutil.copy(project.folder / "results/mh180/claims.parquet", project.folder / "results/own")
-    for configs in (("config.yaml", "small.yaml"), ()):
-        text = project.kinacc("check-results", "results", configs=configs)
-        assert "all is well" in text
-        assert "claims.parquet: left from before" in text
+    text = project.kinacc("check-results", "results")
+    assert "all is well" in text
+    assert "own/claims.parquet: left from before" in text
+    text = project.kinacc("check-results", "results/own", ok=False, configs=())  # no png, no pdf
+    assert "note: results/own/claims.parquet: left from before" in text
+    assert "claims.parquet: missing" not in text
+    assert "hash" not in text
     assert project.to_do() == {}
     page = project.kinacc("fitted", "results/own", configs=())
     assert "claims" not in page
     (project.folder / "results/own/claims.parquet").unlink()
-    assert "all is well" in project.kinacc("check-results", "results", configs=())
+    assert "claims" not in project.kinacc("check-results", "results/own", ok=False, configs=())
