@@ -122,8 +122,8 @@ def _is_of(plan, calibration: Path) -> bool:
     robot = results.recorded_robot(calibration)
     if robot is None or len(robot.q_min_rad) != plan.points.joints.shape[1]:
         return False
-    tables = results.read_tables(calibration)
     try:
+        tables = results.read_tables(calibration)
         arm = results.calibration(tables, robot, plan.about["model"], plan.about["calibration"])
         at = JointState(robot.dh_joints(plan.points.joints), plan.points.directions)
         seen = arm.pose(at, "base", plan.about["point"]).position_mm

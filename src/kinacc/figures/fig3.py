@@ -40,7 +40,7 @@ UNREACHED: dict[str, Any] = {
 }
 PARTLY: dict[str, Any] = {"marker": ".", "ms": 1.6, "mew": 0, "mfc": "white", "ls": ""}
 RING: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "none", "ls": ""}
-HEAD = "Map error, DH to VEC, in radial slices at these angles about the robot's first axis"
+HEAD = "Map error, DH to VEC, in slices at these angles about the robot's first axis"
 DEFAULT_CELL_MM = 25.0
 
 
@@ -142,7 +142,9 @@ def _layout(
     ratio = float(np.ptp(h_edges) / np.ptp(r_edges))
     panel_w = min(max(free / count, 0.5), 3.2 / ratio)
     foot = Panels.foot + (0.0 if wide or not wordy else 0.17)
-    return Panels(count, panel_w, panel_w * ratio, name_h=0.17 if named else 0.0, foot=foot)
+    head = Panels.head + (0.0 if wide else 0.14)
+    name_h = 0.17 if named else 0.0
+    return Panels(count, panel_w, panel_w * ratio, name_h=name_h, head=head, foot=foot)
 
 
 def _edges(levels: np.ndarray) -> np.ndarray:
@@ -225,11 +227,11 @@ def _words(
         fontsize=style.TEXT_PT,
     )
     figure.text(
-        (left + right) / 2,
-        1 - (layout.name_h + 0.12) / layout.height,
-        HEAD if layout.columns > 2 else fill(HEAD, 44),
+        0.5,
+        1 - (layout.name_h + 0.03) / layout.height,
+        HEAD if layout.columns > 2 else fill(HEAD, 40),
         ha="center",
-        va="center",
+        va="top",
         fontsize=style.TEXT_PT,
     )
     handles: list[Any] = [Line2D([], [], **RING, mec=style.INK, mew=0.9)]

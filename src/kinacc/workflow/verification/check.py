@@ -331,7 +331,7 @@ def _without_map(folder: Path, marks: dict, no_claims: bool) -> dict[str, str]:
         return {}
     if no_claims:  # the one table that would tell whether there was a map
         return dict.fromkeys(
-            ("accuracy_map", "fig3"), "there is no map; --config tells if it lacks"
+            ("accuracy_map", "fig3"), "whether a map is missing is known only with --config"
         )
     if not made_without(folder, "accuracy_map", marks):
         return {}
