@@ -33,6 +33,20 @@ def test_files_that_are_named_are_there(page):
     assert [place for place in PLACE.findall(page.read_text()) if not (ROOT / place).exists()] == []
 
 
+def test_files_of_the_walks_are_where_the_walks_say():
+    page = (ROOT / "CONTRIBUTING.md").read_text()
+    walks = page.partition("## Three walks")[2].partition("\n## ")[0]
+    missing = []
+    for step in re.split(r"^\d+\. ", walks, flags=re.MULTILINE)[1:]:
+        folder = ROOT
+        for name in re.findall(r"`([\w./]+(?:\.py|\.yaml|/))`", step):
+            place = ROOT / name if "/" in name else folder / name
+            folder = place if name.endswith("/") else place.parent
+            if not (place.exists() or (ROOT / name).exists()):
+                missing.append(name)
+    assert missing == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_modules_that_are_named_are_there(page):
     missing = []
