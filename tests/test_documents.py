@@ -33,6 +33,20 @@ def test_files_that_are_named_are_there(page):
     assert [place for place in PLACE.findall(page.read_text()) if not (ROOT / place).exists()] == []
 
 
+def test_files_of_the_walks_are_where_the_walks_say():
+    page = (ROOT / "CONTRIBUTING.md").read_text()
+    walks = page.partition("## Three walks")[2].partition("\n## ")[0]
+    missing = []
+    for step in re.split(r"^\d+\. ", walks, flags=re.MULTILINE)[1:]:
+        folder = ROOT
+        for name in re.findall(r"`([\w./]+(?:\.py|\.yaml|/))`", step):
+            place = ROOT / name if "/" in name else folder / name
+            folder = place if name.endswith("/") else place.parent
+            if not (place.exists() or (ROOT / name).exists()):
+                missing.append(name)
+    assert missing == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_modules_that_are_named_are_there(page):
     missing = []
@@ -72,6 +86,46 @@ def test_commands_are_there_and_take_what_is_shown(page):
             continue
         with above:
             command.make_context(command.name, list(words), parent=above)
+
+
+HOW_TO = [  # what is read from top to bottom; the others are looked up, or generated
+    "docs/campaigns.md",
+    "docs/checking-data.md",
+    "docs/choosing-an-assessor.md",
+    "docs/compliance.md",
+    "docs/fitting.md",
+    "docs/from-tracker-file-to-compensated-robot.md",
+    "docs/planning-poses.md",
+    "docs/using-a-calibration.md",
+    "docs/workflow.md",
+]
+
+
+@pytest.mark.parametrize("page", HOW_TO)
+def test_how_to_pages_are_short_enough_to_be_read(page):
+    assert len((ROOT / page).read_text().split()) < 1500
+
+
+def test_the_readme_begins_with_the_readers_robot_and_says_what_its_models_are_called():
+    text = (ROOT / "README.md").read_text()
+    assert re.findall(r"^## (.*)", text, re.MULTILINE)[0] == "Your robot"
+    for short, long in (("VEC", "volumetric error compensation"), ("DH", "denavit-hartenberg")):
+        told = text[: text.lower().index(long)]
+        outside = re.sub(r"^```.*?^```", "", told, flags=re.MULTILINE | re.DOTALL)
+        assert len(re.findall(rf"\b{short}\b", outside)) <= 1  # the name in front of its meaning
+
+
+def test_links_to_a_part_of_a_page_lead_there():
+    def anchors(page: Path) -> set[str]:
+        headings = re.findall(r"^#+ (.*)", page.read_text(), re.MULTILINE)
+        return {re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings}
+
+    missing = []
+    for page in PAGES:
+        for link, part in re.findall(r"\]\(([^)#\s:]*)#([^)\s]+)\)", page.read_text()):
+            if part not in anchors(page.parent / link if link else page):
+                missing.append((page.name, link, part))
+    assert missing == []
 
 
 def test_pages_that_walk_a_reader_through_show_commands():

@@ -1,4 +1,4 @@
-"""The page on campaigns names only commands and options that are there."""
+"""The pages on campaigns name only commands and options that are there."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from kinacc.cli.group import main
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "campaigns.md"
+REFERENCE = PAGE.with_name("campaigns-reference.md")
 
 
 def test_every_command_and_option_on_the_page_exists():
@@ -21,6 +22,7 @@ def test_every_command_and_option_on_the_page_exists():
             command = command.commands[words[1]]
         known = {option for each in command.params for option in each.opts}
         assert {word for word in words if re.match(r"--?[a-z]", word)} <= known
+    text += REFERENCE.read_text(encoding="utf-8")
     commands = [main.commands["plan-campaign"], *main.commands["campaign"].commands.values()]
     known = {option for each in commands for given in each.params for option in given.opts}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", text)) <= known

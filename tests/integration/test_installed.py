@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -51,16 +53,30 @@ def call(installed, tmp_path):
     return started
 
 
-def test_three_commands_lead_from_a_tracker_file_to_models_and_what_they_are_worth(call):
+def printed_in_the_readme(section: str) -> list[list[str]]:
+    """Words of the commands that a section of README.md tells to type, in their order."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (text,) = re.findall(rf"^## {re.escape(section)}\n(.*?)^## ", text, re.MULTILINE | re.DOTALL)
+    blocks = "\n".join(re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL))
+    lines = re.findall(r"^kinacc (.*)", blocks, re.MULTILINE)
+    return [shlex.split(line, comments=True) for line in lines]
+
+
+def test_the_readme_leads_from_a_tracker_file_to_models_and_what_they_are_worth(call):
     shutil.copy(SERIES, call.folder / "tracker.csv")
-    said = call("init", "tracker.csv", "--robot", "ur10", "--yes")
+    commands = printed_in_the_readme("Your robot")
+    assert [words[0] for words in commands] == ["init", "check-data", "calibrate"]
+    described, checked, calibrated = (call(*words) for words in commands)
     for command in ("kinacc check-data tracker.yaml", "kinacc calibrate tracker.yaml"):
-        assert f"  {command}\n" in said
-    said = call("check-data", "tracker.yaml")
-    assert "kinacc calibrate tracker.yaml" in said
-    said = call("calibrate", "tracker.yaml")
-    assert "is selected" in said
-    assert "kinacc study tracker.yaml" in said
+        assert f"  {command}\n" in described
+    assert "kinacc calibrate tracker.yaml" in checked
+    assert "is selected" in calibrated
+    assert "kinacc study tracker.yaml" in calibrated
+    commands = printed_in_the_readme("How large is the largest error?")
+    planned, begun, asked = (call(*words) for words in commands)
+    assert "readings give bounds at most 0.1 mm apart" in planned
+    assert "kinacc campaign next check" in begun
+    assert "reading 1 of 300" in asked
     model = store.read(call.folder / "results" / "tracker" / "dh_model.parquet")
     assert list(model["joint"]) == [1, 2, 3, 4, 5, 6]
     assert not (call.folder / "results" / "tracker" / "study.parquet").exists()
