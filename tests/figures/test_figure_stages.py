@@ -49,6 +49,7 @@ CYLINDER_SPACE = {
     "dataset": "mh180",
     "robot": "mh180",
     "evaluation": {"space": "cylinder", "cylinder": CYLINDER, "tool_mm": [0.0, 0.0, 0.0]},
+    "measurements": {"source": "synthetic"},
 }
 
 

@@ -292,7 +292,8 @@ def draw(table, **settings):
 
 def test_true_accuracy_is_the_largest_true_error():
     def known(**inputs):
-        return truth.known(inputs, {})["true_accuracy_mm"]
+        settings = {"evaluation": {"space": "cylinder"}, "measurements": {"source": "synthetic"}}
+        return truth.known(inputs, settings)["true_accuracy_mm"]
 
     assert known(assessment_points={"true_error_mm": np.array([0.2, np.nan, 0.7])}) == 0.7
     assert known() is None

@@ -21,8 +21,8 @@ def known(inputs: Mapping, settings: Mapping) -> dict[str, Any]:
     """
     errors = floats(inputs.get("assessment_points", {"true_error_mm": ()}), "true_error_mm")
     errors = errors[np.isfinite(errors)]
-    at_measured = settings.get("evaluation", {}).get("space") == "measured"
-    of_measured = settings.get("measurements", {}).get("source", "synthetic") != "synthetic"
+    at_measured = settings["evaluation"]["space"] == "measured"
+    of_measured = settings["measurements"]["source"] != "synthetic"
     return {
         "true_accuracy_mm": float(errors.max()) if errors.size else None,
         "taken_as_true": FOOTNOTE if at_measured else OF_MODELS if of_measured else None,
