@@ -14,6 +14,7 @@ from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.kinematics.robot import Robot, outside_limits
+from kinacc.measurements.files import load
 from kinacc.measurements.layout import (
     ANGLE,
     LENGTH,
@@ -25,7 +26,8 @@ from kinacc.measurements.layout import (
     listed,
     names_of,
 )
-from kinacc.measurements.table import RawTable, load, numbers, numbers_of
+from kinacc.measurements.table import RawTable, numbers, numbers_of
+from kinacc.measurements.written import Written
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
@@ -239,7 +241,7 @@ def open_table(path: str | Path) -> RawTable:
     if kind == ".json":
         return _of_json(path)
     if kind in (".parquet", ".pq"):
-        return _with_units(load(path, ",", "."))
+        return _with_units(load(path))
     delimiter, decimal = ",", "."
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head, first = file.readline(_HEAD), file.readline(_HEAD)
@@ -248,7 +250,7 @@ def open_table(path: str | Path) -> RawTable:
         decimal = "," if "," in first and "." not in first else "."
     elif "\t" in head:
         delimiter = "\t"
-    table = load(path, delimiter, decimal)
+    table = load(path, Written(delimiter, decimal))
     columns = {name: [of_csv(cell) for cell in cells] for name, cells in table.columns.items()}
     return replace(table, columns=columns)
 

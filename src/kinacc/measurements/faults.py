@@ -31,6 +31,15 @@ _JOINT = re.compile(r"q(?P<number>\d)(?:_cmd)?")
 _DEFAULT = {"joint_unit": "deg", "length_unit": "mm", "orientation.unit": "deg"}
 
 
+def none_read(points: np.ndarray, number: float) -> np.ndarray:
+    """True (n,) where ``number`` says of a point (n, 3) that it was not read.
+
+    It does so in any of its coordinates; 0, which may be one, only in all of them.
+    """
+    same = points == number
+    return same.all(axis=1) if number == 0.0 else same.any(axis=1)
+
+
 def quaternion_problems(
     table: RawTable, quaternion: np.ndarray, places: Sequence[Place]
 ) -> list[Problem]:

@@ -403,12 +403,27 @@ def _read_words(values: object) -> object:
     return yaml.safe_load(values)
 
 
+# Keys of files that tables of results do not know of where they are at their defaults.
+_LEFT_OUT_AS_USUAL = (
+    *("exclude", "thousands", "encoding", "sheet", "layout", "directions", "no_reading", "sigma"),
+    "names",
+)
+
+
 def _in_use(config: dict) -> dict:
-    """The configuration without the source of measurements that is not used, or an empty list."""
+    """The configuration without the source of measurements that is not used, and without keys of
+    files that are as usual and came later than tables of results."""
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
-    if "file" in measurements and not measurements["file"]["exclude"]:
-        file = {k: v for k, v in measurements["file"].items() if k != "exclude"}
+    if "file" in measurements:
+        from kinacc.config.schema import defaults
+
+        usual = defaults()["measurements"]["file"]
+        file = {
+            key: value
+            for key, value in measurements["file"].items()
+            if key not in _LEFT_OUT_AS_USUAL or value != usual[key]
+        }
         measurements = {**measurements, "file": file}
     return {**config, "measurements": measurements}
 

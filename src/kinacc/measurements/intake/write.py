@@ -10,8 +10,9 @@ from typing import Any
 
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake.guess import Guess
+from kinacc.measurements.written import Written
 
-_DEFAULTS = {"delimiter": ",", "decimal": ".", "skip_lines": 0, "skip_under_names": 0}
+_AS_USUAL = {**Written().section(), "no_reading": [], "sigma": 1}
 _FEW_POSES = 60  # below, every configuration is held out once
 _PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./ -]*")
 _WORDS_OF_YAML = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
@@ -32,9 +33,9 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         "      file:",
         f"        path: {scalar(section['path'])}",
     ]
-    for key, default in _DEFAULTS.items():
+    for key, default in _AS_USUAL.items():
         if section[key] != default:
-            lines.append(f"        {key}: {scalar(section[key])}")
+            lines.append(f"        {key}: {_listed(section[key])}")
     lines.append(f"        joint_unit: {section['joint_unit']}")
     lines.append(f"        length_unit: {section['length_unit']}")
     words = {"kind": turn["kind"]}
@@ -64,6 +65,15 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         "      space: measured # the region the measured poses fill",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _listed(value: Any) -> str:
+    """A value, a list or a mapping as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_listed(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{', '.join(_listed(each) for each in value)}]"
+    return scalar(value)
 
 
 def shipped_text(name: str) -> str:

@@ -1,0 +1,90 @@
+"""Numbers that say that nothing was read: 9999, 9E9, or 0 in all of x, y and z."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.measurements.faults import none_read
+from kinacc.measurements.intake.choices import Choice
+
+_MOST_SHARE = 0.5  # a number in more than half of the rows is what was read
+_FAR = 1.5  # times the extent of the others
+_BEYOND = 1e8  # no unit makes a length of this
+
+
+@dataclass(frozen=True)
+class NoReading:
+    """Numbers that were found to say so, and what has to be asked first."""
+
+    numbers: tuple[float, ...] = ()
+    choice: Choice | None = None
+
+
+def found(
+    targets: Mapping[str, np.ndarray], joints: np.ndarray, rows_in_words: Callable[..., str]
+) -> NoReading:
+    """What points by target, each (n, 3), hold in place of a reading; ``joints`` (n, k).
+
+    A number counts where it is in all three coordinates and far from all other points, or in all
+    three again and again at other joints. Where it may be a reading it is asked about.
+    """
+    taken: list[float] = []
+    for name, points in targets.items():
+        for number in _candidates(points):
+            rows = none_read(points, number)
+            others = points[~rows & np.isfinite(points).all(axis=1)]
+            if number in taken or rows.sum() > _MOST_SHARE * len(points) or len(others) < 3:
+                continue
+            if _cannot_be(points[rows], others, joints[rows], number):
+                taken.append(number)
+            else:
+                words = rows_in_words(np.flatnonzero(rows))
+                return NoReading(tuple(taken), _choice(name, number, words))
+    return NoReading(tuple(sorted(taken)))
+
+
+def _candidates(points: np.ndarray) -> list[float]:
+    """Numbers of the points that programs write for nothing, the commonest first."""
+    whole = (points == points[:, :1]).all(axis=1)
+    every = points[np.isfinite(points)]
+    found = [0.0] if (whole & (points[:, 0] == 0.0)).any() else []
+    large = np.unique(every[np.abs(every) >= 999.0])
+    return found + [float(each) for each in large if _is_mark(float(each))]
+
+
+def _is_mark(number: float) -> bool:
+    """Whether a number is all nines, as in 9999, 9999.999 and 9E9, or beyond all lengths."""
+    digits = f"{abs(number):.6f}".rstrip("0").rstrip(".").replace(".", "")
+    nines = set(digits) == {"9"} and len(digits) >= 4
+    return nines or abs(number) >= _BEYOND
+
+
+def _cannot_be(points: np.ndarray, others: np.ndarray, joints: np.ndarray, number: float) -> bool:
+    if abs(number) >= _BEYOND:
+        return True
+    if not (points == number).all():
+        return False
+    centre = np.median(others, axis=0)
+    extent = float(np.max(np.linalg.norm(others - centre, axis=1)))
+    away = float(np.linalg.norm(points[0] - centre))
+    if away > _FAR * extent:
+        return True
+    # A point of the arm does not stay where it is while the joints move.
+    moved = np.unique(np.round(joints, 6), axis=0) if joints.size else joints
+    again = len(others) - len(np.unique(others, axis=0))
+    return len(moved) >= 3 and again == 0
+
+
+def _choice(target: str, number: float, rows: str) -> Choice:
+    told = "0, 0, 0" if number == 0 else f"{number:g} in some of x, y, z"
+    return Choice(
+        "--no-reading",
+        f"the point of {target} is {told} in {rows}",
+        {
+            f"{number:g}" if number == 0 else repr(number): "nothing was read there",
+            "none": "it was read so",
+        },
+    )
