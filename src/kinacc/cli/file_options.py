@@ -20,7 +20,7 @@ file_options = together(
     option(
         "--no-reading",
         metavar="NUMBER",
-        help="Number that says that nothing was read: 0 in all of x, y, z, another in any; none.",
+        help="Number that says that nothing was read, such as 0 (all of x, y, z) or 9999; or none.",
     ),
     option(
         "--sigma",

@@ -47,18 +47,20 @@ def report_of(table: RawTable) -> Report | None:
         if len(kinds) < 60 and {axis_of(each) for each in kinds} >= set(AXES):
             axes = name
             break
+    if not axes:
+        return None
     roles = {name: role(name_of(name).words) for name in table.columns}
     values = [name for name, said in roles.items() if said in _VALUES and name != axes]
     values = [name for name in values if _mostly_numbers(table.columns[name])]
     measured = [name for name in values if roles[name] in (MEASURED, REPORTED)]
+    if not measured:
+        return None
     names = [
         name
         for name, cells in table.columns.items()
         if name not in (axes, *values) and not table.is_gap(cells[0]) and _repeated(table, cells)
     ]
-    if not axes or not measured or not names:
-        return None
-    return Report(names[0], axes, tuple(values))
+    return Report(names[0], axes, tuple(values)) if names else None
 
 
 def _mostly_numbers(cells: Sequence) -> bool:

@@ -38,6 +38,7 @@ desviación típica|máximo|mínimo|maximo|minimo|massimo|deviazione standard|de
 """
 STATISTICS = frozenset(word for line in _STATISTICS_TEXT.split("\n") for word in line.split("|"))
 _LABELS = re.compile(r"[\s:=]+$")
+_FIRST_WORD = re.compile(r"[\s(\[:=/,]")
 _RULE = re.compile(r"[\s\-=_+|*.;,\t]*")
 _TWO_BLANKS = re.compile(r"\s{2,}|\t")
 
@@ -116,7 +117,10 @@ def is_statistic(cells: Sequence) -> bool:
     for cell in cells:
         if cell is None or (isinstance(cell, str) and not cell.strip()):
             continue
-        return isinstance(cell, str) and _LABELS.sub("", cell).strip().lower() in STATISTICS
+        if not isinstance(cell, str) or len(cell) > 60:
+            return False
+        label = _LABELS.sub("", cell).strip().lower()
+        return label in STATISTICS or _FIRST_WORD.split(label, 1)[0] in STATISTICS
     return False
 
 
@@ -171,18 +175,15 @@ class Sorted:
                 continue
             self.rows.append(cells)
             self.lines.append(line)
-        if not self.rows or (self.set_aside and not self._remarks_are_few()):
-            self._take_back()
+        for why in ("a remark", "statistics"):
+            self._take_back(why)
 
-    def _remarks_are_few(self) -> bool:
-        """Whether some rows are remarks; where all begin so, it is how they are named."""
-        full = [cells for _, cells, why in self.set_aside if why == "a remark"]
+    def _take_back(self, why: str) -> None:
+        """Make rows of what was set aside where most begin so: it is how they are called."""
         width = len(self.names)
-        return sum(len(cells) == width for cells in full) <= len(self.rows)
-
-    def _take_back(self) -> None:
-        width = len(self.names)
-        named = [each[2] == "a remark" and len(each[1]) == width for each in self.set_aside]
+        named = [each[2] == why and len(each[1]) == width for each in self.set_aside]
+        if sum(named) <= len(self.rows):
+            return
         back = [each[:2] for each, taken in zip(self.set_aside, named, strict=True) if taken]
         self.set_aside = [
             each for each, taken in zip(self.set_aside, named, strict=True) if not taken

@@ -13,24 +13,14 @@ import numpy as np
 from kinacc.errors import Problem, first_few
 
 # What instruments, controllers and spreadsheets write where there is nothing.
-_NOTHING = (
-    *(
-        "",
-        "nan",
-        "na",
-        "n/a",
-        "null",
-        "none",
-        "#n/a",
-        "n.a.",
-        "#nv",
-        "#value!",
-        "#wert!",
-        "#div/0!",
-    ),
-    *("-", "--", "---", "----", "-----", "—", "–", "k.a.", "n.d.", "-nan", "#null!", "#ref!", "?"),
-    *("#div/0!", "nan(ind)", "-nan(ind)", "1.#qnan", "***", "*****"),
-)
+_NOTHING_TEXT = """
+nan|na|n/a|null|none|#n/a|n.a.|#nv|#value!|#wert!|#div/0!|#null!|#ref!|k.a.|k. a.|n.d.|-nan|?
+nan(ind)|-nan(ind)|no reading|no data|nodata|no value|invalid|missing|lost|beam broken|no signal
+fehlt|ungültig|keine messung|kein wert|nicht gemessen|non mesuré|no medido|non misurato|欠測
+"""
+_NOTHING = frozenset(word for line in _NOTHING_TEXT.split("\n") for word in line.split("|"))
+_DASHES = frozenset("-–—*./")  # --, ---.---, ****
+_DIGITS = tuple("123456789")
 _LONGEST_NOTHING = max(map(len, _NOTHING))
 _SHOWN = 5  # rows named per problem; the rest is counted
 _LARGEST = 1e12  # beyond all lengths and angles
@@ -212,8 +202,12 @@ def _number_or_nan(cell: object, decimal: str, thousands: str | None) -> float:
 def _is_gap(cell: object) -> bool:
     """Empty, or not a number in one of the ways programs and people write it."""
     if isinstance(cell, str):
+        if cell[:1] in _DIGITS:
+            return False
         word = cell.strip()
-        return len(word) <= _LONGEST_NOTHING and word.lower() in _NOTHING
+        if len(word) > _LONGEST_NOTHING:
+            return False
+        return word.lower() in _NOTHING or _DASHES.issuperset(word)
     return cell is None or cell != cell
 
 

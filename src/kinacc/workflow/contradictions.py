@@ -227,7 +227,8 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
         yield Problem(
             place("measurements", "file", "path"),
             f"{file['path']!r} {'is a folder' if is_folder else 'does not exist'}",
-            "an existing file of measurements, relative to the folder of the configuration file",
+            "an existing CSV, text, Excel or Parquet file, relative to the folder of the "
+            "configuration file",
             f"the data comes from: {' '.join(origin.split())}"
             if origin
             else "say where the data comes from with measurements.file.source",

@@ -83,8 +83,7 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
         above.pop()
         units += 1
     if not above:
-        # Names that only the line of units stood under are no names.
-        return Head(0, first, 0, width)
+        return Head(0, first, 0, width, _in_remark(rows[:first], width, delimiter))
     names = above[-1]
     cells = header_cells(rows[names][1], width)
     over = header_cells(rows[above[-2]][1], width) if len(above) > 1 else []
@@ -96,6 +95,19 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
         if len(set(joined)) == len(joined):
             return Head(rows[names][0], first, units, width, tuple(joined))
     return Head(rows[names][0], first, units, width)
+
+
+def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ...] | None:
+    """Names that stand behind a sign of remarks in the last line above the numbers."""
+    for _, cells in rows[::-1][:3]:
+        if not isinstance(cells[0] if cells else None, str) or not is_comment(cells, delimiter):
+            continue
+        first = cells[0].lstrip(" #%/!")
+        names = header_cells([first, *cells[1:]] if first else cells[1:], width)
+        names = [name.strip() for name in names]
+        if len(names) == width and all(names) and not numbers_in(names):
+            return tuple(names) if len(set(names)) == width else None
+    return None
 
 
 def _can_name(cells: list, numbers: list, width: int, delimiter: str, sheet: bool) -> bool:

@@ -1,4 +1,4 @@
-"""Numbers that say that nothing was read: 9999, 9E9, or 0 in all of x, y and z."""
+"""Numbers that say that nothing was read: 9999, 9E9, or one number in all of x, y and z."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.measurements.faults import none_read
+from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
 from kinacc.measurements.intake.choices import Choice
 
-_MOST_SHARE = 0.5  # a number in more than half of the rows is what was read
+_FEWEST = 3  # readings beside, to say what is far from them
 _FAR = 1.5  # times the extent of the others
-_BEYOND = 1e8  # no unit makes a length of this
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ def found(
         for number in _candidates(points):
             rows = none_read(points, number)
             others = points[~rows & np.isfinite(points).all(axis=1)]
-            if number in taken or rows.sum() > _MOST_SHARE * len(points) or len(others) < 3:
+            if number in taken:
                 continue
             if _cannot_be(points[rows], others, joints[rows], number):
                 taken.append(number)
@@ -47,25 +46,18 @@ def found(
 
 
 def _candidates(points: np.ndarray) -> list[float]:
-    """Numbers of the points that programs write for nothing, the commonest first."""
-    whole = (points == points[:, :1]).all(axis=1)
+    """Numbers of the points that may stand for nothing: alike in x, y and z, or nothing but 9."""
+    alike = points[(points == points[:, :1]).all(axis=1), 0]
     every = points[np.isfinite(points)]
-    found = [0.0] if (whole & (points[:, 0] == 0.0)).any() else []
     large = np.unique(every[np.abs(every) >= 999.0])
-    return found + [float(each) for each in large if _is_mark(float(each))]
-
-
-def _is_mark(number: float) -> bool:
-    """Whether a number is all nines, as in 9999, 9999.999 and 9E9, or beyond all lengths."""
-    digits = f"{abs(number):.6f}".rstrip("0").rstrip(".").replace(".", "")
-    nines = set(digits) == {"9"} and len(digits) >= 4
-    return nines or abs(number) >= _BEYOND
+    marks = [float(each) for each in large if is_no_coordinate(float(each))]
+    return list(dict.fromkeys([*np.unique(alike).tolist(), *marks]))
 
 
 def _cannot_be(points: np.ndarray, others: np.ndarray, joints: np.ndarray, number: float) -> bool:
-    if abs(number) >= _BEYOND:
+    if abs(number) >= BEYOND:
         return True
-    if not (points == number).all():
+    if not (points == number).all() or len(others) < _FEWEST:
         return False
     centre = np.median(others, axis=0)
     extent = float(np.max(np.linalg.norm(others - centre, axis=1)))
@@ -75,11 +67,11 @@ def _cannot_be(points: np.ndarray, others: np.ndarray, joints: np.ndarray, numbe
     # A point of the arm does not stay where it is while the joints move.
     moved = np.unique(np.round(joints, 6), axis=0) if joints.size else joints
     again = len(others) - len(np.unique(others, axis=0))
-    return len(moved) >= 3 and again == 0
+    return len(moved) >= 3 and 2 * again < len(others)
 
 
 def _choice(target: str, number: float, rows: str) -> Choice:
-    told = "0, 0, 0" if number == 0 else f"{number:g} in some of x, y, z"
+    told = f"{number:g} in x, y, z or some of them"
     return Choice(
         "--no-reading",
         f"the point of {target} is {told} in {rows}",

@@ -172,6 +172,8 @@ def _workbook(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, li
             raise InputError(Problem(f"--sheet {wanted}", "is not there", ", ".join(sheets)))
         for sheet in [wanted] if wanted else sheets:
             rows = list(islice(book.rows(sheet, _LINES), _LINES))
+            width = max((len(cells) for _, cells in rows), default=0)
+            rows = [(line, cells + [None] * (width - len(cells))) for line, cells in rows]
             head = heads.head_of(rows, "", sheet=True)
             if head is not None and head.width > 1:
                 found[sheet] = head, rows
@@ -241,8 +243,10 @@ def _named(
             what = f"{len(names)} names for {head.width} columns"
             raise InputError(Problem(f"--names {given}", what, f"{head.width} names"))
         return replace(written, names=names, skip_lines=rows[head.first][0] - 1)
+    if head.names is not None and not head.line:
+        return replace(written, names=head.names, skip_lines=rows[head.first][0] - 1)
     if head.names is not None:
-        above = rows[head.first - 1][0] if head.under == 0 else head.line
+        above = head.line
         return replace(written, names=head.names, skip_lines=above, skip_under_names=head.under)
     if head.line:
         return replace(written, skip_lines=head.line - 1, skip_under_names=head.under)
