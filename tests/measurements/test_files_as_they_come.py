@@ -107,6 +107,23 @@ WRITTEN = {
         ["Joints", *[""] * 5, "Measured", "", ""],
         ";",
     ),
+    "names behind a hash": "# " + lines(cells(), (*(f"q{i}_deg" for i in range(1, 7)), *"XYZ")),
+    "names behind a hash, blanks": "# "
+    + lines(cells(), (*(f"q{i}_deg" for i in range(1, 7)), *"XYZ"), " "),
+    "names that hold blanks": lines(
+        cells(), [*(f"Joint {i}" for i in range(1, 7)), "Pos X", "Pos Y", "Pos Z"], "    "
+    ),
+    "units in the cells": lines(
+        [
+            [*(f"{c} °" for c in row[:6]), *(f"{c} mm" for c in row[6:])]
+            for row in cells(decimal=",")
+        ],
+        (*(f"J{i}" for i in range(1, 7)), *"XYZ"),
+        ";",
+    ),
+    "a column of row numbers without a name": lines(
+        [[number, *row] for number, row in enumerate(cells())], ["", *JOINTS, *XYZ]
+    ),
     "Windows line ends": lines(cells(), mark=";").replace("\n", "\r\n"),
 }  # fmt: skip
 
@@ -149,6 +166,27 @@ def test_a_mark_that_may_be_one_of_thousands_is_asked_about(case, tmp_path):
     assert np.isclose(np.abs(np.log10(np.median(ratio))), 3.0, atol=0.01) or (ratio != 1).any()
 
 
+def test_the_answer_of_a_person_counts_as_the_option_does(tmp_path):
+    from click.testing import CliRunner
+
+    from kinacc.cli.group import main
+
+    rows = [[*(f"{float(c):.0f}" for c in row[:6]), "2,512", "1,125", "-1,250"] for row in cells()]
+    path = file(tmp_path, lines(rows, mark=";"))
+    words = ["init", str(path), "--robot", "ur10", "--out", str(tmp_path)]
+    for flag in ("--yes", "--json"):
+        done = CliRunner().invoke(main, [*words, flag])
+        assert done.exit_code == 2
+        assert "--decimal" in done.output
+    alone = CliRunner().invoke(main, words, input="")
+    assert alone.exit_code == 2
+    assert "--decimal" in alone.output
+    answered = CliRunner().invoke(main, words, input=".\nur10\n")
+    assert "2,512 is 2512" in answered.output
+    written = (tmp_path / "readings.yaml").read_text(encoding="utf-8")
+    assert 'thousands: ","' in written
+
+
 def test_a_thousand_where_all_others_have_none_is_asked_about(tmp_path):
     rows = cells(decimal=",")
     rows[3][6] = "2.500"
@@ -186,6 +224,22 @@ def test_what_stands_under_the_rows_is_told_and_not_read(case, tmp_path):
     assert any("line" in words and "not read" in words for words in found.told), found.told
     assert_is_truth(reading(path))
     assert any("not read" in words for words in reading(path).left_out())
+
+
+def test_a_summary_behind_a_blank_line_is_told_and_not_read(tmp_path):
+    rows = [[f"P{number}", *row] for number, row in enumerate(cells())]
+    summary = "\nSummary;" + ";".join(["1.5"] * 9) + "\n"
+    path = file(tmp_path, lines(rows, ["Point", *JOINTS, *XYZ], ";") + summary)
+    assert_is_truth(reading(path))
+    assert "line 17: statistics of the rows, not read (Summary)" in reading(path).left_out()
+
+
+def test_units_in_the_cells_are_those_of_the_columns(tmp_path):
+    rows = [[*row[:6], *(f"{v / 1000:.6f} m" for v in point)]
+            for row, point in zip(cells(), POINT_MM, strict=True)]  # fmt: skip
+    path = file(tmp_path, lines(rows, [*JOINTS, *"XYZ"], ";"))
+    assert looked(path).section["length_unit"] == "m"
+    assert_is_truth(reading(path))
 
 
 def test_statistics_and_remarks_between_the_rows_are_told_with_their_lines(tmp_path):

@@ -56,6 +56,15 @@ def test_a_workbook_with_units_under_the_names_and_a_blank_first_column(tmp_path
     assert "row 17: statistics" in " ".join(looked(path).told)
 
 
+def test_a_workbook_with_names_of_groups_over_the_names(tmp_path):
+    over = ["Robot", *[None] * 5, "Nominal", None, None, "Measured", None, None]
+    names = [*(f"J{i}" for i in range(1, 7)), *"XYZ", *"XYZ"]
+    rows = [[*row[:6], 1.0, 2.0, 3.0, *row[6:]] for row in TABLE[1:]]
+    path = workbook(tmp_path, {"Sheet1": [over, names, ["deg"] * 6 + ["mm"] * 6, *rows]})
+    assert looked(path).section["columns"]["x"] == "Measured X"
+    assert_is_truth(reading(path), atol=1e-9)
+
+
 def test_a_workbook_with_text_in_place_of_numbers(tmp_path):
     rows = [[f"{value:.3f}".replace(".", ",") for value in row] for row in TABLE[1:]]
     assert_is_truth(reading(workbook(tmp_path, {"Tabelle1": [TABLE[0], *rows]})))
@@ -259,6 +268,12 @@ def test_angles_without_a_unit_are_asked_about(tmp_path):
     if spherical(np.pi / 200)[:, 0].max() < 361:
         assert "--direction-unit deg or --direction-unit gon" in undecided(path)
     assert_is_truth(reading(path, direction_unit="gon"))
+
+
+def test_a_unit_that_is_gon_in_one_language_and_degrees_in_another_is_asked_about(tmp_path):
+    path = directions(tmp_path, ["Hz [grad]", "V [grad]", "D [m]"], spherical())
+    assert "--direction-unit" in undecided(path)
+    assert_is_truth(reading(path, direction_unit="deg"))
 
 
 def test_gon_beyond_a_full_turn_of_degrees_need_no_question(tmp_path):

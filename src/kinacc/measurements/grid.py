@@ -38,6 +38,10 @@ desviación típica|máximo|mínimo|maximo|minimo|massimo|deviazione standard|de
 """
 STATISTICS = frozenset(word for line in _STATISTICS_TEXT.split("\n") for word in line.split("|"))
 _LABELS = re.compile(r"[\s:=]+$")
+_UNIT_BEHIND = re.compile(
+    r"([+\-−]?[\d.,].*[\d.,]|[+\-−]?\d)\s*(°|deg|rad|gon|mm|m|cm|in|inch|µm|um)"
+)
+_HAS_DIGIT = re.compile(r"\d")
 _FIRST_WORD = re.compile(r"[\s(\[:=/,]")
 _RULE = re.compile(r"[\s\-=_+|*.;,\t]*")
 _TWO_BLANKS = re.compile(r"\s{2,}|\t")
@@ -93,6 +97,12 @@ def _limited(rows: Iterator[Row], path: str) -> Iterator[Row]:
             what = f"more than {max(number - 1, 0)} rows of {len(cells)} columns"
             raise InputError(Problem(path, what, ALLOWED, SMALLER))
         yield line, cells
+
+
+def number_of(cell: str) -> tuple[str, str]:
+    """A cell such as 12.5° or 1204.3 mm as number and unit; the unit is empty where none is."""
+    found = _UNIT_BEHIND.fullmatch(cell)
+    return (found[1], found[2]) if found else (cell, "")
 
 
 def is_blank(cells: Sequence) -> bool:
@@ -203,19 +213,24 @@ class Sorted:
                 self.set_aside.append((self.lines[number], cells, "the names again"))
             else:
                 kept.append(number)
-        while kept and (why := self._closing(self.rows[kept[-1]], width)):
+        while kept and (why := self._closing(kept, width)):
             last = kept.pop()
             self.set_aside.append((self.lines[last], self.rows[last], why))
         if len(kept) < len(self.rows):
             self.rows = [self.rows[number] for number in kept]
             self.lines = [self.lines[number] for number in kept]
 
-    @staticmethod
-    def _closing(cells: list, width: int) -> str:
+    def _closing(self, kept: list[int], width: int) -> str:
         """What a row under the last reading is, empty where it is a reading."""
+        cells = self.rows[kept[-1]]
         filled = [c for c in cells if c is not None and str(c).strip()]
         short = len(cells) < width if len(cells) != width else 2 * len(filled) < width
         text = sum(not _begins_as_number(cell) for cell in filled)
+        if len(kept) > 1 and self.lines[kept[-1]] - self.lines[kept[-2]] > 1:
+            # Behind a blank line, and called by a word where the others have numbers.
+            own, others = (str(self.rows[number][0]).strip() for number in (kept[-1], kept[-2]))
+            if own and not _HAS_DIGIT.search(own) and _HAS_DIGIT.search(others):
+                return "statistics"
         return "text" if short and filled and 2 * text >= len(filled) and len(filled) < 4 else ""
 
 
@@ -236,7 +251,7 @@ def tabled(
         found.names = header_cells(found.head, width)
     names = _without_blank_columns(found, letters)
     found.trim()
-    problems = _header_problems(path, found, written.delimiter)
+    problems = _header_problems(path, found, written.delimiter, bool(letters))
     ragged = [i for i, cells in enumerate(found.rows) if len(cells) != len(found.names)]
     seen = RawTable(path, {}, np.array(found.lines), letters=dict.fromkeys(letters, ""))
     if ragged and not problems:
@@ -253,17 +268,36 @@ def tabled(
         name: list(cells)
         for name, cells in zip(found.names, zip(*found.rows, strict=True), strict=True)
     }
+    under = _units_behind(columns, found.under)
     return RawTable(
         path,
         columns,
         np.array(found.lines),
         written.decimal,
-        tuple("" if cell is None else str(cell) for cell in found.under),
+        under,
         written.thousands,
         tuple(_told(found, seen)),
         tuple(line for line, _, _ in found.set_aside),
         dict(zip(found.names, names, strict=True)) if letters else {},
     )
+
+
+def _units_behind(columns: dict[str, list], under: list) -> tuple[str, ...]:
+    """Take the unit off columns whose every number carries the same; the units by column."""
+    units = ["" if cell is None else str(cell) for cell in under]
+    for place, (name, cells) in enumerate(columns.items()):
+        filled = [cell for cell in cells if not RawTable.is_gap(cell)]
+        if not filled or not isinstance(filled[0], str) or not number_of(filled[0].strip())[1]:
+            continue
+        parts = [number_of(cell.strip()) if isinstance(cell, str) else ("", "") for cell in filled]
+        unit = parts[0][1]
+        if all(each[1] == unit for each in parts):
+            units = units or [""] * len(columns)
+            units[place] = units[place] if units[place].strip("-/ ") else unit
+            columns[name] = [
+                cell if RawTable.is_gap(cell) else number_of(cell.strip())[0] for cell in cells
+            ]
+    return tuple(units)
 
 
 def _without_blank_columns(found: Sorted, letters: Sequence[str]) -> list[str]:
@@ -307,14 +341,14 @@ def _label(cells: Sequence) -> str:
     return str(next(cell for cell in cells if not is_blank([cell]))).strip()
 
 
-def _header_problems(path: str, found: Sorted, delimiter: str) -> list[Problem]:
+def _header_problems(path: str, found: Sorted, delimiter: str, sheet: bool) -> list[Problem]:
     header = found.names
     if not header:
         return [Problem(path, "the file is empty", "a line of column names, then rows")]
     problems = []
     if not found.rows:
         problems.append(Problem(path, "no rows under the column names", "at least one row"))
-    where = f"{path}: line {found.names_line or 1}"
+    where = f"{path}: {'row' if sheet else 'line'} {found.names_line or 1}"
     if len(header) == 1:
         others = [mark for mark in (",", ";", "\t") if mark != delimiter and mark in header[0]]
         hint = f"set measurements.file.delimiter to {others[0]!r}" if others else ""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinacc.measurements.column_names import UNITS, plain
-from kinacc.measurements.grid import Row, header_cells, is_blank, is_comment
+from kinacc.measurements.grid import Row, header_cells, is_blank, is_comment, number_of
 from kinacc.measurements.intake.decimals import shaped_as_number
 from kinacc.measurements.table import RawTable
 
@@ -43,7 +43,7 @@ class Head:
 def is_number(cell: object) -> bool:
     """Whether a cell is a number by some marks."""
     if isinstance(cell, str):
-        return shaped_as_number(cell.strip())
+        return shaped_as_number(number_of(cell.strip())[0])
     return isinstance(cell, (int, float)) and not isinstance(cell, bool)
 
 
@@ -76,7 +76,7 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
         number
         for number in range(first)
         if _can_name(rows[number][1], rows[first][1], width, delimiter, sheet)
-        and counts[number] <= 1
+        and numbers_in(header_cells(rows[number][1], width)) <= 1
     ]
     units = 0
     while above and _are_units(rows[above[-1]][1]):
@@ -86,13 +86,14 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
         return Head(0, first, 0, width, _in_remark(rows[:first], width, delimiter))
     names = above[-1]
     cells = header_cells(rows[names][1], width)
-    over = header_cells(rows[above[-2]][1], width) if len(above) > 1 else []
     told = [name for name in cells if name]
-    if len(set(told)) < len(told) and above[-2:-1] == [names - 1]:
-        if len(set(filter(None, over))) == len([name for name in over if name]) == len(told):
+    over = header_cells(rows[names - 1][1], width) if names else []
+    if len(set(told)) < len(told) and over and not is_comment(rows[names - 1][1], delimiter):
+        grouped = list(filter(None, over))
+        if len(set(grouped)) == len(grouped) == len(told):
             return Head(rows[names - 1][0], first, units + 1, width)
         joined = _joined(over, cells)
-        if len(set(joined)) == len(joined):
+        if grouped and len(set(joined)) == len(joined):
             return Head(rows[names][0], first, units, width, tuple(joined))
     return Head(rows[names][0], first, units, width)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -14,6 +15,7 @@ from kinacc.measurements.written import Directions
 
 _TURN = {"deg": 360.0, "gon": 400.0, "rad": 2.0 * np.pi}
 _SLACK = 1.002
+_GRAD = re.compile(r"\bgra(d|de|ds|des)\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ def directions_of(
     horizontal = _values(table, [each.horizontal.column for each in readings])
     vertical = _values(table, [each.vertical.column for each in readings])
     units = sorted({unit for each in readings for unit in each.angle_units})
+    if any(_GRAD.search(name) for each in readings for name in each.names[:2]):
+        units = []  # grad is gon in one language and degrees in another
     told, choices = [], []
     unit = answers.get("direction_unit") or (units[0] if len(units) == 1 else stated)
     if unit not in PER_UNIT:
