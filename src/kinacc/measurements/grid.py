@@ -41,6 +41,8 @@ _LABELS = re.compile(r"[\s:=]+$")
 _UNIT_BEHIND = re.compile(
     r"([+\-−]?[\d.,].*[\d.,]|[+\-−]?\d)\s*(°|deg|rad|gon|mm|m|cm|in|inch|µm|um)"
 )
+_MOST_LINES = MOST_ROWS + 10_000  # titles and the like beside
+_LONGEST_NUMBER = 60  # with its unit
 _HAS_DIGIT = re.compile(r"\d")
 _FIRST_WORD = re.compile(r"[\s(\[:=/,]")
 _RULE = re.compile(r"[\s\-=_+|*.;,\t]*")
@@ -53,11 +55,20 @@ def decoder(encoding: str) -> tuple[str, str]:
     return codec, "replace"
 
 
-def rows_of_text(path: Path, written: Written) -> Iterator[Row]:
-    """Rows of a text file that are not blank. Raises InputError where there is too much of it."""
+def refuse_large(path: Path) -> None:
+    """Raise InputError where a text has too many bytes or lines."""
     if path.stat().st_size > MOST_BYTES:
         what = f"{path.stat().st_size / 1e6:.0f} MB"
         raise InputError(Problem(str(path), what, ALLOWED, SMALLER))
+    with open(path, "rb") as file:
+        lines = sum(chunk.count(b"\n") for chunk in iter(lambda: file.read(1 << 20), b""))
+    if lines > _MOST_LINES:
+        raise InputError(Problem(str(path), f"{lines} lines", ALLOWED, SMALLER))
+
+
+def rows_of_text(path: Path, written: Written) -> Iterator[Row]:
+    """Rows of a text file that are not blank. Raises InputError where there is too much of it."""
+    refuse_large(path)
     codec, otherwise = decoder(written.encoding)
     with open(path, newline="", encoding=codec, errors=otherwise) as stream:
         yield from _limited(rows_of_lines(stream, written, str(path)), str(path))
@@ -101,7 +112,7 @@ def _limited(rows: Iterator[Row], path: str) -> Iterator[Row]:
 
 def number_of(cell: str) -> tuple[str, str]:
     """A cell such as 12.5° or 1204.3 mm as number and unit; the unit is empty where none is."""
-    found = _UNIT_BEHIND.fullmatch(cell)
+    found = _UNIT_BEHIND.fullmatch(cell) if len(cell) < _LONGEST_NUMBER else None
     return (found[1], found[2]) if found else (cell, "")
 
 

@@ -18,7 +18,7 @@ from kinacc.measurements.table import (
 )
 from kinacc.measurements.written import Written
 
-_MOST_BYTES = 300_000_000  # unpacked; a sheet of a million cells has some 40 MB
+_MOST_BYTES = 150_000_000  # unpacked; a sheet of a million cells has some 40 MB
 
 
 def load(path: Path, written: Written) -> RawTable:
@@ -74,8 +74,8 @@ class Workbook:
         self._book.close()
 
     def rows(self, sheet: str, most: int = MOST_ROWS) -> Iterator[Row]:
-        """Rows of a sheet, each with its number, trailing blank cells left out."""
-        count = 0
+        """Rows of a sheet that are not blank, each with its number, blank cells at its end cut."""
+        count = seen = 0
         worksheet = self._book[sheet]
         worksheet.reset_dimensions()  # what a workbook says of its size may be wrong
         try:
@@ -83,13 +83,15 @@ class Workbook:
                 cells = [_cell(value) for value in values]
                 while cells and cells[-1] is None:
                     cells.pop()
-                count += len(cells)
-                if number > MOST_ROWS or count > MOST_CELLS or len(cells) > MOST_COLUMNS:
-                    what = f"more than {number - 1} rows in sheet {sheet!r}"
+                if not cells:
+                    continue
+                count, seen = count + len(cells), seen + 1
+                if seen > MOST_ROWS or count > MOST_CELLS or len(cells) > MOST_COLUMNS:
+                    what = f"more than {seen - 1} rows in sheet {sheet!r}"
                     raise InputError(Problem(self.path, what, ALLOWED, SMALLER))
-                if number > most:
+                if seen > most:
                     return
-                yield number, cells or [None]
+                yield number, cells
         except InputError:
             raise
         except Exception as error:

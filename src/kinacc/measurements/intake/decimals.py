@@ -83,7 +83,7 @@ def shaped_as_number(cell: str) -> bool:
 
 @cache
 def _pattern(kind: str, mark: str, other: str = "") -> re.Pattern:
-    m, start, end = _BETWEEN[mark], r"^\s*[+\-−]?", r"\s*$"
+    m, start, end = _BETWEEN[mark], r"^[+\-−]?", "$"
     if kind == "decides":  # no thousands are written so
         shapes = rf"(?:\d{{4,}}{m}\d*|0\d*{m}\d*|{m}\d+|\d+{m}(?:\d{{1,2}}|\d{{4,}})?)"
         shapes = rf"(?:{shapes}(?:[eE][+\-−]?\d+)?|\d+{m}\d*[eE][+\-−]?\d+)"
@@ -127,7 +127,7 @@ def _decimal(texts: Mapping[str, str]) -> str:
 
 def _whole(text: str) -> bool:
     """Whether a column has numbers without a mark too, of less than four digits, not all 0."""
-    return bool(re.search(r"^\s*[+\-−]?[1-9]\d{0,2}\s*$", text, re.MULTILINE))
+    return bool(re.search(r"^[+\-−]?[1-9]\d{0,2}$", text, re.MULTILINE))
 
 
 def _either(name: str, text: str, mark: str) -> Choice:

@@ -76,7 +76,7 @@ def _choice(target: str, number: float, rows: str) -> Choice:
         "--no-reading",
         f"the point of {target} is {told} in {rows}",
         {
-            f"{number:g}" if number == 0 else repr(number): "nothing was read there",
+            f"{number:.10g}": "nothing was read there",
             "none": "it was read so",
         },
     )

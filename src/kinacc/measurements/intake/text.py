@@ -13,7 +13,7 @@ from kinacc.errors import InputError, Problem, first_few
 from kinacc.measurements.column_names import name_of
 from kinacc.measurements.features import report_of
 from kinacc.measurements.files import EXCEL, GROUPS, PARQUET, POINT, load, refuse_other_files
-from kinacc.measurements.grid import BLANKS, Row, decoder, rows_of_lines
+from kinacc.measurements.grid import BLANKS, Row, decoder, refuse_large, rows_of_lines
 from kinacc.measurements.intake import decimals, heads, spherical_files
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.encoding import encoding_of
@@ -98,6 +98,7 @@ def _laid_out(path: Path, found: Looked, answers: Mapping[str, str]) -> Looked:
 
 
 def _text(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, list[Row], list[str]]:
+    refuse_large(path)
     encoding = answers.get("encoding") or encoding_of(path)
     codec, otherwise = decoder(encoding)
     with open(path, newline="", encoding=codec, errors=otherwise) as stream:
