@@ -97,6 +97,9 @@ WRITTEN = {
     "units under the names": lines(
         [["deg"] * 6 + ["mm"] * 3, *cells()], (*(f"J{i}" for i in range(1, 7)), *"XYZ")
     ),
+    "units above the names": lines(
+        [[*(f"J{i}" for i in range(1, 7)), *"XYZ"], *cells()], ["deg"] * 6 + ["mm"] * 3
+    ),
     "a rule under the names": lines(
         [["---"] * 9, *cells()], (*(f"J{i}" for i in range(1, 7)), *"XYZ"), "\t"
     ),
@@ -306,6 +309,14 @@ def test_numbers_that_stand_for_no_reading_are_found_and_told(case, unit, tmp_pa
     np.testing.assert_allclose(x, POINT_MM[kept, 0] + 4000, atol=2e-3)
 
 
+def test_two_numbers_for_no_reading_in_one_file_are_both_found(tmp_path):
+    away = np.add(POINT_MM, (4000, 0, 0))
+    rows = [[*row[:6], *(f"{v:.3f}" for v in p)] for row, p in zip(cells(), away, strict=True)]
+    rows[2][6:], rows[8][6:] = ["0"] * 3, ["9999.99"] * 3
+    found = looked(file(tmp_path, lines(rows, mark=";")))
+    assert found.section["no_reading"] == [0.0, 9999.99]
+
+
 def test_one_zero_among_points_around_it_is_asked_about(tmp_path):
     near = POINT_MM - POINT_MM.mean(axis=0)
     rows = [[*row[:6], *map(str, np.round(p, 3))] for row, p in zip(cells(), near, strict=True)]
@@ -316,6 +327,26 @@ def test_one_zero_among_points_around_it_is_asked_about(tmp_path):
     assert "line 6" in str(error)
     assert len(reading(path, no_reading="0").columns["row"]) == ROWS - 1
     assert len(reading(path, no_reading="none").columns["row"]) == ROWS
+
+
+def test_an_answer_about_one_number_leaves_the_others_as_they_were_found(tmp_path):
+    near = POINT_MM - POINT_MM.mean(axis=0)
+    rows = [[*row[:6], *map(str, np.round(p, 3))] for row, p in zip(cells(), near, strict=True)]
+    rows[4][6:] = ["0", "0", "0"]
+    for row in (1, 6, 9):
+        rows[row][6:] = ["9999.999"] * 3
+    path = file(tmp_path, lines(rows, mark=";"))
+    assert reading(path, no_reading="0").columns["row"].tolist() == [
+        2,
+        4,
+        5,
+        7,
+        9,
+        10,
+        *range(12, 16),
+    ]
+    kept = reading(path, no_reading="none").columns["row"].tolist()
+    assert kept == [2, 4, 5, 6, 7, 9, 10, *range(12, 16)]
 
 
 def test_a_nine_in_one_coordinate_is_asked_about(tmp_path):

@@ -202,6 +202,26 @@ def test_a_report_with_a_row_per_axis_becomes_a_row_per_feature(names, once, tmp
     assert reading(path).columns["row"].tolist()[:2] == [2, 5]
 
 
+def test_a_report_whose_features_stand_in_lines_of_their_own(tmp_path):
+    blocks = "Axis;Nominal;Actual;Dev\n" + "".join(
+        f"Point_{n + 1}\n" + lines(
+            [[axis, "1.0", f"{POINT_MM[n, place]:.3f}", "0.1"] for place, axis in enumerate("XYZ")],
+            None,
+            ";",
+        )
+        for n in range(ROWS)
+    )  # fmt: skip
+    padded = "Name;" + blocks.replace("Point_", "Point ").replace("\nX;", "\n;X;")
+    padded = padded.replace("\nY;", "\n;Y;").replace("\nZ;", "\n;Z;")
+    padded = "\n".join(f"{x};;;;" if x.startswith("Point") else x for x in padded.split("\n"))
+    for content in (blocks, padded):
+        table = text.look(file(tmp_path, content)).table
+        named = next(iter(table.columns.values()))
+        assert [name.replace(" ", "_") for name in named[:2]] == ["Point_1", "Point_2"]
+        np.testing.assert_allclose([float(c) for c in table.columns["Actual Y"]], POINT_MM[:, 1])
+        assert table.line[1] == 7
+
+
 def test_other_controls_of_a_report_are_told_and_tolerances_are_no_points(tmp_path):
     rows = []
     names = ["Name", "Control", "Nominal", "Meas", "Tol", "Dev", "Test"]
@@ -307,6 +327,21 @@ def test_the_way_horizontal_angles_count_is_found_by_trying(tmp_path):
     assert told["file"]["directions"]["horizontal"] == "counterclockwise"
     assert told["suspicions"] == []
     assert any("found by trying" in words for words in told["told"])
+
+
+def test_what_is_as_usual_leaves_the_settings_of_a_run_as_they_were(tmp_path):
+    from kinacc.workflow.plan import planned
+
+    path = file(tmp_path, lines(cells()))
+    head = "datasets: {cell: {robot: ur10, calibration: {base_and_tool: estimated}, evaluation: "
+    head += "{space: measured}, measurements: {source: file, file: "
+    for more, there in (("", False), (", sigma: 2, encoding: cp932", True)):
+        config = tmp_path / "cell.yaml"
+        config.write_text(f"{head}{{path: {path}, orientation: {{kind: none}}{more}}}}}}}}}\n")
+        settings = planned([config]).settings("measurements", "cell")["measurements"]["file"]
+        for key in ("sigma", "encoding"):
+            assert (key in settings) == there
+        assert "layout" not in settings
 
 
 def test_a_workbook_goes_from_init_to_the_check(tmp_path):

@@ -44,7 +44,7 @@ def load(path: str | Path, written: Written | None = None, source: str | None = 
         table = workbook.load(path, written)
     else:
         table = tabled(str(path), rows_of_text(path, written), written)
-    if written.names is not None and POINT in written.names:
+    if written.names is not None and {*written.names[:-3]} <= {*GROUPS, POINT}:
         table = in_natural_order(table)
     if written.layout == FEATURES:
         from kinacc.measurements.features import by_feature
@@ -59,6 +59,8 @@ def load(path: str | Path, written: Written | None = None, source: str | None = 
 
 def in_natural_order(table: RawTable) -> RawTable:
     """A list of points with P2 before P10, within groups as they come; each keeps its line."""
+    if POINT not in table.columns:
+        return table
     names = [str(cell).strip() for cell in table.columns[POINT]]
     others = [table.columns[name] for name in GROUPS if name in table.columns]
     groups = list(zip(*others, strict=True)) or [()] * len(table)

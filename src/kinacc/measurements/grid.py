@@ -41,6 +41,7 @@ _LABELS = re.compile(r"[\s:=]+$")
 _UNIT_BEHIND = re.compile(
     r"([+\-−]?[\d.,].*[\d.,]|[+\-−]?\d)\s*(°|deg|rad|gon|mm|m|cm|in|inch|µm|um)"
 )
+_BLOCK = 4  # lines: a name, and X, Y, Z
 _MOST_LINES = MOST_ROWS + 10_000  # titles and the like beside
 _LONGEST_NUMBER = 60  # with its unit
 _HAS_DIGIT = re.compile(r"\d")
@@ -213,6 +214,25 @@ class Sorted:
         self.lines = [line for line, _ in both]
         self.rows = [cells for _, cells in both]
 
+    def name_blocks(self) -> None:
+        """Give rows of X, Y, Z the name that stands in a line of its own above them."""
+        filled = [[c for c in cells if c is not None and str(c).strip()] for cells in self.rows]
+        alone = [len(each) == 1 and isinstance(each[0], str) for each in filled]
+        if len(alone) < _BLOCK or not alone[0]:
+            return
+        last, rows, lines = "", [], []
+        for cells, name, own, line in zip(self.rows, filled, alone, self.lines, strict=True):
+            if own:
+                last = name[0].strip()
+                continue
+            if not isinstance(cells[0], str) or cells[0].strip().upper()[:1] not in "XYZ":
+                return
+            rows.append([last, *cells])
+            lines.append(line)
+        self.rows, self.lines = rows, lines
+        self.names = ["Feature", self.names[0] or "Axis", *self.names[1:]]
+        self.under = ["", *self.under] if self.under else []
+
     def trim(self) -> None:
         """Cut blank cells behind the last column; set aside names said again, and a last text."""
         width = len(self.names)
@@ -220,7 +240,11 @@ class Sorted:
         for number, cells in enumerate(self.rows):
             if len(cells) > width and is_blank(cells[width:]):
                 self.rows[number] = cells[:width]
-            if len(cells) == width and cells == self.names:
+            if (
+                len(cells) == width
+                and [str(c).strip() for c in cells[:2]] == self.names[:2]
+                and ([str(cell).strip() for cell in cells] == self.names)
+            ):
                 self.set_aside.append((self.lines[number], cells, "the names again"))
             else:
                 kept.append(number)
@@ -258,8 +282,8 @@ def tabled(
     """
     found = Sorted(rows, written)
     if found.rows:
-        width = len(found.rows[0])
-        found.names = header_cells(found.head, width)
+        found.names = header_cells(found.head, max(map(len, found.rows[:_BLOCK])))
+    found.name_blocks()
     names = _without_blank_columns(found, letters)
     found.trim()
     problems = _header_problems(path, found, written.delimiter, bool(letters))

@@ -168,9 +168,11 @@ def _no_reading(
 ) -> list[float]:
     """Numbers that say that nothing was read, as answered or as found."""
     given = answers.get("no_reading")
-    if given is not None:
+    known: list[float] = []
+    answered = [each.strip() for each in given.split(",")] if given else []
+    if answered:
         try:
-            return [] if given == "none" else [float(each) for each in given.split(",")]
+            known = [float(each) for each in answered if each != "none"]
         except ValueError:
             what, allowed = f"{given!r} is no number", "a number such as 9999.999, or none"
             raise InputError(Problem("--no-reading", what, allowed)) from None
@@ -179,7 +181,7 @@ def _no_reading(
         for name, target in found.targets.items()
     }
     joints = np.stack([values(name) for name in found.joints], axis=1)
-    none = no_reading.found(points, joints, table.rows_in_words)
+    none = no_reading.found(points, joints, table.rows_in_words, known, "none" not in answered)
     if none.choice:
         raise Undecided(table.path, [none.choice])
     return list(none.numbers)

@@ -16,6 +16,11 @@ _UNITS = re.compile(
     r"\b(?:units?|einheit(?:en)?|unit[eéà]s?|unidad(?:es)?|単位)\b[^:=\n]{0,20}[:=]\s*([^;\n#]+)",
     re.IGNORECASE,
 )
+_IN_UNITS = re.compile(
+    r"\b(?:values|data|coordinates|positions|points|lengths|dimensions|werte|koordinaten|punkte)\b"
+    r"[^.;\n]{0,20}\bin\s+([^.;\n]{1,30})",
+    re.IGNORECASE,
+)
 _FRAME = re.compile(
     r"\b(?:working frame|coordinate (?:frame|system)|frame|koordinatensystem|bezugssystem)\b"
     r"\s*[:=]\s*([^\n;]+)",
@@ -84,10 +89,14 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
         units += 1
     if not above:
         return Head(0, first, 0, width, _in_remark(rows[:first], width, delimiter))
-    names = above[-1]
+    filled = {number: sum(not is_blank([c]) for c in rows[number][1]) for number in above}
+    names = max(number for number in above if 2 * filled[number] >= max(filled.values()))
     cells = header_cells(rows[names][1], width)
     told = [name for name in cells if name]
     over = header_cells(rows[names - 1][1], width) if names else []
+    if over and _are_units(over) and len(over) == width == len(cells):
+        joined = [f"{n} [{u}]" if u.strip("-/ ") else n for n, u in zip(cells, over, strict=True)]
+        return Head(rows[names][0], first, units, width, tuple(joined))
     if len(set(told)) < len(told) and over and not is_comment(rows[names - 1][1], delimiter):
         grouped = list(filter(None, over))
         if len(set(grouped)) == len(grouped) == len(told):
@@ -147,7 +156,7 @@ def stated_above(texts: Sequence[str]) -> dict[str, str]:
     """Units of lengths and angles, and the frame, that the lines around the rows state."""
     found: dict[str, str] = {}
     for text in texts:
-        for listed in _UNITS.findall(text):
+        for listed in (*_UNITS.findall(text), *_IN_UNITS.findall(text)):
             for word in _WORD.findall(listed):
                 unit = UNITS.get(plain(word), "")
                 unit = plain(word) if unit == "?" else unit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,25 +23,34 @@ class NoReading:
 
 
 def found(
-    targets: Mapping[str, np.ndarray], joints: np.ndarray, rows_in_words: Callable[..., str]
+    targets: Mapping[str, np.ndarray],
+    joints: np.ndarray,
+    rows_in_words: Callable[..., str],
+    known: Collection[float] = (),
+    ask: bool = True,
 ) -> NoReading:
     """What points by target, each (n, 3), hold in place of a reading; ``joints`` (n, k).
 
-    A number counts where it is in all three coordinates and far from all other points, or in all
-    three again and again at other joints. Where it may be a reading it is asked about.
+    ``known``: numbers that are known to say so; ``ask``: others may be asked about. A number
+    counts where it is in all three coordinates and far from all other points, or in all three
+    again and again at other joints. Where it may be a reading it is asked about.
     """
-    taken: list[float] = []
+    taken: list[float] = list(known)
     for name, points in targets.items():
-        for number in _candidates(points):
-            rows = none_read(points, number)
-            others = points[~rows & np.isfinite(points).all(axis=1)]
+        numbers = _candidates(points)
+        if not numbers:
+            continue
+        void = np.any([none_read(points, each) for each in numbers], axis=0)
+        others = points[~void & np.isfinite(points).all(axis=1)]
+        for number in numbers:
             if number in taken:
                 continue
+            rows = none_read(points, number)
             if _cannot_be(points[rows], others, joints[rows], number):
                 taken.append(number)
-            else:
+            elif ask:
                 words = rows_in_words(np.flatnonzero(rows))
-                return NoReading(tuple(taken), _choice(name, number, words))
+                return NoReading(tuple(taken), _choice(name, number, words, known))
     return NoReading(tuple(sorted(taken)))
 
 
@@ -70,13 +79,14 @@ def _cannot_be(points: np.ndarray, others: np.ndarray, joints: np.ndarray, numbe
     return len(moved) >= 3 and 2 * again < len(others)
 
 
-def _choice(target: str, number: float, rows: str) -> Choice:
+def _choice(target: str, number: float, rows: str, known: Collection[float]) -> Choice:
+    before = "".join(f"{each:.10g}," for each in known)
     told = f"{number:g} in x, y, z or some of them"
     return Choice(
         "--no-reading",
         f"the point of {target} is {told} in {rows}",
         {
-            f"{number:.10g}": "nothing was read there",
-            "none": "it was read so",
+            f"{before}{number:.10g}": "nothing was read there",
+            f"{before}none": "it was read so",
         },
     )
