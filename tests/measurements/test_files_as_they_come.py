@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from files_as_they_come import (
+    ARM,
     JOINTS,
     POINT_MM,
     Q_DEG,
@@ -22,6 +23,7 @@ from files_as_they_come import (
 
 from kinacc.errors import InputError
 from kinacc.measurements.intake.choices import Undecided
+from kinacc.measurements.reader import read
 
 GERMAN = [*(f"Achse {i} [°]" for i in range(1, 7)), *(f"{axis} gemessen [mm]" for axis in "XYZ")]
 
@@ -64,6 +66,15 @@ def test_characters_are_found_and_named_where_they_are_not_utf_8(case, tmp_path)
     assert list(found.table.columns) == names
     assert (f"read as {said}" in found.told) == (said != "utf-8")
     assert_is_truth(reading(path))
+
+
+def test_a_description_without_the_characters_says_what_to_set(tmp_path):
+    path = file(tmp_path, lines(cells(), [*GERMAN[:6], *"XYZ"], ";"), encoding="latin-1")
+    section = looked(path).section
+    wrong = {ours: name.replace("°", "\ufffd") for ours, name in section["columns"].items()}
+    found = read(section | {"encoding": "utf-8", "columns": wrong}, ARM, strict=False)
+    assert_is_truth(found)
+    assert "set measurements.file.encoding" in " ".join(found.left_out())
 
 
 WRITTEN = {

@@ -44,6 +44,10 @@ def load(path: str | Path, written: Written | None = None, source: str | None = 
         table = workbook.load(path, written)
     else:
         table = tabled(str(path), rows_of_text(path, written), written)
+        if written.encoding == "utf-8" and any("\ufffd" in name for name in table.columns):
+            told = "names of columns hold characters that are not UTF-8: set "
+            told += "measurements.file.encoding, such as latin-1 or cp932"
+            table = replace(table, notes=(*table.notes, told))
     if written.names is not None and {*written.names[:-3]} <= {*GROUPS, POINT}:
         table = in_natural_order(table)
     if written.layout == FEATURES:

@@ -35,7 +35,7 @@ _POSE = (
     "a pose in numbered columns, which are not read",
     "the controller's own forward kinematics, never a measurement",
 )
-NO_SIGMA = f"{SPREAD}, of which nothing says that it is one sigma"
+NO_SIGMA = f"{SPREAD}, of which nothing says that it is one sigma; --sigma 1 or 2 reads it"
 _UNCERTAINTY_TEXT = """
 uncertainty uncertainties unc uncert u σ sigma unsicherheit messunsicherheit incertitude
 incertidumbre incertezza incerteza u95 std

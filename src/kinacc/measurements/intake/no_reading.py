@@ -81,7 +81,8 @@ def _cannot_be(points: np.ndarray, others: np.ndarray, joints: np.ndarray, numbe
 
 def _choice(target: str, number: float, rows: str, known: Collection[float]) -> Choice:
     before = "".join(f"{each:.10g}," for each in known)
-    told = f"{number:g} in x, y, z or some of them"
+    several = ", ".join([f"{number:g}"] * 3)
+    told = f"{number:.10g} in some of x, y, z" if is_no_coordinate(number) else several
     return Choice(
         "--no-reading",
         f"the point of {target} is {told} in {rows}",
