@@ -267,6 +267,10 @@ SPHERICAL = {
     "degrees": (["Hz [deg]", "V [deg]", "D [m]"], spherical()),
     "German": (["Hz (°)", "V (°)", "Schrägstrecke (m)"], spherical()),
     "elevation": (["Hz [deg]", "Elevation [deg]", "Distance [m]"], spherical(horizon=True)),
+    "letters": (
+        ["Az [deg]", "El [deg]", "R [m]"],
+        spherical(horizon=True, clockwise=False),
+    ),
     "azimuth": (
         ["Azimuth [deg]", "Zenith [deg]", "Distance [m]"],
         spherical(clockwise=False),

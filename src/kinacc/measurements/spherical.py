@@ -29,7 +29,7 @@ hoehenwinkel hohenwinkel polar vwinkel zenital zenitale verticale cenital elev
 """
 _DISTANCE = """
 d dist distance distanz sd slopedistance schraegstrecke schragstrecke schraegdistanz schragdistanz
-strecke range entfernung distancia distanza radius slope
+strecke r rho range entfernung distancia distanza radius slope
 """
 _FROM_HORIZON = frozenset(("elevation", "el", "elev", "hoehenwinkel", "hohenwinkel"))
 _FROM_ZENITH = frozenset(
@@ -82,10 +82,12 @@ def readings_of(names: Sequence[Name]) -> list[Reading]:
         return []
     parts: dict[tuple[str, ...], dict[str, Name]] = {}
     for name in names:
-        said = [_PARTS[word] for word in name.words if word in _PARTS and word not in _FILLING]
-        said = said or [_PARTS[word] for word in name.words if word in _PARTS]
+        whole = "".join(name.spelled).lower()  # Az is no acceleration along z here
+        own = (whole,) if whole in _PARTS else name.words
+        said = [_PARTS[word] for word in own if word in _PARTS and word not in _FILLING]
+        said = said or [_PARTS[word] for word in own if word in _PARTS]
         if len(set(said)) == 1:
-            rest = tuple(w for w in name.words if w not in _PARTS and w not in _FILLING)
+            rest = tuple(w for w in own if w not in _PARTS and w not in _FILLING)
             parts.setdefault(rest, {}).setdefault(said[0], name)
     return [
         Reading(**found, rest=rest)

@@ -302,10 +302,11 @@ def _in_words(
         for line, cells in rows
         if line <= last
     ]
-    above = [text for text in above if text and not _SEP.fullmatch(text)]
+    above = [text for text in above if text and not text.lower().startswith(("sep=", '"sep='))]
     if above and head.names is None:
         what = "the names" if head.line else "the rows"
-        told.append(f"{len(above)} lines above {what}, not read ({_shortened(above[0])})")
+        count = f"{len(above)} line{'s' if len(above) > 1 else ''}"
+        told.append(f"{count} above {what}, not read ({_shortened(above[0])})")
     if written.names is not None:
         told.append(f"columns are called {', '.join(written.names)}")
     if written.decimal == ",":
