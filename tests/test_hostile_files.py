@@ -147,6 +147,41 @@ def test_a_small_parquet_file_of_sixty_million_rows_is_refused(much, command):
     assert "at most 1000000 rows" in said
 
 
+@pytest.mark.parametrize("command", ["check-data", "init"])
+def test_a_small_workbook_of_much_text_is_refused(tmp_path, command):
+    import zipfile
+
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(COLUMNS)
+    book.active.append([1.0] * 9)
+    book.save(tmp_path / "good.xlsx")
+    with (
+        zipfile.ZipFile(tmp_path / "good.xlsx") as good,
+        zipfile.ZipFile(tmp_path / "much.xlsx", "w", zipfile.ZIP_DEFLATED) as much,
+    ):
+        for name in good.namelist():
+            much.writestr(name, good.read(name))
+        much.writestr("xl/sharedStrings.xml", b" " * 200_000_000)
+    assert (tmp_path / "much.xlsx").stat().st_size < 1_000_000
+    assert "MB" in refused(tmp_path, *COMMANDS[command](tmp_path, "much.xlsx"))
+
+
+@pytest.mark.parametrize("cell", ["<!ENTITY", "9" * 40_000, "=1/0"])
+def test_cells_of_a_workbook_that_are_no_numbers_are_named(tmp_path, cell):
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(COLUMNS)
+    for _ in range(5):
+        book.active.append([1.0] * 8 + [2.0])
+    book.active.cell(3, 9).value = cell
+    book.save(tmp_path / "odd.xlsx")
+    said = refused(tmp_path, "check-data", data_set(tmp_path, "odd.xlsx"))
+    assert "odd.xlsx" in said
+
+
 def test_long_texts_repeated_in_a_small_parquet_file_are_refused(tmp_path):
     rows = 100_000
     text = pa.DictionaryArray.from_arrays(

@@ -168,7 +168,7 @@ def test_a_mapped_column_that_is_not_there(tmp_path, good):
 
 def test_bad_cells_of_several_columns_are_all_named(tmp_path, good):
     good = {name: values.astype(object) for name, values in good.items()}
-    good["q2_deg"][3] = "nan"
+    good["q2_deg"][3] = "no"
     good["x_mm"][5] = "12,5"
     good["z_mm"][[1, 7]] = "inf"
     path = tmp_path / "poses.csv"
@@ -177,7 +177,7 @@ def test_bad_cells_of_several_columns_are_all_named(tmp_path, good):
     with pytest.raises(InputError) as caught:
         read(SECTION | {"path": str(path), "delimiter": ";"}, ARM)
     text = str(caught.value)
-    assert "column q2_deg, line 5: not a finite number: 'nan'" in text
+    assert "column q2_deg, line 5: not a finite number: 'no'" in text
     assert "column x_mm, line 7: not a finite number: '12,5'" in text
     assert "column z_mm, lines 3, 9: not a finite number: 'inf', 'inf'" in text
 
@@ -270,9 +270,11 @@ def test_what_programs_write_for_nothing_is_an_empty_cell(tmp_path, good, nothin
         columns[name][3] = nothing
     reading = read(SECTION | {"path": written(tmp_path, columns)}, ARM)
     assert len(reading.columns["pose"]) == 11
-    assert "nothing was measured in line 5" in " ".join(reading.left_out())
+    assert "1 row holds no reading: line 5" in " ".join(reading.left_out())
     columns["q2_deg"][4] = nothing
-    assert "not a finite number" in problems_of(tmp_path, columns)
+    reading = read(SECTION | {"path": written(tmp_path, columns)}, ARM)
+    assert len(reading.columns["pose"]) == 10
+    assert "1 row holds not all joints: line 6" in reading.left_out()
 
 
 def test_a_list_of_no_targets_asks_for_a_name(tmp_path, good):

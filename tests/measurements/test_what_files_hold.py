@@ -77,14 +77,17 @@ def test_a_row_without_any_target_is_left_out_and_named(tmp_path, joints):
         one[name][5] = " "
     found = reading(tmp_path, joints | one)
     assert len(found.columns["pose"]) == COUNT - 1
-    assert found.left_out() == ["nothing was measured in line 7"]
+    assert found.left_out() == ["1 row holds no reading: line 7"]
 
 
-def test_half_a_point_is_refused(tmp_path, joints):
+def test_half_a_point_is_no_reading_of_its_target_and_is_told(tmp_path, joints):
     one = {n: v.astype(object) for n, v in points("mA_").items()}
     one["mA_y_mm"][2] = ""
-    text = refused(tmp_path, joints | one)
-    assert "columns mA_x_mm, mA_y_mm, mA_z_mm, line 4: some of them are empty" in text
+    found = reading(tmp_path, joints | one | points("mB_"))
+    assert found.left_out() == ["1 row holds no reading of mA: line 4"]
+    read_of = {name: found.columns["row"][found.columns["target"] == name] for name in ("mA", "mB")}
+    assert 4 not in read_of["mA"]
+    assert 4 in read_of["mB"]
 
 
 def test_only_the_targets_asked_for(tmp_path, joints):

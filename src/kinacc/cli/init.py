@@ -11,6 +11,7 @@ import click
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
+from kinacc.cli.file_options import file_options
 from kinacc.cli.output import Output, answers
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ _FILE = "measurements.file"
     help="Read this column, and those that go with it, where the names leave several readings "
     "open. May be given again.",
 )
+@file_options
 @option(
     "--yes",
     is_flag=True,
@@ -172,7 +174,15 @@ def _asked(guess: Guess) -> Guess:
     """The guess after a person was asked about what it assumes."""
     for setting, words in guess.assumed.items():
         click.echo(f"Not stated in the file: {words}.")
-        if setting == "orientation":
+        if setting == "horizontal":
+            ways = guess.section["directions"]
+            answer = _prompt(
+                "Horizontal angles, seen from above",
+                type=click.Choice(["clockwise", "counterclockwise"]),
+                default=ways["horizontal"],
+            )
+            guess = guess.but({"directions": ways | {"horizontal": answer}})
+        elif setting == "orientation":
             answer = _prompt(
                 "Orientation (Euler capitals: about moving axes, small: about fixed axes)",
                 type=click.Choice(_CONVENTIONS),
@@ -245,6 +255,8 @@ def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report]:
             layout = Layout.of(guess.section)
             report = check.check(reading, layout, robot, name, guess.section["path"], progress)
             settings = _contradicted(guess, report)
+            told = (*guess.told, *reading.notes)
+            guess = replace(guess, told=tuple(dict.fromkeys(told)))
             if not settings:
                 break
             guess = _set_right(guess, settings)
@@ -255,6 +267,8 @@ def _contradicted(guess: Guess, report: Report) -> dict:
     """Settings that were assumed and that the readings contradict, as they should be."""
     settings: dict = {}
     for each in report.suspicions:
+        if each.kind == "left_handed" and "horizontal" in guess.assumed:
+            return {"horizontal": ""}
         wanted = dict(each.values.get("setting", {}))
         turn = dict(wanted.pop("orientation", {}))
         about = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
@@ -265,8 +279,20 @@ def _contradicted(guess: Guess, report: Report) -> dict:
     return settings
 
 
+def _turned_round(guess: Guess) -> Guess:
+    """The guess with horizontal angles counted the other way."""
+    ways = guess.section["directions"]
+    clockwise = ways["horizontal"] == "counterclockwise"
+    ways = ways | {"horizontal": "clockwise" if clockwise else "counterclockwise"}
+    told = f"horizontal angles count {ways['horizontal']}, seen from above: found by trying"
+    kept = {k: v for k, v in guess.assumed.items() if k != "horizontal"}
+    return replace(guess.but({"directions": ways}), assumed=kept, told=(*guess.told, told))
+
+
 def _set_right(guess: Guess, settings: dict) -> Guess:
     settings = dict(settings)
+    if "horizontal" in settings:
+        return _turned_round(guess)
     in_order = settings.pop("e", None)
     if in_order:
         columns = dict(guess.section["columns"])
@@ -349,6 +375,7 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
         "targets": list(guess.targets),
         "file": guess.section,
         "assumed": guess.assumed,
+        "told": list(guess.told),
         "unused_columns": [name for names, _ in guess.unused() for name in names],
         "left_aside": [
             {"columns": list(names), "because": why} for names, why in guess.unused() if why
@@ -359,6 +386,7 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
     }
     section, turn = guess.section, guess.section["orientation"]
     lines = [
+        *(f"file: {words}" for words in guess.told),
         f"robot: {robot} ({chosen})",
         f"joints: {guess.joints}, in {section['joint_unit']}: {_listed(guess.found.joints)}",
     ]

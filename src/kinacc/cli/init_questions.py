@@ -6,8 +6,10 @@ import shlex
 
 import click
 
+from kinacc.cli.file_options import ANSWERS
 from kinacc.errors import InputError, Problem
 from kinacc.measurements.intake import guess as guesses
+from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import Question
 from kinacc.measurements.intake.guess import Guess
 
@@ -15,11 +17,22 @@ from kinacc.measurements.intake.guess import Guess
 def looked(path: str, options: dict, ask: bool) -> Guess:
     """The guess at a file without open questions: answered by ``--take``, or by a person."""
     take, turned = list(options["take"]), options["orientation"] != "none"
+    answers = {name: options[name] for name in ANSWERS if options.get(name) is not None}
     while True:
-        guess = guesses.look(path, take, turned)
+        try:
+            guess = guesses.look(path, take, turned, answers)
+        except Undecided as error:
+            if not ask:
+                raise
+            answers |= {each.key: _answered(each, error) for each in error.choices}
+            continue
         questions = guess.found.questions
         if not questions:
-            return guess
+            choice = guesses.sigma_choice(guess) if ask and "sigma" not in answers else None
+            if choice is None:
+                return guess
+            answers[choice.key] = _answered(choice, Undecided(path, [choice]))
+            continue
         if not ask:
             raise InputError(
                 [_open(path, each) for each in questions], f"{path} leaves open what is to be read"
@@ -27,6 +40,18 @@ def looked(path: str, options: dict, ask: bool) -> Guess:
         answer = _which(path, questions[0])
         take += answer
         turned = turned and bool(answer)
+
+
+def _answered(choice: Choice, error: Undecided) -> str:
+    """The answer to a choice. Raises ``error`` where nobody is there to answer."""
+    click.echo(f"{choice.about[0].upper()}{choice.about[1:]}.")
+    for value, words in choice.answers.items():
+        click.echo(f"  {value}: {words}")
+    wanted = click.Choice(list(choice.answers))
+    try:
+        return click.prompt("Which", type=wanted, show_choices=False)
+    except click.Abort:
+        raise error from None
 
 
 def _which(path: str, question: Question) -> list[str]:

@@ -15,6 +15,7 @@ from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.kinematics.robot import Robot, outside_limits
+from kinacc.measurements.files import load
 from kinacc.measurements.layout import (
     ANGLE,
     LENGTH,
@@ -28,7 +29,8 @@ from kinacc.measurements.layout import (
     listed,
     names_of,
 )
-from kinacc.measurements.table import RawTable, load, numbers, numbers_of
+from kinacc.measurements.table import RawTable, numbers, numbers_of
+from kinacc.measurements.written import Written
 
 if TYPE_CHECKING:
     from kinacc.deployment.record import Calibration
@@ -261,7 +263,7 @@ def open_table(path: str | Path) -> RawTable:
     if kind == ".json":
         return _of_json(path)
     if kind in (".parquet", ".pq"):
-        return _with_units(load(path, ",", "."))
+        return _with_units(load(path))
     delimiter, decimal = ",", "."
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head, first = file.readline(_HEAD), file.readline(_HEAD)
@@ -270,7 +272,7 @@ def open_table(path: str | Path) -> RawTable:
         decimal = "," if "," in first and "." not in first else "."
     elif "\t" in head:
         delimiter = "\t"
-    table = load(path, delimiter, decimal)
+    table = load(path, Written(delimiter, decimal))
     columns = {name: [of_csv(cell) for cell in cells] for name, cells in table.columns.items()}
     return replace(table, columns=columns)
 

@@ -24,11 +24,29 @@ from kinacc.measurements.layout import (
 )
 from kinacc.measurements.table import RawTable
 
+BEYOND = 1e8  # no unit makes a length of this
+_NINES = 4
 _UNIT_QUATERNION = 1e-3  # how far from 1 a measured quaternion's length may be
 LIMIT_SLACK = 1e-6  # a joint may be beyond its limits by the last written digit
 _CORRELATION = 1.0 + 1e-6  # a correlation may exceed 1 by rounding only
 _JOINT = re.compile(r"q(?P<number>\d)(?:_cmd)?")
 _DEFAULT = {"joint_unit": "deg", "length_unit": "mm", "orientation.unit": "deg"}
+
+
+def none_read(points: np.ndarray, number: float) -> np.ndarray:
+    """True (n,) where ``number`` says of a point (n, 3) that it was not read.
+
+    It does so in all three coordinates; one that cannot be a coordinate, in any of them.
+    """
+    same = points == number
+    return same.any(axis=1) if is_no_coordinate(number) else same.all(axis=1)
+
+
+def is_no_coordinate(number: float) -> bool:
+    """Whether a number is all nines, as in 9999, 9999.999 and 9E9, or beyond all lengths."""
+    digits = f"{abs(number):.6f}".rstrip("0").rstrip(".").replace(".", "")
+    nines = set(digits) == {"9"} and len(digits) >= _NINES
+    return nines or abs(number) >= BEYOND
 
 
 def quaternion_problems(

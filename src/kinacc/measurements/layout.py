@@ -64,7 +64,8 @@ class Layout:
     ``columns`` maps our names (``q1``, ``x``, ``mA_x``, ``pose``, ...) to the file's own, which
     then carry ``joint_unit``, ``length_unit`` and ``angle_unit``. ``orientation`` is none,
     quaternion (``order`` of quat1..quat4), rotation_vector or euler (of ``convention``).
-    ``targets`` names those to read; None for all that are there.
+    ``targets`` names those to read; None for all that are there. ``no_reading`` are numbers that
+    say that nothing was read; uncertainties are ``sigma`` standard deviations.
     """
 
     columns: Mapping[str, str]
@@ -75,6 +76,8 @@ class Layout:
     angle_unit: str
     order: str | None
     targets: tuple[str, ...] | None
+    no_reading: tuple[float, ...] = ()
+    sigma: int = 1
 
     @classmethod
     def of(cls, section: Mapping) -> Layout:
@@ -89,6 +92,8 @@ class Layout:
             turn["unit"],
             turn.get("order"),
             None if targets is None else tuple(targets),
+            tuple(section.get("no_reading", ())),
+            section.get("sigma", 1),
         )
 
 

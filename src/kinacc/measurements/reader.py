@@ -12,9 +12,11 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
+from kinacc.measurements.files import load
 from kinacc.measurements.layout import STD, TOOL, FoundColumns, Layout, Place, Target, find
 from kinacc.measurements.orientation import quaternions, rotation_std
-from kinacc.measurements.table import RawTable, load, numbers
+from kinacc.measurements.table import RawTable, numbers
+from kinacc.measurements.written import Written
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 QUATERNION = ("qw", "qx", "qy", "qz")
@@ -86,15 +88,9 @@ def excluded_lines(section: Mapping) -> dict[int, str]:
 
 def _loaded(section: Mapping) -> RawTable:
     """The whole file. Raises InputError where it excludes lines that hold no reading."""
-    table = load(
-        section["path"],
-        section["delimiter"],
-        section["decimal"],
-        section.get("source"),
-        (section["skip_lines"], section["skip_under_names"]),
-    )
+    table = load(section["path"], Written.of(section), section.get("source"))
     excluded = excluded_lines(section)
-    absent = sorted(set(excluded) - set(table.line.tolist()))
+    absent = sorted(set(excluded) - set(table.line.tolist()) - set(table.not_rows))
     problems = []
     if absent:
         what = f"line{'s' if len(absent) > 1 else ''} {', '.join(map(str, absent))} hold no reading"
@@ -115,7 +111,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     problems += faults.unit_problems(table, layout, robot.dh.prismatic)
     if found is None or problems:
         raise InputError(problems, title)
-    q_rad = _stacked(table, found.joints, problems)
+    q_rad = _stacked(table, found.joints, problems, gaps=True)
     commanded = _stacked(table, found.commanded, problems, gaps=True) if found.commanded else None
     shared = _numbered(table, found, problems)
     s = _directions(table, found, len(found.joints), problems)
@@ -126,6 +122,12 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
             Problem(table.path, "no target is asked for", "names in measurements.file.targets")
         )
         raise InputError(problems, title)
+    posed = ~np.isnan(q_rad).any(axis=1)
+    if not problems:
+        problems += _without_joints(table, found, posed, parts)
+    notes = [*table.notes, *_not_read(table, parts, posed)]
+    for part in parts:
+        part["there"] &= posed
     nothing = ~np.any([part["there"] for part in parts], axis=0)
     if nothing.all() and not problems:
         problems.append(Problem(table.path, "no target was measured in any row", "positions"))
@@ -154,10 +156,49 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     return MeasuredFile(
         columns,
         found.unused(table),
-        tuple(notes if nothing.any() else ()),
+        tuple(notes),
         commanded if commanded is None else commanded[order],
         turns,
     )
+
+
+def _not_read(table: RawTable, parts: list[Columns], posed: np.ndarray) -> list[str]:
+    """What is left out of the rows, in words: those without joints, and points that are none."""
+
+    def told(rows: np.ndarray, of: str, what: str = "no reading") -> str:
+        lines = np.flatnonzero(rows)
+        count = f"{len(lines)} row{'s hold' if len(lines) > 1 else ' holds'}"
+        return f"{count} {what}{of}: {table.rows_in_words(lines)}"
+
+    nothing = ~np.any([part["there"] for part in parts], axis=0)
+    notes = []
+    if (posed & nothing).any():
+        notes.append(told(posed & nothing, ""))
+    for part in parts:
+        rows = part["void"] & posed & ~nothing
+        if rows.any():
+            notes.append(told(rows, f" of {part['target'][0]}"))
+    if not posed.all():
+        notes.append(told(~posed, "", "no joints" if nothing[~posed].all() else "not all joints"))
+    return notes
+
+
+_MOST_WITHOUT_JOINTS = 0.2  # of the points; beyond, joints may stand for the rows below them
+
+
+def _without_joints(
+    table: RawTable, found: Found, posed: np.ndarray, parts: list[Columns]
+) -> list[Problem]:
+    """Joints that are missing beside so many points that it can be no gap."""
+    points = np.any([part["there"] for part in parts], axis=0)
+    missing = np.flatnonzero(points & ~posed)
+    if len(missing) <= _MOST_WITHOUT_JOINTS * points.sum():
+        return []
+    names = ", ".join(table.column_in_words(place.column) for place in found.joints)
+    where = f"{table.path}: columns {names}, {table.rows_in_words(missing)}"
+    what = f"empty beside {len(missing)} of {points.sum()} points"
+    fix = "fill the joints in, where they stand for the rows below them too"
+    return [Problem(where, what, "joints in every row", fix)]
 
 
 def _stacked(table: RawTable, places: tuple[Place, ...], problems, gaps=False) -> np.ndarray:
@@ -181,12 +222,21 @@ def _target(table: RawTable, target: Target, layout: Layout, problems) -> Column
     """Columns (n,) of one target, and ``there`` (n,): where it was measured."""
     count = len(table)
     position = _stacked(table, target.position, problems, gaps=True)
-    empty = _empty(table, target.position, problems)
-    part = {"there": ~empty, "target": np.full(count, target.name, dtype=object)}
+    gaps = np.stack([table.gaps(place.column) for place in target.position], axis=1)
+    factors = np.array([place.factor for place in target.position])
+    void = gaps.any(axis=1) & ~gaps.all(axis=1)
+    for number in layout.no_reading:
+        void |= faults.none_read(np.where(position == number * factors, number, np.nan), number)
+    position[void] = np.nan
+    part = {
+        "there": ~gaps.all(axis=1) & ~void,
+        "void": void,
+        "target": np.full(count, target.name, dtype=object),
+    }
     turn = np.full((count, 4 if layout.orientation == "quaternion" else 3), np.nan)
     quaternion = np.full((count, 4), np.nan)
     if target.turn:
-        _empty(table, target.turn, problems)
+        _refuse_parts(table, target.turn, problems)
         turn = _stacked(table, target.turn, problems, gaps=True)
         if layout.orientation == "quaternion":
             problems += faults.quaternion_problems(table, turn, target.turn)
@@ -198,22 +248,21 @@ def _target(table: RawTable, target: Target, layout: Layout, problems) -> Column
     return part
 
 
-def _empty(table: RawTable, places: tuple[Place, ...], problems) -> np.ndarray:
-    """True (n,) where the columns are empty; some of them empty in a row is a problem."""
+def _refuse_parts(table: RawTable, places: tuple[Place, ...], problems) -> None:
+    """Note rows in which some of the columns are empty and others are not."""
     cells = np.stack([table.gaps(place.column) for place in places], axis=1)
     partly = np.flatnonzero(cells.any(axis=1) & ~cells.all(axis=1))
     if partly.size:
         names = ", ".join(place.column for place in places)
         where = f"{table.path}: columns {names}, {table.rows_in_words(partly)}"
         problems.append(Problem(where, "some of them are empty", "all of them, or none"))
-    return cells.all(axis=1)
 
 
 def _uncertainty(table, target, turn, layout, problems) -> Columns:
     """Standard deviations and correlations (n,) of a target, NaN where the file has none."""
     values = np.full((9, len(table)), np.nan)
     if target.std:
-        values[:3] = _spread(table, target.std, problems).T
+        values[:3] = _spread(table, target.std, problems, layout.sigma).T
     if target.covariance:
         xx, xy, xz, yy, yz, zz = _stacked(table, target.covariance, problems, gaps=True).T
         problems += faults.covariance_problems(table, (xx, xy, xz, yy, yz, zz), target.covariance)
@@ -221,7 +270,7 @@ def _uncertainty(table, target, turn, layout, problems) -> Columns:
             values[:3] = np.sqrt([xx, yy, zz])
             values[3:6] = xy / np.sqrt(xx * yy), xz / np.sqrt(xx * zz), yz / np.sqrt(yy * zz)
     if target.std_turn and target.turn and layout.orientation != "quaternion":
-        std = _spread(table, target.std_turn, problems)
+        std = _spread(table, target.std_turn, problems, layout.sigma)
         there = np.isfinite(turn).all(axis=1) & np.isfinite(std).all(axis=1)
         values[6:, there] = rotation_std(
             turn[there], _in_reading_order(std[there], layout), layout
@@ -229,9 +278,12 @@ def _uncertainty(table, target, turn, layout, problems) -> Columns:
     return dict(zip(UNCERTAINTY, values, strict=True))
 
 
-def _spread(table: RawTable, places: tuple[Place, ...], problems) -> np.ndarray:
-    """Standard deviations (n, 3); an empty cell or a zero, which says nothing, is NaN."""
-    std = _stacked(table, places, problems, gaps=True)
+def _spread(table: RawTable, places: tuple[Place, ...], problems, sigma: int) -> np.ndarray:
+    """Standard deviations (n, 3) of uncertainties that are ``sigma`` of them.
+
+    An empty cell or a zero, which says nothing, is NaN.
+    """
+    std = _stacked(table, places, problems, gaps=True) / sigma
     problems += faults.negative(table, std, places)
     return np.where(std > 0.0, std, np.nan)
 
@@ -264,7 +316,7 @@ def _payload(table: RawTable, places: tuple[Place, ...], problems) -> Columns:
     """
     if not places:
         return {}
-    _empty(table, places, problems)
+    _refuse_parts(table, places, problems)
     values = _stacked(table, places, problems, gaps=True)
     bad = np.flatnonzero(values[:, 0] < 0.0)
     if bad.size:

@@ -227,7 +227,7 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
         yield Problem(
             place("measurements", "source"),
             f"data set {name} reads a file, but measurements.file.path is not given",
-            "path of a CSV or Parquet file",
+            "path of a CSV, text, Excel or Parquet file",
         )
     elif not os.path.isfile(folder / file["path"]):
         is_folder = os.path.isdir(folder / file["path"])
@@ -235,7 +235,8 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
         yield Problem(
             place("measurements", "file", "path"),
             f"{file['path']!r} {'is a folder' if is_folder else 'does not exist'}",
-            "an existing CSV or Parquet file, relative to the folder of the configuration file",
+            "an existing CSV, text, Excel or Parquet file, relative to the folder of the "
+            "configuration file",
             f"the data comes from: {' '.join(origin.split())}"
             if origin
             else "say where the data comes from with measurements.file.source",
@@ -245,6 +246,12 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
             place("measurements", "file", "decimal"),
             f"{shown(file['decimal'])} is also the delimiter",
             "a decimal mark that differs from the delimiter",
+        )
+    if file["thousands"] is not None and file["thousands"] in (file["decimal"], file["delimiter"]):
+        yield Problem(
+            place("measurements", "file", "thousands"),
+            f"{shown(file['thousands'])} is also the decimal mark or the delimiter",
+            "a mark that differs from both",
         )
     taken = sorted(
         {

@@ -405,15 +405,30 @@ def _read_words(values: object) -> object:
     return yaml.safe_load(values)
 
 
+# Keys of files that tables of results do not know of where they are at their defaults.
+_LEFT_OUT_AS_USUAL = (
+    *("exclude", "thousands", "encoding", "sheet", "layout", "directions", "no_reading", "sigma"),
+    "names",
+)
+
+
 def _in_use(config: dict) -> dict:
     """The configuration without what it does not use.
 
-    That is the other source of measurements, an empty list, and models nobody asks for.
+    That is the other source of measurements, models nobody asks for, and keys of files that are as
+    usual and came later than tables of results.
     """
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
-    if "file" in measurements and not measurements["file"]["exclude"]:
-        file = {k: v for k, v in measurements["file"].items() if k != "exclude"}
+    if "file" in measurements:
+        from kinacc.config.schema import defaults
+
+        usual = defaults()["measurements"]["file"]
+        file = {
+            key: value
+            for key, value in measurements["file"].items()
+            if key not in _LEFT_OUT_AS_USUAL or value != usual[key]
+        }
         measurements = {**measurements, "file": file}
     calibration, asked = config["calibration"], asked_for(config["calibration"])
     calibration = {

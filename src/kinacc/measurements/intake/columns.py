@@ -35,6 +35,12 @@ _POSE = (
     "a pose in numbered columns, which are not read",
     "the controller's own forward kinematics, never a measurement",
 )
+NO_SIGMA = f"{SPREAD}, of which nothing says that it is one sigma; --sigma 1 or 2 reads it"
+_UNCERTAINTY_TEXT = """
+uncertainty uncertainties unc uncert u σ sigma unsicherheit messunsicherheit incertitude
+incertidumbre incertezza incerteza u95 std
+"""
+_UNCERTAINTIES = frozenset(_UNCERTAINTY_TEXT.split())
 _SINGLE = {
     "pose": {"pose", "config", "configuration", "point", "pt", "no", "nr", "index"},
     "repeat": {"repeat", "repetition", "rep", "reading"},
@@ -92,14 +98,16 @@ def recognise(
     values: Values | None = None,
     take: Sequence[str] = (),
     turned: bool = True,
+    uncertainties: bool = False,
 ) -> NamedColumns:
     """What the columns of these names hold; no joints or no targets where none were found.
 
     ``values`` gives a column's numbers (n,), NaN where it has none. ``take``: columns whose groups
-    are read whatever their names say. ``turned``: orientations are wanted.
+    are read whatever their names say. ``turned``: orientations are wanted. ``uncertainties``: it is
+    known how many standard deviations one is.
     """
     no_load = [name for name in names if not _of_payload(name)]
-    choice = _Choice(groups.found(no_load, values), values, frozenset(take))
+    choice = _Choice(groups.found(no_load, values), values, frozenset(take), uncertainties)
     choice.off = any(groups.is_deviation(name) for name in names)
     joints = choice.joints()
     points = choice.points(joints)
@@ -134,8 +142,15 @@ class _Choice:
 
     off = False  # whether a column by itself says how far off the points were
 
-    def __init__(self, found: Sequence[Group], values: Values | None, take: frozenset[str]) -> None:
+    def __init__(
+        self,
+        found: Sequence[Group],
+        values: Values | None,
+        take: frozenset[str],
+        uncertainties: bool = False,
+    ) -> None:
         self.values = values
+        self.uncertainties = uncertainties
         self.take = take
         self.aside: list[tuple[Group, str]] = []
         self.questions: list[Question] = []
@@ -356,8 +371,9 @@ class _Choice:
             turned = "std_rx" in each.columns
             of = turns.get(point.target) if point and turned else point
             words = {word for name in each.columns.values() for word in name.words}
-            if each.weak:
-                self._leave([each], f"{SPREAD}, of which nothing says that it is one sigma")
+            known = self.uncertainties and bool(words & _UNCERTAINTIES)
+            if each.weak and not known:
+                self._leave([each], NO_SIGMA if words & _UNCERTAINTIES else SPREAD)
             elif of is None or of.turn[0] == "quaternion" or _wanted(words):
                 self._leave([each], f"{SPREAD} of nothing that is read")
             elif each.units != of.units:

@@ -12,8 +12,9 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name, name_of
-from kinacc.measurements.intake import columns, text
-from kinacc.measurements.intake.columns import NamedColumns
+from kinacc.measurements.intake import columns, no_reading, text
+from kinacc.measurements.intake.choices import Choice, Undecided
+from kinacc.measurements.intake.columns import NO_SIGMA, NamedColumns
 from kinacc.measurements.layout import TOOL, Layout, find
 from kinacc.measurements.table import RawTable, numbers
 
@@ -27,7 +28,8 @@ class Guess:
 
     ``assumed`` are words on settings taken by default or by the size of numbers, by setting:
     joint_unit, length_unit, angle_unit, orientation, order. ``stated``: columns that state a unit,
-    by setting. ``found`` is what the columns were recognised as; its questions are open.
+    by setting. ``found`` is what the columns were recognised as; its questions are open. ``told``
+    are words on how the file is written and what of it is no reading.
     """
 
     section: dict[str, Any]
@@ -35,6 +37,7 @@ class Guess:
     found: NamedColumns
     assumed: dict[str, str] = field(default_factory=dict)
     stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+    told: tuple[str, ...] = ()
 
     @property
     def joints(self) -> int:
@@ -71,19 +74,26 @@ class Guess:
         return (*told, (tuple(left), "")) if left else tuple(told)
 
 
-def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Guess:
+def look(
+    path: str | Path,
+    take: Sequence[str] = (),
+    turned: bool = True,
+    answers: Mapping[str, str] | None = None,
+) -> Guess:
     """The best guess at a file; what it leaves open stands in ``found.questions``.
 
     ``take``: columns that are read whatever their names say, each for all that go with it;
-    ``turned``: orientations are wanted. Raises InputError where joints or positions cannot be
+    ``turned``: orientations are wanted; ``answers`` to choices, by key. Raises Undecided where the
+    file can be read in more than one way, InputError where joints or positions cannot be
     found, where units contradict each other, and where ``take`` names what cannot be read.
     """
-    written = text.look(path)
-    table = written.load(path)
-    units = written.units or ("",) * len(table.columns)
+    answers = answers or {}
+    looked = text.look(path, answers)
+    table, stated = looked.table, looked.stated
+    units = table.under or ("",) * len(table.columns)
     if len(units) != len(table.columns):
         what = f"{len(units)} units under {len(table.columns)} column names"
-        where = f"{path}: line {written.skip_lines + 2}"
+        where = f"{path}: line {looked.written.skip_lines + 2}"
         raise InputError(Problem(where, what, "a unit, or nothing, for each"))
     names = [name_of(c, u) for c, u in zip(table.columns, units, strict=True)]
     cells: dict[str, np.ndarray] = {}
@@ -91,12 +101,20 @@ def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Gue
     def values(name: Name) -> np.ndarray:
         if name.column not in cells:
             cells[name.column] = numbers(table, name.column, [], gaps=True)
+            # What says that nothing was read tells nothing of units and distances.
+            every = cells[name.column]
+            cells[name.column] = np.where(np.isin(every, void), np.nan, every)
         return cells[name.column]
 
-    found = columns.recognise(names, values, take, turned)
+    void: list[float] = []
+    sigma = answers.get("sigma", "none")
+    found = columns.recognise(names, values, take, turned, sigma != "none")
     _refuse(str(path), table, found, take)
+    none = [] if found.questions else _no_reading(table, found, values, answers)
+    void += none
+    cells.clear()
     problems: list[Problem] = []
-    sizes = _Units(str(path), values, problems)
+    sizes = _Units(table.path, values, problems, dict(looked.assumed), above=stated)
     first = next(iter(found.targets.values()))
     turn = [n for q, n in first.items() if q in ("rx", "ry", "rz")]
     joint_unit = sizes.of(
@@ -123,16 +141,50 @@ def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Gue
     refuse(problems, f"{path} cannot be described")
     section: dict[str, Any] = {
         "path": str(path),
-        "delimiter": written.delimiter,
-        "decimal": written.decimal,
-        "skip_lines": written.skip_lines,
-        "skip_under_names": written.skip_under_names,
+        **looked.written.section(),
+        "no_reading": none,
+        "sigma": 1 if sigma == "none" else int(sigma),
         **units,
         "orientation": turned_as,
         "targets": list(found.targets),
         "columns": mapping,
     }
-    return Guess(section, table, found, sizes.assumed, sizes.stated)
+    told = (*looked.told, *table.notes)
+    return Guess(section, table, found, sizes.assumed, sizes.stated, told)
+
+
+def sigma_choice(guess: Guess) -> Choice | None:
+    """The question how many standard deviations an uncertainty is, where the file has some."""
+    left = [group for group, why in guess.found.aside if why == NO_SIGMA]
+    if not left:
+        return None
+    names = ", ".join(name for group in left for name in group.names)
+    meant = {"1": "one standard deviation", "2": "two", "none": "they are not read"}
+    return Choice("--sigma", f"{names} do not tell how many standard deviations they are", meant)
+
+
+def _no_reading(
+    table: RawTable, found: Columns, values: Callable[[Name], np.ndarray], answers: Mapping
+) -> list[float]:
+    """Numbers that say that nothing was read, as answered or as found."""
+    given = answers.get("no_reading")
+    known: list[float] = []
+    answered = [each.strip() for each in given.split(",")] if given else []
+    if answered:
+        try:
+            known = [float(each) for each in answered if each != "none"]
+        except ValueError:
+            what, allowed = f"{given!r} is no number", "a number such as 9999.999, or none"
+            raise InputError(Problem("--no-reading", what, allowed)) from None
+    points = {
+        name: np.stack([values(target[axis]) for axis in "xyz"], axis=1)
+        for name, target in found.targets.items()
+    }
+    joints = np.stack([values(name) for name in found.joints], axis=1)
+    none = no_reading.found(points, joints, table.rows_in_words, known, "none" not in answered)
+    if none.choice:
+        raise Undecided(table.path, [none.choice])
+    return list(none.numbers)
 
 
 def _refuse(path: str, table: RawTable, found: NamedColumns, take: Sequence[str]) -> None:
@@ -179,6 +231,7 @@ class _Units:
     problems: list[Problem]
     assumed: dict[str, str] = field(default_factory=dict)
     stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+    above: Mapping[str, str] = field(default_factory=dict)
 
     def of(
         self, names: Sequence[Name], setting: str, units: tuple[str, str], largest: float
@@ -191,6 +244,9 @@ class _Units:
         sizes = [np.nanmax(np.abs(self.values(n)), initial=0.0) for n in names]
         most = float(max(sizes))
         stated = list(dict.fromkeys(each.unit for each in names if each.unit))
+        kind = {"length_unit": "length", "angle_unit": "angle"}.get(setting, "")
+        if not stated and kind in self.above:
+            stated = [self.above[kind]]  # in a line around the rows
         if not stated:
             unit = small if most <= largest else usual
             self.assumed[setting] = f"{listed} are in {unit}: the largest number is {most:.4g}"

@@ -11,8 +11,9 @@ from typing import Any
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake.guess import Guess
+from kinacc.measurements.written import Written
 
-_WRITTEN = ("delimiter", "decimal", "skip_lines", "skip_under_names")
+_AS_USUAL = {**Written().section(), "no_reading": [], "sigma": 1}
 _FEW_POSES = 60  # below, every configuration is held out once
 _PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./ -]*")
 _WORDS_OF_YAML = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
@@ -33,10 +34,9 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         "      file:",
         f"        path: {scalar(section['path'])}",
     ]
-    usual = defaults()["measurements"]
-    for key in _WRITTEN:
-        if section[key] != usual["file"][key]:
-            lines.append(f"        {key}: {scalar(section[key])}")
+    for key, default in _AS_USUAL.items():
+        if section[key] != default:
+            lines.append(f"        {key}: {_listed(section[key])}")
     lines.append(f"        joint_unit: {section['joint_unit']}")
     lines.append(f"        length_unit: {section['length_unit']}")
     words = {"kind": turn["kind"]}
@@ -54,7 +54,7 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         for ours, own in section["columns"].items():
             key = ours if _PLAIN.fullmatch(ours) else scalar(ours)
             lines.append(f"          {key}: {scalar(own)}")
-    folds = configurations if configurations < _FEW_POSES else usual["folds"]
+    folds = configurations if configurations < _FEW_POSES else defaults()["measurements"]["folds"]
     held = " # one configuration held out at a time" if configurations < _FEW_POSES else ""
     lines += [
         f"      folds: {folds}{held}",
@@ -66,6 +66,15 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         "      space: measured # the region the measured poses fill",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _listed(value: Any) -> str:
+    """A value, a list or a mapping as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_listed(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{', '.join(_listed(each) for each in value)}]"
+    return scalar(value)
 
 
 def shipped_text(name: str) -> str:

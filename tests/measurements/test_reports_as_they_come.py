@@ -1,0 +1,363 @@
+"""Workbooks, and reports of trackers that are no table of readings: turned into one, or asked."""
+
+from __future__ import annotations
+
+import datetime
+
+import numpy as np
+import pytest
+from written_tables import (
+    ARM,
+    JOINTS,
+    POINT_MM,
+    Q_DEG,
+    ROWS,
+    XYZ,
+    assert_is_truth,
+    cells,
+    file,
+    lines,
+    looked,
+    reading,
+    workbook,
+)
+
+from kinacc.errors import InputError
+from kinacc.measurements.files import load
+from kinacc.measurements.intake import text
+from kinacc.measurements.intake.choices import Undecided
+
+TABLE = [[*JOINTS, *XYZ], *np.hstack([Q_DEG, POINT_MM]).tolist()]
+
+
+def undecided(path, **answers) -> str:
+    with pytest.raises(Undecided) as caught:
+        looked(path, **answers)
+    return str(caught.value)
+
+
+def test_a_workbook_with_a_title_is_read_from_the_sheet_that_holds_a_table(tmp_path):
+    sheets = {"Cover": [["Survey of cell 3"], ["Date", datetime.date(2024, 3, 1)]]}
+    sheets["Data"] = [["Survey of cell 3"], [], *TABLE]
+    found = looked(workbook(tmp_path, sheets))
+    assert found.section["sheet"] == "Data"
+    assert any("sheet 'Data'" in words and "Cover" in words for words in found.told)
+    assert_is_truth(reading(tmp_path / "readings.xlsx"), atol=1e-9)
+    assert reading(tmp_path / "readings.xlsx").columns["row"][0] == 4
+
+
+def test_a_workbook_with_units_under_the_names_and_a_blank_first_column(tmp_path):
+    names = [None, *(f"J{i}" for i in range(1, 7)), *"XYZ", "Remark"]
+    units = [None, *["deg"] * 6, *["mm"] * 3]
+    rows = [[None, *row] for row in TABLE[1:]]
+    rows[3].append("tracker moved?")
+    path = workbook(tmp_path, {"Sheet1": [names, units, *rows, [None, "Mean", *[1.0] * 8]]})
+    assert_is_truth(reading(path), atol=1e-9)
+    assert "row 17: statistics" in " ".join(looked(path).told)
+
+
+def test_a_workbook_with_names_of_groups_over_the_names(tmp_path):
+    over = ["Robot", *[None] * 5, "Nominal", None, None, "Measured", None, None]
+    names = [*(f"J{i}" for i in range(1, 7)), *"XYZ", *"XYZ"]
+    rows = [[*row[:6], 1.0, 2.0, 3.0, *row[6:]] for row in TABLE[1:]]
+    path = workbook(tmp_path, {"Sheet1": [over, names, ["deg"] * 6 + ["mm"] * 6, *rows]})
+    assert looked(path).section["columns"]["x"] == "Measured X"
+    assert_is_truth(reading(path), atol=1e-9)
+
+
+def test_a_workbook_with_text_in_place_of_numbers(tmp_path):
+    rows = [[f"{value:.3f}".replace(".", ",") for value in row] for row in TABLE[1:]]
+    assert_is_truth(reading(workbook(tmp_path, {"Tabelle1": [TABLE[0], *rows]})))
+
+
+def test_two_sheets_with_tables_are_asked_about(tmp_path):
+    other = [TABLE[0], *[[value + 1.0 for value in row] for row in TABLE[1:]]]
+    path = workbook(tmp_path, {"before": TABLE, "after": other})
+    assert "--sheet before or --sheet after" in undecided(path)
+    assert_is_truth(reading(path, sheet="before"), atol=1e-9)
+    with pytest.raises(InputError, match="before, after"):
+        looked(path, sheet="between")
+
+
+def test_blank_cells_of_a_workbook_are_no_readings_by_row(tmp_path):
+    rows = [list(row) for row in TABLE]
+    rows[3][6:] = [None] * 3
+    rows[9][6:] = ["---"] * 3
+    found = reading(workbook(tmp_path, {"Sheet1": rows}))
+    assert_is_truth(found, ~np.isin(np.arange(ROWS), (2, 8)), atol=1e-9)
+    assert "2 rows hold no reading: rows 4, 10" in found.left_out()
+
+
+def test_a_date_in_a_workbook_is_named_with_sheet_row_and_column(tmp_path):
+    rows = [list(row) for row in TABLE]
+    rows[5][7] = datetime.datetime(2024, 5, 3)
+    with pytest.raises(InputError) as caught:
+        reading(workbook(tmp_path, {"Messung": rows}))
+    said = str(caught.value)
+    assert "sheet 'Messung': column Y [mm] (H), row 6: a date where a number is expected" in said
+
+
+@pytest.mark.parametrize("name", ["a.xls", "a.ods", "a.xlsx"])
+def test_what_is_no_workbook_is_refused_with_what_to_do(name, tmp_path):
+    path = tmp_path / name
+    path.write_bytes(b"\xd0\xcf\x11\xe0 not a zip")
+    with pytest.raises(InputError, match=r"\.xlsx or as? ?CSV|\.xlsx or CSV"):
+        looked(path)
+
+
+HEAD = "// Exported from the instrument\n// Working Frame: CELL::BASE\n// Units: Millimeters\n"
+
+
+def points(rows=(1, 2, 10), mark=", "):
+    return [["CELL", "Poses", f"P{n}", *(f"{v:.4f}" for v in POINT_MM[n])] for n in rows]
+
+
+@pytest.mark.parametrize("mark", [",", ", ", "\t", ";"])
+def test_a_list_of_points_without_names_is_collection_group_point(mark, tmp_path):
+    path = file(tmp_path, HEAD + lines(points(), None, mark))
+    found = text.look(path)
+    assert found.written.names == ("Collection", "Group", "Point", "X_mm", "Y_mm", "Z_mm")
+    table = load(path, found.written)
+    assert [cell.strip() for cell in table.columns["Point"]] == ["P1", "P2", "P10"]
+    np.testing.assert_allclose([float(c) for c in table.columns["X_mm"]], POINT_MM[[1, 2, 10], 0])
+    assert any("CELL::BASE" in words for words in found.told)
+    assert any("Collection" in words for words in found.told)
+
+
+def test_remarks_of_a_list_of_points_may_begin_with_a_semicolon(tmp_path):
+    path = file(tmp_path, HEAD.replace("//", ";") + lines(points(), None, ","))
+    found = text.look(path)
+    assert found.stated["length"] == "mm"
+    assert len(found.table) == 3
+
+
+def test_points_in_the_order_of_letters_come_in_their_own(tmp_path):
+    order = sorted(range(ROWS), key=lambda n: f"P{n}")
+    path = file(tmp_path, HEAD + lines(points(order), None, ","))
+    found = text.look(path)
+    names = [cell.strip() for cell in found.table.columns["Point"]]
+    assert names == [f"P{n}" for n in range(ROWS)]
+    assert found.table.line[2] != 6  # each keeps the line it stands on
+    assert "order" in " ".join(found.table.notes)
+
+
+UNCERTAIN = [*(f"q{i}_deg" for i in range(1, 7)), *"XYZ", "Ux", "Uy", "Uz"]
+
+
+def test_uncertainties_are_read_once_it_is_said_how_many_sigma_they_are(tmp_path):
+    rows = [[*row, "0.02", "0.04", "0.06"] for row in cells()]
+    path = file(tmp_path, lines(rows, UNCERTAIN))
+    assert_is_truth(reading(path))
+    assert np.isnan(reading(path).columns["std_x_mm"]).all()
+    for sigma in (1, 2):
+        found = reading(path, sigma=str(sigma))
+        np.testing.assert_allclose(found.columns["std_y_mm"], 0.04 / sigma)
+
+
+def test_how_many_sigma_is_asked_where_someone_is_there(tmp_path):
+    from click.testing import CliRunner
+
+    from kinacc.cli.group import main
+    from kinacc.workflow.contradictions import load as configuration
+
+    rows = [[*row, "0.02", "0.04", "0.06"] for row in cells()]
+    path = file(tmp_path, lines(rows, UNCERTAIN))
+    words = ["init", str(path), "--robot", "ur10", "--out", str(tmp_path), "--name", "cell"]
+    done = CliRunner().invoke(main, words, input="2\nmm\nur10\n")
+    assert done.exit_code == 0, done.output
+    assert "Ux, Uy, Uz do not tell how many standard deviations" in done.output
+    section = configuration((tmp_path / "cell.yaml",))["cell"]["measurements"]["file"]
+    assert section["sigma"] == 2
+
+
+def report(names, more=(), axes=("X", "Y", "Z"), once=False):
+    """Rows per feature and axis, names of the features in the first of them where ``once``."""
+    rows = []
+    for number in range(ROWS):
+        for place, axis in enumerate(axes):
+            name = names(number) if place == 0 or not once else ""
+            value = POINT_MM[number, place]
+            row = [name, axis, f"{value + 0.5:.3f}", f"{value:.3f}", "-0.500", *more]
+            rows.append([*row, *(f"{q:.3f}" for q in Q_DEG[number])])
+    return rows
+
+
+@pytest.mark.parametrize("once", [True, False])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["Name", "Control", "Nominal", "Measured", "Dev"],
+        ["Feature", "Axis", "Nominal [mm]", "Actual [mm]", "Deviation [mm]"],
+        ["Merkmal", "Achse", "Soll", "Ist", "Abw."],
+    ],
+)
+def test_a_report_with_a_row_per_axis_becomes_a_row_per_feature(names, once, tmp_path):
+    rows = report(lambda n: f"Point {n + 1}", once=once)
+    path = file(tmp_path, lines(rows, [*names, *JOINTS], "\t"))
+    found = looked(path)
+    assert found.section["layout"] == "features"
+    assert found.section["columns"]["x"] == f"{names[3]} X"
+    assert any("14 features" in words for words in found.told)
+    assert_is_truth(reading(path))
+    assert reading(path).columns["row"].tolist()[:2] == [2, 5]
+
+
+def test_a_report_whose_features_stand_in_lines_of_their_own(tmp_path):
+    blocks = "Axis;Nominal;Actual;Dev\n" + "".join(
+        f"Point_{n + 1}\n" + lines(
+            [[axis, "1.0", f"{POINT_MM[n, place]:.3f}", "0.1"] for place, axis in enumerate("XYZ")],
+            None,
+            ";",
+        )
+        for n in range(ROWS)
+    )  # fmt: skip
+    padded = "Name;" + blocks.replace("Point_", "Point ").replace("\nX;", "\n;X;")
+    padded = padded.replace("\nY;", "\n;Y;").replace("\nZ;", "\n;Z;")
+    padded = "\n".join(f"{x};;;;" if x.startswith("Point") else x for x in padded.split("\n"))
+    for content in (blocks, padded):
+        table = text.look(file(tmp_path, content)).table
+        named = next(iter(table.columns.values()))
+        assert [name.replace(" ", "_") for name in named[:2]] == ["Point_1", "Point_2"]
+        np.testing.assert_allclose([float(c) for c in table.columns["Actual Y"]], POINT_MM[:, 1])
+        assert table.line[1] == 7
+
+
+def test_other_controls_of_a_report_are_told_and_tolerances_are_no_points(tmp_path):
+    rows = []
+    names = ["Name", "Control", "Nominal", "Meas", "Tol", "Dev", "Test"]
+    for number in range(ROWS):
+        for place, axis in enumerate(("X", "Y", "Z", "3D")):
+            value = POINT_MM[number, place] if place < 3 else 0.1
+            row = [f"p{number}", axis, f"{value:.2f}", f"{value:.3f}", "0.5", "0.003", "Pass"]
+            rows.append([*row, *(f"{q:.3f}" for q in Q_DEG[number])])
+    path = file(tmp_path, lines(rows, [*names, *JOINTS], ";"))
+    assert_is_truth(reading(path))
+    assert any("14 rows of other quantities" in words and "3D" in words
+               for words in reading(path).left_out())  # fmt: skip
+
+
+def test_a_feature_without_one_of_its_axes_is_no_reading(tmp_path):
+    rows = report(lambda n: f"P{n}")
+    del rows[4]
+    path = file(tmp_path, lines(rows, ["Name", "Axis", "Nominal", "Measured", "Dev", *JOINTS]))
+    found = reading(path)
+    assert_is_truth(found, np.arange(ROWS) != 1)
+    assert "1 row holds no reading: line 5" in " ".join(found.left_out())
+
+
+def spherical(unit=np.pi / 180.0, horizon=False, clockwise=True):
+    x, y, z = POINT_MM.T
+    distance = np.sqrt(x**2 + y**2 + z**2)
+    turn = np.arctan2(x, y) if clockwise else np.arctan2(y, x)
+    up = np.arcsin(z / distance)
+    vertical = up if horizon else np.pi / 2 - up
+    return np.column_stack([np.mod(turn, 2 * np.pi) / unit, vertical / unit, distance / 1000.0])
+
+
+def directions(folder, names, values, decimals=7):
+    rows = [
+        [*row[:6], *(f"{v:.{decimals}f}" for v in direction)]
+        for row, direction in zip(cells(), values, strict=True)
+    ]
+    return file(folder, lines(rows, [*JOINTS, *names], ";"))
+
+
+SPHERICAL = {
+    "gon": (["Hz [gon]", "V [gon]", "D [m]"], spherical(np.pi / 200)),
+    "degrees": (["Hz [deg]", "V [deg]", "D [m]"], spherical()),
+    "German": (["Hz (°)", "V (°)", "Schrägstrecke (m)"], spherical()),
+    "elevation": (["Hz [deg]", "Elevation [deg]", "Distance [m]"], spherical(horizon=True)),
+    "letters": (
+        ["Az [deg]", "El [deg]", "R [m]"],
+        spherical(horizon=True, clockwise=False),
+    ),
+    "azimuth": (
+        ["Azimuth [deg]", "Zenith [deg]", "Distance [m]"],
+        spherical(clockwise=False),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SPHERICAL)
+def test_two_angles_and_a_distance_become_a_point(case, tmp_path):
+    path = directions(tmp_path, *SPHERICAL[case])
+    found = looked(path)
+    assert found.section["layout"] == "spherical"
+    assert_is_truth(reading(path))
+    assert any("counted from the" in words for words in found.told)
+
+
+def test_angles_without_a_unit_are_asked_about(tmp_path):
+    path = directions(tmp_path, ["Hz", "V", "D [m]"], spherical(np.pi / 200))
+    if spherical(np.pi / 200)[:, 0].max() < 361:
+        assert "--direction-unit deg or --direction-unit gon" in undecided(path)
+    assert_is_truth(reading(path, direction_unit="gon"))
+
+
+def test_a_unit_that_is_gon_in_one_language_and_degrees_in_another_is_asked_about(tmp_path):
+    path = directions(tmp_path, ["Hz [grad]", "V [grad]", "D [m]"], spherical())
+    assert "--direction-unit" in undecided(path)
+    assert_is_truth(reading(path, direction_unit="deg"))
+
+
+def test_gon_beyond_a_full_turn_of_degrees_need_no_question(tmp_path):
+    values = spherical(np.pi / 200)
+    values[0, 0] = 399.5
+    found = looked(directions(tmp_path, ["Hz", "V", "D [m]"], values))
+    assert found.section["directions"]["unit"] == "gon"
+
+
+def test_a_vertical_angle_that_may_count_from_either_is_asked_about(tmp_path):
+    values = spherical()
+    values[:, 1] = np.linspace(20, 80, ROWS)
+    path = directions(tmp_path, ["Hz [deg]", "V [deg]", "D [m]"], values)
+    assert "--vertical zenith or --vertical horizon" in undecided(path)
+    assert looked(path, vertical="horizon").section["directions"]["vertical"] == "horizon"
+
+
+def test_the_way_horizontal_angles_count_is_found_by_trying(tmp_path):
+    import json
+
+    from click.testing import CliRunner
+
+    from kinacc.cli.group import main
+
+    names = ["Hz [deg]", "V [deg]", "D [m]"]
+    path = directions(tmp_path, names, spherical(clockwise=False), 8)
+    words = ["init", str(path), "--robot", "ur10", "--out", str(tmp_path), "--json"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert told["file"]["directions"]["horizontal"] == "counterclockwise"
+    assert told["suspicions"] == []
+    assert any("found by trying" in words for words in told["told"])
+
+
+def test_what_is_as_usual_leaves_the_settings_of_a_run_as_they_were(tmp_path):
+    from kinacc.workflow.plan import planned
+
+    path = file(tmp_path, lines(cells()))
+    head = "datasets: {cell: {robot: ur10, calibration: {base_and_tool: estimated}, evaluation: "
+    head += "{space: measured}, measurements: {source: file, file: "
+    for more, there in (("", False), (", sigma: 2, encoding: cp932", True)):
+        config = tmp_path / "cell.yaml"
+        config.write_text(f"{head}{{path: {path}, orientation: {{kind: none}}{more}}}}}}}}}\n")
+        settings = planned([config]).settings("measurements", "cell")["measurements"]["file"]
+        for key in ("sigma", "encoding"):
+            assert (key in settings) == there
+        assert "layout" not in settings
+
+
+def test_a_workbook_goes_from_init_to_the_check(tmp_path):
+    from click.testing import CliRunner
+
+    from kinacc.cli.group import main
+
+    path = workbook(tmp_path, {"notes": [["warm"]], "Data": [["Cell 3"], [], *TABLE]})
+    words = ["init", str(path), "--robot", "ur10", "--out", str(tmp_path), "--yes"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    assert "file: sheet 'Data'" in done.output
+    checked = CliRunner().invoke(main, ["check-data", str(tmp_path / "readings.yaml")])
+    assert checked.exit_code in (0, 1), checked.output
+    assert ARM.name in checked.output or "ur10" in checked.output

@@ -1,0 +1,82 @@
+"""A cell whose readings are known, and files of it as instruments and spreadsheets write them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinacc.kinematics import robot
+from kinacc.measurements.intake import guess
+from kinacc.measurements.reader import read
+
+ARM = robot.load("ur10")
+ROWS = 14
+AXES = "xyz"
+_RNG = np.random.default_rng(8)
+Q_DEG = np.round(_RNG.uniform(-100, 100, (ROWS, 6)), 3)
+TURN = Rotation.from_euler("XYZ", [5, -10, 130], degrees=True)
+POINT_MM = np.add(TURN.apply(robot.forward(ARM, np.deg2rad(Q_DEG)).position_mm), (2600, -900, 300))
+POINT_MM = np.round(POINT_MM + _RNG.normal(0, 0.04, (ROWS, 3)), 3)
+JOINTS = [f"J{number} [deg]" for number in range(1, 7)]
+XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
+
+
+def cells(decimals=3, decimal=".", thousands="", q=Q_DEG, point=POINT_MM):
+    """Rows of text: joints, then the point."""
+    return [
+        [number(value, decimals, decimal, thousands) for value in row]
+        for row in np.hstack([q, point])
+    ]
+
+
+def number(value, decimals=3, decimal=".", thousands=""):
+    """A number as a spreadsheet of some country writes it."""
+    text = f"{value:,.{decimals}f}" if thousands else f"{value:.{decimals}f}"
+    return text.replace(",", "T").replace(".", decimal).replace("T", thousands)
+
+
+def lines(rows, names=(*JOINTS, *XYZ), mark=","):
+    """Lines of names and rows."""
+    return "\n".join(mark.join(map(str, row)) for row in ([names] if names else []) + rows) + "\n"
+
+
+def file(folder, text, name="readings.txt", encoding="utf-8") -> Path:
+    """The text as a file."""
+    path = folder / name
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def workbook(folder, sheets, name="readings.xlsx") -> Path:
+    """Rows by name of sheet as a workbook."""
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append(row)
+    path = folder / name
+    book.save(path)
+    return path
+
+
+def looked(path, **answers):
+    """What init finds out about a file; answers are those of its options."""
+    return guess.look(path, answers=answers)
+
+
+def reading(path, **answers):
+    """What a run reads of the file, by the keys init writes."""
+    return read(looked(path, **answers).section, ARM, strict=False)
+
+
+def assert_is_truth(found, rows=slice(None), atol=2e-3):
+    """Joints and points are those of the cell at ``rows``, in their order."""
+    q = np.rad2deg(np.stack([found.columns[f"q{i}"] for i in range(1, 7)], axis=1))
+    point = np.stack([found.columns[f"{axis}_mm"] for axis in AXES], axis=1)
+    np.testing.assert_allclose(q, Q_DEG[rows], atol=atol)
+    np.testing.assert_allclose(point, POINT_MM[rows], atol=atol)
