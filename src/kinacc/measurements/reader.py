@@ -187,7 +187,7 @@ _MOST_WITHOUT_JOINTS = 0.2  # of the points; beyond, joints may stand for the ro
 
 
 def _without_joints(
-    table: RawTable, found: Found, posed: np.ndarray, parts: list[Columns]
+    table: RawTable, found: FoundColumns, posed: np.ndarray, parts: list[Columns]
 ) -> list[Problem]:
     """Joints that are missing beside so many points that it can be no gap."""
     points = np.any([part["there"] for part in parts], axis=0)

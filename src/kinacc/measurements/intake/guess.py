@@ -164,7 +164,7 @@ def sigma_choice(guess: Guess) -> Choice | None:
 
 
 def _no_reading(
-    table: RawTable, found: Columns, values: Callable[[Name], np.ndarray], answers: Mapping
+    table: RawTable, found: NamedColumns, values: Callable[[Name], np.ndarray], answers: Mapping
 ) -> list[float]:
     """Numbers that say that nothing was read, as answered or as found."""
     given = answers.get("no_reading")
