@@ -57,6 +57,16 @@ class Meaning:
         """Orientations (n, 3, 3) in right-handed coordinates."""
         return rotation * np.outer(MIRROR, MIRROR) if self.mirrored else rotation
 
+    @property
+    def numbers(self) -> tuple[object, ...]:
+        """What it does, whatever it is called: the same of two that are one meaning."""
+        arrays = (self.matrix, self.unit, self.zero)
+        return (*(each.tobytes() for each in arrays), self.scale, self.mirrored)
+
+    def part_of(self, other: Meaning) -> bool:
+        """Whether the other one only adds changes to it, which then explain nothing themselves."""
+        return {each.words for each in self.changes} <= {each.words for each in other.changes}
+
     def changed(self, change: Change, **values) -> Meaning:
         """This meaning with one more change."""
         return replace(self, changes=(*self.changes, change), **values)
