@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.measurements import column_names
-from kinacc.measurements.column_names import READ, Name
+from kinacc.measurements.column_names import READ, WORDS, Name
 from kinacc.measurements.layout import TOOL
 
 JOINTS, POINT, TURN, SPREAD, POSE = "joints", "point", "orientation", "spread", "pose"
 Values = Callable[[Name], np.ndarray]
 
 _JOINT_TEXT = """
-q joint joints j axis a theta θ th achse achsen gelenk gelenkwinkel axe eje asse giunto articulacion
+q joint joints j axis a theta θ th achse achsen gelenk gelenkwinkel axe eje asse giunto articulacion articulacao
 articulation junta jnt jt rax robax jpos jointangle angle angles winkel angulo angolo
 """
 _TURN_TEXT = """
@@ -29,7 +29,7 @@ rotvec rvec rotationvector rpy
 """
 _FILLING_TEXT = """
 position positions pos posicion posizione xyz coord coordinate coordinates koordinate koordinaten
-coordonnee coordonnees coordenada coordinata ort lage loc location translation trans point pt punkt
+coordonnee coordonnees coordenada coordenadas coordinata coordinate quota quote cota posicao ort lage loc location translation point pt punkt
 axis achse axe eje asse mean avg average mittel mittelwert moyenne media value wert valeur valor
 valore values of the der die das de du la le del di in pose data robax standard deviation dev
 """
@@ -51,6 +51,8 @@ _ANGLES = (  # words of the three angles, their order about x, y, z, and what th
     (("roulis", "tangage", "lacet"), "xyz"),
     (("alabeo", "cabeceo", "guinada"), "xyz"),
     (("rollio", "beccheggio", "imbardata"), "xyz"),
+    (("alpha", "beta", "gamma"), "XYZ"),  # Mecademic
+    (("o", "a", "t"), "ZYZ"),  # Kawasaki
     (("w", "p", "r"), "xyz"),  # FANUC: about fixed x, y, z
     (("c", "b", "a"), "ZYX"),  # KUKA: A about z, then B about y, then C about x
 )
@@ -180,7 +182,7 @@ def _named(names: Sequence[Name]) -> Iterator[Group]:
             for joint in series:
                 words = joint.split("_")
                 rest = tuple(w for w in name.words if w not in words and w not in ("joint", "j"))
-                whole = len(joint) > 1 or len(name.words) == 1
+                whole = len(joint) > 1 or all(w in _JOINT_WORDS or w in WORDS for w in rest)
                 if whole and {*words} <= {*name.words} and name.column not in taken:
                     rows.setdefault(rest, {}).setdefault(joint, []).append(name)
         for rest, row in rows.items():
@@ -298,7 +300,12 @@ def _target(one: Name, drop: bool = False) -> str:
 def _target_of(one: Name, words: Sequence[str]) -> str:
     spelling = dict(zip(one.words, one.spelled, strict=True))
     told = [w for w in words if not column_names.speaks(w) and w not in _FILLING]
-    return "_".join(spelling[w] for w in told) or TOOL
+    name = ""
+    for spelled in (spelling[w] for w in told):
+        # As the file has it: smr1, and not smr_1.
+        glue = "" if not name or f"{name}{spelled}" in one.column else "_"
+        name += f"{glue}{spelled}"
+    return name or TOOL
 
 
 def _one_sigma(one: Name) -> bool:
