@@ -83,8 +83,8 @@ tcp flange flansch bride brida flangia ee eef effector endeffector cartesian car
 """
 _OPEN = """
 target targets trans ref reference referenz referencia riferimento t estimated est estimate
-geschaetzt estime filtered raw gt truth groundtruth corrected korrigiert corrige before after vor nach
-initial start end base world set
+geschaetzt estime filtered raw gt truth groundtruth corrected korrigiert corrige before after vor
+nach initial start end base world set
 """
 
 _ROLE = {

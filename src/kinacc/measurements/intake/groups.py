@@ -19,8 +19,8 @@ JOINTS, POINT, TURN, SPREAD, POSE = "joints", "point", "orientation", "spread", 
 Values = Callable[[Name], np.ndarray]
 
 _JOINT_TEXT = """
-q joint joints j axis a theta θ th achse achsen gelenk gelenkwinkel axe eje asse giunto articulacion articulacao
-articulation junta jnt jt rax robax jpos jointangle angle angles winkel angulo angolo
+q joint joints j axis a theta θ th achse achsen gelenk gelenkwinkel axe eje asse giunto articulacion
+articulacao articulation junta jnt jt rax robax jpos jointangle angle angles winkel angulo angolo
 """
 _TURN_TEXT = """
 r rot rotation rotations rotacion rotazione orientation orient ori orientierung orientacion
@@ -29,9 +29,10 @@ rotvec rvec rotationvector rpy
 """
 _FILLING_TEXT = """
 position positions pos posicion posizione xyz coord coordinate coordinates koordinate koordinaten
-coordonnee coordonnees coordenada coordenadas coordinata coordinate quota quote cota posicao ort lage loc location translation point pt punkt
-axis achse axe eje asse mean avg average mittel mittelwert moyenne media value wert valeur valor
-valore values of the der die das de du la le del di in pose data robax standard deviation dev
+coordonnee coordonnees coordenada coordenadas coordinata quota quote cota posicao ort lage loc
+location translation point pt punkt axis achse axe eje asse mean avg average mittel mittelwert
+moyenne media value wert valeur valor valore values of the der die das de du la le del di in pose
+data robax standard deviation dev
 """
 _JOINT_WORDS = frozenset(_JOINT_TEXT.split())
 _TURN_WORDS = frozenset(_TURN_TEXT.split())
