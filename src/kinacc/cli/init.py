@@ -15,12 +15,13 @@ from kinacc.cli.output import Output, answers
 if TYPE_CHECKING:
     from kinacc.checks.report import Report
     from kinacc.measurements.intake.guess import Guess
+    from kinacc.measurements.reader import Reading
 
 _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
 
 
 @click.command("init")
-@click.argument("measurement_file", type=click.Path())
+@click.argument("measurement_files", nargs=-1, required=True, type=click.Path())
 @option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @option("--out", "folder", default=".", help="Folder to write to.")
 @option("--name", help="Name of the data set. [as the file]")
@@ -40,33 +41,48 @@ _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "z
     "open. May be given again.",
 )
 @option(
+    "--join",
+    metavar="HOW",
+    help="How joints and points of two files belong together: A=B (column A of the joints names "
+    "the poses as B of the points), time or order.",
+)
+@option(
+    "--clock-offset",
+    metavar="SECONDS",
+    help="Seconds to add to times of points to get the joints'.",
+)
+@option("--pulses-per-deg", metavar="A,B,..", help="Pulses of each joint in a degree.")
+@option(
     "--yes",
     is_flag=True,
     help="Ask nothing; take the guesses, which are stated. Stops where there is no guess.",
 )
 @answers("Print the answer as JSON; asks nothing.", force="Replace files that are there.")
-def init(measurement_file: str, out: Output, **options) -> None:
-    """Describe MEASUREMENT_FILE: write its data set and, where needed, its robot.
+def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
+    """Describe MEASUREMENT_FILES: write their data set and, where needed, its robot.
 
     Looks at the names and numbers of the file, asks what they do not say, and tries the answer on
     the readings themselves. What was measured is read, and not what was wanted or how far off it
     was; joints read back are read, and not commanded ones. Writes NAME.yaml and NAME.robot.yaml,
-    which name every column that is read, and overwrites nothing.
+    which name every column that is read, and overwrites nothing. Two files are joints and points
+    of the same poses.
 
     \b
     Example:
       kinacc init ../shared/data/ur10_tmac/series_D.csv --robot ur10 --name ur10_d
       kinacc init tracker.csv --robot arm.urdf --orientation ZYX --out cell3 --yes
       kinacc init log.csv --take actual_q_0 --take X
+      kinacc init joints.csv points.csv --join Name=Point
     """
     from kinacc.artifacts.atomic import replacing
+    from kinacc.cli.first_poses import first_poses
     from kinacc.cli.init_questions import looked
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
 
     ask = not (options["yes"] or out.as_json)
-    guess = _stated(looked(measurement_file, options, ask), options)
-    name = options["name"] or plain_name(measurement_file)
+    guess = _stated(looked(measurement_files, options, ask), options)
+    name = options["name"] or plain_name(guess.table.path)
     folder = Path(options["folder"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
     _refuse(paths, name, out.force)
@@ -75,14 +91,53 @@ def init(measurement_file: str, out: Output, **options) -> None:
     robot, chosen = _robot(guess, options["robot"], ask)
     own, text = _robot_file(robot, guess.joints, name, paths[1])
     texts = {} if text is None else {paths[1]: text}
-    report = None
+    report, shown = None, []
     if robot is not None:
-        guess, report = _tried(guess, robots.load(robot), name)
+        arm = robots.load(robot)
+        guess, report, reading = _tried(guess, arm, name)
+        shown = first_poses(reading, arm.dh.prismatic)
+        _show(shown, out)
     texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
     with replacing(list(texts)) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
             part.write_text(text, encoding="utf-8")
-    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0])
+    rounded = [] if robot is None else _rounded(guess, reading, arm)
+    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0], shown, rounded)
+
+
+def _show(shown: list[dict], out: Output) -> None:
+    """Print the first poses, before anything is written."""
+    from kinacc.cli.first_poses import in_words
+
+    if not out.as_json:
+        click.echo("\n".join(in_words(shown)))
+
+
+_ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
+
+
+def _rounded(guess: Guess, reading: Reading, arm) -> list[str]:
+    """What rounding the joints costs, in words, where it costs anything that matters."""
+    import numpy as np
+
+    from kinacc.checks import rounding
+
+    if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
+        return []
+    unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
+    cells = [guess.table.columns[name.column] for name in guess.found.joints]
+    step = rounding.step_deg(cells, unit, guess.table.decimal)
+    if step <= 0.0:
+        return []
+    q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
+    cost = rounding.cost(arm.dh, q @ np.asarray(arm.joint_map).T, step)
+    if cost.rms_mm < _ROUNDED_MM:
+        return []
+    return [
+        f"joints are written in steps of {step:.2g} deg: {cost.step_mm:.2g} mm at "
+        f"{cost.reach_mm / 1000.0:.2g} m from an axis. Rounding all joints puts a flange off by "
+        f"{cost.rms_mm:.2g} mm rms, {cost.most_mm:.2g} mm at most: export more digits"
+    ]
 
 
 _FOLDS_UNKNOWN = 60
@@ -222,7 +277,7 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     return found, "the only shipped robot that fits the readings"
 
 
-def _tried(guess: Guess, arm, name: str) -> tuple[Guess, Report]:
+def _tried(guess: Guess, arm, name: str) -> tuple[Guess, Report, Reading]:
     """The guess held against the readings: what was assumed and contradicts them is set right."""
     from kinacc.checks import check
     from kinacc.errors import InputError, Problem
@@ -242,7 +297,7 @@ def _tried(guess: Guess, arm, name: str) -> tuple[Guess, Report]:
             if not settings:
                 break
             guess = _set_right(guess, settings)
-    return guess, report
+    return guess, report, reading
 
 
 def _contradicted(guess: Guess, report: Report) -> dict:
@@ -311,7 +366,11 @@ def _dataset(
     note.append(f"Everything not given here is as in config.yaml.\n    {check}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     robot = robot if robot in shipped() else seen_from(path.parent, robot)
-    guess = guess.but({"path": seen_from(path.parent, guess.section["path"])})
+    seen = {"path": seen_from(path.parent, guess.section["path"])}
+    if "joints" in guess.section:
+        joints = guess.section["joints"]
+        seen["joints"] = joints | {"path": seen_from(path.parent, joints["path"])}
+    guess = guess.but(seen)
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
 
 
@@ -333,7 +392,9 @@ def _turned(guess: Guess) -> str:
     return ""
 
 
-def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> None:
+def _tell(
+    out: Output, guess, robot, chosen, report, written, dataset: Path, shown=(), rounded=()
+) -> None:
     commands = [shlex.join(["kinacc", name, str(dataset)]) for name in ("check-data", "calibrate")]
     answer = {
         "written": [str(path) for path in written],
@@ -348,7 +409,9 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
             {"columns": list(names), "because": why} for names, why in guess.unused() if why
         ],
         "suspicions": [] if report is None else [s.kind for s in report.suspicions],
-        "remarks": _remarks(report),
+        "remarks": [*_remarks(report), *rounded],
+        "told": list(guess.told),
+        "first_poses": list(shown),
         "next": commands,
     }
     section, turn = guess.section, guess.section["orientation"]
@@ -363,6 +426,7 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
     lines.append(f"orientation: {kind}{unit}{_turned(guess)}")
+    lines += [f"file: {words}" for words in guess.told]
     for words in guess.assumed.values():
         lines.append(f"{_how(report)}: {words}")
     for names, why in guess.unused():
@@ -370,7 +434,7 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
     if report is not None and report.suspicions:
         kinds = ", ".join(dict.fromkeys(each.kind for each in report.suspicions))
         lines.append(f"suspicions: {kinds} (check-data says more)")
-    for words in _remarks(report):
+    for words in (*_remarks(report), *rounded):
         lines.append(f"note: {words}")
     for path in written:
         lines.append(f"written: {path}")

@@ -3,20 +3,39 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 import click
 
 from kinacc.errors import InputError, Problem
 from kinacc.measurements.intake import guess as guesses
+from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import Question
 from kinacc.measurements.intake.guess import Guess
 
+# Options that answer a choice, by its key.
+_ANSWERS = ("join", "clock_offset", "pulses_per_deg")
 
-def looked(path: str, options: dict, ask: bool) -> Guess:
-    """The guess at a file without open questions: answered by ``--take``, or by a person."""
+
+def looked(paths: Sequence[str], options: dict, ask: bool) -> Guess:
+    """The guess at a file without open questions: answered by options, or by a person.
+
+    Two files are joints and points of the same poses.
+    """
+    if len(paths) > 2:
+        what, allowed = f"{len(paths)} files", "one file, or one of joints and one of points"
+        raise InputError(Problem(" ".join(paths), what, allowed))
+    files, path = (paths[0] if len(paths) == 1 else paths), " ".join(paths)
     take, turned = list(options["take"]), options["orientation"] != "none"
+    answers = {name: options[name] for name in _ANSWERS if options.get(name) is not None}
     while True:
-        guess = guesses.look(path, take, turned)
+        try:
+            guess = guesses.look(files, take, turned, answers)
+        except Undecided as error:
+            if not ask:
+                raise
+            answers |= {each.key: _answered(each, error) for each in error.choices}
+            continue
         questions = guess.found.questions
         if not questions:
             return guess
@@ -27,6 +46,17 @@ def looked(path: str, options: dict, ask: bool) -> Guess:
         answer = _which(path, questions[0])
         take += answer
         turned = turned and bool(answer)
+
+
+def _answered(choice: Choice, error: Undecided) -> str:
+    """The answer to a choice. Raises ``error`` where nobody is there to answer."""
+    click.echo(f"{choice.about[0].upper()}{choice.about[1:]}.")
+    for value, words in choice.answers.items():
+        click.echo(f"  {value}: {words}")
+    try:
+        return click.prompt("Answer", type=str)
+    except click.Abort:
+        raise error from None
 
 
 def _which(path: str, question: Question) -> list[str]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,7 +104,13 @@ def _loaded(section: Mapping) -> RawTable:
         what = f"every row of {table.path} is excluded"
         problems.append(Problem("measurements.file.exclude", what, "some of them"))
     refuse(problems)
-    return table
+    joints = section.get("joints") or {}
+    if not joints.get("path"):
+        return table
+    from kinacc.measurements.joining import Join, joined
+
+    beside = _loaded({**section, "exclude": (), "source": None, **joints, "joints": None})
+    return joined(table, beside, Join.of(joints))
 
 
 def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> Reading:
@@ -116,7 +123,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
         raise InputError(problems, title)
     q_rad = _stacked(table, found.joints, problems)
     commanded = _stacked(table, found.commanded, problems, gaps=True) if found.commanded else None
-    shared = _numbered(table, found, problems)
+    shared = _numbered(table, found, problems, layout.repeats_in_names)
     s = _directions(table, found, len(found.joints), problems)
     parts = [_target(table, target, layout, problems) for target in found.targets]
     if not parts:
@@ -147,11 +154,12 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     if strict and not problems:
         problems += faults.scale_problems(table, columns, robot)
     refuse(problems, title)
-    notes = [f"nothing was measured in {table.rows_in_words(np.flatnonzero(nothing))}"]
+    none = f"nothing was measured in {table.rows_in_words(np.flatnonzero(nothing))}"
+    notes = [*table.notes, *([none] if nothing.any() else [])]
     return Reading(
         columns,
         found.unused(table),
-        tuple(notes if nothing.any() else ()),
+        tuple(notes),
         commanded if commanded is None else commanded[order],
         turns,
     )
@@ -254,7 +262,7 @@ def _directions(table: RawTable, found: Found, joints: int, problems) -> np.ndar
     return s
 
 
-def _numbered(table: RawTable, found: Found, problems) -> Columns:
+def _numbered(table: RawTable, found: Found, problems, again: bool = False) -> Columns:
     """Pose, repeat, session and temperature (n,); without poses every row is one of its own."""
     count = len(table)
     shared = {
@@ -269,12 +277,22 @@ def _numbered(table: RawTable, found: Found, problems) -> Columns:
         elif name == "temperature":
             shared[name] = numbers(table, place.column, problems, gaps=True)
         else:
-            shared[name] = _whole(table, place.column, problems, words=name == "pose")
+            column = _poses(table, place.column) if again and name == "pose" else table
+            shared[name] = _whole(column, place.column, problems, words=name == "pose")
     if "session" in found.single and "pose" in found.single:
         # Every session may count its poses from 0.
         pairs = list(zip(shared["session"], shared["pose"].tolist(), strict=True))
         shared["pose"] = _by_appearance(pairs)
     return shared
+
+
+_AGAIN = re.compile(r"(?<=\d)[_-]\d+$")
+
+
+def _poses(table: RawTable, column: str) -> RawTable:
+    """The table with the names of poses without the number of the reading: P12 of P12_1."""
+    cells = [_AGAIN.sub("", str(cell).strip()) for cell in table.columns[column]]
+    return replace(table, columns=table.columns | {column: cells})
 
 
 def _labels(table: RawTable, column: str, problems) -> np.ndarray:

@@ -32,6 +32,7 @@ class RawTable:
 
     ``line`` (n,) is the line in the file a row stands on (CSV) or its row number from 1 (Parquet).
     ``under`` are the cells of the line left out under the names, such as a line of units.
+    ``notes`` say what of the file was left out.
     """
 
     path: str
@@ -39,6 +40,7 @@ class RawTable:
     line: np.ndarray
     decimal: str = "."
     under: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.line)

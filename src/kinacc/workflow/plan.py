@@ -350,7 +350,7 @@ class Plan:
                     read = zip(roles, files(value), strict=False)
                     found |= {role: str(file) for role, file in read}
             elif value is not None and config["measurements"]["source"] == "file":
-                found["measurements_file"] = value
+                found["joints_file" if "joints" in path else "measurements_file"] = value
         if self.files_absolute:
             return {role: os.path.abspath(file) for role, file in found.items()}
         return found
@@ -407,8 +407,11 @@ def _in_use(config: dict) -> dict:
     """The configuration without the source of measurements that is not used, or an empty list."""
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
-    if "file" in measurements and not measurements["file"]["exclude"]:
-        file = {k: v for k, v in measurements["file"].items() if k != "exclude"}
+    if "file" in measurements:
+        spare = {key for key in ("exclude", "pulses_per_deg", "repeats_in_names")
+                 if not measurements["file"][key]}  # fmt: skip
+        spare |= set() if measurements["file"]["joints"]["path"] else {"joints"}
+        file = {k: v for k, v in measurements["file"].items() if k not in spare}
         measurements = {**measurements, "file": file}
     return {**config, "measurements": measurements}
 

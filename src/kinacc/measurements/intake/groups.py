@@ -16,6 +16,7 @@ from kinacc.measurements.column_names import READ, WORDS, Name
 from kinacc.measurements.layout import TOOL
 
 JOINTS, POINT, TURN, SPREAD, POSE = "joints", "point", "orientation", "spread", "pose"
+RADIUS = "radius"
 Values = Callable[[Name], np.ndarray]
 
 _JOINT_TEXT = """
@@ -57,6 +58,12 @@ _ANGLES = (  # words of the three angles, their order about x, y, z, and what th
     (("w", "p", "r"), "xyz"),  # FANUC: about fixed x, y, z
     (("c", "b", "a"), "ZYX"),  # KUKA: A about z, then B about y, then C about x
 )
+_RADII = frozenset(("radius", "radii", "rayon", "radio", "raggio", "raio", "halbmesser"))
+_NOT_CORRECTED_TEXT = """
+uncorrected uncompensated unkorrigiert unkompensiert not nicht non no ohne without sin senza sans
+off
+"""
+_NOT_CORRECTED = frozenset(_NOT_CORRECTED_TEXT.split())
 _UNIT_LENGTH = 2e-3  # how far from 1 the length of a quaternion may be, as written
 
 
@@ -96,7 +103,21 @@ def found(names: Sequence[Name], values: Values | None = None) -> list[Group]:
     """Every group of the columns, whatever it holds."""
     groups = [*_numbered(names, values), *_named(names), *_by_axis(names)]
     points = {_words_of(each) for each in groups if each.kind == POINT}
-    return [*groups, *_by_word(names, points)]
+    return [*groups, *_by_word(names, points), *_radii(names)]
+
+
+def _radii(names: Sequence[Name]) -> Iterator[Group]:
+    """Radii of reflectors; ``OPEN`` where the name says that the points are no centres."""
+    for name in names:
+        if _RADII & {*name.words}:
+            open_ = bool(_NOT_CORRECTED & {*name.words})
+            said = column_names.OPEN if open_ else column_names.OTHER
+            yield Group(RADIUS, said, "", {"radius": name})
+
+
+def is_pulse(unit: str) -> bool:
+    """Whether a unit is pulses of a motor, which mean nothing without their number per degree."""
+    return unit.lower() in ("pulse", "pulses", "count", "counts", "tick", "ticks")
 
 
 def is_deviation(name: Name) -> bool:
@@ -105,7 +126,7 @@ def is_deviation(name: Name) -> bool:
         w for w in name.words if w not in _FILLING and not w.isdigit() and w not in ("d", "total")
     ]
     said = column_names.role(name.words) == column_names.DEVIATION or {*name.words} == {"deviation"}
-    return said and len(told) <= 1 and name.unit not in ("deg", "rad")
+    return said and len(told) <= 1 and not _EXTERNAL & {*told} and name.unit not in ("deg", "rad")
 
 
 def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:

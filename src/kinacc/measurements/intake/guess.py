@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,12 +13,15 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name, name_of
-from kinacc.measurements.intake import columns, text
+from kinacc.measurements.intake import columns, motor_pulses, pairs, text
 from kinacc.measurements.intake.columns import Columns
+from kinacc.measurements.intake.groups import is_pulse
 from kinacc.measurements.layout import TOOL, Layout, find
 from kinacc.measurements.table import RawTable, numbers
 
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
+_AGAIN = re.compile(r"(?<=\d)[_-]\d+$")
+_SAME_DEG = 0.02
 _LARGEST_M = 50.0  # no instrument stands further away
 
 
@@ -27,7 +31,8 @@ class Guess:
 
     ``assumed`` are words on settings taken by default or by the size of numbers, by setting:
     joint_unit, length_unit, angle_unit, orientation, order. ``stated``: columns that state a unit,
-    by setting. ``found`` is what the columns were recognised as; its questions are open.
+    by setting. ``found`` is what the columns were recognised as; its questions are open. ``told``
+    are words on what else is known of the file.
     """
 
     section: dict[str, Any]
@@ -35,6 +40,7 @@ class Guess:
     found: Columns
     assumed: dict[str, str] = field(default_factory=dict)
     stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+    told: tuple[str, ...] = ()
 
     @property
     def joints(self) -> int:
@@ -71,16 +77,28 @@ class Guess:
         return (*told, (tuple(left), "")) if left else tuple(told)
 
 
-def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Guess:
+def look(
+    path: str | Path | Sequence[str | Path],
+    take: Sequence[str] = (),
+    turned: bool = True,
+    answers: Mapping[str, str] | None = None,
+) -> Guess:
     """The best guess at a file; what it leaves open stands in ``found.questions``.
 
     ``take``: columns that are read whatever their names say, each for all that go with it;
-    ``turned``: orientations are wanted. Raises InputError where joints or positions cannot be
-    found, where units contradict each other, and where ``take`` names what cannot be read.
+    ``turned``: orientations are wanted; ``answers`` to choices, by key. Two paths are joints and
+    points of the same poses. Raises Undecided where a choice is open, InputError where joints or
+    positions cannot be found, where units contradict each other, and where ``take`` names what
+    cannot be read.
     """
-    written = text.look(path)
-    table = written.load(path)
-    units = written.units or ("",) * len(table.columns)
+    answers = answers or {}
+    pair = None
+    if not isinstance(path, (str, Path)):
+        pair = pairs.look(path, take, turned, answers)
+        path = pair.table.path
+    written = pair.written if pair else text.look(path)
+    table = pair.table if pair else written.load(path)
+    units = table.under or ("",) * len(table.columns)
     if len(units) != len(table.columns):
         what = f"{len(units)} units under {len(table.columns)} column names"
         where = f"{path}: line {written.skip_lines + 2}"
@@ -93,14 +111,16 @@ def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Gue
             cells[name.column] = numbers(table, name.column, [], gaps=True)
         return cells[name.column]
 
-    found = columns.recognise(names, values, take, turned)
+    found = pair.found if pair else columns.recognise(names, values, take, turned)
+    pulses = motor_pulses.pulses(found, values, answers, table.path)
+    found = pulses.found
     _refuse(str(path), table, found, take)
     problems: list[Problem] = []
     sizes = _Units(str(path), values, problems)
     first = next(iter(found.targets.values()))
     turn = [n for q, n in first.items() if q in ("rx", "ry", "rz")]
     joint_unit = sizes.of(
-        [n for n in found.joints if n.unit not in ("mm", "m")],
+        [n for n in found.joints if n.unit not in ("mm", "m") and not pulses.per_deg],
         "joint_unit",
         ("deg", "rad"),
         _FULL_TURN_RAD,
@@ -132,7 +152,31 @@ def look(path: str | Path, take: Sequence[str] = (), turned: bool = True) -> Gue
         "targets": list(found.targets),
         "columns": mapping,
     }
-    return Guess(section, table, found, sizes.assumed, sizes.stated)
+    if pulses.per_deg:
+        section["pulses_per_deg"] = list(pulses.per_deg)
+    if pair:
+        section["joints"] = pair.joints
+    if _counts_readings(table, found, values):
+        section["repeats_in_names"] = True
+    told = (*(pair.told if pair else ()), *pulses.told)
+    return Guess(section, table, found, sizes.assumed, sizes.stated, told)
+
+
+def _counts_readings(table: RawTable, found: Columns, values: Callable[[Name], np.ndarray]) -> bool:
+    """Whether numbers behind the names of poses count readings: P12_1, P12-2 of equal joints."""
+    if "pose" not in found.single:
+        return False
+    told = [str(cell).strip() for cell in table.columns[found.single["pose"].column]]
+    poses = [_AGAIN.sub("", each) for each in told]
+    if any(a == b for a, b in zip(told, poses, strict=True)) or len(set(told)) < len(told):
+        return False
+    q = np.stack([values(name) for name in found.joints], axis=1)
+    q = q if np.nanmax(np.abs(q), initial=0.0) > _FULL_TURN_RAD else np.rad2deg(q)
+    rows: dict[str, list[int]] = {}
+    for row, pose in enumerate(poses):
+        rows.setdefault(pose, []).append(row)
+    several = [each for each in rows.values() if len(each) > 1]
+    return bool(several) and all(np.ptp(q[each], axis=0).max() < _SAME_DEG for each in several)
 
 
 def _refuse(path: str, table: RawTable, found: Columns, take: Sequence[str]) -> None:
@@ -215,7 +259,7 @@ def _mapping(
     mapping: dict[str, str] = {}
 
     def put(ours: str, name: Name, unit: str) -> None:
-        if name.unit in ("", unit) or not unit:
+        if name.unit in ("", unit) or not unit or is_pulse(name.unit):
             mapping[ours] = name.column
         elif name.column != f"{ours}_{name.unit}":  # our own name says its unit
             what = f"is in {name.unit}, others of its kind are in {unit}"

@@ -35,6 +35,14 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
     for key, default in _DEFAULTS.items():
         if section[key] != default:
             lines.append(f"        {key}: {scalar(section[key])}")
+    if section.get("pulses_per_deg"):
+        lines.append(f"        pulses_per_deg: {scalar(section['pulses_per_deg'])}")
+    if section.get("repeats_in_names"):
+        lines.append("        repeats_in_names: true # P12_1 and P12-2 are readings of one pose")
+    if "joints" in section:
+        lines.append("        joints: # in a file of their own")
+        given = {k: v for k, v in section["joints"].items() if v is not None}
+        lines += [f"          {key}: {scalar(value)}" for key, value in given.items()]
     lines.append(f"        joint_unit: {section['joint_unit']}")
     lines.append(f"        length_unit: {section['length_unit']}")
     words = {"kind": turn["kind"]}
