@@ -68,7 +68,7 @@ def test_yaskawa_pulses_are_asked_about(names, tmp_path):
     assert "--pulses-per-deg" in refused(files)
     per_deg = ",".join(map(str, PULSES))
     assert "6 numbers" in refused(files, "--pulses-per-deg", "1000,1000")
-    section, told = described(files, f"--pulses-per-deg={per_deg}")
+    section, _ = described(files, f"--pulses-per-deg={per_deg}")
     assert section["pulses_per_deg"] == list(PULSES)
     arm = tracked()
     rounded = np.round(arm.q * PULSES) / PULSES
@@ -173,7 +173,9 @@ def test_centres_that_were_not_corrected_are_asked_about(tmp_path):
 @pytest.mark.parametrize("mark", ["_", "-"])
 def test_readings_of_a_pose_that_its_name_counts_are_repeats(mark, tmp_path):
     rows = np.repeat(np.arange(len(IT.q)), 2)
-    names = [f"P{row + 1}{mark}{number}" for row, number in zip(rows, [1, 2] * len(IT.q))]
+    names = [
+        f"P{row + 1}{mark}{number}" for row, number in zip(rows, [1, 2] * len(IT.q), strict=True)
+    ]
     point = IT.point[rows]
     text = table(["Point", *joints("q{}_deg"), *XYZ], names, IT.q[rows], point)
     section, _ = described(written(tmp_path, m_csv=text))
