@@ -71,7 +71,7 @@ def joined(points: RawTable, joints: RawTable, how: Join) -> RawTable:
         table,
         columns=columns,
         under=tuple(under) if points.under or joints.under else (),
-        notes=(*points.notes, *notes),
+        notes=(*points.notes, *joints.notes, *notes),
     )
 
 

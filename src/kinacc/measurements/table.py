@@ -81,7 +81,10 @@ def load(
         raise InputError(Problem(str(path), "no such file", "a CSV or Parquet file", origin))
     if path.suffix.lower() in (".parquet", ".pq"):
         return _parquet(path)
-    return _csv(path, delimiter, decimal, skip)
+    from kinacc.measurements import robot_programs
+
+    program = robot_programs.read(path)
+    return program or robot_programs.expanded(_csv(path, delimiter, decimal, skip))
 
 
 def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool = False):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kinacc.errors import InputError, Problem
+from kinacc.measurements import robot_programs
 from kinacc.measurements.table import RawTable, load
 
 DELIMITERS = (";", "\t", ",", " ")
@@ -40,6 +41,8 @@ def look(path: str | Path) -> Written:
     if not path.is_file():
         raise InputError(Problem(str(path), "no such file", "a CSV or Parquet file"))
     if path.suffix.lower() in (".parquet", ".pq"):
+        return Written()
+    if robot_programs.read(path) is not None:
         return Written()
     with open(path, encoding="utf-8-sig", errors="replace") as stream:
         head = stream.read(_CHARACTERS)
