@@ -29,7 +29,7 @@ def measured(name, target_mm, off_mm=0.0):
     q = rng.uniform(0.9 * low, 0.9 * high, (POSES, arm.dh.joints))
     pose = robot.forward(arm, q)
     point = pose.position_mm + pose.rotation @ np.array(target_mm)
-    seen = Rotation.from_euler("xyz", [0.1, 0.2, 1.5]).apply(point) + [2000, -900, 300]
+    seen = Rotation.from_euler("xyz", [0.1, 0.2, 1.5]).apply(point) + np.array([2000, -900, 300])
     return np.rad2deg(q), seen + rng.normal(0, NOISE_MM, seen.shape)
 
 

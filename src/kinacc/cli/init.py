@@ -77,6 +77,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     from kinacc.artifacts.atomic import replacing
     from kinacc.cli.first_poses import first_poses
     from kinacc.cli.init_questions import looked
+    from kinacc.cli.init_remarks import remarks_on, rounded
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
 
@@ -101,8 +102,8 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     with replacing(list(texts)) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
             part.write_text(text, encoding="utf-8")
-    rounded = [] if robot is None else _rounded(guess, reading, arm)
-    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0], shown, rounded)
+    remarks = [] if robot is None else [*remarks_on(report), *rounded(guess, reading, arm)]
+    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0], shown, remarks)
 
 
 def _show(shown: list[dict], out: Output) -> None:
@@ -111,33 +112,6 @@ def _show(shown: list[dict], out: Output) -> None:
 
     if not out.as_json:
         click.echo("\n".join(in_words(shown)))
-
-
-_ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
-
-
-def _rounded(guess: Guess, reading: Reading, arm) -> list[str]:
-    """What rounding the joints costs, in words, where it costs anything that matters."""
-    import numpy as np
-
-    from kinacc.checks import rounding
-
-    if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
-        return []
-    unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
-    cells = [guess.table.columns[name.column] for name in guess.found.joints]
-    step = rounding.step_deg(cells, unit, guess.table.decimal)
-    if step <= 0.0:
-        return []
-    q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
-    cost = rounding.cost(arm.dh, q @ np.asarray(arm.joint_map).T, step)
-    if cost.rms_mm < _ROUNDED_MM:
-        return []
-    return [
-        f"joints are written in steps of {step:.2g} deg: {cost.step_mm:.2g} mm at "
-        f"{cost.reach_mm / 1000.0:.2g} m from an axis. Rounding all joints puts a flange off by "
-        f"{cost.rms_mm:.2g} mm rms, {cost.most_mm:.2g} mm at most: export more digits"
-    ]
 
 
 _FOLDS_UNKNOWN = 60
@@ -332,20 +306,6 @@ def _set_right(guess: Guess, settings: dict) -> Guess:
     return replace(guess.but(settings), assumed=kept)
 
 
-_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
-
-
-def _remarks(report: Report | None) -> list[str]:
-    """What has to be said of the points though nothing contradicts them."""
-    left = report.facts.get("quick_fit", {}).get("left_per_axis_mm") if report else None
-    if left is None or left > _CALCULATED_MM:
-        return []
-    return [
-        f"the points follow the joints to {left:.1g} mm, closer than an instrument measures: if a "
-        "controller or a simulation calculated them, they say nothing of the arm"
-    ]
-
-
 def _how(report: Report | None) -> str:
     """How far what the file does not state was held against its readings."""
     return "assumed" if report is None or report.stopping else "assumed, and the readings agree"
@@ -393,7 +353,7 @@ def _turned(guess: Guess) -> str:
 
 
 def _tell(
-    out: Output, guess, robot, chosen, report, written, dataset: Path, shown=(), rounded=()
+    out: Output, guess, robot, chosen, report, written, dataset: Path, shown=(), remarks=()
 ) -> None:
     commands = [shlex.join(["kinacc", name, str(dataset)]) for name in ("check-data", "calibrate")]
     answer = {
@@ -409,7 +369,7 @@ def _tell(
             {"columns": list(names), "because": why} for names, why in guess.unused() if why
         ],
         "suspicions": [] if report is None else [s.kind for s in report.suspicions],
-        "remarks": [*_remarks(report), *rounded],
+        "remarks": list(remarks),
         "told": list(guess.told),
         "first_poses": list(shown),
         "next": commands,
@@ -434,7 +394,7 @@ def _tell(
     if report is not None and report.suspicions:
         kinds = ", ".join(dict.fromkeys(each.kind for each in report.suspicions))
         lines.append(f"suspicions: {kinds} (check-data says more)")
-    for words in (*_remarks(report), *rounded):
+    for words in remarks:
         lines.append(f"note: {words}")
     for path in written:
         lines.append(f"written: {path}")
