@@ -80,7 +80,10 @@ def test_no_explanation_is_named_twice_and_none_undoes_itself(tmp_path):
 def test_a_coupling_of_joints_2_and_3_is_not_explained_by_joint_6(tmp_path):
     q, point = measured("irb120", [0, 0, 100])
     q[:, 2] -= q[:, 1]
-    line = of_kind(advice(tmp_path, q, point, "irb120"), "joint_coupling")
+    text = advice(tmp_path, q, point, "irb120")
+    line = of_kind(text, "joint_coupling")
+    assert "joint_map: [[" in text
+    assert "[0, 1, 1, 0, 0, 0]" in text
     assert "joint 3 is joint 3 plus joint 2" in line
     assert "joint 6" not in line
 

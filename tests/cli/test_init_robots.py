@@ -228,3 +228,19 @@ def test_the_first_poses_are_part_of_the_answer_for_a_program(tmp_path):
     assert [pose["line"] for pose in told["first_poses"]] == [2, 3, 4]
     np.testing.assert_allclose(told["first_poses"][1]["joints"], IT.q[1], atol=1e-3)
     assert told["first_poses"][2]["targets"][0]["x_mm"] == pytest.approx(IT.point[2, 0], abs=1e-3)
+
+
+def test_points_a_controller_calculated_are_told_so_though_they_are_rounded(tmp_path):
+    text = table([*joints("q{}_deg"), *XYZ], IT.q, np.round(IT.controller, 2))
+    _, told = described(written(tmp_path, m_csv=text))
+    assert any("closer than an instrument measures" in words for words in told["remarks"])
+    _, told = described(written(tmp_path, m_csv=table([*joints("q{}_deg"), *XYZ], IT.q, IT.point)))
+    assert not any("closer than" in words for words in told["remarks"])
+
+
+def test_the_first_poses_are_shown_of_an_unknown_robot_too(tmp_path):
+    names = [*joints("q{}_deg")[:5], *XYZ]
+    files = written(tmp_path, m_csv=table(names, IT.q[:, 1:], IT.point))
+    done = call("init", *files, "--out", tmp_path / "cell", "--yes")
+    assert done.exit_code == 0, done.output
+    assert "  line 2: joints " + ", ".join(f"{v:.3f}" for v in IT.q[0, 1:]) in done.output

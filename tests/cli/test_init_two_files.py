@@ -208,3 +208,23 @@ def test_the_data_set_of_two_files_passes_the_check(tmp_path):
     done = call("check-data", tmp_path / "cell" / "m.yaml", "--json")
     assert "does_not_fit" not in done.output
     assert '"kind": "few_poses"' in done.output
+
+
+def test_targets_in_rows_of_their_own_share_the_joints_of_their_pose(tmp_path):
+    others = [[0, 0, 0], [80, 0, 0], [0, 90, 0], [0, 0, 70]]
+    rows = np.repeat(np.arange(COUNT), 4)
+    point = np.stack([IT.point + IT.turn.apply(other) for other in others], axis=1).reshape(-1, 3)
+    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
+    names = ["Name", "Target", *XYZ]
+    points = table(names, named("P{}", rows), ["A", "B", "C", "D"] * COUNT, point)
+    section, _ = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert_read(section, IT, target="A")
+    assert len(read(section, robot.load("ur10")).columns["row"]) == 4 * COUNT
+
+
+def test_points_counted_by_a_tracker_that_has_fewer_are_asked_about(tmp_path):
+    joints = table(["Pose", *Q], np.arange(1, COUNT + 1), IT.q)
+    points = table(["Point", *XYZ], np.arange(1, COUNT), IT.point[1:])
+    said = refused(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert "--join" in said
+    assert "Pose=Point" in said

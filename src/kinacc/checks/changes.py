@@ -188,10 +188,16 @@ def _coupled(meaning: Meaning, joint: int, other: int, sign: float) -> Meaning:
     change = Change(
         "joint_coupling",
         f"joint {joint + 1} is joint {joint + 1} {word} joint {other + 1} of the file",
-        "state the coupling in the robot's joint_map",
+        f"write joint_map: {_listed(meaning.matrix @ coupling)} into the robot file",
         (joint, other),
     )
     return meaning.changed(change, matrix=meaning.matrix @ coupling)
+
+
+def _listed(matrix: np.ndarray) -> str:
+    """A matrix as YAML on one line."""
+    rows = (", ".join(f"{value:g}" for value in row) for row in matrix + 0.0)
+    return f"[{', '.join(f'[{row}]' for row in rows)}]"
 
 
 def _shifted(meaning: Meaning, joint: int, quarter_deg: float) -> Meaning:

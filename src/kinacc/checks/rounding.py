@@ -29,11 +29,11 @@ class Rounding:
     most_mm: float
 
 
-def step_deg(cells: Sequence[Sequence[object]], factor_deg: float, decimal: str) -> float:
-    """The smallest step of joints as written: the most digits that any cell has behind its mark.
+def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) -> float:
+    """The step of numbers as written: the most digits that any cell has behind its mark.
 
-    ``factor_deg`` is a unit of the file in deg. Zero where the file holds no texts, whose numbers
-    are not rounded.
+    ``unit`` is that of the file in the unit wanted. Zero where the file holds no texts, whose
+    numbers are not rounded.
     """
     digits = 0
     for column in cells:
@@ -42,7 +42,7 @@ def step_deg(cells: Sequence[Sequence[object]], factor_deg: float, decimal: str)
             if not isinstance(cell, str) or "e" in text.lower():
                 return 0.0
             digits = max(digits, len(text.partition(decimal)[2]))
-    return factor_deg * 10.0**-digits
+    return unit * 10.0**-digits
 
 
 def cost(model: DHModel, q: np.ndarray, step: float) -> Rounding:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from kinacc.measurements.intake.guess import Guess
     from kinacc.measurements.reader import Reading
 
 _POSES = 3
@@ -32,6 +34,21 @@ def first_poses(reading: Reading, prismatic: np.ndarray) -> list[dict[str, objec
             }
         )
     return shown
+
+
+def poses_without_robot(guess: Guess) -> list[dict[str, object]]:
+    """The same where no robot is known: joints need none to be read."""
+    from tempfile import TemporaryDirectory
+
+    from kinacc.kinematics import robot as robots
+    from kinacc.measurements.intake.write import template_text
+    from kinacc.measurements.reader import read
+
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "any.yaml"
+        file.write_text(template_text("any", guess.joints), encoding="utf-8")
+        arm = robots.load(str(file))
+    return first_poses(read(guess.section, arm, strict=False), arm.dh.prismatic)
 
 
 def _target(columns, row: int) -> dict[str, object]:

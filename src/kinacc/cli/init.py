@@ -75,7 +75,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
       kinacc init joints.csv points.csv --join Name=Point
     """
     from kinacc.artifacts.atomic import replacing
-    from kinacc.cli.first_poses import first_poses
+    from kinacc.cli.first_poses import first_poses, poses_without_robot
     from kinacc.cli.init_questions import looked
     from kinacc.cli.init_remarks import remarks_on, rounded
     from kinacc.kinematics import robot as robots
@@ -97,12 +97,14 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
         arm = robots.load(robot)
         guess, report, reading = _tried(guess, arm, name)
         shown = first_poses(reading, arm.dh.prismatic)
-        _show(shown, out)
+    else:
+        shown = poses_without_robot(guess)
+    _show(shown, out)
     texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
     with replacing(list(texts)) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
             part.write_text(text, encoding="utf-8")
-    remarks = [] if robot is None else [*remarks_on(report), *rounded(guess, reading, arm)]
+    remarks = [] if robot is None else [*remarks_on(guess, report), *rounded(guess, reading, arm)]
     _tell(out, guess, robot or own, chosen, report, list(texts), paths[0], shown, remarks)
 
 

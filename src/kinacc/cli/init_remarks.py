@@ -11,13 +11,20 @@ if TYPE_CHECKING:
     from kinacc.measurements.reader import Reading
 
 _CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
+_FINE_MM = 0.01  # coarser steps would hide what instruments measure
 _ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
 
 
-def remarks_on(report: Report | None) -> list[str]:
+def remarks_on(guess: Guess, report: Report | None) -> list[str]:
     """What has to be said of the points though nothing contradicts them."""
+    from kinacc.checks.rounding import smallest_step
+
     left = report.facts.get("quick_fit", {}).get("left_per_axis_mm") if report else None
-    if left is None or left > _CALCULATED_MM:
+    points = [target[axis].column for target in guess.found.targets.values() for axis in "xyz"]
+    unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
+    step = smallest_step([guess.table.columns[name] for name in points], unit, guess.table.decimal)
+    # Rounding alone leaves 0.3 of a step.
+    if left is None or left > max(_CALCULATED_MM, 0.4 * min(step, _FINE_MM)):
         return []
     return [
         f"the points follow the joints to {left:.1g} mm, closer than an instrument measures: if a "
@@ -35,7 +42,7 @@ def rounded(guess: Guess, reading: Reading, arm: Robot) -> list[str]:
         return []
     unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
     cells = [guess.table.columns[name.column] for name in guess.found.joints]
-    step = rounding.step_deg(cells, unit, guess.table.decimal)
+    step = rounding.smallest_step(cells, unit, guess.table.decimal)
     if step <= 0.0:
         return []
     q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)

@@ -194,10 +194,11 @@ class Plan:
         """
         problems: list[Problem] = []
         for dataset, config in self.datasets.items():
-            path = self._files(STAGES["measurements"], dataset).get("measurements_file")
+            files = self._files(STAGES["measurements"], dataset)
+            read = [files[role] for role in ("measurements_file", "joints_file") if role in files]
             table = self._table("measurements", dataset)
             settings = self.settings("measurements", dataset)
-            if path is None or _is_current(table, path, settings):
+            if not read or _is_current(table, read, settings):
                 continue
             from kinacc.kinematics import robot
             from kinacc.workflow import calibration_settings
@@ -372,9 +373,10 @@ def _fix(role: str, dataset: str | bool) -> str:
     return f"make it first: kinacc run {maker_of(artefact).name}{where}"
 
 
-def _is_current(table: str, path: str, settings: Mapping[str, object]) -> bool:
-    """Whether a table was made after the file ``path`` changed, and by these settings."""
-    if not os.path.exists(table) or os.path.getmtime(path) >= os.path.getmtime(table):
+def _is_current(table: str, files: Sequence[str], settings: Mapping[str, object]) -> bool:
+    """Whether a table was made after the ``files`` changed, and by these settings."""
+    changed = max(map(os.path.getmtime, files))
+    if not os.path.exists(table) or changed >= os.path.getmtime(table):
         return False
     from kinacc.artifacts.store import read_metadata
 

@@ -27,6 +27,7 @@ tiempo ora tempo t
 """
 _TIMES = frozenset(_TIME_TEXT.split())
 _OF_POSES = frozenset(("pose", "point", "pt", "config", "configuration", "name", "label", "target"))
+_FEWEST_NAMES = 0.05  # of the rows: targets of a pose stand in rows of their own
 _SHARE = 0.5  # of the points: fewer in common are no key
 
 
@@ -193,7 +194,7 @@ def _named(file: _File) -> list[str]:
         timed = bool(_TIMES & set(name.words)) or any(":" in each for each in told)
         if name.column in used or name.unit or timed or not whole:
             continue
-        if len(set(told)) > 0.3 * len(told) and len(set(told)) > 1:
+        if len(set(told)) > max(_FEWEST_NAMES * len(told), 1):
             found.append(name.column)
     return found
 
@@ -207,13 +208,14 @@ def _is_number(text: str) -> bool:
 
 
 def _counts_rows(how: Join, joints: _File, points: _File) -> bool:
-    """Whether both keys only count the rows, and no word says that they count poses."""
+    """Whether both keys only count rows: as many of both are poses where a word says so."""
+    same = len(joints.table) == len(points.table)
     for file, key in ((joints, how.key), (points, how.key_of_points)):
         told = joining.labels(file.table.columns[key])
         words = set(name_of(key or "").words)
         counts = [each for each in told if each.isdigit()]
         steps = {int(b) - int(a) for a, b in pairwise(counts)}
-        if len(counts) < len(told) or steps != {1} or words & _OF_POSES:
+        if len(counts) < len(told) or steps != {1} or (same and words & _OF_POSES):
             return False
     return True
 

@@ -41,8 +41,10 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         lines.append("        repeats_in_names: true # P12_1 and P12-2 are readings of one pose")
     if "joints" in section:
         lines.append("        joints: # in a file of their own")
-        given = {k: v for k, v in section["joints"].items() if v is not None}
-        lines += [f"          {key}: {scalar(value)}" for key, value in given.items()]
+        spare = () if section["joints"]["by"] == "time" else ("clock_offset_s", "within_s")
+        for key, value in section["joints"].items():
+            if value is not None and key not in spare and value != _DEFAULTS.get(key):
+                lines.append(f"          {key}: {scalar(value)}")
     lines.append(f"        joint_unit: {section['joint_unit']}")
     lines.append(f"        length_unit: {section['length_unit']}")
     words = {"kind": turn["kind"]}
