@@ -244,3 +244,24 @@ def test_the_first_poses_are_shown_of_an_unknown_robot_too(tmp_path):
     done = call("init", *files, "--out", tmp_path / "cell", "--yes")
     assert done.exit_code == 0, done.output
     assert "  line 2: joints " + ", ".join(f"{v:.3f}" for v in IT.q[0, 1:]) in done.output
+
+
+def test_the_direction_a_pose_was_approached_from_is_kept(tmp_path):
+    rows = np.repeat(np.arange(len(IT.q)), 2)
+    names = [f"P{row + 1}_{number}" for row, number in zip(rows, [1, 2] * len(IT.q), strict=True)]
+    side = ["+", "-"] * len(IT.q)
+    text = table(
+        ["Point", "Approach", *joints("q{}_deg"), *XYZ], names, side, IT.q[rows], IT.point[rows]
+    )
+    section, told = described(written(tmp_path, m_csv=text))
+    assert len(set(assert_read(section, IT, rows)["pose"].tolist())) == 2 * len(IT.q)
+    assert any(words.startswith("Approach differs") for words in told["told"])
+
+
+def test_points_alone_are_told_to_bring_their_joints(tmp_path):
+    files = written(tmp_path, m_csv=table(["Point", *XYZ], named_rows(), IT.point))
+    assert "kinacc init JOINTS POINTS" in refused(files)
+
+
+def named_rows():
+    return [f"P{row + 1}" for row in range(len(IT.q))]

@@ -72,8 +72,10 @@ def test_readings_that_the_tracker_counts_find_the_joints_of_their_pose(tmp_path
 def test_a_log_of_the_robot_with_a_pose_of_its_own_gives_the_joints_alone(tmp_path):
     joints = table(["Name", *Q, *XYZ], named("P{}", range(COUNT)), IT.q, IT.controller)
     points = table(["Name", *XYZ], named("P{}", range(COUNT)), IT.point)
-    section, _ = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
     assert_read(section, IT)
+    left = {name: each["because"] for each in told["left_aside"] for name in each["columns"]}
+    assert {left[f"joints file {name}"] for name in XYZ} == {"of the file of joints"}
 
 
 def test_as_many_rows_without_a_key_are_asked_about(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,15 +12,13 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name, name_of
-from kinacc.measurements.intake import columns, motor_pulses, pairs, text
+from kinacc.measurements.intake import columns, counted_readings, motor_pulses, pairs, text
 from kinacc.measurements.intake.columns import Columns
 from kinacc.measurements.intake.groups import is_pulse
 from kinacc.measurements.layout import TOOL, Layout, find
 from kinacc.measurements.table import RawTable, numbers
 
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
-_AGAIN = re.compile(r"(?<=\d)[_-]\d+$")
-_SAME_DEG = 0.02
 _LARGEST_M = 50.0  # no instrument stands further away
 
 
@@ -156,27 +153,12 @@ def look(
         section["pulses_per_deg"] = list(pulses.per_deg)
     if pair:
         section["joints"] = pair.joints
-    if _counts_readings(table, found, values):
-        section["repeats_in_names"] = True
     told = (*(pair.told if pair else ()), *pulses.told)
+    again, words = counted_readings.found(table, found, values)
+    if again:
+        section["repeats_in_names"] = True
+    told = (*told, *words)
     return Guess(section, table, found, sizes.assumed, sizes.stated, told)
-
-
-def _counts_readings(table: RawTable, found: Columns, values: Callable[[Name], np.ndarray]) -> bool:
-    """Whether numbers behind the names of poses count readings: P12_1, P12-2 of equal joints."""
-    if "pose" not in found.single:
-        return False
-    told = [str(cell).strip() for cell in table.columns[found.single["pose"].column]]
-    poses = [_AGAIN.sub("", each) for each in told]
-    if any(a == b for a, b in zip(told, poses, strict=True)) or len(set(told)) < len(told):
-        return False
-    q = np.stack([values(name) for name in found.joints], axis=1)
-    q = q if np.nanmax(np.abs(q), initial=0.0) > _FULL_TURN_RAD else np.rad2deg(q)
-    rows: dict[str, list[int]] = {}
-    for row, pose in enumerate(poses):
-        rows.setdefault(pose, []).append(row)
-    several = [each for each in rows.values() if len(each) > 1]
-    return bool(several) and all(np.ptp(q[each], axis=0).max() < _SAME_DEG for each in several)
 
 
 def _refuse(path: str, table: RawTable, found: Columns, take: Sequence[str]) -> None:
@@ -207,6 +189,8 @@ def _refuse(path: str, table: RawTable, found: Columns, take: Sequence[str]) -> 
         told = "; ".join(f"{group.in_words()}: {why}" for group, why in left)
         takeable = [g.names[0] for g, _ in left if g.kind == "point" and g.role == NOMINAL]
         fix = f"name them {fix}, {by_hand}"
+        if bool(found.joints) != bool(found.targets):
+            fix += "; where they stand in a file of their own, give both: kinacc init JOINTS POINTS"
         if takeable:
             fix += f"; --take {shlex.quote(takeable[0])} reads them all the same"
         what = f"{what} were found" + (f" ({told})" if told else "")

@@ -12,10 +12,11 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.measurements import joining
-from kinacc.measurements.column_names import Name, name_of
+from kinacc.measurements.column_names import OTHER, Name, name_of
 from kinacc.measurements.intake import clocks, columns, text
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import Columns
+from kinacc.measurements.intake.groups import Group
 from kinacc.measurements.intake.text import Written
 from kinacc.measurements.joining import NAME, ORDER, TIME, Join
 from kinacc.measurements.table import RawTable, numbers
@@ -67,7 +68,9 @@ def look(
     single = dict(points.found.single)
     if how.by == NAME:
         single["pose"] = own[how.key or ""]
-    aside = [group for group, _ in joints.found.aside if group.kind != columns.JOINTS]
+    used = {n.column for n in (*joints.found.joints, *joints.found.commanded)} | {how.key}
+    spare = {n.column: own[n.column] for n in joints.names if n.column not in used}
+    aside = [Group("", OTHER, "", {name: each}) for name, each in spare.items()]
     found = replace(
         points.found,
         joints=tuple(own[n.column] for n in joints.found.joints),
