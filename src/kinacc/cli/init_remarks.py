@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,7 +20,8 @@ def remarks_on(guess: Guess, report: Report | None) -> list[str]:
     """What has to be said of the points though nothing contradicts them."""
     from kinacc.checks.rounding import smallest_step
 
-    left = report.facts.get("quick_fit", {}).get("left_per_axis_mm") if report else None
+    fit = report.facts.get("quick_fit") if report else None
+    left = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else None
     points = [target[axis].column for target in guess.found.targets.values() for axis in "xyz"]
     unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
     step = smallest_step([guess.table.columns[name] for name in points], unit, guess.table.decimal)
