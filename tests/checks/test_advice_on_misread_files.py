@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.cli.group import main
 from kinacc.kinematics import robot
+from kinacc.measurements.intake.write import shipped_text
 
 POSES = 60
 NOISE_MM = 0.2
@@ -102,3 +103,15 @@ def test_with_the_wrong_robot_and_metres_the_unit_is_to_be_checked_too(tmp_path)
     text = advice(tmp_path, q, point / 1000.0, "ur10")
     assert "does_not_fit" in text
     assert "check the unit of the positions too" in text
+
+
+def test_the_joint_map_that_is_advised_mends_the_coupling(tmp_path):
+    q, point = measured("irb120", [30, -20, 100])
+    q[:, 2] -= q[:, 1]
+    text = advice(tmp_path, q, point, "irb120")
+    line = re.search(r"write (joint_map: \[.*\]) into the robot file", text)[1]
+    own = tmp_path / "own.yaml"
+    own.write_text(f"{shipped_text('irb120')}\n{line}\n", encoding="utf-8")
+    text = advice(tmp_path, q, point, str(own))
+    assert "joint_coupling" not in text
+    assert "does_not_fit" not in text
