@@ -184,7 +184,7 @@ RIGHT = {
 
 @pytest.mark.parametrize("case", RIGHT)
 def test_what_was_measured_is_read_whatever_stands_beside_it(case, file):
-    others = ("B_1", "B_2") if case == "three reflectors" else ()
+    others = ("B1", "B2") if case == "three reflectors" else ()
     assert_measured(described(file(*RIGHT[case])), others)
 
 

@@ -114,6 +114,27 @@ def test_no_more_parts_than_repetitions_or_draws(plan_of):
     assert plan.part_names("study", "arm") == [None]
 
 
+def test_joints_in_a_file_of_their_own_are_an_input_and_a_setting(plan_of, tmp_path):
+    for name in ("points.csv", "joints.csv"):
+        (tmp_path / name).touch()
+    text = """
+datasets:
+  two:
+    robot: mh180
+    evaluation: {{space: measured}}
+    measurements:
+      source: file
+      file: {{path: "{folder}/points.csv", orientation: {{kind: none}}{joints}}}
+"""
+    beside = f', joints: {{path: "{tmp_path}/joints.csv", by: order}}'
+    plan = plan_of(text.format(folder=tmp_path, joints=beside))
+    assert plan.inputs("measurements", "two")["joints_file"] == f"{tmp_path}/joints.csv"
+    assert plan.settings("measurements", "two")["measurements"]["file"]["joints"]["by"] == "order"
+    alone = plan_of(text.format(folder=tmp_path, joints=""))
+    file = alone.settings("measurements", "two")["measurements"]["file"]
+    assert not {"joints", "pulses_per_deg", "repeats_in_names"} & set(file)
+
+
 def test_the_tournament_reads_tables_of_every_data_set_by_where_its_errors_come_from(
     plan_of, tmp_path
 ):

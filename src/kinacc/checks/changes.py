@@ -57,6 +57,16 @@ class Meaning:
         """Orientations (n, 3, 3) in right-handed coordinates."""
         return rotation * np.outer(MIRROR, MIRROR) if self.mirrored else rotation
 
+    @property
+    def numbers(self) -> tuple[object, ...]:
+        """What it does, whatever it is called: the same of two that are one meaning."""
+        arrays = (self.matrix, self.unit, self.zero)
+        return (*(each.tobytes() for each in arrays), self.scale, self.mirrored)
+
+    def part_of(self, other: Meaning) -> bool:
+        """Whether the other one only adds changes to it, which then explain nothing themselves."""
+        return {each.words for each in self.changes} <= {each.words for each in other.changes}
+
     def changed(self, change: Change, **values) -> Meaning:
         """This meaning with one more change."""
         return replace(self, changes=(*self.changes, change), **values)
@@ -178,10 +188,16 @@ def _coupled(meaning: Meaning, joint: int, other: int, sign: float) -> Meaning:
     change = Change(
         "joint_coupling",
         f"joint {joint + 1} is joint {joint + 1} {word} joint {other + 1} of the file",
-        "state the coupling in the robot's joint_map",
+        f"write joint_map: {_listed(meaning.matrix @ coupling)} into the robot file",
         (joint, other),
     )
     return meaning.changed(change, matrix=meaning.matrix @ coupling)
+
+
+def _listed(matrix: np.ndarray) -> str:
+    """A matrix as YAML on one line."""
+    rows = (", ".join(f"{value:g}" for value in row) for row in matrix + 0.0)
+    return f"[{', '.join(f'[{row}]' for row in rows)}]"
 
 
 def _shifted(meaning: Meaning, joint: int, quarter_deg: float) -> Meaning:

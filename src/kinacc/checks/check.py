@@ -37,8 +37,8 @@ _FEWEST_POSES = 6
 _FROM_THERE_ON = ("base_jump", "target_moved")
 NO_TURN = "orientations"
 _SYMPTOMS = ("outliers", "outside_limits")
-_FAR = 0.02  # of the points' spread: what no meaning of the file explains
 _OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a tenth of that
+_REACH = (0.02, 3.0)  # of the arm's length: what points that an arm reaches may spread over
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
@@ -118,8 +118,8 @@ def _meant(
     )
     centred = one.position_mm - np.median(one.position_mm, axis=0)
     spread = float(np.median(np.linalg.norm(centred, axis=1)))
-    if fitted.trial.sigma_mm > _FAR * spread * finding.meaning.scale:
-        suspicions.append(_no_fit(one, fitted, robot))
+    if fitted.trial.sigma_mm > meaning.FAR * spread * finding.meaning.scale:
+        suspicions.append(_no_fit(one, fitted, robot, spread * finding.meaning.scale))
         return fitted, raw, suspicions
     suspicions += _of_other_lengths(one, fitted, robot)
     if seen.cells.turned.any():
@@ -176,7 +176,7 @@ def _of_all(one: Cells, change: changes.Change, finding: meaning.Finding) -> Sus
         " and ".join(each.words for each in other.changes if each not in finding.meaning.changes)
         for other in finding.equal
     ]
-    rivals = [words for words in others if words][:3]
+    rivals = list(dict.fromkeys(words for words in others if words))[:3]
     equal = f"; as well explained by: {', or '.join(rivals)}" if rivals else ""
     left = f"{finding.as_written_mm:.3g} mm per axis left as written, {finding.found_mm:.3g} mm so"
     return suspicion(
@@ -204,14 +204,21 @@ def _turn(one: Cells, change: changes.Change, least: float, before: float, there
     )
 
 
-def _no_fit(one: Cells, fitted: Fitted, robot: Robot) -> Suspicion:
+def _no_fit(one: Cells, fitted: Fitted, robot: Robot, spread_mm: float) -> Suspicion:
+    whole_mm = float(np.sum(np.abs(robot.dh.a_mm)) + np.sum(np.abs(robot.dh.d_mm)))
+    unit = ""
+    if not _REACH[0] * whole_mm < spread_mm < _REACH[1] * whole_mm:
+        unit = (
+            f". The points spread over {spread_mm:.3g} mm, links and offsets of {robot.name} add "
+            f"up to {whole_mm:.4g} mm: check the unit of the positions too"
+        )
     return suspicion(
         "does_not_fit",
         f"no meaning of the numbers that was tried brings {robot.name} nearer than "
         f"{fitted.trial.sigma_mm:.3g} mm per axis",
         one.lines(np.arange(len(one))),
         "check the robot, its joint order, zeros and couplings, and that joints and readings are "
-        "of the same rows",
+        f"of the same rows{unit}",
         sigma_mm=fitted.trial.sigma_mm,
     )
 

@@ -26,6 +26,7 @@ _FITTED_ROWS = 360
 _GOOD = 0.01  # of the points' spread: what an arm as described may leave, uncalibrated
 _SURE = 0.003  # of the spread: what leaves no more than this needs no rival
 _BETTER = 0.5  # of what the file as written leaves: more than errors of an arm can hide
+FAR = 0.02  # of the spread: what leaves more explains nothing, of this arm
 _PROMISING = 0.7
 _MAJORITY = 0.7  # share of the readings a meaning must explain
 _FITTED = 4  # meanings that are fitted in full
@@ -46,7 +47,7 @@ class Finding:
     """What the file means; ``equal`` are other meanings that explain it as well.
 
     ``as_written_mm`` and ``found_mm``: standard deviation per axis left by the file as written and
-    by the meaning found, arm corrected, in the file's own lengths.
+    by the meaning found, arm corrected, each in the millimetres it takes the positions for.
     """
 
     meaning: Meaning
@@ -79,7 +80,7 @@ def find(cells: Cells, robot: Robot, written: Trial, progress: Progress) -> Find
     misfit = Misfit(few, robot)
     least = misfit(as_it_is)
     good = written.sigma_mm < _GOOD * spread
-    wanted = list(_searched(misfit, as_it_is, robot, good, progress))
+    wanted = _each_once(_searched(misfit, as_it_is, robot, good, progress))
     better = [(value, each) for value, each in wanted if value < _PROMISING * least]
     if not better:
         return here
@@ -94,10 +95,19 @@ def find(cells: Cells, robot: Robot, written: Trial, progress: Progress) -> Find
         for _, each in progress(close[:_FITTED], "meanings of the file fitted")
     ]
     smallest = min(value for value, _ in fitted)
-    if smallest >= _BETTER * _left(many, robot, as_it_is):
+    if smallest >= _BETTER * _left(many, robot, as_it_is) or smallest > FAR * spread:
         return here
-    equal = [each for value, each in fitted if value < 1.5 * smallest]
-    return Finding(equal[0], tuple(equal[1:]), written.sigma_mm, smallest)
+    left, found = next((value, each) for value, each in fitted if value < 1.5 * smallest)
+    equal = [e for value, e in fitted if value < 1.5 * smallest and not found.part_of(e)]
+    return Finding(found, tuple(equal), written.sigma_mm, left * found.scale)
+
+
+def _each_once(tried: Iterable[tuple[float, Meaning]]) -> list[tuple[float, Meaning]]:
+    """Meanings that differ, each as it was found first: with the fewest changes."""
+    found: dict[tuple, tuple[float, Meaning]] = {}
+    for value, each in tried:
+        found.setdefault(each.numbers, (value, each))
+    return list(found.values())
 
 
 def _simplicity(meaning: Meaning) -> tuple[int, int]:

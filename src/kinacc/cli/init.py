@@ -17,13 +17,14 @@ from kinacc.cli.output import Output, answers
 if TYPE_CHECKING:
     from kinacc.checks.report import Report
     from kinacc.measurements.intake.guess import Guess
+    from kinacc.measurements.reader import MeasuredFile
 
 _CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
 _FILE = "measurements.file"
 
 
 @click.command("init")
-@click.argument("measurement_file", type=click.Path())
+@click.argument("measurement_files", nargs=-1, required=True, type=click.Path())
 @option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @option("--out", "folder", default=".", help="Folder to write to.")
 @option("--name", help="Name of the data set. [as the file]")
@@ -48,33 +49,49 @@ _FILE = "measurements.file"
 )
 @file_options
 @option(
+    "--join",
+    metavar="HOW",
+    help="How joints and points of two files belong together: A=B (column A of the joints names "
+    "the poses as B of the points), time or order.",
+)
+@option(
+    "--clock-offset",
+    metavar="SECONDS",
+    help="Seconds to add to times of points to get the joints'.",
+)
+@option("--pulses-per-deg", metavar="A,B,..", help="Pulses of each joint in a degree.")
+@option(
     "--yes",
     is_flag=True,
     help="Ask nothing; take the guesses, which are stated. Stops where there is no guess.",
 )
 @answers("Print the answer as JSON; asks nothing.", force="Replace files that are there.")
-def init(measurement_file: str, out: Output, **options) -> None:
-    """Describe MEASUREMENT_FILE: write its data set and, where needed, its robot.
+def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
+    """Describe MEASUREMENT_FILES: write their data set and, where needed, its robot.
 
     Looks at the names and numbers of the file, asks what they do not say, and tries the answer on
     the readings themselves. What was measured is read, and not what was wanted or how far off it
     was; joints read back are read, and not commanded ones. Writes NAME.yaml and NAME.robot.yaml,
-    which name every column that is read, and overwrites nothing.
+    which name every column that is read, and overwrites nothing. Two files are joints and points
+    of the same poses.
 
     \b
     Example:
       kinacc init ../shared/data/ur10_tmac/series_D.csv --robot ur10 --name ur10_d
       kinacc init tracker.csv --robot arm.urdf --orientation ZYX --out cell3 --yes
       kinacc init log.csv --take actual_q_0 --take X
+      kinacc init joints.csv points.csv --join Name=Point
     """
     from kinacc.artifacts.atomic import replacing
+    from kinacc.cli.first_poses import first_poses, poses_without_robot
     from kinacc.cli.init_questions import looked
+    from kinacc.cli.init_remarks import remarks_on, rounded
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
 
     ask = not (options["yes"] or out.as_json)
-    guess = _stated(looked(measurement_file, options, ask), options)
-    name = options["name"] or plain_name(measurement_file)
+    guess = _stated(looked(measurement_files, options, ask), options)
+    name = options["name"] or plain_name(guess.table.path)
     folder = Path(options["folder"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
     _refuse(paths, name, out.force)
@@ -83,14 +100,28 @@ def init(measurement_file: str, out: Output, **options) -> None:
     robot, chosen = _robot(guess, options["robot"], ask)
     own, text = _robot_file(robot, guess.joints, name, paths[1])
     texts = {} if text is None else {paths[1]: text}
-    report = None
+    report, shown = None, []
     if robot is not None:
-        guess, report = _tried(guess, robots.load(robot), name)
+        arm = robots.load(robot)
+        guess, report, reading = _tried(guess, arm, name)
+        shown = first_poses(reading, arm.dh.prismatic)
+    else:
+        shown = poses_without_robot(guess)
+    _show(shown, out)
     texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
     with replacing(list(texts)) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
             part.write_text(text, encoding="utf-8")
-    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0])
+    remarks = [] if robot is None else [*remarks_on(guess, report), *rounded(guess, reading, arm)]
+    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0], shown, remarks)
+
+
+def _show(shown: list[dict], out: Output) -> None:
+    """Print the first poses, before anything is written."""
+    from kinacc.cli.first_poses import in_words
+
+    if not out.as_json:
+        click.echo("\n".join(in_words(shown)))
 
 
 _FOLDS_UNKNOWN = 60
@@ -238,7 +269,7 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     return found, "the only shipped robot that fits the readings"
 
 
-def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report]:
+def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report, MeasuredFile]:
     """The guess held against the readings: what was assumed and contradicts them is set right."""
     from kinacc.checks import check
     from kinacc.errors import InputError, Problem
@@ -260,7 +291,7 @@ def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report]:
             if not settings:
                 break
             guess = _set_right(guess, settings)
-    return guess, report
+    return guess, report, reading
 
 
 def _contradicted(guess: Guess, report: Report) -> dict:
@@ -309,20 +340,6 @@ def _set_right(guess: Guess, settings: dict) -> Guess:
     return replace(guess.but(settings), assumed=kept)
 
 
-_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
-
-
-def _remarks(report: Report | None) -> list[str]:
-    """What has to be said of the points though nothing contradicts them."""
-    left = report.facts.get("quick_fit", {}).get("left_per_axis_mm") if report else None
-    if left is None or left > _CALCULATED_MM:
-        return []
-    return [
-        f"the points follow the joints to {left:.1g} mm, closer than an instrument measures: if a "
-        "controller or a simulation calculated them, they say nothing of the arm"
-    ]
-
-
 def _how(report: Report | None) -> str:
     """How far what the file does not state was held against its readings."""
     return "assumed" if report is None or report.stopping else "assumed, and the readings agree"
@@ -343,7 +360,11 @@ def _dataset(
     note.append(f"Everything not given here is as in config.yaml.\n    {check}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     robot = robot if robot in shipped() else seen_from(path.parent, robot)
-    guess = guess.but({"path": seen_from(path.parent, guess.section["path"])})
+    seen = {"path": seen_from(path.parent, guess.section["path"])}
+    if "joints" in guess.section:
+        joints = guess.section["joints"]
+        seen["joints"] = joints | {"path": seen_from(path.parent, joints["path"])}
+    guess = guess.but(seen)
     return dataset_text(name, robot, guess, configurations, "\n".join(note))
 
 
@@ -365,7 +386,9 @@ def _turned(guess: Guess) -> str:
     return ""
 
 
-def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> None:
+def _tell(
+    out: Output, guess, robot, chosen, report, written, dataset: Path, shown=(), remarks=()
+) -> None:
     commands = [shlex.join(["kinacc", name, str(dataset)]) for name in ("check-data", "calibrate")]
     answer = {
         "written": [str(path) for path in written],
@@ -381,7 +404,8 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
             {"columns": list(names), "because": why} for names, why in guess.unused() if why
         ],
         "suspicions": [] if report is None else [s.kind for s in report.suspicions],
-        "remarks": _remarks(report),
+        "remarks": list(remarks),
+        "first_poses": list(shown),
         "next": commands,
     }
     section, turn = guess.section, guess.section["orientation"]
@@ -397,6 +421,7 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
     lines.append(f"orientation: {kind}{unit}{_turned(guess)}")
+    lines += [f"file: {words}" for words in guess.told]
     for words in guess.assumed.values():
         lines.append(f"{_how(report)}: {words}")
     for names, why in guess.unused():
@@ -404,7 +429,7 @@ def _tell(out: Output, guess, robot, chosen, report, written, dataset: Path) -> 
     if report is not None and report.suspicions:
         kinds = ", ".join(dict.fromkeys(each.kind for each in report.suspicions))
         lines.append(f"suspicions: {kinds} (check-data says more)")
-    for words in _remarks(report):
+    for words in remarks:
         lines.append(f"note: {words}")
     for path in written:
         lines.append(f"written: {path}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 import click
 
@@ -13,14 +14,25 @@ from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import Question
 from kinacc.measurements.intake.guess import Guess
 
+# Options that answer a choice, by its key.
+_FREE = ("join", "clock_offset", "pulses_per_deg")  # answers that no list holds
 
-def looked(path: str, options: dict, ask: bool) -> Guess:
-    """The guess at a file without open questions: answered by ``--take``, or by a person."""
+
+def looked(paths: Sequence[str], options: dict, ask: bool) -> Guess:
+    """The guess at a file without open questions: answered by options, or by a person.
+
+    Two files are joints and points of the same poses.
+    """
+    if len(paths) > 2:
+        what, allowed = f"{len(paths)} files", "one file, or one of joints and one of points"
+        raise InputError(Problem(" ".join(paths), what, allowed))
+    files, path = (paths[0] if len(paths) == 1 else paths), " ".join(paths)
     take, turned = list(options["take"]), options["orientation"] != "none"
-    answers = {name: options[name] for name in ANSWERS if options.get(name) is not None}
+    names = (*ANSWERS, *_FREE)
+    answers = {name: options[name] for name in names if options.get(name) is not None}
     while True:
         try:
-            guess = guesses.look(path, take, turned, answers)
+            guess = guesses.look(files, take, turned, answers)
         except Undecided as error:
             if not ask:
                 raise
@@ -47,9 +59,9 @@ def _answered(choice: Choice, error: Undecided) -> str:
     click.echo(f"{choice.about[0].upper()}{choice.about[1:]}.")
     for value, words in choice.answers.items():
         click.echo(f"  {value}: {words}")
-    wanted = click.Choice(list(choice.answers))
+    wanted = str if choice.key in _FREE else click.Choice(list(choice.answers))
     try:
-        return click.prompt("Which", type=wanted, show_choices=False)
+        return click.prompt("Answer", type=wanted, show_choices=False)
     except click.Abort:
         raise error from None
 

@@ -30,7 +30,11 @@ _MOST_DATASETS = 500
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
 # Values that name files: in every data set, and of the top level.
-_FILES = (("robot",), ("measurements", "file", "path"))
+_FILES = (
+    ("robot",),
+    ("measurements", "file", "path"),
+    ("measurements", "file", "joints", "path"),
+)
 
 
 def _none(*given: Any) -> tuple[Problem, ...]:

@@ -1,7 +1,8 @@
 """What a column's name says: its words, its unit, and what its numbers are.
 
 The words are those that instruments, controllers and people write, in small letters without
-accents, in English, German, French, Spanish, Italian and Portuguese.
+accents, in English, German, French, Spanish, Italian and Portuguese; Japanese ones are put into
+English first.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ import re
 import unicodedata
 from collections.abc import Collection
 from dataclasses import dataclass
+
+from kinacc.measurements.japanese import in_english
 
 # What the numbers of a column are, by a word of its name.
 MEASURED = "measured"
@@ -29,7 +32,8 @@ coppia par force forces kraft fuerza forza ft wrench moment moments momento curr
 courant corriente corrente voltage voltages spannung temperature temperatures temp temperatur
 temperatura temps mode modes status state gain output outputs input inputs digital analog control
 accelerometer gyro imu payload cog inertia normal direction dir vector distance dist abstand
-azimuth elevation intensity quality quaternionnorm station instrument frame uframe utool offset
+radius radii rayon radio raggio raio halbmesser diameter durchmesser diametre diametro azimuth
+elevation intensity quality quaternionnorm station instrument frame uframe utool offset
 origin ursprung speedscaling load time zeit stamp timestamp date
 """
 _SPREAD = """
@@ -78,9 +82,9 @@ _FRAME = """
 tcp flange flansch bride brida flangia ee eef effector endeffector cartesian cart kartesisch kart
 """
 _OPEN = """
-target targets ref reference referenz referencia riferimento t estimated est estimate geschaetzt
-estime filtered raw gt truth groundtruth corrected korrigiert corrige before after vor nach
-initial start end base world set
+target targets trans ref reference referenz referencia riferimento t estimated est estimate
+geschaetzt estime filtered raw gt truth groundtruth corrected korrigiert corrige before after vor
+nach initial start end base world set
 """
 
 _ROLE = {
@@ -179,12 +183,15 @@ class Name:
 def name_of(column: str, unit: str = "") -> Name:
     """The name taken apart; ``unit`` is what a line of units says of it."""
     stated = [unit_of(unit)] if unit_of(unit) else []
-    text = _T_MAC.sub("tmac", column.translate(_SIGNS))
-    for inside in _BRACKET.findall(text):
-        if _says_more(inside):
-            continue
-        stated += [unit_of(inside)] if unit_of(inside) else []
-        text = text.replace(inside, " ", 1)
+    text = _T_MAC.sub("tmac", in_english(column).translate(_SIGNS))
+
+    def put_aside(bracket: re.Match[str]) -> str:
+        if _says_more(bracket[1]):
+            return bracket[0]
+        stated.extend([unit_of(bracket[1])] if unit_of(bracket[1]) else [])
+        return " "
+
+    text = _BRACKET.sub(put_aside, text)
     words: list[tuple[str, str]] = []
     for part in _HUMP.split(text):
         for spelled in _WORD.findall(part):
@@ -211,6 +218,7 @@ def name_of(column: str, unit: str = "") -> Name:
 
 def unit_of(text: str) -> str:
     """The unit a cell such as [mm] or deg states, as the file writes it where it is not known."""
+    text = in_english(text)
     inside = _BRACKET.search(text)
     word = (inside[1] if inside else text).strip()
     if not word.strip("-/ "):

@@ -151,7 +151,7 @@ def unit_problems(table: RawTable, layout: Layout, prismatic: np.ndarray) -> Ite
     ``prismatic`` (k,) marks joints whose position is a length.
     """
     keys = {
-        "joint_unit": layout.joint_unit,
+        **({} if layout.pulses_per_deg else {"joint_unit": layout.joint_unit}),
         "length_unit": layout.length_unit,
         "orientation.unit": layout.angle_unit,
     }

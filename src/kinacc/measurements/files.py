@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.errors import InputError, Problem
+from kinacc.measurements import robot_programs
 from kinacc.measurements.grid import rows_of_text, tabled
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.written import FEATURES, SPHERICAL, Written
@@ -42,12 +43,15 @@ def load(path: str | Path, written: Written | None = None, source: str | None = 
         from kinacc.measurements import workbook
 
         table = workbook.load(path, written)
+    elif (program := robot_programs.read(path)) is not None:
+        return program
     else:
         table = tabled(str(path), rows_of_text(path, written), written)
         if written.encoding == "utf-8" and any("\ufffd" in name for name in table.columns):
             told = "names of columns hold characters that are not UTF-8: set "
             told += "measurements.file.encoding, such as latin-1 or cp932"
             table = replace(table, notes=(*table.notes, told))
+    table = robot_programs.expanded(table)
     if written.names is not None and {*written.names[:-3]} <= {*GROUPS, POINT}:
         table = in_natural_order(table)
     if written.layout == FEATURES:

@@ -65,7 +65,8 @@ class Layout:
     then carry ``joint_unit``, ``length_unit`` and ``angle_unit``. ``orientation`` is none,
     quaternion (``order`` of quat1..quat4), rotation_vector or euler (of ``convention``).
     ``targets`` names those to read; None for all that are there. ``no_reading`` are numbers that
-    say that nothing was read; uncertainties are ``sigma`` standard deviations.
+    say that nothing was read; uncertainties are ``sigma`` standard deviations. ``pulses_per_deg``:
+    mapped joints are motor pulses. ``repeats_in_names``: P12_1 and P12-2 are readings of one pose.
     """
 
     columns: Mapping[str, str]
@@ -78,6 +79,8 @@ class Layout:
     targets: tuple[str, ...] | None
     no_reading: tuple[float, ...] = ()
     sigma: int = 1
+    pulses_per_deg: tuple[float, ...] | None = None
+    repeats_in_names: bool = False
 
     @classmethod
     def of(cls, section: Mapping) -> Layout:
@@ -94,6 +97,8 @@ class Layout:
             None if targets is None else tuple(targets),
             tuple(section.get("no_reading", ())),
             section.get("sigma", 1),
+            tuple(section.get("pulses_per_deg") or ()) or None,
+            section.get("repeats_in_names", False),
         )
 
 
@@ -229,7 +234,22 @@ class _Finder:
             missing = [name for name, place in zip(names, places, strict=True) if place is None]
             if not required:
                 self._problem(", ".join(missing), "is missing beside the other joints")
-        return () if None in places else tuple(places)
+        if None in places:
+            return ()
+        return self._in_pulses(places) if self.layout.pulses_per_deg else tuple(places)
+
+    def _in_pulses(self, places: list[Place]) -> tuple[Place, ...]:
+        """The joints as pulses of their motors, each with its own number of them in a degree."""
+        count = self.layout.pulses_per_deg or ()
+        if len(count) != len(places) or 0.0 in count:
+            what = f"{len(count)} numbers for {len(places)} joints" if 0.0 not in count else "a 0"
+            allowed = "one number for each joint, none of them 0"
+            self.problems.append(Problem("measurements.file.pulses_per_deg", what, allowed))
+            return tuple(places)
+        return tuple(
+            Place(place.column, ANGLE["deg"] / each)
+            for place, each in zip(places, count, strict=True)
+        )
 
     def targets(self) -> list[str]:
         """Names of the targets to read, in order of their columns.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from kinacc.measurements.files import load
 from kinacc.measurements.layout import STD, TOOL, FoundColumns, Layout, Place, Target, find
 from kinacc.measurements.orientation import quaternions, rotation_std
 from kinacc.measurements.table import RawTable, numbers
-from kinacc.measurements.written import Written
+from kinacc.measurements.written import TABLE, Written
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 QUATERNION = ("qw", "qx", "qy", "qz")
@@ -100,7 +101,14 @@ def _loaded(section: Mapping) -> RawTable:
         what = f"every row of {table.path} is excluded"
         problems.append(Problem("measurements.file.exclude", what, "some of them"))
     refuse(problems)
-    return table
+    joints = section.get("joints") or {}
+    if not joints.get("path"):
+        return table
+    from kinacc.measurements.joining import Join, joined
+
+    own = {**section, "exclude": (), "source": None, "layout": TABLE, **joints, "joints": None}
+    beside = _loaded(own)
+    return joined(table, beside, Join.of(joints))
 
 
 def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> MeasuredFile:
@@ -113,7 +121,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
         raise InputError(problems, title)
     q_rad = _stacked(table, found.joints, problems, gaps=True)
     commanded = _stacked(table, found.commanded, problems, gaps=True) if found.commanded else None
-    shared = _numbered(table, found, problems)
+    shared = _numbered(table, found, problems, layout.repeats_in_names)
     s = _directions(table, found, len(found.joints), problems)
     payload = _payload(table, found.payload, problems)
     parts = [_target(table, target, layout, problems) for target in found.targets]
@@ -152,7 +160,6 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     if strict and not problems:
         problems += faults.scale_problems(table, columns, robot)
     refuse(problems, title)
-    notes = [f"nothing was measured in {table.rows_in_words(np.flatnonzero(nothing))}"]
     return MeasuredFile(
         columns,
         found.unused(table),
@@ -327,7 +334,7 @@ def _payload(table: RawTable, places: tuple[Place, ...], problems) -> Columns:
     return dict(zip(PAYLOAD_COLUMNS, values.T, strict=True))
 
 
-def _numbered(table: RawTable, found: FoundColumns, problems) -> Columns:
+def _numbered(table: RawTable, found: FoundColumns, problems, again: bool = False) -> Columns:
     """Pose, repeat, session and temperature (n,); without poses every row is one of its own."""
     count = len(table)
     shared = {
@@ -342,12 +349,22 @@ def _numbered(table: RawTable, found: FoundColumns, problems) -> Columns:
         elif name == "temperature":
             shared[name] = numbers(table, place.column, problems, gaps=True)
         else:
-            shared[name] = _whole(table, place.column, problems, words=name == "pose")
+            column = _poses(table, place.column) if again and name == "pose" else table
+            shared[name] = _whole(column, place.column, problems, words=name == "pose")
     if "session" in found.single and "pose" in found.single:
         # Every session may count its poses from 0.
         pairs = list(zip(shared["session"], shared["pose"].tolist(), strict=True))
         shared["pose"] = _by_appearance(pairs)
     return shared
+
+
+_AGAIN = re.compile(r"(?<=\d)[_-]\d+$")
+
+
+def _poses(table: RawTable, column: str) -> RawTable:
+    """The table with the names of poses without the number of the reading: P12 of P12_1."""
+    cells = [_AGAIN.sub("", str(cell).strip()) for cell in table.columns[column]]
+    return replace(table, columns=table.columns | {column: cells})
 
 
 def _labels(table: RawTable, column: str, problems) -> np.ndarray:

@@ -222,6 +222,25 @@ def _choice(full: Mapping[str, Any], place) -> Iterator[Problem]:
             )
 
 
+def _joints(name: str, joints: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:
+    """What is wrong with joints in a file of their own."""
+    if joints["path"] is None:
+        return
+    if not os.path.isfile(folder / joints["path"]):
+        yield Problem(
+            place("measurements", "file", "joints", "path"),
+            f"{joints['path']!r} does not exist",
+            "an existing CSV or Parquet file, relative to the folder of the configuration file",
+        )
+    for key in ("key", "key_of_points"):
+        if joints["by"] != "order" and joints[key] is None:
+            yield Problem(
+                place("measurements", "file", "joints", key),
+                f"data set {name} joins joints to points by {joints['by']}, and {key} is not given",
+                "the name of a column",
+            )
+
+
 def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:
     if file["path"] is None:
         yield Problem(
@@ -253,6 +272,7 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
             f"{shown(file['thousands'])} is also the decimal mark or the delimiter",
             "a mark that differs from both",
         )
+    yield from _joints(name, file["joints"], place, folder)
     taken = sorted(
         {
             each

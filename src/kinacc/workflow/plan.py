@@ -199,10 +199,11 @@ class Plan:
         """
         problems: list[Problem] = []
         for dataset, config in self.datasets.items():
-            path = self._files(STAGES["measurements"], dataset).get("measurements_file")
+            files = self._files(STAGES["measurements"], dataset)
+            read = [files[role] for role in ("measurements_file", "joints_file") if role in files]
             table = self._table("measurements", dataset)
             settings = self.settings("measurements", dataset)
-            if path is None or _is_current(table, path, settings):
+            if not read or _is_current(table, read, settings):
                 continue
             from kinacc.kinematics import robot
             from kinacc.workflow import calibration_settings
@@ -352,7 +353,7 @@ class Plan:
                     read = zip(roles, files(value), strict=False)
                     found |= {role: str(file) for role, file in read}
             elif value is not None and config["measurements"]["source"] == "file":
-                found["measurements_file"] = value
+                found["joints_file" if "joints" in path else "measurements_file"] = value
         if self.files_absolute:
             return {role: os.path.abspath(file) for role, file in found.items()}
         return found
@@ -374,9 +375,10 @@ def _fix(role: str, dataset: str | bool) -> str:
     return f"make it first: kinacc run {maker_of(artefact).name}{where}"
 
 
-def _is_current(table: str, path: str, settings: Mapping[str, object]) -> bool:
-    """Whether a table was made after the file ``path`` changed, and by these settings."""
-    if not os.path.exists(table) or os.path.getmtime(path) >= os.path.getmtime(table):
+def _is_current(table: str, files: Sequence[str], settings: Mapping[str, object]) -> bool:
+    """Whether a table was made after the ``files`` changed, and by these settings."""
+    changed = max(map(os.path.getmtime, files))
+    if not os.path.exists(table) or changed >= os.path.getmtime(table):
         return False
     from kinacc.artifacts.store import read_metadata
 
@@ -408,7 +410,7 @@ def _read_words(values: object) -> object:
 # Keys of files that tables of results do not know of where they are at their defaults.
 _LEFT_OUT_AS_USUAL = (
     *("exclude", "thousands", "encoding", "sheet", "layout", "directions", "no_reading", "sigma"),
-    "names",
+    *("names", "pulses_per_deg", "repeats_in_names"),
 )
 
 
@@ -428,6 +430,7 @@ def _in_use(config: dict) -> dict:
             key: value
             for key, value in measurements["file"].items()
             if key not in _LEFT_OUT_AS_USUAL or value != usual[key]
+            if key != "joints" or value["path"]
         }
         measurements = {**measurements, "file": file}
     calibration, asked = config["calibration"], asked_for(config["calibration"])

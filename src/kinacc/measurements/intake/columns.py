@@ -29,6 +29,7 @@ from kinacc.measurements.layout import TOOL
 
 _LENGTHS, _ANGLES = {"mm", "m"}, {"deg", "rad"}
 _NOT_MEASURED = (NOMINAL, CALCULATED, DEVIATION, SPREAD, OTHER)
+_MAY_BE_MEASURED = (MEASURED, REPORTED, PLAIN, OPEN)
 # Words of records of measurement; a controller writes target, command or set point.
 _OF_PROTOCOLS = frozenset(("nominal", "nom", "nominell", "nominale", "nenn", "nennwert"))
 _POSE = (
@@ -41,6 +42,7 @@ uncertainty uncertainties unc uncert u σ sigma unsicherheit messunsicherheit in
 incertidumbre incertezza incerteza u95 std
 """
 _UNCERTAINTIES = frozenset(_UNCERTAINTY_TEXT.split())
+_RADIUS = "a radius: positions are read as those of the reflectors' centres"
 _SINGLE = {
     "pose": {"pose", "config", "configuration", "point", "pt", "no", "nr", "index"},
     "repeat": {"repeat", "repetition", "rep", "reading"},
@@ -162,11 +164,16 @@ class _Choice:
         fit = {JOINTS: _ANGLES | _LENGTHS, POINT: _LENGTHS, TURN: _ANGLES, POSE: set()}
         allowed = fit.get(group.kind, _ANGLES | _LENGTHS)
         wrong = sorted(units - allowed)
+        if group.kind == JOINTS and units and all(map(groups.is_pulse, units)):
+            return True
         if group.kind == JOINTS and units and not units & _ANGLES:
             wrong = sorted(units)
         if wrong and group.role not in (DEVIATION, SPREAD, OTHER):
             what = {JOINTS: "joints", POINT: "a position", TURN: "an orientation"}
             self.aside.append((group, f"{what.get(group.kind, 'a pose')} in {' and '.join(wrong)}"))
+            return False
+        if group.kind == groups.RADIUS and group.role == OTHER:
+            self.aside.append((group, _RADIUS))
             return False
         if group.kind == POSE:
             self.aside.append((group, _POSE[group.role == CALCULATED]))
@@ -247,6 +254,10 @@ class _Choice:
             return self._named_apart(taken)
         for each in self._of(POINT, *_NOT_MEASURED):
             self._leave([each], _POSE[1] if is_own_pose(each.columns["x"].words) else each.role)
+        if (radii := self._of(groups.RADIUS)) and (every := self._of(POINT, *_MAY_BE_MEASURED)):
+            names = ", ".join(each.in_words() for each in radii)
+            why = f"{names}: the radius was not corrected for, so they may not be the centres"
+            return self._chosen(every, why)
         measured, reported = self._of(POINT, MEASURED), self._of(POINT, REPORTED)
         plain, unclear = self._of(POINT, PLAIN), self._of(POINT, OPEN)
         if measured:

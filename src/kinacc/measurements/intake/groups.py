@@ -12,15 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.measurements import column_names
-from kinacc.measurements.column_names import READ, Name
+from kinacc.measurements.column_names import READ, WORDS, Name
 from kinacc.measurements.layout import TOOL
 
 JOINTS, POINT, TURN, SPREAD, POSE = "joints", "point", "orientation", "spread", "pose"
+RADIUS = "radius"
 Values = Callable[[Name], np.ndarray]
 
 _JOINT_TEXT = """
 q joint joints j axis a theta θ th achse achsen gelenk gelenkwinkel axe eje asse giunto articulacion
-articulation junta jnt jt rax robax jpos jointangle angle angles winkel angulo angolo
+articulacao articulation junta jnt jt rax robax jpos jointangle angle angles winkel angulo angolo
 """
 _TURN_TEXT = """
 r rot rotation rotations rotacion rotazione orientation orient ori orientierung orientacion
@@ -29,9 +30,10 @@ rotvec rvec rotationvector rpy
 """
 _FILLING_TEXT = """
 position positions pos posicion posizione xyz coord coordinate coordinates koordinate koordinaten
-coordonnee coordonnees coordenada coordinata ort lage loc location translation trans point pt punkt
-axis achse axe eje asse mean avg average mittel mittelwert moyenne media value wert valeur valor
-valore values of the der die das de du la le del di in pose data robax standard deviation dev
+coordonnee coordonnees coordenada coordenadas coordinata quota quote cota posicao ort lage loc
+location translation point pt punkt axis achse axe eje asse mean avg average mittel mittelwert
+moyenne media value wert valeur valor valore values of the der die das de du la le del di in pose
+data robax standard deviation dev
 """
 _JOINT_WORDS = frozenset(_JOINT_TEXT.split())
 _TURN_WORDS = frozenset(_TURN_TEXT.split())
@@ -51,9 +53,17 @@ _ANGLES = (  # words of the three angles, their order about x, y, z, and what th
     (("roulis", "tangage", "lacet"), "xyz"),
     (("alabeo", "cabeceo", "guinada"), "xyz"),
     (("rollio", "beccheggio", "imbardata"), "xyz"),
+    (("alpha", "beta", "gamma"), "XYZ"),  # Mecademic
+    (("o", "a", "t"), "ZYZ"),  # Kawasaki
     (("w", "p", "r"), "xyz"),  # FANUC: about fixed x, y, z
     (("c", "b", "a"), "ZYX"),  # KUKA: A about z, then B about y, then C about x
 )
+_RADII = frozenset(("radius", "radii", "rayon", "radio", "raggio", "raio", "halbmesser"))
+_NOT_CORRECTED_TEXT = """
+uncorrected uncompensated unkorrigiert unkompensiert not nicht non no ohne without sin senza sans
+off
+"""
+_NOT_CORRECTED = frozenset(_NOT_CORRECTED_TEXT.split())
 _UNIT_LENGTH = 2e-3  # how far from 1 the length of a quaternion may be, as written
 
 
@@ -93,7 +103,21 @@ def found(names: Sequence[Name], values: Values | None = None) -> list[Group]:
     """Every group of the columns, whatever it holds."""
     groups = [*_numbered(names, values), *_named(names), *_by_axis(names)]
     points = {_words_of(each) for each in groups if each.kind == POINT}
-    return [*groups, *_by_word(names, points)]
+    return [*groups, *_by_word(names, points), *_radii(names)]
+
+
+def _radii(names: Sequence[Name]) -> Iterator[Group]:
+    """Radii of reflectors; ``OPEN`` where the name says that the points are no centres."""
+    for name in names:
+        if _RADII & {*name.words}:
+            open_ = bool(_NOT_CORRECTED & {*name.words})
+            said = column_names.OPEN if open_ else column_names.OTHER
+            yield Group(RADIUS, said, "", {"radius": name})
+
+
+def is_pulse(unit: str) -> bool:
+    """Whether a unit is pulses of a motor, which mean nothing without their number per degree."""
+    return unit.lower() in ("pulse", "pulses", "count", "counts", "tick", "ticks")
 
 
 def is_deviation(name: Name) -> bool:
@@ -102,7 +126,7 @@ def is_deviation(name: Name) -> bool:
         w for w in name.words if w not in _FILLING and not w.isdigit() and w not in ("d", "total")
     ]
     said = column_names.role(name.words) == column_names.DEVIATION or {*name.words} == {"deviation"}
-    return said and len(told) <= 1 and name.unit not in ("deg", "rad")
+    return said and len(told) <= 1 and not _EXTERNAL & {*told} and name.unit not in ("deg", "rad")
 
 
 def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
@@ -180,7 +204,7 @@ def _named(names: Sequence[Name]) -> Iterator[Group]:
             for joint in series:
                 words = joint.split("_")
                 rest = tuple(w for w in name.words if w not in words and w not in ("joint", "j"))
-                whole = len(joint) > 1 or len(name.words) == 1
+                whole = len(joint) > 1 or all(w in _JOINT_WORDS or w in WORDS for w in rest)
                 if whole and {*words} <= {*name.words} and name.column not in taken:
                     rows.setdefault(rest, {}).setdefault(joint, []).append(name)
         for rest, row in rows.items():
@@ -298,7 +322,12 @@ def _target(one: Name, drop: bool = False) -> str:
 def _target_of(one: Name, words: Sequence[str]) -> str:
     spelling = dict(zip(one.words, one.spelled, strict=True))
     told = [w for w in words if not column_names.speaks(w) and w not in _FILLING]
-    return "_".join(spelling[w] for w in told) or TOOL
+    name = ""
+    for spelled in (spelling[w] for w in told):
+        # As the file has it: smr1, and not smr_1.
+        glue = "" if not name or f"{name}{spelled}" in one.column else "_"
+        name += f"{glue}{spelled}"
+    return name or TOOL
 
 
 def _one_sigma(one: Name) -> bool:

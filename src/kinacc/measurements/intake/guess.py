@@ -12,9 +12,17 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name, name_of
-from kinacc.measurements.intake import columns, no_reading, text
+from kinacc.measurements.intake import (
+    columns,
+    counted_readings,
+    motor_pulses,
+    no_reading,
+    pairs,
+    text,
+)
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import NO_SIGMA, NamedColumns
+from kinacc.measurements.intake.groups import is_pulse
 from kinacc.measurements.layout import TOOL, Layout, find
 from kinacc.measurements.table import RawTable, numbers
 
@@ -29,7 +37,7 @@ class Guess:
     ``assumed`` are words on settings taken by default or by the size of numbers, by setting:
     joint_unit, length_unit, angle_unit, orientation, order. ``stated``: columns that state a unit,
     by setting. ``found`` is what the columns were recognised as; its questions are open. ``told``
-    are words on how the file is written and what of it is no reading.
+    are words on what else is known of the file.
     """
 
     section: dict[str, Any]
@@ -75,7 +83,7 @@ class Guess:
 
 
 def look(
-    path: str | Path,
+    path: str | Path | Sequence[str | Path],
     take: Sequence[str] = (),
     turned: bool = True,
     answers: Mapping[str, str] | None = None,
@@ -83,13 +91,18 @@ def look(
     """The best guess at a file; what it leaves open stands in ``found.questions``.
 
     ``take``: columns that are read whatever their names say, each for all that go with it;
-    ``turned``: orientations are wanted; ``answers`` to choices, by key. Raises Undecided where the
-    file can be read in more than one way, InputError where joints or positions cannot be
-    found, where units contradict each other, and where ``take`` names what cannot be read.
+    ``turned``: orientations are wanted; ``answers`` to choices, by key. Two paths are joints and
+    points of the same poses. Raises Undecided where a choice is open, InputError where joints or
+    positions cannot be found, where units contradict each other, and where ``take`` names what
+    cannot be read.
     """
     answers = answers or {}
-    looked = text.look(path, answers)
-    table, stated = looked.table, looked.stated
+    pair = None
+    if not isinstance(path, (str, Path)):
+        pair = pairs.look(path, take, turned, answers)
+        path = pair.table.path
+    looked = pair.points if pair else text.look(path, answers)
+    table, stated = pair.table if pair else looked.table, looked.stated
     units = table.under or ("",) * len(table.columns)
     if len(units) != len(table.columns):
         what = f"{len(units)} units under {len(table.columns)} column names"
@@ -108,7 +121,11 @@ def look(
 
     void: list[float] = []
     sigma = answers.get("sigma", "none")
-    found = columns.recognise(names, values, take, turned, sigma != "none")
+    found = (
+        columns.recognise(names, values, take, turned, sigma != "none") if not pair else pair.found
+    )
+    pulses = motor_pulses.pulses(found, values, answers, table.path)
+    found = pulses.found
     _refuse(str(path), table, found, take)
     none = [] if found.questions else _no_reading(table, found, values, answers)
     void += none
@@ -118,7 +135,7 @@ def look(
     first = next(iter(found.targets.values()))
     turn = [n for q, n in first.items() if q in ("rx", "ry", "rz")]
     joint_unit = sizes.of(
-        [n for n in found.joints if n.unit not in ("mm", "m")],
+        [n for n in found.joints if n.unit not in ("mm", "m") and not pulses.per_deg],
         "joint_unit",
         ("deg", "rad"),
         _FULL_TURN_RAD,
@@ -149,7 +166,15 @@ def look(
         "targets": list(found.targets),
         "columns": mapping,
     }
-    told = (*looked.told, *table.notes)
+    if pulses.per_deg:
+        section["pulses_per_deg"] = list(pulses.per_deg)
+    if pair:
+        section["joints"] = pair.joints
+    told = (*looked.told, *table.notes, *(pair.told if pair else ()), *pulses.told)
+    again, words = counted_readings.found(table, found, values)
+    if again:
+        section["repeats_in_names"] = True
+    told = tuple(dict.fromkeys((*told, *words)))
     return Guess(section, table, found, sizes.assumed, sizes.stated, told)
 
 
@@ -215,6 +240,8 @@ def _refuse(path: str, table: RawTable, found: NamedColumns, take: Sequence[str]
         told = "; ".join(f"{group.in_words()}: {why}" for group, why in left)
         takeable = [g.names[0] for g, _ in left if g.kind == "point" and g.role == NOMINAL]
         fix = f"name them {fix}, {by_hand}"
+        if bool(found.joints) != bool(found.targets):
+            fix += "; where they stand in a file of their own, give both: kinacc init JOINTS POINTS"
         if takeable:
             fix += f"; --take {shlex.quote(takeable[0])} reads them all the same"
         what = f"{what} were found" + (f" ({told})" if told else "")
@@ -271,7 +298,7 @@ def _mapping(
     mapping: dict[str, str] = {}
 
     def put(ours: str, name: Name, unit: str) -> None:
-        if name.unit in ("", unit) or not unit:
+        if name.unit in ("", unit) or not unit or is_pulse(name.unit):
             mapping[ours] = name.column
         elif name.column != f"{ours}_{name.unit}":  # our own name says its unit
             what = f"is in {name.unit}, others of its kind are in {unit}"

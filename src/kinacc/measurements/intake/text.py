@@ -10,6 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from kinacc.errors import InputError, Problem, first_few
+from kinacc.measurements import robot_programs
 from kinacc.measurements.column_names import name_of
 from kinacc.measurements.features import report_of
 from kinacc.measurements.files import EXCEL, GROUPS, PARQUET, POINT, load, refuse_other_files
@@ -55,6 +56,8 @@ def look(path: str | Path, answers: Mapping[str, str] | None = None) -> Looked:
     refuse_other_files(path)
     kind = path.suffix.lower()
     if kind in PARQUET:
+        return Looked(Written(), load(path))
+    if kind not in EXCEL and robot_programs.read(path) is not None:
         return Looked(Written(), load(path))
     if kind in EXCEL:
         written, head, rows, told = _workbook(path, answers)

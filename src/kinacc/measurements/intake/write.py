@@ -37,6 +37,16 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
     for key, default in _AS_USUAL.items():
         if section[key] != default:
             lines.append(f"        {key}: {_listed(section[key])}")
+    if section.get("pulses_per_deg"):
+        lines.append(f"        pulses_per_deg: {scalar(section['pulses_per_deg'])}")
+    if section.get("repeats_in_names"):
+        lines.append("        repeats_in_names: true # P12_1 and P12-2 are readings of one pose")
+    if "joints" in section:
+        lines.append("        joints: # in a file of their own")
+        spare = () if section["joints"]["by"] == "time" else ("clock_offset_s", "within_s")
+        for key, value in section["joints"].items():
+            if value is not None and key not in spare and value != _AS_USUAL.get(key):
+                lines.append(f"          {key}: {_listed(value)}")
     lines.append(f"        joint_unit: {section['joint_unit']}")
     lines.append(f"        length_unit: {section['length_unit']}")
     words = {"kind": turn["kind"]}

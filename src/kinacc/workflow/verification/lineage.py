@@ -97,7 +97,8 @@ def parts(folder: Path, artefact: str) -> list[list[str]]:
 
 
 def _roles(stage: Stage) -> set[str]:
-    return {"measurements_file"} if "measurements.file.path" in stage.files else set()
+    roles = {"measurements_file", "joints_file"}
+    return roles if "measurements.file.path" in stage.files else set()
 
 
 def _one_version(folder: Path, marks: Marks) -> Iterator[Found]:

@@ -1,0 +1,166 @@
+"""Joints out of robots' own programs and records: ABB, KUKA, FANUC, Yaskawa.
+
+A program says where an arm was sent. Its cartesian positions are what the controller was told and
+no measurement; its joint positions are those of a pose, which a tracker's file may name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.errors import InputError, Problem, first_few
+from kinacc.measurements.table import RawTable
+
+_SUFFIXES = (".mod", ".sys", ".prg", ".dat", ".src", ".ls", ".jbi", ".txt", "")
+_MOST_BYTES = 20_000_000
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_ABB = re.compile(r"\b(jointtarget|robtarget)\s+(\w+)\s*:=\s*\[\s*\[([^\]]*)\]", re.IGNORECASE)
+_KUKA = re.compile(
+    r"(?:\b(?:E6AXIS|AXIS|E6POS|POS|FRAME)\s+(\w+)\s*=|\b(?:PTP|LIN|SPTP|SLIN)\b)\s*"
+    r"(\{[^}]*\})", re.IGNORECASE
+)  # fmt: skip
+_FANUC = re.compile(r"^\s*P\[\s*(\d+)[^\]]*\]\s*\{(.*?)\}\s*;", re.DOTALL | re.MULTILINE)
+_YASKAWA = re.compile(r"^\s*(B?C\d+|P\d+)\s*=\s*([-+\d.,\s]+)$", re.MULTILINE)
+_KUKA_PARTS = re.compile(rf"\b([A-Z]\d?)\s+({_NUMBER})", re.IGNORECASE)
+_FANUC_JOINT = re.compile(rf"\bJ(\d)\s*=\s*({_NUMBER})\s*(deg|mm)?", re.IGNORECASE)
+_UNUSED = 9e8  # ABB writes 9E9 for an axis that is not there
+_FEWEST = 4
+_TARGETS = "cartesian positions, which say where the arm was sent: they are no joints, and not read"
+_HORIZONTAL = (
+    "FANUC counts joint 3 from the horizontal: the arm's own is J3 plus J2, as joint_map of its "
+    "robot file says; check-data holds that to the points"
+)
+
+
+@dataclass(frozen=True)
+class _Position:
+    name: str
+    place: int
+    joints: tuple[float, ...]
+
+
+def read(path: Path) -> RawTable | None:
+    """The joints of a program, one row per position; None where the file is none.
+
+    Raises InputError where its positions are cartesian only.
+    """
+    if path.suffix.lower() not in _SUFFIXES or path.stat().st_size > _MOST_BYTES:
+        return None
+    text = path.read_bytes().decode("utf-8", errors="replace")
+    for maker in (_of_abb, _of_kuka, _of_fanuc, _of_yaskawa):
+        found, names, notes = maker(text)
+        joints = [each for each in found if each.joints]
+        cartesian = [each.name for each in found if not each.joints]
+        if not found:
+            continue
+        if not joints:
+            what = f"holds {len(cartesian)} {_TARGETS}"
+            allowed = "joint positions: jointtarget, E6AXIS, J1 .. J6 of P[n], pulses of a job"
+            fix = "record the joints at each pose, or give the points alone with a file of joints"
+            raise InputError(Problem(str(path), what, allowed, fix))
+        if cartesian:
+            notes = (*notes, f"{path}: {first_few(cartesian)}: {_TARGETS}")
+        return _table(path, text, joints, names, notes)
+    return None
+
+
+def _table(path: Path, text: str, found: list[_Position], names, notes) -> RawTable:
+    widths = {len(each.joints) for each in found}
+    lines = np.array([text.count("\n", 0, each.place) + 1 for each in found])
+    if len(widths) > 1 or not _FEWEST <= len(found[0].joints) <= len(names):
+        odd = [n for n, each in zip(lines, found, strict=True) if len(each.joints) != min(widths)]
+        where = f"{path}: lines {first_few(odd or list(lines))}"
+        raise InputError(Problem(where, "another number of joints than elsewhere", "4 to 7 joints"))
+    columns: dict[str, list] = {"name": [each.name for each in found]}
+    for number in range(len(found[0].joints)):
+        columns[names[number]] = [repr(each.joints[number]) for each in found]
+    return RawTable(str(path), columns, lines, ".", notes=notes)
+
+
+_DEGREES = tuple(f"J{number} [deg]" for number in range(1, 8))
+
+
+def _of_abb(text: str):
+    found = []
+    for match in _ABB.finditer(text):
+        numbers = _floats(match[3])
+        joints = tuple(each for each in numbers if abs(each) < _UNUSED)
+        found.append(_Position(match[2], match.start(), joints if match[1][0] in "jJ" else ()))
+    return found, _DEGREES, ()
+
+
+def _of_kuka(text: str):
+    found = []
+    for match in _KUKA.finditer(text):
+        parts = _parts(match[2])
+        joints = tuple(parts[f"A{n}"] for n in range(1, 8) if f"A{n}" in parts)
+        name = (match[1] or f"P{len(found) + 1}").removeprefix("X").removeprefix("x")
+        if parts:
+            found.append(_Position(name, match.start(), joints))
+    return found, tuple(f"A{number} [deg]" for number in range(1, 8)), ()
+
+
+def _of_fanuc(text: str):
+    found = []
+    for match in _FANUC.finditer(text):
+        first_group = re.split(r"GP[2-9]\s*:", match[2])[0]
+        joints = {int(m[1]): float(m[2]) for m in _FANUC_JOINT.finditer(first_group)}
+        row = tuple(joints[number] for number in sorted(joints))
+        found.append(_Position(f"P[{match[1]}]", match.start(1), row))
+    joints = any(each.joints for each in found)
+    return found, _DEGREES, (_HORIZONTAL,) if joints else ()
+
+
+def _of_yaskawa(text: str):
+    if "/JOB" not in text or "///PULSE" not in text:
+        return [], (), ()
+    rows = _YASKAWA.finditer(text)
+    found = [_Position(each[1], each.start(1), tuple(_floats(each[2]))) for each in rows]
+    return found, tuple(f"{letter} [pulse]" for letter in "SLURBTE"), ()
+
+
+def _floats(text: str) -> list[float]:
+    return [float(each) for each in re.findall(_NUMBER, text)]
+
+
+def _parts(text: str) -> dict[str, float]:
+    return {name.upper(): float(value) for name, value in _KUKA_PARTS.findall(text)}
+
+
+def expanded(table: RawTable) -> RawTable:
+    """The table with cells such as {A1 10, A2 -90 ..} and [[10,-90,..],[9E9,..]] as columns."""
+    columns: dict[str, list] = {}
+    for name, cells in table.columns.items():
+        parts = list(_cells(cells))
+        columns |= {f"{name} {part}": values for part, values in parts} or {name: cells}
+    if columns.keys() == table.columns.keys():
+        return table
+    return replace(table, columns=columns, under=())
+
+
+def _cells(cells: list) -> Iterator[tuple[str, list]]:
+    """Columns within the cells of one, none where they are ordinary."""
+    texts = [str(cell).strip() for cell in cells]
+    if texts and all(each.startswith("{") and each.endswith("}") for each in texts):
+        rows = [_parts(each) for each in texts]
+    elif texts and all(each.startswith("[[") and each.endswith("]") for each in texts):
+        rows = [_of_target(each) for each in texts]
+    else:
+        return
+    if rows[0] and all(row.keys() == rows[0].keys() for row in rows):
+        for part in rows[0]:
+            yield part, [repr(row[part]) for row in rows]
+
+
+def _of_target(text: str) -> dict[str, float]:
+    """Numbers of an ABB target: joints of [[6],[6]], a pose of [[3],[4],..], unused axes aside."""
+    groups = [_floats(each) for each in re.findall(r"\[([^\[\]]*)\]", text)]
+    if len(groups) >= 2 and len(groups[0]) == 3 and len(groups[1]) == 4:
+        names = ("trans x", "trans y", "trans z", "rot q1", "rot q2", "rot q3", "rot q4")
+        return dict(zip(names, [*groups[0], *groups[1]], strict=True))
+    return {f"rax_{n}": v for n, v in enumerate(groups[0] if groups else [], 1) if v < _UNUSED}

@@ -1,0 +1,232 @@
+"""Joints in one file and tracker points in another: joined by a key or by time, asked, refused."""
+
+import numpy as np
+import pytest
+from tracked_arm import assert_read, call, described, refused, table, tracked, written
+
+from kinacc.errors import InputError
+from kinacc.kinematics import robot
+from kinacc.measurements.reader import read
+from kinacc.workflow.contradictions import load
+
+IT = tracked(poses=20)
+COUNT = len(IT.q)
+Q = [f"q{i}_deg" for i in range(1, 7)]
+XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
+ORDER = np.random.default_rng(7).permutation(COUNT)
+# Poses are not taken at regular times.
+START_S = np.cumsum(np.random.default_rng(3).uniform(20.0, 60.0, COUNT))
+
+
+def named(pattern, rows):
+    return [pattern.format(row + 1) for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("there", "here"),
+    [("P{}", "P{}"), ("P{:03d}", "p{}"), ("{}", "Punkt {}"), ("P[{}]", "P{}"), ("pose_{}", "{}")],
+)
+def test_a_name_joins_whatever_the_order(there, here, tmp_path):
+    joints = table(["Name", *Q], named(there, range(COUNT)), IT.q)
+    points = table(["Point", *XYZ], named(here, ORDER), IT.point[ORDER], mark=";")
+    files = written(tmp_path, joints_csv=joints, tracker_csv=points)
+    section, told = described(files)
+    assert_read(section, IT, ORDER)
+    assert section["path"].endswith("tracker.csv")
+    assert "20 of 20 points have joints" in told["told"][0]
+    assert read(section, robot.load("ur10")).columns["row"].tolist() == list(range(2, COUNT + 2))
+
+
+def test_the_order_of_the_files_is_of_no_account(tmp_path):
+    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
+    points = table(["Name", *XYZ], named("P{}", ORDER), IT.point[ORDER])
+    files = written(tmp_path, tracker_csv=points, joints_csv=joints)
+    section, _ = described(files)
+    assert_read(section, IT, ORDER)
+
+
+def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
+    rows = np.arange(COUNT)
+    joints = table(["Name", *Q], named("P{}", rows[3:]), IT.q[3:])
+    points = table(["Name", *XYZ], named("P{}", rows[:-2]), IT.point[:-2])
+    files = written(tmp_path, joints_csv=joints, tracker_csv=points)
+    section, told = described(files)
+    assert_read(section, IT, rows[3:-2])
+    said = "\n".join(told["told"])
+    assert "lines 2, 3, 4" in said
+    assert f"lines {COUNT - 3}, {COUNT - 2}" in said
+    notes = "\n".join(read(section, robot.load("ur10")).notes)
+    assert "lines 2, 3, 4" in notes
+
+
+def test_readings_that_the_tracker_counts_find_the_joints_of_their_pose(tmp_path):
+    rows = np.repeat(np.arange(COUNT), 2)
+    names = [f"P{row + 1}_{number}" for row, number in zip(rows, [1, 2] * COUNT, strict=True)]
+    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
+    points = table(["Name", *XYZ], names, IT.point[rows])
+    section, _ = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    columns = assert_read(section, IT, rows)
+    assert columns["repeat"].tolist() == [0, 1] * COUNT
+
+
+def test_a_log_of_the_robot_with_a_pose_of_its_own_gives_the_joints_alone(tmp_path):
+    joints = table(["Name", *Q, *XYZ], named("P{}", range(COUNT)), IT.q, IT.controller)
+    points = table(["Name", *XYZ], named("P{}", range(COUNT)), IT.point)
+    section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert_read(section, IT)
+    left = {name: each["because"] for each in told["left_aside"] for name in each["columns"]}
+    assert {left[f"joints file {name}"] for name in XYZ} == {"of the file of joints"}
+
+
+def test_as_many_rows_without_a_key_are_asked_about(tmp_path):
+    files = written(tmp_path, joints_csv=table(Q, IT.q), tracker_csv=table(XYZ, IT.point))
+    assert "--join order" in refused(files)
+    section, _ = described(files, "--join", "order")
+    assert_read(section, IT)
+    cell = tmp_path / "asked"
+    done = call("init", *files, "--robot", "ur10", "--out", cell, "--name", "m", input="order\n")
+    assert done.exit_code == 0, done.output
+    assert load((cell / "m.yaml",))["m"]["measurements"]["file"]["joints"]["by"] == "order"
+
+
+def test_other_counts_without_a_key_are_refused(tmp_path):
+    files = written(tmp_path, joints_csv=table(Q, IT.q), tracker_csv=table(XYZ, IT.point[1:]))
+    assert "19 points" in refused(files)
+
+
+def test_a_count_of_rows_is_no_name(tmp_path):
+    # The tracker missed the fifth pose; its count goes on all the same.
+    rows = np.delete(np.arange(COUNT), 4)
+    joints = table(["No", *Q], np.arange(1, COUNT + 1), IT.q)
+    points = table(["No", *XYZ], np.arange(1, COUNT), IT.point[rows])
+    said = refused(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert "--join" in said
+    assert "No=No" in said
+
+
+def test_one_name_for_two_poses_is_refused(tmp_path):
+    names = named("P{}", range(COUNT))
+    names[7] = names[3]
+    joints = table(["Name", *Q], names, IT.q)
+    points = table(["Name", *XYZ], named("P{}", range(COUNT)), IT.point)
+    files = written(tmp_path, joints_csv=joints, tracker_csv=points)
+    assert "lines 5, 9" in refused(files, "--join", "Name")
+
+
+def dense_log(offset_s=0.0, period_s=0.2):
+    """A controller's record of joints that runs on between poses, and when each pose was held."""
+    times, rows = [], []
+    for row in range(COUNT):
+        held = np.arange(START_S[row], START_S[row] + 8.0, period_s)
+        times.append(held)
+        rows.append(np.repeat(IT.q[row : row + 1], len(held), axis=0))
+        if row + 1 < COUNT:
+            moving = np.arange(held[-1] + period_s, held[-1] + 6.0, period_s)
+            share = np.linspace(0.05, 0.95, len(moving))[:, None]
+            times.append(moving)
+            rows.append((1 - share) * IT.q[row] + share * IT.q[row + 1])
+    return np.concatenate(times) + offset_s, np.concatenate(rows)
+
+
+def clock(seconds):
+    return [
+        f"2026-03-02 {int(s // 3600):02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}" for s in seconds
+    ]
+
+
+def test_time_stamps_join_with_the_offset_of_the_clocks(tmp_path):
+    time, q = dense_log(offset_s=137.4)
+    reading = START_S + np.random.default_rng(5).uniform(2.0, 6.0, COUNT)
+    joints = table(["timestamp", *Q], time, q)
+    points = table(["Time", *XYZ], clock(reading), IT.point)
+    section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert_read(section, IT)
+    assert section["joints"]["by"] == "time"
+    told = " ".join(told["told"])
+    assert "known to" in told
+    assert "20 of 20 points at standstill" in told
+
+
+def test_a_point_taken_while_the_arm_moved_is_left_out_and_said(tmp_path):
+    time, q = dense_log(offset_s=-20.0)
+    reading = START_S + np.random.default_rng(5).uniform(2.0, 6.0, COUNT)
+    reading[6] = START_S[6] + 10.0
+    joints = table(["timestamp", *Q], time, q)
+    points = table(["Time", *XYZ], reading, IT.point)
+    section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert_read(section, IT, np.delete(np.arange(COUNT), 6))
+    assert "the arm was moving at line 8" in " ".join(told["told"])
+
+
+def test_a_row_of_joints_for_every_pose_joins_by_time_too(tmp_path):
+    late = START_S + 30.0 + np.random.default_rng(5).uniform(0.0, 1.0, COUNT)
+    joints = table(["Zeit [s]", *Q], START_S, IT.q)
+    points = table(["Zeit [s]", *XYZ], late[ORDER], IT.point[ORDER])
+    section, _ = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert section["joints"]["clock_offset_s"] == pytest.approx(-30.5, abs=0.5)
+    assert_read(section, IT, ORDER)
+
+
+def test_regular_times_leave_the_offset_open(tmp_path):
+    time = 30.0 * np.arange(COUNT)
+    joints = table(["time", *Q], time, IT.q)
+    points = table(["time", *XYZ], time + 3.0, IT.point)
+    files = written(tmp_path, joints_csv=joints, tracker_csv=points)
+    assert "--clock-offset" in refused(files)
+    section, _ = described(files, "--clock-offset", "-3")
+    assert_read(section, IT)
+
+
+@pytest.mark.parametrize("cell", ["2,02103E+13", "12:31"])
+def test_times_that_a_spreadsheet_destroyed_are_no_key(cell, tmp_path):
+    joints = table(["time", *Q], START_S, IT.q, mark=";")
+    points = table(["time", *XYZ], [cell] * COUNT, IT.point, mark=";")
+    said = refused(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert cell in said
+    assert "export the times again" in said
+
+
+def test_two_files_of_joints_are_refused(tmp_path):
+    joints = table([*Q, *XYZ], IT.q, IT.point)
+    files = written(tmp_path, a_csv=joints, b_csv=joints)
+    assert "both hold joints" in refused(files)
+    assert "3 files" in refused([*files, files[0]])
+
+
+def test_joints_that_are_gone_are_named_before_a_run(tmp_path):
+    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
+    points = table(["Name", *XYZ], named("P{}", range(COUNT)), IT.point)
+    files = written(tmp_path, joints_csv=joints, tracker_csv=points)
+    described(files)
+    files[0].unlink()
+    with pytest.raises(InputError, match=r"joints\.csv.*does not exist"):
+        load((tmp_path / "cell" / "m.yaml",))
+
+
+def test_the_data_set_of_two_files_passes_the_check(tmp_path):
+    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
+    points = table(["Name", *XYZ], named("P{}", ORDER), IT.point[ORDER])
+    described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    done = call("check-data", tmp_path / "cell" / "m.yaml", "--json")
+    assert "does_not_fit" not in done.output
+    assert '"kind": "few_poses"' in done.output
+
+
+def test_targets_in_rows_of_their_own_share_the_joints_of_their_pose(tmp_path):
+    others = [[0, 0, 0], [80, 0, 0], [0, 90, 0], [0, 0, 70]]
+    rows = np.repeat(np.arange(COUNT), 4)
+    point = np.stack([IT.point + IT.turn.apply(other) for other in others], axis=1).reshape(-1, 3)
+    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
+    names = ["Name", "Target", *XYZ]
+    points = table(names, named("P{}", rows), ["A", "B", "C", "D"] * COUNT, point)
+    section, _ = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert_read(section, IT, target="A")
+    assert len(read(section, robot.load("ur10")).columns["row"]) == 4 * COUNT
+
+
+def test_points_counted_by_a_tracker_that_has_fewer_are_asked_about(tmp_path):
+    joints = table(["Pose", *Q], np.arange(1, COUNT + 1), IT.q)
+    points = table(["Point", *XYZ], np.arange(1, COUNT), IT.point[1:])
+    said = refused(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    assert "--join" in said
+    assert "Pose=Point" in said

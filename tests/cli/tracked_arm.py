@@ -1,0 +1,104 @@
+"""What an arm that is a little off did, as its controller and a laser tracker have it."""
+
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
+
+from kinacc.cli.group import main
+from kinacc.kinematics import robot
+from kinacc.measurements.reader import read
+from kinacc.workflow.contradictions import load
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """Joints (n, 6) in deg as read back, points (n, 3) in mm and rotations of a target."""
+
+    name: str
+    q: np.ndarray
+    point: np.ndarray
+    turn: Rotation
+    controller: np.ndarray
+
+
+def tracked(name="ur10", poses=16, seed=4, digits=4):
+    """A run of ``poses`` on the shipped robot ``name``, whose links are off by up to 0.5 mm."""
+    arm, rng = robot.load(name), np.random.default_rng(seed)
+    low, high = np.maximum(arm.q_min_rad, -1.8), np.minimum(arm.q_max_rad, 1.8)
+    q = np.round(np.rad2deg(rng.uniform(0.9 * low, 0.9 * high, (poses, arm.dh.joints))), digits)
+    off = replace(arm.dh, a_mm=arm.dh.a_mm + rng.uniform(-0.5, 0.5, arm.dh.a_mm.shape))
+    nominal = robot.forward(arm, np.deg2rad(q))
+    pose = robot.forward(replace(arm, dh=off), np.deg2rad(q))
+    base = Rotation.from_euler("XYZ", [20, -30, 100], degrees=True)
+    tip = pose.position_mm + pose.rotation @ np.array([40.0, -25.0, 120.0])
+    point = base.apply(tip) + np.array([2000.0, -900.0, 300.0])
+    point = np.round(point + rng.normal(0, 0.03, point.shape), 4)
+    turn = base * Rotation.from_matrix(pose.rotation)
+    return Tracked(name, q, point, turn, nominal.position_mm)
+
+
+def call(*words, **more):
+    return CliRunner().invoke(main, [str(word) for word in words], **more)
+
+
+def table(names, *columns, mark=","):
+    """Text of a file: names, then rows of columns, numbers with up to nine digits."""
+    blocks = [np.asarray(each, dtype=object) for each in columns]
+    blocks = [each[:, None] if each.ndim == 1 else each for each in blocks]
+    rows = [
+        mark.join(v if isinstance(v, str) else f"{float(v):.9g}" for v in row)
+        for row in np.hstack(blocks)
+    ]
+    return "\n".join([mark.join(names), *rows]) + "\n"
+
+
+def written(folder, **texts):
+    """The files of these texts, named after their keywords: joints_csv is joints.csv."""
+    paths = []
+    for name, text in texts.items():
+        path = folder / ".".join(name.rsplit("_", 1))
+        path.write_text(text, encoding="utf-8")
+        paths.append(path)
+    return paths
+
+
+def described(paths, *options, robot="ur10"):
+    """What a run would read from the data set that init writes, and init's answer."""
+    cell = paths[0].parent / "cell"
+    words = ("--robot", robot, "--out", cell, "--name", "m", "--json", "--force", *options)
+    done = call("init", *paths, *words)
+    assert done.exit_code == 0, done.output
+    return load((cell / "m.yaml",))["m"]["measurements"]["file"], json.loads(done.stdout)
+
+
+def refused(paths, *options, robot="ur10"):
+    """What init says where it does not go on, with --yes and with nobody to ask."""
+    cell = paths[0].parent / "cell"
+    said = []
+    for more in (("--yes",), ("--json",), ()):
+        done = call("init", *paths, "--robot", robot, "--out", cell, *options, *more)
+        assert done.exit_code == 2, done.output
+        assert not cell.exists()
+        said.append(done.output)
+    return said[0]
+
+
+def assert_read(section, arm, rows=None, target="tool"):
+    """The run reads joints and points of these rows of the arm, in order; returns its columns."""
+    rows = np.arange(len(arm.q)) if rows is None else np.asarray(rows)
+    columns = read(section, robot.load(arm.name), strict=False).columns
+    columns = {name: values[columns["target"] == target] for name, values in columns.items()}
+    q = np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, arm.q.shape[1] + 1)], axis=1))
+    point = np.stack([columns[f"{axis}_mm"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(q, arm.q[rows], atol=1e-4)
+    np.testing.assert_allclose(point, arm.point[rows], atol=1e-3)
+    return columns
+
+
+def assert_turned(columns, arm):
+    """The orientations are those of the target."""
+    found = np.stack([columns[f"q{part}"] for part in "xyzw"], axis=1)
+    assert (Rotation.from_quat(found) * arm.turn.inv()).magnitude().max() < 1e-5
