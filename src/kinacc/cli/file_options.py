@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import click
 
-from kinacc.cli.choice import option, together
-from kinacc.measurements.written import ENCODINGS
+from kinacc.cli.choice import option, together, values_of
+
+_FILE = "measurements.file"
 
 file_options = together(
-    option("--encoding", type=click.Choice(ENCODINGS), help="Characters of a text file."),
+    option("--encoding", type=values_of(f"{_FILE}.encoding"), help="Characters of a text file."),
     option("--sheet", help="Sheet of an Excel workbook."),
-    option("--decimal", type=click.Choice([",", "."]), help="Decimal mark."),
+    option("--decimal", type=values_of(f"{_FILE}.decimal"), help="Decimal mark."),
     option(
         "--thousands",
         type=click.Choice([".", ",", " ", "'", "none"]),
@@ -29,17 +30,17 @@ file_options = together(
     ),
     option(
         "--direction-unit",
-        type=click.Choice(["deg", "gon", "rad"]),
+        type=values_of(f"{_FILE}.directions.unit"),
         help="Unit of an instrument's horizontal and vertical angles.",
     ),
     option(
         "--vertical",
-        type=click.Choice(["zenith", "horizon"]),
+        type=values_of(f"{_FILE}.directions.vertical"),
         help="What vertical angles are counted from.",
     ),
     option(
         "--horizontal",
-        type=click.Choice(["clockwise", "counterclockwise"]),
+        type=values_of(f"{_FILE}.directions.horizontal"),
         help="How horizontal angles are counted, seen from above.",
     ),
 )

@@ -19,7 +19,7 @@ _BETWEEN = {" ": _BLANK, "'": "['\u2019]", ",": ",", ".": r"\."}
 class Marks:
     """The two marks, and the choices that are left where the cells do not tell them."""
 
-    decimal: str = "."
+    decimal: str
     thousands: str | None = None
     choices: tuple[Choice, ...] = ()
 
@@ -32,7 +32,7 @@ def marks_of(
     texts = {name: text for name, text in texts.items() if text}
     decimal = given.get("decimal") or _decimal(texts)
     if decimal == "both":
-        return Marks(choices=(_both(texts),))
+        return Marks(".", choices=(_both(texts),))
     if not decimal:
         open_ = [name for name, text in texts.items() if _search("open", ",", text)]
         points = [name for name, text in texts.items() if _search("open", ".", text)]
@@ -40,7 +40,7 @@ def marks_of(
         if not open_ and not mixed:
             return _with_thousands(texts, ".", given, blanks_part)
         name = (open_ or mixed)[0]
-        return Marks(choices=(_either(name, texts[name], "," if open_ else "."),))
+        return Marks(".", choices=(_either(name, texts[name], "," if open_ else "."),))
     return _with_thousands(texts, decimal, given, blanks_part)
 
 
