@@ -42,8 +42,8 @@ OTHERS = {
 }
 
 
-# Settings of a stage leave keys out that are at their defaults and came after tables of results: the
-# reader says what a key that is not there stands for, which has to be what the schema says.
+# Settings of a stage leave keys out that are at their defaults and came after tables of results:
+# the reader says what a key that is not there stands for, which has to be what the schema says.
 LEFT_OUT = ("measurements/written.py", "measurements/layout.py", "measurements/joining.py")
 
 
