@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from command_line import call, small_study
 
+from kinacc.campaign import slips
+from kinacc.campaign.instrument import instruments
+
 
 @pytest.fixture(scope="module")
 def calibration(tmp_path_factory):
@@ -122,3 +125,27 @@ def test_tables_of_a_campaign_open_in_a_spreadsheet(visited, tmp_path):
     assert text.splitlines()[0].split(",") == list(names)
     for name in ("campaign_points.xlsx", "campaign_readings.xlsx", "campaign_bounds.csv"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(tmp_path):
+    rng = np.random.default_rng(3)
+    pose = np.repeat(np.arange(30), 4)
+    q = np.repeat(rng.uniform(-1, 1, (30, 6)), 4, axis=0)
+    at = np.repeat(rng.uniform(-900, 900, (30, 3)), 4, axis=0) + rng.normal(size=(120, 3)) * 0.06
+    columns = {f"q{i + 1}": q[:, i] for i in range(6)}
+    columns |= {f"{axis}_mm": at[:, i] for i, axis in enumerate("xyz")}
+    columns |= {"pose": pose, "target": np.array(["tool"] * 120, dtype=object)}
+    found, freedom = slips.scatter(columns)
+    assert freedom == 90
+    assert found == pytest.approx(0.06, rel=0.15)
+    (problem,) = slips.of_little_noise(instruments(["tracker=0.03"], "base"), columns)
+    assert "scatter by 0.0" in problem.what
+    assert not slips.of_little_noise(instruments(["tracker=0.06"], "base"), columns)
+    once = {name: values[::4] for name, values in columns.items()}
+    assert not slips.of_little_noise(instruments(["tracker=0.03"], "base"), once)
+
+
+def test_a_campaign_is_no_results_folder_and_the_command_for_it_is_named(visited):
+    done = call("fitted", visited[0])
+    assert done.exit_code == 2
+    assert "kinacc campaign status" in done.output

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, SELECTABLE
+from kinacc.artifacts.allowed import FINDING_LEVELS, SELECTABLE, SUBSETS
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.calibration import blind_words
@@ -101,6 +101,7 @@ def _data(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
         "readings": len(measurements["pose"]),
         "poses": len(np.unique(measurements["pose"])),
         "targets": len(np.unique(np.asarray(measurements["target"]).astype(str))),
+        "fitted": int(np.sum(np.asarray(measurements["subset"]) == SUBSETS[0])),
     }
     yield Fact("robot", robot.name, "name", text=robot.name)
     yield Fact("data", "measurements", "source", text=source)
@@ -173,6 +174,20 @@ def _selection(tables: Mapping) -> Iterator[Fact]:
         order = tables.get(f"{name}_model", {}).get("order")
         if order is not None:
             yield Fact("selection", name, "order", float(np.max(order)), "1")
+            yield from _orders(name, tables.get(f"{name}_orders"))
+
+
+def _orders(name: str, table: Mapping | None) -> Iterator[Fact]:
+    """The orders that held-out errors were found with, and the highest of several tried."""
+    if table is None:
+        return
+    order, chosen = (np.asarray(table[each], dtype=float) for each in ("order", "chosen"))
+    folds = np.isfinite(np.asarray(table["fold"], dtype=float)) & (chosen == 1)
+    if folds.any():
+        yield Fact("selection", name, "low_order_held_out", float(order[folds].min()), "1")
+        yield Fact("selection", name, "high_order_held_out", float(order[folds].max()), "1")
+    if len(np.unique(order)) > 1:
+        yield Fact("selection", name, "highest_order_tried", float(order.max()), "1")
 
 
 def _excluded(table: Mapping | None, model: str) -> Iterator[Fact]:

@@ -61,7 +61,14 @@ def _data(facts: Sequence[Fact]) -> list[str]:
     robot = next(iter(of(facts, "robot")))
     targets = counted(number["targets"], "target")
     poses = counted(number["poses"], "pose")
-    return [f"{counted(number['readings'], 'reading')} of {targets} at {poses}: {robot}, {of_what}"]
+    lines = [
+        f"{counted(number['readings'], 'reading')} of {targets} at {poses}: {robot}, {of_what}"
+    ]
+    if number["fitted"] < number["readings"]:
+        rest = number["readings"] - number["fitted"]
+        told = f"the models that are used are fitted to {number['fitted']:.0f} of them"
+        lines.append(f"{told}; {rest:.0f} stay held out (measurements.validation_fold)")
+    return lines
 
 
 def _checked(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
@@ -104,11 +111,21 @@ def _table(
             fitted = of(facts, "robot")["base and tool"]["fitted"].value
             called = "nominal, with base and tool fitted" if fitted else "nominal"
         elif "order" in chosen[model]:
-            called += f", order {chosen[model]['order'].value:.0f}"
+            called += _order(chosen[model])
         mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
         shown = "".join(f"{figures[each].value:10.3f}" for each in _FIGURES)
         lines.append(f"{'':4}{called:53}{shown}{mark}".rstrip())
     return lines
+
+
+def _order(known: Mapping[str, Fact]) -> str:
+    """The order of a model, with those its held-out errors were found with where they differ."""
+    order = {name: each.value for name, each in known.items() if "order" in name}
+    told = f", order {order['order']:.0f}"
+    if "highest_order_tried" in order and order["order"] == order["highest_order_tried"]:
+        told += ", the highest tried"
+    low, high = (order.get(f"{which}_order_held_out", order["order"]) for which in ("low", "high"))
+    return told + (f" (held out: {low:.0f} to {high:.0f})" if low < high else "")
 
 
 def _selected(facts: Sequence[Fact]) -> list[str]:
@@ -196,7 +213,7 @@ def _range(joints: Mapping[str, Mapping[str, Fact]]) -> list[str]:
         for name, known in joints.items()
     ]
     lines = [told[i : i + _JOINTS_PER_LINE] for i in range(0, len(told), _JOINTS_PER_LINE)]
-    head = "the models were tried only where the poses are (share of each joint's range):"
+    head = "near the measured poses; range of each joint by itself (share of its travel):"
     return [head, *("".join(line).rstrip().replace(" ", _KEPT) for line in lines)]
 
 

@@ -7,14 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.campaign import words
 from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
 from kinacc.errors import Problem
+from kinacc.measurements import folds
 
 _NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads to nothing
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
+_LITTLE_NOISE = 0.8  # of the scatter that was measured
 _USUAL_READINGS = 10  # that say what size is usual
 _UNUSUAL = 6.0  # times the median size
 _FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
@@ -40,6 +43,43 @@ def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> li
         fix = f"are micrometres meant? Then it is {1e-3 * std:g} mm. --sure takes it as it is"
         problems.append(Problem(f"noise of {each.name}", what, "millimetres", fix))
     return problems
+
+
+def of_little_noise(instruments: Sequence[Instrument], measured: Columns) -> list[Problem]:
+    """Noise smaller than the scatter of ``measured`` readings at joints that were visited again."""
+    scatter_mm, freedom = scatter(measured)
+    problems = []
+    for each in instruments:
+        std_mm = math.sqrt(float(np.trace(each.covariance_mm2)) / 3.0)
+        if freedom < _USUAL_READINGS or std_mm >= _LITTLE_NOISE * scatter_mm:
+            continue
+        what = (
+            f"{noise(each)}: readings of the calibration at equal joints scatter by "
+            f"{scatter_mm:.3g} mm ({freedom} degrees of freedom)"
+        )
+        fix = (
+            f"the noise has to hold how the arm repeats a pose: give {scatter_mm:.2g}, or more; "
+            "--sure takes it as it is"
+        )
+        problems.append(Problem(f"noise of {each.name}", what, fix=fix))
+    return problems
+
+
+def scatter(measured: Columns) -> tuple[float, int]:
+    """Std of one axis (mm) about the mean of readings of one target at one configuration.
+
+    And the degrees of freedom of an axis; of ``measurements`` of a results folder.
+    """
+    same = folds.configurations_of(measured)
+    _, target = np.unique(np.asarray(measured["target"]).astype(str), return_inverse=True)
+    _, group = np.unique(np.stack([same, target.ravel()]), axis=1, return_inverse=True)
+    group = group.ravel()
+    count = np.bincount(group)
+    freedom = int(np.sum(count - 1))
+    at_mm = np.stack([np.asarray(measured[f"{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
+    means = np.stack([np.bincount(group, axis) / count for axis in at_mm.T], axis=1)
+    squares = np.sum((at_mm - means[group]) ** 2)
+    return (math.sqrt(squares / (3 * freedom)) if freedom else math.nan), freedom
 
 
 def of_budget(begun: Plan) -> list[Problem]:

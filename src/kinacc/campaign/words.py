@@ -22,7 +22,7 @@ REASONS = {
     "least {crowd} candidates have an error above the largest divided by {isolation:g}",
     # of statements withheld
     "nothing_measured": "nothing measured yet",
-    "first_visit": "{left} points of the first visit are left",
+    "first_visit": "{left} more points of the first visit have to be read before anything is said",
     "first_visit_by_travel": "{left} points of the first visit, made in order of travel, are left",
     "suspects": "the suspects are not all measured again yet",
     "unmeasured": "{left} of {points} candidates are not measured",

@@ -23,6 +23,7 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 
 def start(given: Mapping, out: Output) -> None:
     """Begin a campaign and say what was begun."""
+    from kinacc.artifacts import store
     from kinacc.campaign import begin, prediction_check, slips
     from kinacc.cli import campaign_candidates, campaign_options, rows
 
@@ -72,6 +73,8 @@ def start(given: Mapping, out: Output) -> None:
     if not given["sure"]:
         left_mm = calibration.residual.position_mm if calibration.residual else math.nan
         problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
+        if (readings := Path(given["calibration"]) / "measurements.parquet").is_file():
+            problems += slips.of_little_noise(instruments, store.read(readings))
         refuse(problems, "The campaign was not begun")
     unsure = prediction_check.unsure(
         calibration, points, instruments, given["point"], limits.implausible_mm

@@ -421,7 +421,6 @@ def _tell(
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
     lines.append(f"orientation: {kind}{unit}{_turned(guess)}")
-    lines += [f"file: {words}" for words in guess.told]
     for words in guess.assumed.values():
         lines.append(f"{_how(report)}: {words}")
     for names, why in guess.unused():

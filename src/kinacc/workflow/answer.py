@@ -13,8 +13,9 @@ from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, model_name, paragraph
 from kinacc.campaign import of_calibration
+from kinacc.campaign.journal import PLAN
 from kinacc.campaign.of_calibration import Sought
-from kinacc.errors import Problem, refuse
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics import robot
 from kinacc.study.summary import claims_counted, claims_that_differ, differences
 from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES
@@ -22,7 +23,8 @@ from kinacc.workflow.plan import Plan
 
 IF_THERE = (
     *(f"{kind}_model" for kind in ERROR_MODELS),
-    *("data_check", "excluded_rows", "accuracy_map", "assessment_points", "claims"),
+    *("data_check", "excluded_rows", "vec_orders", "accuracy_map"),
+    *("assessment_points", "claims"),
 )
 Tables = Mapping[str, Columns]
 
@@ -30,6 +32,10 @@ Tables = Mapping[str, Columns]
 def read(folder: Path | str, needed: Collection[str] = summary.TABLES) -> dict[str, Columns]:
     """The tables an answer is made from. Raises InputError naming all ``needed`` ones missing."""
     folder = Path(folder)
+    if (folder / PLAN).is_file():
+        status = shlex.join(["kinacc", "campaign", "status", str(folder)])
+        fix = f"ask {status}, or name its results folder"
+        raise InputError(Problem(str(folder), "is a campaign, and no results folder", fix=fix))
     refuse(
         [
             Problem(str(folder / f"{name}.parquet"), "no such file", fix="run the workflow first")

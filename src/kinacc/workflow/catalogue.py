@@ -220,7 +220,7 @@ STAGES: dict[str, Stage] = {
                 "model_selection",
             ),
             ("summary",),
-            optional=("data_check", "excluded_rows", *_FURTHER),
+            optional=("data_check", "excluded_rows", "vec_orders", *_FURTHER),
         ),
         Stage(
             "accuracy_map",

@@ -44,8 +44,14 @@ incertidumbre incertezza incerteza u95 std
 _UNCERTAINTIES = frozenset(_UNCERTAINTY_TEXT.split())
 _RADIUS = "a radius: positions are read as those of the reflectors' centres"
 _SINGLE = {
-    "pose": {"pose", "config", "configuration", "point", "pt", "no", "nr", "index"},
-    "repeat": {"repeat", "repetition", "rep", "reading"},
+    "pose": {
+        *("pose", "config", "configuration", "point", "pt", "no", "nr", "index"),
+        *("messung", "messpunkt", "punkt", "konfiguration", "stellung", "mesure", "punto", "pos"),
+    },
+    "repeat": {
+        *("repeat", "repetition", "rep", "reading", "wiederholung", "wdh", "répétition"),
+        *("repetición", "repeticion", "ripetizione"),
+    },
     "session": {"session", "setup", "station", "series", "campaign"},
     "target": {"target", "marker", "reflector", "smr"},
     "temperature": {"temp", "temperature"},
