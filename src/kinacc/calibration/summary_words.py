@@ -66,8 +66,8 @@ def _data(facts: Sequence[Fact]) -> list[str]:
     ]
     if number["fitted"] < number["readings"]:
         rest = number["readings"] - number["fitted"]
-        told = f"the models that are used are fitted to {number['fitted']:.0f} of them"
-        lines.append(f"{told}; {rest:.0f} stay held out (measurements.validation_fold)")
+        told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} kept out"
+        lines.append(f"{told} (measurements.validation_fold)")
     return lines
 
 
