@@ -177,7 +177,7 @@ def test_regular_times_leave_the_offset_open(tmp_path):
     assert_read(section, IT)
 
 
-@pytest.mark.parametrize("cell", ["2,02103E+13", "12:31"])
+@pytest.mark.parametrize("cell", ["2,02103E+13", "12:31", "07:41.5"])
 def test_times_that_a_spreadsheet_destroyed_are_no_key(cell, tmp_path):
     joints = table(["time", *Q], START_S, IT.q, mark=";")
     points = table(["time", *XYZ], [cell] * COUNT, IT.point, mark=";")

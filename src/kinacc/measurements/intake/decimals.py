@@ -64,13 +64,15 @@ def _with_thousands(texts, decimal: str, given: Mapping[str, str], blanks_part: 
 
 
 def _text(cells: Sequence) -> str:
-    """Cells that are text, a line each; a column of names is left out."""
-    text = "\n".join([each.strip() for each in cells if isinstance(each, str)])
+    """Cells that are text, a line each; a column of names and rounded time stamps are left out."""
+    told = [each.strip() for each in cells if isinstance(each, str)]
+    text = "\n".join([each for each in told if not _HUGE.fullmatch(each)])
     head = [each.strip() for each in text[:2000].split("\n")[:-1] or text.split("\n")]
     numeric = sum(bool(_SHAPED.fullmatch(each)) for each in head)
     return text if 2 * numeric >= sum(map(bool, head)) and numeric else ""
 
 
+_HUGE = re.compile(r"\d(?:[.,]\d+)?E\+?[1-9]\d", re.IGNORECASE)  # 2,02103E+13: no length or angle
 _SHAPED = re.compile(
     rf"[+\-−]?(?:\d+(?:(?:{_BLANK}|[.,'\u2019])\d+)*[.,]?|[.,]\d+)(?:[eE][+\-−]?\d+)?"
 )
