@@ -70,7 +70,7 @@ def _dated(cells: list, where: str, problems: list[Problem]) -> np.ndarray:
         for each in cells
     ]
     parts = zip(cells, found, strict=True)
-    wrong = [c for c, f in parts if c and (f is None or isinstance(f, re.Match) and not f["s"])]
+    wrong = [c for c, f in parts if c and (not f or (isinstance(f, re.Match) and not f["s"]))]
     if wrong:
         problems.append(Problem(where, f"no time: {wrong[0]}", "hh:mm:ss, with a date or without"))
         return nothing

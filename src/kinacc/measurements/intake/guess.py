@@ -18,12 +18,13 @@ from kinacc.measurements.intake import (
     motor_pulses,
     no_reading,
     pairs,
+    targets_in_rows,
     text,
 )
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import NO_SIGMA, NamedColumns
 from kinacc.measurements.intake.groups import is_pulse
-from kinacc.measurements.layout import TOOL, Layout, find
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find
 from kinacc.measurements.table import RawTable, numbers
 
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
@@ -143,6 +144,13 @@ def look(
     points = [each[axis] for each in found.targets.values() for axis in "xyz"]
     length_unit = sizes.of(points, "length_unit", ("mm", "m"), _LARGEST_M)
     angle_unit = sizes.of(turn, "angle_unit", ("deg", "rad"), _FULL_TURN_RAD)
+    found, apart = targets_in_rows.told_apart(
+        table,
+        found,
+        values,
+        ANGLE[joint_unit] / np.array(pulses.per_deg or 1.0),
+        LENGTH[length_unit],
+    )
     kind, convention = found.turn
     if kind == "euler":
         sizes.assumed["orientation"] = (
@@ -170,7 +178,7 @@ def look(
         section["pulses_per_deg"] = list(pulses.per_deg)
     if pair:
         section["joints"] = pair.joints
-    told = (*looked.told, *table.notes, *(pair.told if pair else ()), *pulses.told)
+    told = (*looked.told, *table.notes, *(pair.told if pair else ()), *pulses.told, *apart)
     again, words = counted_readings.found(table, found, values)
     if again:
         section["repeats_in_names"] = True
