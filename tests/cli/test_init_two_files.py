@@ -55,6 +55,7 @@ def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
     said = "\n".join(told["told"])
     assert "lines 2, 3, 4" in said
     assert f"lines {COUNT - 3}, {COUNT - 2}" in said
+    assert "Name P1, P2, P3" in said
     notes = "\n".join(read(section, robot.load("ur10")).notes)
     assert "lines 2, 3, 4" in notes
 

@@ -121,10 +121,8 @@ def look(
         return cells[name.column]
 
     void: list[float] = []
-    sigma = answers.get("sigma", "none")
-    found = (
-        columns.recognise(names, values, take, turned, sigma != "none") if not pair else pair.found
-    )
+    given = answers.get("sigma", "")
+    found = pair.found if pair else columns.recognise(names, values, take, turned, given)
     pulses = motor_pulses.pulses(found, values, answers, table.path)
     found = pulses.found
     _refuse(str(path), table, found, take)
@@ -168,7 +166,7 @@ def look(
         "path": str(path),
         **looked.written.section(),
         "no_reading": none,
-        "sigma": 1 if sigma == "none" else int(sigma),
+        "sigma": _sigma(str(path), found, given),
         **units,
         "orientation": turned_as,
         "targets": list(found.targets),
@@ -184,6 +182,20 @@ def look(
         section["repeats_in_names"] = True
     told = tuple(dict.fromkeys((*told, *words)))
     return Guess(section, table, found, sizes.assumed, sizes.stated, told)
+
+
+def _sigma(path: str, found: NamedColumns, given: str) -> int:
+    """How many standard deviations the uncertainties that are read are, by name or by answer."""
+    spreads = [n for t in found.targets.values() for q, n in t.items() if q.startswith("std_")]
+    said = {name.coverage for name in spreads}
+    if len(said) > 1 or (given not in ("", "none") and not said <= {0, int(given)}):
+        names = ", ".join(name.column for name in spreads)
+        what = f"not all of {names} are so many standard deviations"
+        where = f"--sigma {given}" if given else path
+        fix = "give --sigma none, which reads none of them"
+        raise InputError(Problem(where, what, "one number for all of them", fix))
+    named = max(said, default=0)
+    return named or (1 if given in ("", "none") else int(given))
 
 
 def sigma_choice(guess: Guess) -> Choice | None:
