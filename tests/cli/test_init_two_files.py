@@ -55,6 +55,7 @@ def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
     said = "\n".join(told["told"])
     assert "lines 2, 3, 4" in said
     assert f"lines {COUNT - 3}, {COUNT - 2}" in said
+    assert "Name P1, P2, P3" in said
     notes = "\n".join(read(section, robot.load("ur10")).notes)
     assert "lines 2, 3, 4" in notes
 
@@ -177,7 +178,7 @@ def test_regular_times_leave_the_offset_open(tmp_path):
     assert_read(section, IT)
 
 
-@pytest.mark.parametrize("cell", ["2,02103E+13", "12:31"])
+@pytest.mark.parametrize("cell", ["2,02103E+13", "12:31", "07:41.5"])
 def test_times_that_a_spreadsheet_destroyed_are_no_key(cell, tmp_path):
     joints = table(["time", *Q], START_S, IT.q, mark=";")
     points = table(["time", *XYZ], [cell] * COUNT, IT.point, mark=";")

@@ -6,6 +6,7 @@ import datetime
 
 import numpy as np
 import pytest
+from command_line import call
 from written_tables import (
     ARM,
     JOINTS,
@@ -168,6 +169,37 @@ def test_how_many_sigma_is_asked_where_someone_is_there(tmp_path):
     assert "Ux, Uy, Uz do not tell how many standard deviations" in done.output
     section = configuration((tmp_path / "cell.yaml",))["cell"]["measurements"]["file"]
     assert section["sigma"] == 2
+
+
+def test_how_many_sigma_stops_where_nobody_is_there(tmp_path):
+    rows = [[*row, "0.02", "0.04", "0.06"] for row in cells()]
+    words = ["--robot", "ur10", "--out", tmp_path, "--name", "cell", "--yes"]
+    done = call("init", file(tmp_path, lines(rows, UNCERTAIN)), *words)
+    assert done.exit_code == 2
+    assert "Ux, Uy, Uz do not tell how many standard deviations" in done.output
+    assert not (tmp_path / "cell.yaml").exists()
+
+
+@pytest.mark.parametrize("name", ["U{} (k=2) [mm]", "Unc. {} [mm] (k = 2)"])
+def test_uncertainties_whose_names_say_k_are_so_many_standard_deviations(name, tmp_path):
+    names = [*JOINTS, *XYZ, *(name.format(axis) for axis in "xyz")]
+    path = file(tmp_path, lines([[*row, "0.02", "0.04", "0.06"] for row in cells()], names))
+    found = reading(path)
+    assert_is_truth(found)
+    np.testing.assert_allclose(found.columns["std_y_mm"], 0.02)
+    assert np.isnan(reading(path, sigma="none").columns["std_y_mm"]).all()
+    with pytest.raises(InputError, match=r"--sigma 1: not all of"):
+        looked(path, sigma="1")
+
+
+def test_uncertainties_of_the_points_of_two_files_are_read_as_answered(tmp_path):
+    names = [f"P{row}" for row in range(len(cells()))]
+    rows = [[name, *row] for name, row in zip(names, cells(), strict=True)]
+    joints = file(tmp_path, lines([row[:7] for row in rows], ["Name", *JOINTS]), "joints.csv")
+    spread = [[row[0], *row[7:], "0.02", "0.04", "0.06"] for row in rows]
+    points = file(tmp_path, lines(spread, ["Name", *"XYZ", "Ux", "Uy", "Uz"]), "points.csv")
+    found = reading([joints, points], sigma="2")
+    np.testing.assert_allclose(found.columns["std_z_mm"], 0.03)
 
 
 def report(names, more=(), axes=("X", "Y", "Z"), once=False):

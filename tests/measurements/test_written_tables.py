@@ -23,6 +23,7 @@ from written_tables import (
 
 from kinacc.errors import InputError
 from kinacc.measurements.intake.choices import Undecided
+from kinacc.measurements.intake.text import look
 from kinacc.measurements.reader import read
 
 GERMAN = [*(f"Achse {i} [°]" for i in range(1, 7)), *(f"{axis} gemessen [mm]" for axis in "XYZ")]
@@ -178,6 +179,22 @@ def test_a_mark_that_may_be_one_of_thousands_is_asked_about(case, tmp_path):
     }
     ratio = values[","] / values["."]
     assert np.isclose(np.abs(np.log10(np.median(ratio))), 3.0, atol=0.01) or (ratio != 1).any()
+
+
+@pytest.mark.parametrize("decimal", [",", "."])
+def test_angles_tell_decimals_as_no_joint_turns_by_thousands_of_degrees(decimal, tmp_path):
+    q = np.sign(Q_DEG) * (np.abs(Q_DEG) % 100 + 10).round(3)
+    rows = cells(decimal=decimal, q=q, point=np.abs(POINT_MM) % 800 + 100)
+    found = reading(file(tmp_path, lines(rows, mark=";")))
+    np.testing.assert_allclose(np.rad2deg(found.columns["q2"]), q[:, 1], atol=1e-9)
+
+
+def test_commas_and_a_blank_between_cells_are_commas(tmp_path):
+    rows = [["Cell 3", "Calibration", f"P{number}", *row[6:]] for number, row in enumerate(cells())]
+    text = "// Units: Millimeters\n" + lines(rows, names=(), mark=", ")
+    found = look(file(tmp_path, text))
+    assert found.written.delimiter == ","
+    assert list(found.table.columns) == ["Collection", "Group", "Point", "X_mm", "Y_mm", "Z_mm"]
 
 
 def test_the_answer_of_a_person_counts_as_the_option_does(tmp_path):

@@ -40,10 +40,13 @@ def looked(paths: Sequence[str], options: dict, ask: bool) -> Guess:
             continue
         questions = guess.found.questions
         if not questions:
-            choice = guesses.sigma_choice(guess) if ask and "sigma" not in answers else None
+            choice = guesses.sigma_choice(guess) if "sigma" not in answers else None
             if choice is None:
                 return guess
-            answers[choice.key] = _answered(choice, Undecided(path, [choice]))
+            error = Undecided(path, [choice])
+            if not ask:
+                raise error
+            answers[choice.key] = _answered(choice, error)
             continue
         if not ask:
             raise InputError(

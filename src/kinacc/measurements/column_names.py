@@ -150,6 +150,7 @@ _HUMP = re.compile(
 )
 _SIGNS = str.maketrans({"º": "°", "˚": "°", "∆": "Δ", "µ": "μ", "ß": "ss"})
 _AXIS = re.compile(r"(?:r|q)?[xyzw]|q|j")
+_COVERAGE = re.compile(r"(?<![^\W_])k\s*=\s*([123])(?!\d|[.,]\d)", re.IGNORECASE)  # (k=2)
 _T_MAC = re.compile(r"t-mac", re.IGNORECASE)
 _JOINED = re.compile(r"(.{1,4}?)(mm|deg|rad|grad|cm|um|μm)")
 _PLACE_TEXT = "pos position rot rotation quat ori trans tool euler"
@@ -167,13 +168,14 @@ class Name:
     """A column's name taken apart: ``words`` in small letters, ``unit`` or empty.
 
     ``unit`` is one of ``READ``, or as the file writes it where it is none of them. ``spelled`` are
-    the words as the file writes them.
+    the words as the file writes them. ``coverage``: the k of an uncertainty, 0 where none is said.
     """
 
     column: str
     words: tuple[str, ...]
     unit: str
     spelled: tuple[str, ...] = ()
+    coverage: int = 0
 
     def without(self, place: int) -> tuple[str, ...]:
         """The words but the one at ``place``."""
@@ -182,8 +184,10 @@ class Name:
 
 def name_of(column: str, unit: str = "") -> Name:
     """The name taken apart; ``unit`` is what a line of units says of it."""
-    stated = [unit_of(unit)] if unit_of(unit) else []
-    text = _T_MAC.sub("tmac", in_english(column).translate(_SIGNS))
+    covered = _COVERAGE.search(f"{column} {unit}")
+    unit = unit_of(_COVERAGE.sub("", unit))
+    stated = [unit] if unit else []
+    text = _T_MAC.sub("tmac", in_english(_COVERAGE.sub("", column)).translate(_SIGNS))
 
     def put_aside(bracket: re.Match[str]) -> str:
         if _says_more(bracket[1]):
@@ -213,6 +217,7 @@ def name_of(column: str, unit: str = "") -> Name:
         tuple(word for word, _ in kept),
         units[0] if len(units) == 1 else " or ".join(units),
         tuple(spelled for _, spelled in kept),
+        int(covered[1]) if covered else 0,
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.measurements.table import RawTable, numbers
 from kinacc.measurements.times import seconds
 
@@ -104,7 +104,9 @@ def pairs(points: RawTable, joints: RawTable, how: Join) -> tuple[np.ndarray, tu
     if how.by == NAME:
         row = by_name(points, joints, how)
         spare = np.setdiff1d(np.arange(len(joints)), row)
-        return row, (*_left(points, np.flatnonzero(row < 0), joints), *_left(joints, spare, points))
+        none = np.flatnonzero(row < 0)
+        alone = _left(points, none, joints, key=how.key_of_points)
+        return row, (*alone, *_left(joints, spare, points, key=how.key))
     row, moving = by_time(points, joints, how)
     none = np.flatnonzero((row < 0) & ~moving)
     notes = [*_left(points, none, joints, "no joints at the time of")]
@@ -114,10 +116,19 @@ def pairs(points: RawTable, joints: RawTable, how: Join) -> tuple[np.ndarray, tu
     return row, tuple(notes)
 
 
-def _left(table: RawTable, rows: np.ndarray, other: RawTable, what="nothing belongs to") -> list:
+def _left(
+    table: RawTable,
+    rows: np.ndarray,
+    other: RawTable,
+    what: str = "nothing belongs to",
+    key: str | None = None,
+) -> list[str]:
+    """Rows of a table that the other has no partner of, by their lines and names."""
     if not rows.size:
         return []
-    return [f"{table.path}: {what} {table.rows_in_words(rows)} ({other.path})"]
+    names = first_few([str(table.columns[key][row]).strip() for row in rows], 5) if key else ""
+    named = f", {key} {names}" if key else ""
+    return [f"{table.path}: {what} {table.rows_in_words(rows)}{named} ({other.path})"]
 
 
 def by_name(points: RawTable, joints: RawTable, how: Join) -> np.ndarray:

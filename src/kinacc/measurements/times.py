@@ -13,13 +13,14 @@ from kinacc.measurements.table import RawTable
 _CLOCK = re.compile(
     r"(?:(?P<date>\S+)[ T])?(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2}(?:[.,]\d+)?))?"
 )
+_NO_HOUR = re.compile(r"\d{1,2}:\d{2}[.,]\d+")  # 07:41.5, as spreadsheets show 10:07:41.5
 _ROUNDED = re.compile(r"\d(?:[.,]\d+)?E\+?\d+", re.IGNORECASE)
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y")
 _ZONE = re.compile(r"(?:Z|[+-]\d{2}:?\d{2})$")
 # Numbers that can be no seconds of this century are milli-, micro- or nanoseconds.
 _LATEST_S = 4.2e9
 _OWN_UNITS = (("ms", 1e-3), ("us", 1e-6), ("µs", 1e-6), ("μs", 1e-6), ("ns", 1e-9))
-_FIX = "export the times again, with seconds, as text or as a number of seconds"
+_FIX = "export the times again, with hours and seconds, as text or as a number of seconds"
 
 
 def seconds(table: RawTable, column: str, problems: list[Problem]) -> np.ndarray:
@@ -31,6 +32,9 @@ def seconds(table: RawTable, column: str, problems: list[Problem]) -> np.ndarray
     if any(_ROUNDED.fullmatch(each) for each in written):
         what = f"a spreadsheet has rounded these times: {written[0]}"
         problems.append(Problem(where, what, "times that tell the rows apart", _FIX))
+    elif any(_NO_HOUR.fullmatch(each) for each in written):
+        shown = next(each for each in written if _NO_HOUR.fullmatch(each))
+        problems.append(Problem(where, f"times without hours: {shown}", fix=_FIX))
     elif any((found := _CLOCK.fullmatch(each)) and not found["s"] for each in written):
         problems.append(Problem(where, f"times without seconds: {written[0]}", fix=_FIX))
     else:
@@ -61,8 +65,12 @@ def _numbers(cells: list, column: str, decimal: str) -> np.ndarray | None:
 def _dated(cells: list, where: str, problems: list[Problem]) -> np.ndarray:
     """Times of the day, of days where there are dates, in s."""
     nothing = np.full(len(cells), np.nan)
-    found = [each if isinstance(each, datetime) else _CLOCK.match(each) for each in cells]
-    wrong = [c for c, f in zip(cells, found, strict=True) if f is None and c]
+    found = [
+        each if isinstance(each, datetime) else _CLOCK.fullmatch(_ZONE.sub("", each).rstrip())
+        for each in cells
+    ]
+    parts = zip(cells, found, strict=True)
+    wrong = [c for c, f in parts if c and (not f or (isinstance(f, re.Match) and not f["s"]))]
     if wrong:
         problems.append(Problem(where, f"no time: {wrong[0]}", "hh:mm:ss, with a date or without"))
         return nothing

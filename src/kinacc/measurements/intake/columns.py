@@ -106,16 +106,16 @@ def recognise(
     values: Values | None = None,
     take: Sequence[str] = (),
     turned: bool = True,
-    uncertainties: bool = False,
+    sigma: str = "",
 ) -> NamedColumns:
     """What the columns of these names hold; no joints or no targets where none were found.
 
     ``values`` gives a column's numbers (n,), NaN where it has none. ``take``: columns whose groups
-    are read whatever their names say. ``turned``: orientations are wanted. ``uncertainties``: it is
-    known how many standard deviations one is.
+    are read whatever their names say. ``turned``: orientations are wanted. ``sigma``: how many
+    standard deviations an uncertainty is, as answered; "none" for none that is read.
     """
     no_load = [name for name in names if not _of_payload(name)]
-    choice = _Choice(groups.found(no_load, values), values, frozenset(take), uncertainties)
+    choice = _Choice(groups.found(no_load, values), values, frozenset(take), sigma)
     choice.off = any(groups.is_deviation(name) for name in names)
     joints = choice.joints()
     points = choice.points(joints)
@@ -155,10 +155,10 @@ class _Choice:
         found: Sequence[Group],
         values: Values | None,
         take: frozenset[str],
-        uncertainties: bool = False,
+        sigma: str = "",
     ) -> None:
         self.values = values
-        self.uncertainties = uncertainties
+        self.sigma = sigma
         self.take = take
         self.aside: list[tuple[Group, str]] = []
         self.questions: list[Question] = []
@@ -382,21 +382,26 @@ class _Choice:
     def spreads(self, points: Sequence[Group], turns: dict[str, Group]) -> dict[str, dict]:
         """Standard deviations by target, in the unit of what they are of."""
         found: dict[str, dict[str, Name]] = {}
-        for each in self._of(groups.SPREAD):
+        for each in sorted(self._of(groups.SPREAD), key=lambda each: each.weak):
             point = next((p for p in points if p.target == each.target), None)
             point = point or (points[0] if len(points) == 1 and each.target == TOOL else None)
             turned = "std_rx" in each.columns
             of = turns.get(point.target) if point and turned else point
             words = {word for name in each.columns.values() for word in name.words}
-            known = self.uncertainties and bool(words & _UNCERTAINTIES)
-            if each.weak and not known:
-                self._leave([each], NO_SIGMA if words & _UNCERTAINTIES else SPREAD)
+            covered = all(name.coverage for name in each.columns.values())
+            known = self.sigma != "none" and bool(
+                (self.sigma or covered) and words & _UNCERTAINTIES
+            )
+            if each.weak and not words & _UNCERTAINTIES:
+                self._leave([each], SPREAD)
             elif of is None or of.turn[0] == "quaternion" or _wanted(words):
                 self._leave([each], f"{SPREAD} of nothing that is read")
             elif each.units != of.units:
                 self._leave([each], f"{SPREAD} whose unit is not stated as that of its values")
             elif set(each.columns) & set(found.get(point.target, {})):
                 self._leave([each], f"{SPREAD}, there twice")
+            elif each.weak and not known:
+                self._leave([each], NO_SIGMA)
             else:
                 found[point.target] = found.get(point.target, {}) | each.columns
         return found

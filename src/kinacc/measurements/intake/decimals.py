@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
+from kinacc.measurements.column_names import name_of
 from kinacc.measurements.intake.choices import Choice
 
 _ENDS = (",", ".")
@@ -39,6 +40,8 @@ def marks_of(
         mixed = [n for n in points if _whole(texts[n])]
         if not open_ and not mixed:
             return _with_thousands(texts, ".", given, blanks_part)
+        if mark := _by_angles(texts):
+            return _with_thousands(texts, mark, given, blanks_part)
         name = (open_ or mixed)[0]
         return Marks(".", choices=(_either(name, texts[name], "," if open_ else "."),))
     return _with_thousands(texts, decimal, given, blanks_part)
@@ -64,13 +67,16 @@ def _with_thousands(texts, decimal: str, given: Mapping[str, str], blanks_part: 
 
 
 def _text(cells: Sequence) -> str:
-    """Cells that are text, a line each; a column of names is left out."""
-    text = "\n".join([each.strip() for each in cells if isinstance(each, str)])
+    """Cells that are text, a line each; a column of names and rounded time stamps are left out."""
+    told = [each.strip() for each in cells if isinstance(each, str)]
+    text = "\n".join([each for each in told if not _HUGE.fullmatch(each)])
     head = [each.strip() for each in text[:2000].split("\n")[:-1] or text.split("\n")]
     numeric = sum(bool(_SHAPED.fullmatch(each)) for each in head)
     return text if 2 * numeric >= sum(map(bool, head)) and numeric else ""
 
 
+_MOST_DEG = 7200  # no joint turns further
+_HUGE = re.compile(r"\d(?:[.,]\d+)?E\+?[1-9]\d", re.IGNORECASE)  # 2,02103E+13: no length or angle
 _SHAPED = re.compile(
     rf"[+\-−]?(?:\d+(?:(?:{_BLANK}|[.,'\u2019])\d+)*[.,]?|[.,]\d+)(?:[eE][+\-−]?\d+)?"
 )
@@ -123,6 +129,16 @@ def _decimal(texts: Mapping[str, str]) -> str:
     if not said and not any(mark in text for mark in _ENDS for text in texts.values()):
         return "."
     return "both" if len(said) > 1 else next(iter(said), "")
+
+
+def _by_angles(texts: Mapping[str, str]) -> str:
+    """The mark that stands before decimals because joints do not turn by thousands of degrees."""
+    for mark in _ENDS:
+        for name, text in texts.items():
+            cells = _pattern("open", mark).findall(text) if name_of(name).unit == "deg" else ()
+            if any(int(re.sub(r"\D", "", cell)) > _MOST_DEG for cell in cells):
+                return mark
+    return ""
 
 
 def _whole(text: str) -> bool:

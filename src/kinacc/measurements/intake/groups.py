@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -362,19 +363,23 @@ def rigid(groups: Sequence[Group], values: Values | None) -> bool:
     if values is None:
         return True
     points = [np.stack([values(g.columns[axis]) for axis in "xyz"], axis=1) for g in groups]
-    for i, a in enumerate(points):
-        for b in points[:i]:
-            apart = a - b
-            apart = apart[np.isfinite(apart).all(axis=1)]
-            if len(apart) < 3:
-                return False
-            length = np.linalg.norm(apart, axis=1)
-            usual = float(np.median(length))
-            off = float(np.median(np.abs(length - usual)))
-            turned = float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))
-            if off > 0.01 * usual or turned < 5.0 * off or turned < 1e-3 * usual:
-                return False
-    return True
+    return all(keeps_distance(a, b) for a, b in combinations(points, 2))
+
+
+def keeps_distance(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two points (n, 3), NaN where unread, keep their distance and turn about each other.
+
+    Fewer than three readings of both tell nothing.
+    """
+    apart = one - other
+    apart = apart[np.isfinite(apart).all(axis=1)]
+    if len(apart) < 3:
+        return False
+    length = np.linalg.norm(apart, axis=1)
+    usual = float(np.median(length))
+    off = float(np.median(np.abs(length - usual)))
+    turned = float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))
+    return off <= 0.01 * usual and turned >= 5.0 * off and turned >= 1e-3 * usual
 
 
 def unread(group: Group) -> str:

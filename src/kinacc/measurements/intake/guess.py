@@ -18,12 +18,13 @@ from kinacc.measurements.intake import (
     motor_pulses,
     no_reading,
     pairs,
+    targets_in_rows,
     text,
 )
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import NO_SIGMA, NamedColumns
 from kinacc.measurements.intake.groups import is_pulse
-from kinacc.measurements.layout import TOOL, Layout, find
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find
 from kinacc.measurements.table import RawTable, numbers
 
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
@@ -120,10 +121,8 @@ def look(
         return cells[name.column]
 
     void: list[float] = []
-    sigma = answers.get("sigma", "none")
-    found = (
-        columns.recognise(names, values, take, turned, sigma != "none") if not pair else pair.found
-    )
+    given = answers.get("sigma", "")
+    found = pair.found if pair else columns.recognise(names, values, take, turned, given)
     pulses = motor_pulses.pulses(found, values, answers, table.path)
     found = pulses.found
     _refuse(str(path), table, found, take)
@@ -143,6 +142,13 @@ def look(
     points = [each[axis] for each in found.targets.values() for axis in "xyz"]
     length_unit = sizes.of(points, "length_unit", ("mm", "m"), _LARGEST_M)
     angle_unit = sizes.of(turn, "angle_unit", ("deg", "rad"), _FULL_TURN_RAD)
+    found, apart = targets_in_rows.told_apart(
+        table,
+        found,
+        values,
+        ANGLE[joint_unit] / np.array(pulses.per_deg or 1.0),
+        LENGTH[length_unit],
+    )
     kind, convention = found.turn
     if kind == "euler":
         sizes.assumed["orientation"] = (
@@ -160,7 +166,7 @@ def look(
         "path": str(path),
         **looked.written.section(),
         "no_reading": none,
-        "sigma": 1 if sigma == "none" else int(sigma),
+        "sigma": _sigma(str(path), found, given),
         **units,
         "orientation": turned_as,
         "targets": list(found.targets),
@@ -170,12 +176,26 @@ def look(
         section["pulses_per_deg"] = list(pulses.per_deg)
     if pair:
         section["joints"] = pair.joints
-    told = (*looked.told, *table.notes, *(pair.told if pair else ()), *pulses.told)
+    told = (*looked.told, *table.notes, *(pair.told if pair else ()), *pulses.told, *apart)
     again, words = counted_readings.found(table, found, values)
     if again:
         section["repeats_in_names"] = True
     told = tuple(dict.fromkeys((*told, *words)))
     return Guess(section, table, found, sizes.assumed, sizes.stated, told)
+
+
+def _sigma(path: str, found: NamedColumns, given: str) -> int:
+    """How many standard deviations the uncertainties that are read are, by name or by answer."""
+    spreads = [n for t in found.targets.values() for q, n in t.items() if q.startswith("std_")]
+    said = {name.coverage for name in spreads}
+    if len(said) > 1 or (given not in ("", "none") and not said <= {0, int(given)}):
+        names = ", ".join(name.column for name in spreads)
+        what = f"not all of {names} are so many standard deviations"
+        where = f"--sigma {given}" if given else path
+        fix = "give --sigma none, which reads none of them"
+        raise InputError(Problem(where, what, "one number for all of them", fix))
+    named = max(said, default=0)
+    return named or (1 if given in ("", "none") else int(given))
 
 
 def sigma_choice(guess: Guess) -> Choice | None:

@@ -119,7 +119,12 @@ def _opened(
     def values(name: Name) -> np.ndarray:
         return numbers(table, name.column, [], gaps=True)
 
-    return _File(looked, table, names, columns.recognise(names, values, own, turned))
+    return _File(
+        looked,
+        table,
+        names,
+        columns.recognise(names, values, own, turned, answers.get("sigma", "")),
+    )
 
 
 def _sorted(files: Sequence[_File]) -> tuple[_File, _File]:

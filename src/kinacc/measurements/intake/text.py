@@ -116,6 +116,8 @@ def _text(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, list[R
         mark = "\t" if said[1] in ("\t", "\\t") else said[1]
         marks = (mark,) if mark in DELIMITERS else DELIMITERS
     split = {mark: _rows(lines, mark, path) for mark in marks}
+    if len(split) > 1 and _ends_in_marks(split[BLANKS]):
+        del split[BLANKS]
     best = _best(split)
     rows = split[best]
     head = heads.head_of(rows, best)
@@ -144,6 +146,13 @@ def _best(split: Mapping[str, Sequence[Row]]) -> str:
         return head is not None and head.line > 0, *scores[mark], -DELIMITERS.index(mark)
 
     return max(split, key=rank)
+
+
+def _ends_in_marks(rows: Sequence[Row]) -> bool:
+    """Whether most rows of words hold one that ends in a mark, which parts them: "P1, 2.5, 3"."""
+    filled = [cells for _, cells in rows if cells]
+    parted = [any(cell[-1] in ",;" for cell in cells[:-1]) for cells in filled]
+    return 2 * sum(parted) > len(filled)
 
 
 def _score(rows: Sequence[Row]) -> tuple[int, int]:

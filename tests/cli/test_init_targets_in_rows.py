@@ -1,0 +1,87 @@
+"""Files with a row for every target of a pose, where no column calls the targets so."""
+
+import numpy as np
+from tracked_arm import call, described, refused, table, tracked, written
+
+from kinacc.kinematics import robot
+from kinacc.measurements.reader import read
+
+IT = tracked(poses=20)
+COUNT = len(IT.q)
+NAMES = [f"P{row + 1}" for row in range(COUNT)]
+Q = [f"q{i}_deg" for i in range(1, 7)]
+XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
+LOWER = IT.point + IT.turn.apply([0.0, 0.0, -12.7])
+JOINTS = table(["Pose", *Q], NAMES, IT.q)
+
+
+def targets(section):
+    found = read(section, robot.load("ur10")).columns
+    return {name: np.sum(found["target"] == name) for name in dict.fromkeys(found["target"])}
+
+
+def grouped(*points, labels="ABC"):
+    """Names of groups and points, and the points (n * COUNT, 3) one group behind the other."""
+    groups = [f"SMR_{label}" for label in labels[: len(points)] for _ in range(COUNT)]
+    return table(["Group", "Point", *XYZ], groups, NAMES * len(points), np.vstack(points))
+
+
+def test_groups_of_points_are_the_targets_where_they_keep_their_distances(tmp_path):
+    points = grouped(IT.point, IT.point + IT.turn.apply([150.0, 20.0, 0.0]), LOWER)
+    section, told = described(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
+    assert section["columns"]["target"] == "Group"
+    assert targets(section) == {"SMR_A": COUNT, "SMR_B": COUNT, "SMR_C": COUNT}
+    assert "Group names the targets" in " ".join(told["told"])
+
+
+def test_groups_of_the_same_points_are_readings_of_one_target(tmp_path):
+    points = grouped(IT.point, IT.point + 0.01)
+    section, _ = described(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
+    assert targets(section) == {"tool": 2 * COUNT}
+
+
+def test_groups_from_two_places_of_the_tracker_are_no_targets(tmp_path):
+    x, y, z = IT.point.T
+    points = grouped(IT.point, np.stack([-y + 900.0, x, z], axis=1))
+    said = refused(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
+    assert "rows of equal joints lie more than 5 mm apart" in said
+    assert "a column session" in said
+
+
+def in_one_nest(radius, **more):
+    columns = [np.array(each) for each in more.values()]
+    point = np.where(np.array(radius)[:, None] > 10.0, IT.point, LOWER)
+    return table(
+        [*Q, "Reflector radius [mm]", *more, *XYZ],
+        IT.q,
+        [f"{r:g}" for r in radius],
+        *columns,
+        point,
+    )
+
+
+def test_a_reflector_of_another_radius_is_a_target_of_its_own(tmp_path):
+    text = in_one_nest([19.05] * 12 + [6.35] * (COUNT - 12))
+    section, told = described(written(tmp_path, cell_csv=text))
+    assert targets(section) == {"19.05": 12, "6.35": COUNT - 12}
+    assert "centres elsewhere" in " ".join(told["told"])
+
+
+def test_radii_that_were_measured_scatter_and_are_one_reflector(tmp_path):
+    radius = np.linspace(19.04, 19.06, COUNT)
+    section, _ = described(written(tmp_path, cell_csv=in_one_nest(radius)))
+    assert targets(section) == {"tool": COUNT}
+
+
+def test_a_radius_that_changes_within_a_target_is_refused(tmp_path):
+    text = in_one_nest([19.05] * 12 + [6.35] * (COUNT - 12), Target=["A"] * COUNT)
+    said = refused(written(tmp_path, cell_csv=text))
+    assert "column Reflector radius [mm]" in said
+    assert "their centres lie elsewhere" in said
+
+
+def test_targets_called_by_their_radius_pass_the_check(tmp_path):
+    described(written(tmp_path, cell_csv=in_one_nest([19.05] * 12 + [6.35] * (COUNT - 12))))
+    done = call("check-data", tmp_path / "cell" / "m.yaml", "--json")
+    assert "does_not_fit" not in done.output
+    assert "target_moved" not in done.output
