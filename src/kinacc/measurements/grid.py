@@ -36,7 +36,9 @@ desviación típica|máximo|mínimo|maximo|minimo|massimo|deviazione standard|de
 平均|平均値|標準偏差|最大|最小|最大値|最小値|合計|範囲
 3 sigma|2 sigma|6 sigma|mean value|max dev|rms error|mean error|max error
 """
-STATISTICS = frozenset(word for line in _STATISTICS_TEXT.split("\n") for word in line.split("|"))
+STATISTICS = frozenset(
+    word for line in _STATISTICS_TEXT.strip().split("\n") for word in line.split("|")
+)
 _LABELS = re.compile(r"[\s:=]+$")
 _UNIT_BEHIND = re.compile(
     r"([+\-−]?[\d.,].*[\d.,]|[+\-−]?\d)\s*(°|deg|rad|gon|mm|m|cm|in|inch|µm|um)"

@@ -28,6 +28,8 @@ _FANUC = re.compile(r"^\s*P\[\s*(\d+)[^\]]*\]\s*\{(.*?)\}\s*;", re.DOTALL | re.M
 _YASKAWA = re.compile(r"^\s*(B?C\d+|P\d+)\s*=\s*([-+\d.,\s]+)$", re.MULTILINE)
 _KUKA_PARTS = re.compile(rf"\b([A-Z]\d?)\s+({_NUMBER})", re.IGNORECASE)
 _FANUC_JOINT = re.compile(rf"\bJ(\d)\s*=\s*({_NUMBER})\s*(deg|mm)?", re.IGNORECASE)
+_LIST = re.compile(r"(?:p?\[.*\]|\{.*\})", re.DOTALL)
+_LISTED = re.compile(rf"(?<![\w.]){_NUMBER}(?![\w.])")
 _UNUSED = 9e8  # ABB writes 9E9 for an axis that is not there
 _FEWEST = 4
 _TARGETS = "cartesian positions, which say where the arm was sent: they are no joints, and not read"
@@ -141,6 +143,12 @@ def expanded(table: RawTable) -> RawTable:
     if columns.keys() == table.columns.keys():
         return table
     return replace(table, columns=columns, under=())
+
+
+def numbers_within(cell: object) -> int:
+    """How many numbers a cell such as {A1 10, A2 -90}, [[10,-90],[9E9]] or p[0.1,0.2] lists."""
+    text = cell.strip() if isinstance(cell, str) else ""
+    return len(_LISTED.findall(text)) if _LIST.fullmatch(text) else 0
 
 
 def _cells(cells: list) -> Iterator[tuple[str, list]]:
