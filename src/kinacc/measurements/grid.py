@@ -49,6 +49,7 @@ _LONGEST_NUMBER = 60  # with its unit
 _HAS_DIGIT = re.compile(r"\d")
 _FIRST_WORD = re.compile(r"[\s(\[:=/,]")
 _RULE = re.compile(r"[\s\-=_+|*.;,\t]*")
+_WITH_BRACKETS = re.compile(r"(?:\{[^{}]*\}|\[(?:[^\[\]]|\[[^\[\]]*\])*\]|\S)+")
 _TWO_BLANKS = re.compile(r"\s{2,}|\t")
 
 
@@ -81,7 +82,8 @@ class Words(list):
     """Cells of a line that are parted by blanks; ``line`` is what they were."""
 
     def __init__(self, line: str) -> None:
-        super().__init__(line.split())
+        within = "{" in line or "[" in line
+        super().__init__(_WITH_BRACKETS.findall(line) if within else line.split())
         self.line = line.strip()
 
 

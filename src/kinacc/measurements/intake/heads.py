@@ -115,6 +115,8 @@ def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ..
             continue
         first = cells[0].lstrip(" #%/!")
         names = header_cells([first, *cells[1:]] if first else cells[1:], width)
+        # The sign by itself is what a column of numbers is called.
+        names = cells if not first and len(names) < width == len(cells) else names
         names = [name.strip() for name in names]
         if len(names) == width and all(names) and not numbers_in(names):
             return tuple(names) if len(set(names)) == width else None
