@@ -355,13 +355,17 @@ def _set_right(guess: Guess, settings: dict) -> Guess:
         angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
         columns |= {f"e{number}": column for number, column in enumerate(angles, 1)}
         settings["columns"] = columns
-    told = {key: "found by trying it on the readings" for key in settings if key in guess.assumed}
+    found = {key: settings[key] for key in settings if key in guess.assumed}
     if "orientation" in settings:
         turn = settings["orientation"]
         key = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
-        told[key] = "found by trying it on the readings"
-    kept = {k: v for k, v in guess.assumed.items() if k not in told}
-    return replace(guess.but(settings), assumed=kept)
+        found[key] = " ".join(str(each) for each in turn.values())
+    kept = {k: v for k, v in guess.assumed.items() if k not in found}
+    told = [
+        f"{key.replace('_', ' ')} {value}: found by trying it on the readings"
+        for key, value in found.items()
+    ]
+    return replace(guess.but(settings), assumed=kept, told=(*guess.told, *told))
 
 
 def _how(report: Report | None) -> str:
