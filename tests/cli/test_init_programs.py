@@ -106,3 +106,22 @@ def test_an_abb_target_in_one_cell_is_read_by_a_data_set(tmp_path):
     section = defaults()["measurements"]["file"] | {"path": str(files[0]), "delimiter": ";"}
     section |= {"columns": own, "orientation": section["orientation"] | {"kind": "none"}}
     assert_read(section, IT)
+
+
+def braces(word):
+    """Lines of a log without names: P1 {E6AXIS: A1 ..} MEASURED {POS: X .., Y .., Z ..}."""
+    for name, q, x in zip(NAMES, IT.q, IT.point, strict=True):
+        axes = ", ".join(f"A{n} {value:.4f}" for n, value in enumerate(q, 1))
+        place = ", ".join(f"{axis} {value:.4f}" for axis, value in zip("XYZ", x, strict=True))
+        yield f"{name} {{E6AXIS: {axes}, E1 0.0}} {word}{{POS: {place}}}\n"
+
+
+def test_a_log_whose_cells_name_their_parts_needs_no_line_of_names(tmp_path):
+    section, _ = described(written(tmp_path, log_txt="".join(braces("MEASURED "))))
+    assert_read(section, IT)
+
+
+def test_a_frame_in_braces_that_nobody_calls_measured_is_asked_about(tmp_path):
+    said = refused(written(tmp_path, log_txt="".join(braces(""))))
+    assert "the measured point" in said
+    assert "--take" in said

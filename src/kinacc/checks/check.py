@@ -179,6 +179,8 @@ def _of_all(one: Cells, change: changes.Change, finding: meaning.Finding) -> Sus
     rivals = list(dict.fromkeys(words for words in others if words))[:3]
     equal = f"; as well explained by: {', or '.join(rivals)}" if rivals else ""
     left = f"{finding.as_written_mm:.3g} mm per axis left as written, {finding.found_mm:.3g} mm so"
+    joints = [each.kind for each in finding.meaning.changes if each.joints]
+    alone = joints == ["joint_coupling"] and not rivals
     return suspicion(
         change.kind,
         f"{change.words} ({left}{equal})",
@@ -188,6 +190,7 @@ def _of_all(one: Cells, change: changes.Change, finding: meaning.Finding) -> Sus
         found_mm=finding.found_mm,
         joints=[joint + 1 for joint in change.joints],
         setting=change.setting,
+        **({"joint_map": finding.meaning.matrix.tolist()} if alone and change.joints else {}),
     )
 
 

@@ -16,6 +16,8 @@ from kinacc.cli.output import Output, answers
 
 if TYPE_CHECKING:
     from kinacc.checks.report import Report
+    from kinacc.checks.suspicion import Suspicion
+    from kinacc.kinematics.robot import Robot
     from kinacc.measurements.intake.guess import Guess
     from kinacc.measurements.reader import MeasuredFile
 
@@ -99,15 +101,18 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
         guess = _asked(guess)
     robot, chosen = _robot(guess, options["robot"], ask)
     own, text = _robot_file(robot, guess.joints, name, paths[1])
-    texts = {} if text is None else {paths[1]: text}
     report, shown = None, []
     if robot is not None:
         arm = robots.load(robot)
         guess, report, reading = _tried(guess, arm, name)
+        if text is not None and (coupling := _coupling(report)) is not None:
+            text, arm, guess = _coupled(text, arm, guess, coupling)
+            guess, report, reading = _tried(guess, arm, name)
         shown = first_poses(reading, arm.dh.prismatic)
     else:
         shown = poses_without_robot(guess)
     _show(shown, out)
+    texts = {} if text is None else {paths[1]: text}
     texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
     with replacing(list(texts)) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
@@ -310,6 +315,25 @@ def _contradicted(guess: Guess, report: Report) -> dict:
     return settings
 
 
+def _coupling(report: Report) -> Suspicion | None:
+    """The coupling of two joints that alone explains the readings, where there is one."""
+    return next((each for each in report.suspicions if "joint_map" in each.values), None)
+
+
+def _coupled(text: str, arm: Robot, guess: Guess, coupling: Suspicion) -> tuple:
+    """The robot file's text, the arm and the guess, with the joint_map that the readings show."""
+    import numpy as np
+
+    from kinacc.measurements.intake.write import coupled_text
+
+    matrix = coupling.values["joint_map"]
+    found = f"found by trying it on the readings: {coupling.what}"
+    told = f"joint_map of the robot file that is written couples joints, {found}"
+    text = coupled_text(text, matrix, f"Joints are coupled, {found}.")
+    arm = replace(arm, joint_map=np.array(matrix, dtype=float))
+    return text, arm, replace(guess, told=(*guess.told, told))
+
+
 def _turned_round(guess: Guess) -> Guess:
     """The guess with horizontal angles counted the other way."""
     ways = guess.section["directions"]
@@ -331,13 +355,17 @@ def _set_right(guess: Guess, settings: dict) -> Guess:
         angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
         columns |= {f"e{number}": column for number, column in enumerate(angles, 1)}
         settings["columns"] = columns
-    told = {key: "found by trying it on the readings" for key in settings if key in guess.assumed}
+    found = {key: settings[key] for key in settings if key in guess.assumed}
     if "orientation" in settings:
         turn = settings["orientation"]
         key = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
-        told[key] = "found by trying it on the readings"
-    kept = {k: v for k, v in guess.assumed.items() if k not in told}
-    return replace(guess.but(settings), assumed=kept)
+        found[key] = " ".join(str(each) for each in turn.values())
+    kept = {k: v for k, v in guess.assumed.items() if k not in found}
+    told = [
+        f"{key.replace('_', ' ')} {value}: found by trying it on the readings"
+        for key, value in found.items()
+    ]
+    return replace(guess.but(settings), assumed=kept, told=(*guess.told, *told))
 
 
 def _how(report: Report | None) -> str:

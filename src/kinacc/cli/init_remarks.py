@@ -29,8 +29,9 @@ def remarks_on(guess: Guess, report: Report | None) -> list[str]:
     if left is None or left > max(_CALCULATED_MM, 0.4 * min(step, _FINE_MM)):
         return []
     return [
-        f"the points follow the joints to {left:.1g} mm, closer than an instrument measures: if a "
-        "controller or a simulation calculated them, they say nothing of the arm"
+        f"the points follow the joints to {left:.1g} mm, closer than an instrument measures: they "
+        "may be the controller's own kinematics or a simulation, computed from the joints and not "
+        "measured; then they say nothing of the arm"
     ]
 
 

@@ -105,6 +105,8 @@ WORDS = frozenset(_ROLE)
 # Say that it was measured, and are what a measured target is called.
 _NAMES = frozenset(("smr", "reflector", "reflektor", "reflecteur", "prism", "prisma", "tmac"))
 _COMMANDS = frozenset((*_NOMINAL.split(), "target", "targets", "ref", "reference", "set"))
+# Types of RAPID: what a value is written as, and not whether it was wanted or measured.
+_TYPES = frozenset(("jointtarget", "robtarget"))
 _FRAMES = frozenset(_FRAME.split())
 ONE_SIGMA = frozenset(("std", "sigma", "stddev", "stdev", "sd", "stdabw", "standardabweichung"))
 # Letters that say so in front of an axis: dx, ux. Alone, as in d_x, they may be a target's name.
@@ -248,7 +250,7 @@ def _says_more(inside: str) -> bool:
 def _parted(spelled: str) -> list[tuple[str, str]]:
     """A word, parted where an axis is written together with what it is: dX, Xsoll, rxdeg."""
     word = plain(spelled)
-    if word in WORDS or word in UNITS:
+    if word in WORDS or word in UNITS or word in _TYPES:
         return [(word, spelled)]
     if (joined := _JOINED.fullmatch(word)) and _AXIS.fullmatch(joined[1]):
         return [(joined[1], spelled[: len(joined[1])]), (joined[2], joined[2])]
@@ -278,6 +280,7 @@ def role(words: Collection[str]) -> str:
         if each in said:
             return each
     if MEASURED in said:
+        said = {_ROLE[word] for word in words if word in _ROLE and word not in _TYPES}
         return OPEN if {NOMINAL, CALCULATED} & said else MEASURED
     if NOMINAL in said:
         return OPEN if REPORTED in said else NOMINAL

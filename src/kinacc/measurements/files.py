@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.measurements import robot_programs
-from kinacc.measurements.grid import rows_of_text, tabled
+from kinacc.measurements.grid import decoder, rows_of_text, tabled
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.written import FEATURES, SPHERICAL, Written
 
@@ -24,6 +24,7 @@ _OTHERS = {
     ".pdf": "a PDF file",
     ".docx": "a text document",
 }
+_LOOKED_AT = 100_000  # characters
 _KINDS = "a CSV, text, Excel (.xlsx) or Parquet file"
 
 
@@ -84,6 +85,17 @@ def _natural(name: str) -> list[tuple[int, int | str]]:
     """A key that puts P2 before P10."""
     parts = re.findall(r"\d{1,18}|\D+|\d", name)
     return [(0, int(part)) if part.isdecimal() else (1, part) for part in parts]
+
+
+def quotes_numbers(path: Path, written: Written) -> bool:
+    """Whether numbers with the delimiter within them are one cell: in quotes, or in a workbook."""
+    if path.suffix.lower() in (*EXCEL, *PARQUET):
+        return True
+    codec, otherwise = decoder(written.encoding)
+    with open(path, encoding=codec, errors=otherwise) as stream:
+        text = stream.read(_LOOKED_AT)
+    number = rf'"\s*[+\-−]?\d[\d.,\'\s]*{re.escape(written.delimiter)}\d[\d.,]*\s*"'
+    return bool(re.search(number, text))
 
 
 def refuse_other_files(path: Path, source: str | None = None) -> None:

@@ -36,7 +36,9 @@ desviación típica|máximo|mínimo|maximo|minimo|massimo|deviazione standard|de
 平均|平均値|標準偏差|最大|最小|最大値|最小値|合計|範囲
 3 sigma|2 sigma|6 sigma|mean value|max dev|rms error|mean error|max error
 """
-STATISTICS = frozenset(word for line in _STATISTICS_TEXT.split("\n") for word in line.split("|"))
+STATISTICS = frozenset(
+    word for line in _STATISTICS_TEXT.strip().split("\n") for word in line.split("|")
+)
 _LABELS = re.compile(r"[\s:=]+$")
 _UNIT_BEHIND = re.compile(
     r"([+\-−]?[\d.,].*[\d.,]|[+\-−]?\d)\s*(°|deg|rad|gon|mm|m|cm|in|inch|µm|um)"
@@ -47,6 +49,7 @@ _LONGEST_NUMBER = 60  # with its unit
 _HAS_DIGIT = re.compile(r"\d")
 _FIRST_WORD = re.compile(r"[\s(\[:=/,]")
 _RULE = re.compile(r"[\s\-=_+|*.;,\t]*")
+_WITH_BRACKETS = re.compile(r"(?:\{[^{}]*\}|\[(?:[^\[\]]|\[[^\[\]]*\])*\]|\S)+")
 _TWO_BLANKS = re.compile(r"\s{2,}|\t")
 
 
@@ -79,7 +82,8 @@ class Words(list):
     """Cells of a line that are parted by blanks; ``line`` is what they were."""
 
     def __init__(self, line: str) -> None:
-        super().__init__(line.split())
+        within = "{" in line or "[" in line
+        super().__init__(_WITH_BRACKETS.findall(line) if within else line.split())
         self.line = line.strip()
 
 

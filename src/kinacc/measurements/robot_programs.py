@@ -7,7 +7,7 @@ no measurement; its joint positions are those of a pose, which a tracker's file 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,6 +28,10 @@ _FANUC = re.compile(r"^\s*P\[\s*(\d+)[^\]]*\]\s*\{(.*?)\}\s*;", re.DOTALL | re.M
 _YASKAWA = re.compile(r"^\s*(B?C\d+|P\d+)\s*=\s*([-+\d.,\s]+)$", re.MULTILINE)
 _KUKA_PARTS = re.compile(rf"\b([A-Z]\d?)\s+({_NUMBER})", re.IGNORECASE)
 _FANUC_JOINT = re.compile(rf"\bJ(\d)\s*=\s*({_NUMBER})\s*(deg|mm)?", re.IGNORECASE)
+_FLAT = re.compile(rf"p?\[\s*{_NUMBER}(?:\s*,\s*{_NUMBER})+\s*\]")
+_KIND = re.compile(r"\{\s*(\w+)\s*:")
+_LIST = re.compile(r"(?:p?\[.*\]|\{.*\})", re.DOTALL)
+_LISTED = re.compile(rf"(?<![\w.]){_NUMBER}(?![\w.])")
 _UNUSED = 9e8  # ABB writes 9E9 for an axis that is not there
 _FEWEST = 4
 _TARGETS = "cartesian positions, which say where the arm was sent: they are no joints, and not read"
@@ -143,6 +147,12 @@ def expanded(table: RawTable) -> RawTable:
     return replace(table, columns=columns, under=())
 
 
+def numbers_within(cell: object) -> int:
+    """How many numbers a cell such as {A1 10, A2 -90}, [[10,-90],[9E9]] or p[0.1,0.2] lists."""
+    text = cell.strip() if isinstance(cell, str) else ""
+    return len(_LISTED.findall(text)) if _LIST.fullmatch(text) else 0
+
+
 def _cells(cells: list) -> Iterator[tuple[str, list]]:
     """Columns within the cells of one, none where they are ordinary."""
     texts = [str(cell).strip() for cell in cells]
@@ -150,11 +160,35 @@ def _cells(cells: list) -> Iterator[tuple[str, list]]:
         rows = [_parts(each) for each in texts]
     elif texts and all(each.startswith("[[") and each.endswith("]") for each in texts):
         rows = [_of_target(each) for each in texts]
+    elif texts and all(_FLAT.fullmatch(each) for each in texts):
+        rows = [_of_list(each) for each in texts]
     else:
         return
     if rows[0] and all(row.keys() == rows[0].keys() for row in rows):
         for part in rows[0]:
             yield part, [repr(row[part]) for row in rows]
+
+
+def _of_list(text: str) -> dict[str, float]:
+    """Numbers of [1.2, 0.3, ..] or p[..]: x, y, z where there are three, else by their place."""
+    values = _floats(text)
+    names = "xyz" if len(values) == 3 else [str(place) for place in range(1, len(values) + 1)]
+    return dict(zip(names, values, strict=True))
+
+
+def names_of_cells(cells: Sequence, word: str) -> str:
+    """What a column of cells such as {E6AXIS: A1 10, ..} is called behind ``word``; may be empty.
+
+    A frame that no word calls measured is one of the controller's.
+    """
+    kinds = {
+        found[1].upper() if (found := _KIND.match(str(cell).strip())) else "" for cell in cells
+    }
+    if not kinds <= {"E6AXIS", "AXIS", "E6POS", "POS", "FRAME"}:
+        return ""
+    if kinds <= {"E6AXIS", "AXIS"}:
+        return f"{word} joints".strip()
+    return f"{word} position" if word else "TCP position"
 
 
 def _of_target(text: str) -> dict[str, float]:

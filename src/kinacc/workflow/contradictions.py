@@ -241,6 +241,15 @@ def _joints(name: str, joints: Mapping[str, Any], place, folder: Path) -> Iterat
             )
 
 
+def _quoted(folder: Path, file: Mapping[str, Any]) -> bool:
+    """Whether the delimiter may stand within numbers: in quotes, or in cells of a workbook."""
+    from kinacc.measurements.files import quotes_numbers
+    from kinacc.measurements.written import Written
+
+    path = file["path"] and folder / file["path"]
+    return bool(path) and os.path.isfile(path) and quotes_numbers(path, Written.of(file))
+
+
 def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:
     if file["path"] is None:
         yield Problem(
@@ -260,13 +269,15 @@ def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[P
             if origin
             else "say where the data comes from with measurements.file.source",
         )
-    if file["delimiter"] == file["decimal"]:
+    marks = {file["decimal"], file["thousands"]}
+    parts = file["delimiter"] if file["delimiter"] in marks and not _quoted(folder, file) else None
+    if parts == file["decimal"]:
         yield Problem(
             place("measurements", "file", "decimal"),
             f"{shown(file['decimal'])} is also the delimiter",
-            "a decimal mark that differs from the delimiter",
+            "a decimal mark that differs from the delimiter, or numbers in quotes",
         )
-    if file["thousands"] is not None and file["thousands"] in (file["decimal"], file["delimiter"]):
+    if file["thousands"] is not None and file["thousands"] in (file["decimal"], parts):
         yield Problem(
             place("measurements", "file", "thousands"),
             f"{shown(file['thousands'])} is also the decimal mark or the delimiter",

@@ -23,6 +23,7 @@ Values = Callable[[Name], np.ndarray]
 _JOINT_TEXT = """
 q joint joints j axis a theta θ th achse achsen gelenk gelenkwinkel axe eje asse giunto articulacion
 articulacao articulation junta jnt jt rax robax jpos jointangle angle angles winkel angulo angolo
+jointtarget
 """
 _TURN_TEXT = """
 r rot rotation rotations rotacion rotazione orientation orient ori orientierung orientacion
@@ -150,10 +151,19 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
             yield turn
         elif len(row) == 6 and about & _POSE_WORDS and not about & {"joint", "joints"}:
             yield Group(POSE, column_names.role(words), "", dict(zip("123456", row, strict=True)))
+        elif len(row) == 3 and about & (_TURN_WORDS - _JOINT_WORDS) and _in_angles(row):
+            columns = dict(zip(("rx", "ry", "rz"), row, strict=True))
+            turn = ("euler", "XYZ")
+            yield Group(TURN, column_names.role(words), _target(row[0], drop=True), columns, turn)
         elif 4 <= len(row) <= 7:
             known = bool(about & _JOINT_WORDS) and not about & _EXTERNAL
             if known or len(row) >= 6:
                 yield _joints(row, words, weak=not known)
+
+
+def _in_angles(row: Sequence[Name]) -> bool:
+    """Whether the columns state a unit of angles, all the same."""
+    return {name.unit for name in row} in ({"deg"}, {"rad"})
 
 
 def _quaternion(row: list[Name], about: set[str], values: Values | None) -> Group | None:

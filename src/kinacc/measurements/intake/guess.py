@@ -93,15 +93,16 @@ def look(
 
     ``take``: columns that are read whatever their names say, each for all that go with it;
     ``turned``: orientations are wanted; ``answers`` to choices, by key. Two paths are joints and
-    points of the same poses. Raises Undecided where a choice is open, InputError where joints or
-    positions cannot be found, where units contradict each other, and where ``take`` names what
-    cannot be read.
+    points of the same poses, as are two sheets of a workbook. Raises Undecided where a choice is
+    open, InputError where joints or positions cannot be found, where units contradict each other,
+    and where ``take`` names what cannot be read.
     """
     answers = answers or {}
     pair = None
-    if not isinstance(path, (str, Path)):
-        pair = pairs.look(path, take, turned, answers)
-        path = pair.table.path
+    sheets = pairs.sheets_apart(Path(path), answers) if isinstance(path, (str, Path)) else ()
+    if sheets or not isinstance(path, (str, Path)):
+        pair = pairs.look([path, path] if sheets else path, take, turned, answers, sheets)
+        path = pair.path
     looked = pair.points if pair else text.look(path, answers)
     table, stated = pair.table if pair else looked.table, looked.stated
     units = table.under or ("",) * len(table.columns)

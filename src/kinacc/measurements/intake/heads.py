@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from kinacc.measurements.column_names import UNITS, plain
 from kinacc.measurements.grid import Row, header_cells, is_blank, is_comment, number_of
 from kinacc.measurements.intake.decimals import shaped_as_number
+from kinacc.measurements.robot_programs import numbers_within
 from kinacc.measurements.table import RawTable
 
 _UNITS = re.compile(
@@ -53,8 +54,8 @@ def is_number(cell: object) -> bool:
 
 
 def numbers_in(cells: Sequence) -> int:
-    """How many cells of a row are numbers."""
-    return sum(map(is_number, cells))
+    """How many numbers a row holds, those within cells such as {A1 10, A2 -90} included."""
+    return sum(is_number(cell) or numbers_within(cell) for cell in cells)
 
 
 def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | None:
@@ -114,6 +115,8 @@ def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ..
             continue
         first = cells[0].lstrip(" #%/!")
         names = header_cells([first, *cells[1:]] if first else cells[1:], width)
+        # The sign by itself is what a column of numbers is called.
+        names = cells if not first and len(names) < width == len(cells) else names
         names = [name.strip() for name in names]
         if len(names) == width and all(names) and not numbers_in(names):
             return tuple(names) if len(set(names)) == width else None

@@ -13,6 +13,7 @@ import numpy as np
 from kinacc.errors import InputError, Problem
 from kinacc.measurements import joining
 from kinacc.measurements.column_names import OTHER, Name, name_of
+from kinacc.measurements.files import EXCEL
 from kinacc.measurements.intake import clocks, columns, text
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import NamedColumns
@@ -36,9 +37,10 @@ _SHARE = 0.5  # of the points: fewer in common are no key
 class Pair:
     """Two files as one ``table``, what its columns are, and the section of its joints' file.
 
-    ``points``: how the file of the points is written.
+    ``points``: how the file of the points at ``path`` is written.
     """
 
+    path: str
     points: Looked
     table: RawTable
     found: NamedColumns
@@ -48,6 +50,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class _File:
+    path: str
     looked: Looked
     table: RawTable
     names: tuple[Name, ...]
@@ -58,11 +61,33 @@ class _File:
         return bool(self.found.joints)
 
 
+def sheets_apart(path: Path, answers: Mapping[str, str]) -> tuple[str, ...]:
+    """The sheets of joints and of points of a workbook that holds both once and apart; or none."""
+    if path.suffix.lower() not in EXCEL or "sheet" in answers or not path.is_file():
+        return ()
+    joints, points = [], []
+    for sheet, named in text.names_of_sheets(path).items():
+        found = columns.recognise([name_of(each) for each in named])
+        if found.joints and found.targets:
+            return ()
+        joints += [sheet] if found.joints else []
+        points += [sheet] if found.targets else []
+    return (*joints, *points) if len(joints) == len(points) == 1 else ()
+
+
 def look(
-    paths: Sequence[str | Path], take: Sequence[str], turned: bool, answers: Mapping[str, str]
+    paths: Sequence[str | Path],
+    take: Sequence[str],
+    turned: bool,
+    answers: Mapping[str, str],
+    sheets: Sequence[str] = (),
 ) -> Pair:
-    """One view of two files. Raises InputError where they cannot be joined, Undecided if asked."""
-    files = [_opened(path, take, turned, answers) for path in paths]
+    """One view of two files, or of two ``sheets`` of one that is named twice.
+
+    Raises InputError where they cannot be joined, Undecided if asked.
+    """
+    said = [{**answers, "sheet": sheet} for sheet in sheets] or [answers] * len(paths)
+    files = [_opened(path, take, turned, each) for path, each in zip(paths, said, strict=True)]
     joints, points = _sorted(files)
     how, told = _join(joints, points, answers)
     table = joining.joined(points.table, joints.table, how)
@@ -86,9 +111,10 @@ def look(
         ),
     )
     written = joints.looked.written.section()
-    section: dict[str, Any] = {"path": joints.table.path, **_keys(how)}
+    section: dict[str, Any] = {"path": joints.path, **_keys(how)}
     section |= {key: written[key] for key in _WRITTEN}
-    return Pair(points.looked, table, found, section, (*joints.looked.told, *told, *table.notes))
+    every = (*joints.looked.told, *told, *table.notes)
+    return Pair(points.path, points.looked, table, found, section, every)
 
 
 _WRITTEN = (
@@ -120,6 +146,7 @@ def _opened(
         return numbers(table, name.column, [], gaps=True)
 
     return _File(
+        str(path),
         looked,
         table,
         names,

@@ -175,12 +175,38 @@ def _single(lines: Sequence[str], rows: Sequence[Row], head: Head) -> bool:
 
 
 def _workbook(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, list[Row], list[str]]:
+    sheets, found = _tables_of(path, answers.get("sheet"))
+    if not found:
+        what = "no sheet has rows of numbers under names"
+        raise InputError(Problem(str(path), what, "a sheet with columns of joints and points"))
+    likely = _likely(found)
+    if len(likely) > 1:
+        meant = {sheet: _shown(*found[sheet]) for sheet in likely}
+        raise Undecided(str(path), [Choice("--sheet", "several sheets hold tables", meant)])
+    sheet = likely[0]
+    others = [each for each in sheets if each != sheet and "sheet" not in answers]
+    told = [f"sheet {sheet!r}" + (f"; not read: {first_few(others)}" if others else "")]
+    return Written(sheet=sheet if len(sheets) > 1 else None), *found[sheet], told
+
+
+def names_of_sheets(path: Path) -> dict[str, list[str]]:
+    """Names of the columns of every sheet of a workbook that holds rows of numbers."""
+    named = {}
+    for sheet, (head, rows) in _tables_of(path)[1].items():
+        cells = next((cells for line, cells in rows if line == head.line), [])
+        named[sheet] = list(head.names or [str(each) for each in cells if each is not None])
+    return named
+
+
+def _tables_of(
+    path: Path, wanted: str | None = None
+) -> tuple[list[str], dict[str, tuple[Head, list[Row]]]]:
+    """The sheets of a workbook; where the names are, and the first rows, of those with numbers."""
     from kinacc.measurements.workbook import Workbook
 
     found: dict[str, tuple[Head, list[Row]]] = {}
     with Workbook(path) as book:
         sheets = book.sheets
-        wanted = answers.get("sheet")
         if wanted is not None and wanted not in sheets:
             raise InputError(Problem(f"--sheet {wanted}", "is not there", ", ".join(sheets)))
         for sheet in [wanted] if wanted else sheets:
@@ -190,17 +216,7 @@ def _workbook(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, li
             head = heads.head_of(rows, "", sheet=True)
             if head is not None and head.width > 1:
                 found[sheet] = head, rows
-    if not found:
-        what = "no sheet has rows of numbers under names"
-        raise InputError(Problem(str(path), what, "a sheet with columns of joints and points"))
-    likely = _likely(found)
-    if len(likely) > 1:
-        meant = {sheet: _shown(*found[sheet]) for sheet in likely}
-        raise Undecided(str(path), [Choice("--sheet", "several sheets hold tables", meant)])
-    sheet = likely[0]
-    others = [each for each in sheets if each != sheet]
-    told = [f"sheet {sheet!r}" + (f"; not read: {first_few(others)}" if others else "")]
-    return Written(sheet=sheet if len(sheets) > 1 else None), *found[sheet], told
+    return sheets, found
 
 
 def _likely(found: Mapping[str, tuple[Head, list[Row]]]) -> list[str]:
@@ -263,7 +279,7 @@ def _named(
         return replace(written, names=head.names, skip_lines=above, skip_under_names=head.under)
     if head.line:
         return replace(written, skip_lines=head.line - 1, skip_under_names=head.under)
-    names = _point_names(rows, head, stated)
+    names = _point_names(rows, head, stated) or _names_within(rows, head)
     if not names:
         _refuse_other_width(path, written, head, rows)
         what = "the columns have no names"
@@ -297,6 +313,24 @@ def _point_names(rows: Sequence[Row], head: Head, stated: Mapping[str, str]) -> 
         return ()
     unit = f"_{stated['length']}" if "length" in stated else ""
     return (*_POINT_NAMES[3 - before :], *(f"{axis}{unit}" for axis in "XYZ"))
+
+
+def _names_within(rows: Sequence[Row], head: Head) -> tuple[str, ...]:
+    """Names of columns whose cells name their parts, as {E6AXIS: A1 10, ..}: by the word before.
+
+    A first column of other texts names the poses. Nothing where a column of numbers has no name.
+    """
+    cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
+    names: list[str] = []
+    word = ""
+    for place, column in enumerate(zip(*cells, strict=True)):
+        own = robot_programs.names_of_cells(column, word)
+        if not own and any(map(heads.numbers_in, [[each] for each in column])):
+            return ()
+        names.append(own or (POINT if place == 0 else f"word {place + 1}"))
+        word = "" if own or len(set(column)) > 1 else str(column[0])
+    within = any(map(robot_programs.numbers_within, cells[0])) if cells else False
+    return tuple(names) if within and len(set(names)) == len(names) else ()
 
 
 def _counted(column: Sequence) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,14 @@ def urdf_text(name: str, urdf: Path, folder: Path) -> str:
         "# base_link: base       # where the chain starts, if not at the root\n"
         "# tip_link: tool0       # where it ends, if there is a choice\n"
     )
+
+
+def coupled_text(text: str, joint_map: Sequence[Sequence[float]], why: str) -> str:
+    """The text of a robot file with another ``joint_map``, which holds the rows' signs too."""
+    text = re.sub(r",?\s*\bsign:\s*[+-]?1\b", "", text)
+    text = re.sub(r"^joint_map:.*\n(?:[ \t-].*\n)*", "", text, flags=re.MULTILINE)
+    rows = ", ".join(f"[{', '.join(f'{each:g}' for each in row)}]" for row in joint_map)
+    return f"{text.rstrip()}\n# {why}\njoint_map: [{rows}]\n"
 
 
 def template_text(name: str, joints: int) -> str:
