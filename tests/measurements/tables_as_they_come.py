@@ -147,11 +147,12 @@ def thousands_german(folder: Path) -> Measured:
 
 
 def thousands_swiss(folder: Path) -> Measured:
-    """Apostrophes between thousands, a decimal point."""
+    """Apostrophes between thousands, a decimal point; controllers call their own point Ist, too."""
     joints, points = one_point("fanuc_uncoupled")
     names = [f"A{i} [Grad]" for i in range(1, 7)] + [f"{axis}-Ist [mm]" for axis in "XYZ"]
     rows = beside(cells(joints, 3), cells(points, 3, grouped_swiss))
-    return truth(save(folder / "ch.csv", joined([names, *rows], ";")), FANUC, joints, points)
+    path = save(folder / "ch.csv", joined([names, *rows], ";"))
+    return truth(path, FANUC, joints, points, questions=frozenset({"measurement"}))
 
 
 def quoted_decimal_commas(folder: Path) -> Measured:
