@@ -18,6 +18,7 @@ _NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
 _LITTLE_NOISE = 0.8  # of the scatter that was measured
+_SAME_RAD = 2e-5  # joints this close move a point by 0.02 mm in a metre: less than noise
 _USUAL_READINGS = 10  # that say what size is usual
 _UNUSUAL = 6.0  # times the median size
 _FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
@@ -70,7 +71,9 @@ def scatter(measured: Columns) -> tuple[float, int]:
 
     And the degrees of freedom of an axis; of ``measurements`` of a results folder.
     """
-    same = folds.configurations_of(measured)
+    names = [name for name in measured if name[:1] == "q" and name[1:].isdigit()]
+    q_rad = np.stack([np.asarray(measured[name], dtype=float) for name in names], axis=1)
+    same = folds.configurations(np.arange(len(q_rad)), q_rad, _SAME_RAD)
     _, target = np.unique(np.asarray(measured["target"]).astype(str), return_inverse=True)
     _, group = np.unique(np.stack([same, target.ravel()]), axis=1, return_inverse=True)
     group = group.ravel()
