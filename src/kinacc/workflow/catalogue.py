@@ -220,6 +220,9 @@ STAGES: dict[str, Stage] = {
                 "model_selection",
             ),
             ("summary",),
+            ("robot",),
+            files=("robot",),
+            uses=(_ROBOT,),
             optional=("data_check", "excluded_rows", "vec_orders", *_FURTHER),
         ),
         Stage(
