@@ -127,22 +127,37 @@ def test_tables_of_a_campaign_open_in_a_spreadsheet(visited, tmp_path):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
-def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(tmp_path):
-    rng = np.random.default_rng(3)
-    pose = np.repeat(np.arange(30), 4)
-    q = np.repeat(rng.uniform(-1, 1, (30, 6)), 4, axis=0)
-    at = np.repeat(rng.uniform(-900, 900, (30, 3)), 4, axis=0) + rng.normal(size=(120, 3)) * 0.06
-    columns = {f"q{i + 1}": q[:, i] for i in range(6)}
-    columns |= {f"{axis}_mm": at[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"pose": pose, "target": np.array(["tool"] * 120, dtype=object)}
-    found, freedom = slips.scatter(columns)
-    assert freedom == 90
-    assert found == pytest.approx(0.06, rel=0.15)
-    (problem,) = slips.of_little_noise(instruments(["tracker=0.03"], "base"), columns)
+def readings_of(poses, times, std_mm, sessions=1, seed=3):
+    """``measurements`` and ``pose_errors`` of poses read several times, bases of sessions apart."""
+    rng = np.random.default_rng(seed)
+    pose = np.tile(np.repeat(np.arange(poses), times), sessions)
+    session = np.repeat(np.arange(sessions), poses * times)
+    q = rng.uniform(-1, 1, (poses, 6))[pose] + rng.normal(size=(len(pose), 6)) * 1e-4
+    left = rng.normal(size=(poses, 3))[pose] + 0.5 * session[:, None]
+    left = left + rng.normal(size=left.shape) * std_mm
+    measured = {f"q{i + 1}": q[:, i] for i in range(6)}
+    measured |= {"pose": np.arange(len(pose)), "session": session.astype(str).astype(object)}
+    measured["target"] = np.array(["tool"] * len(pose), dtype=object)
+    errors = {f"e{axis}_mm": left[:, i] for i, axis in enumerate("xyz")}
+    errors |= {"row": np.arange(len(pose))}
+    errors["comparison"] = np.array(["dh_vs_measured"] * len(pose), dtype=object)
+    errors["estimate"] = np.array(["cross_validated"] * len(pose), dtype=object)
+    return measured, errors
+
+
+@pytest.mark.parametrize("sessions", [1, 2])
+def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(sessions):
+    tables = readings_of(30, 4, 0.06, sessions)
+    found = slips.scatter(*tables)
+    assert found.freedom == 90 * sessions
+    assert found.std_mm == pytest.approx(0.06, rel=0.25)
+    (problem,) = slips.of_little_noise(instruments(["tracker=0.03"], "base"), *tables)
     assert "scatter by 0.0" in problem.what
-    assert not slips.of_little_noise(instruments(["tracker=0.06"], "base"), columns)
-    once = {name: values[::4] for name, values in columns.items()}
-    assert not slips.of_little_noise(instruments(["tracker=0.03"], "base"), once)
+    assert not slips.of_little_noise(instruments(["tracker=0.06"], "base"), *tables)
+
+
+def test_poses_that_were_read_once_say_nothing_of_the_noise():
+    assert not slips.of_little_noise(instruments(["t=0.03"], "base"), *readings_of(120, 1, 0.06))
 
 
 def test_a_campaign_is_no_results_folder_and_the_command_for_it_is_named(visited):

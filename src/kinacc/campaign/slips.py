@@ -7,10 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinacc.artifacts.allowed import ESTIMATES
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison
 from kinacc.campaign import words
 from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
+from kinacc.checks.noise import Revisits, revisits
 from kinacc.errors import Problem
 from kinacc.measurements import folds
 
@@ -18,7 +21,6 @@ _NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
 _LITTLE_NOISE = 0.8  # of the scatter that was measured
-_SAME_RAD = 2e-5  # joints this close move a point by 0.02 mm in a metre: less than noise
 _USUAL_READINGS = 10  # that say what size is usual
 _UNUSUAL = 6.0  # times the median size
 _FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
@@ -46,17 +48,23 @@ def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> li
     return problems
 
 
-def of_little_noise(instruments: Sequence[Instrument], measured: Columns) -> list[Problem]:
-    """Noise smaller than the scatter of ``measured`` readings at joints that were visited again."""
-    scatter_mm, freedom = scatter(measured)
+def of_little_noise(
+    instruments: Sequence[Instrument], measured: Columns, errors: Columns
+) -> list[Problem]:
+    """Noise smaller than the scatter of readings at configurations that were read again.
+
+    ``measured`` and ``errors``: ``measurements`` and ``pose_errors`` of the calibration.
+    """
+    again = scatter(measured, errors)
+    scatter_mm = math.sqrt(float(np.mean(again.std_mm**2)))
     problems = []
     for each in instruments:
         std_mm = math.sqrt(float(np.trace(each.covariance_mm2)) / 3.0)
-        if freedom < _USUAL_READINGS or std_mm >= _LITTLE_NOISE * scatter_mm:
+        if again.freedom < _USUAL_READINGS or std_mm >= _LITTLE_NOISE * scatter_mm:
             continue
         what = (
             f"{noise(each)}: readings of the calibration at equal joints scatter by "
-            f"{scatter_mm:.3g} mm ({freedom} degrees of freedom)"
+            f"{scatter_mm:.3g} mm per axis ({again.freedom} degrees of freedom)"
         )
         fix = (
             f"the noise has to hold how the arm repeats a pose: give {scatter_mm:.2g}, or more; "
@@ -66,23 +74,22 @@ def of_little_noise(instruments: Sequence[Instrument], measured: Columns) -> lis
     return problems
 
 
-def scatter(measured: Columns) -> tuple[float, int]:
-    """Std of one axis (mm) about the mean of readings of one target at one configuration.
+def scatter(measured: Columns, errors: Columns) -> Revisits:
+    """Scatter of what the plainest model leaves of readings at one configuration.
 
-    And the degrees of freedom of an axis; of ``measurements`` of a results folder.
+    Cross-validated errors where there are: readings of a configuration are held out together.
     """
-    names = [name for name in measured if name[:1] == "q" and name[1:].isdigit()]
-    q_rad = np.stack([np.asarray(measured[name], dtype=float) for name in names], axis=1)
-    same = folds.configurations(np.arange(len(q_rad)), q_rad, _SAME_RAD)
-    _, target = np.unique(np.asarray(measured["target"]).astype(str), return_inverse=True)
-    _, group = np.unique(np.stack([same, target.ravel()]), axis=1, return_inverse=True)
-    group = group.ravel()
-    count = np.bincount(group)
-    freedom = int(np.sum(count - 1))
-    at_mm = np.stack([np.asarray(measured[f"{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
-    means = np.stack([np.bincount(group, axis) / count for axis in at_mm.T], axis=1)
-    squares = np.sum((at_mm - means[group]) ** 2)
-    return (math.sqrt(squares / (3 * freedom)) if freedom else math.nan), freedom
+    own = np.asarray(errors["comparison"]) == Comparison(MEASURED, PLAINEST).name
+    held_out = own & (np.asarray(errors["estimate"]) == ESTIMATES[1])
+    used = held_out if held_out.any() else own
+    row = np.asarray(errors["row"])[used].astype(int)
+    left_mm = np.stack([np.asarray(errors[f"e{axis}_mm"])[used] for axis in "xyz"], axis=1)
+    session, target = (
+        np.unique(np.asarray(measured[name]).astype(str), return_inverse=True)[1].ravel()
+        for name in ("session", "target")
+    )
+    same = folds.configurations_of(measured)
+    return revisits(session[row], target[row], left_mm, same[row])
 
 
 def of_budget(begun: Plan) -> list[Problem]:

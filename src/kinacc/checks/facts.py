@@ -83,7 +83,8 @@ def _revisits(fitted: Fitted) -> Revisits:
     first = np.unique(np.column_stack([same, cells.pose]), axis=0)[:, 0]
     came_back = np.isin(same, np.flatnonzero(np.bincount(first) > 1)) & ~fitted.bad
     left = fitted.left.position_mm[came_back]
-    return revisits(cells.select(came_back), left, same[came_back])
+    session, target = cells.session[came_back], cells.target[came_back]
+    return revisits(session, target, left, same[came_back])
 
 
 def _coverage(every: Cells, robot: Robot) -> list[dict[str, object]]:

@@ -81,26 +81,30 @@ def _side_by_side(cells: Cells, values: np.ndarray) -> np.ndarray:
 class Revisits:
     """Scatter of what a fit leaves at configurations that were gone to more than once.
 
-    ``std_mm`` (3,) pooled per axis of the instrument, NaN where none was; it holds the arm's own
-    repeatability besides the instrument's noise.
+    ``std_mm`` (3,) pooled per axis of the instrument, NaN where none was, of ``freedom`` degrees;
+    it holds the arm's own repeatability besides the instrument's noise.
     """
 
     std_mm: np.ndarray
     configurations: int
     readings: int
+    freedom: int
 
 
-def revisits(cells: Cells, left_mm: np.ndarray, same: np.ndarray) -> Revisits:
+def revisits(
+    session: np.ndarray, target: np.ndarray, left_mm: np.ndarray, same: np.ndarray
+) -> Revisits:
     """Scatter of residuals ``left_mm`` (n, 3) of poses of one configuration ``same`` (n,).
 
-    Cells of one target and session are compared; the fit takes out what little the joints differ.
+    Those of one ``session`` (n,) and ``target`` (n,) are compared, given as numbers; the fit takes
+    out what little the joints differ.
     """
-    label = np.column_stack([same, cells.session, cells.target])
+    label = np.column_stack([same, session, target])
     number = np.unique(label, axis=0, return_inverse=True)[1].ravel()
     counts = np.bincount(number)
     again = counts[number] > 1
     if not again.any():
-        return Revisits(np.full(3, np.nan), 0, 0)
+        return Revisits(np.full(3, np.nan), 0, 0, 0)
     sums = np.stack([np.bincount(number, left_mm[:, axis]) for axis in range(3)], axis=1)
     centred = (left_mm - (sums / counts[:, None])[number])[again]
     length = np.linalg.norm(centred, axis=1)
@@ -108,7 +112,7 @@ def revisits(cells: Cells, left_mm: np.ndarray, same: np.ndarray) -> Revisits:
     used = number[again][good]
     freedom = len(used) - np.unique(used).size
     std = np.sqrt(np.sum(centred[good] ** 2, axis=0) / max(freedom, 1))
-    return Revisits(std, int(np.unique(same[again]).size), int(again.sum()))
+    return Revisits(std, int(np.unique(same[again]).size), int(again.sum()), freedom)
 
 
 @dataclass(frozen=True)

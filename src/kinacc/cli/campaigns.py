@@ -20,6 +20,8 @@ from kinacc.cli import choice
 from kinacc.cli.output import Output
 from kinacc.errors import InputError, Problem, gathered, refuse
 
+_READINGS = ("measurements", "pose_errors")
+
 
 def start(given: Mapping, out: Output) -> None:
     """Begin a campaign and say what was begun."""
@@ -73,8 +75,9 @@ def start(given: Mapping, out: Output) -> None:
     if not given["sure"]:
         left_mm = calibration.residual.position_mm if calibration.residual else math.nan
         problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
-        if (readings := Path(given["calibration"]) / "measurements.parquet").is_file():
-            problems += slips.of_little_noise(instruments, store.read(readings))
+        readings = [Path(given["calibration"]) / f"{name}.parquet" for name in _READINGS]
+        if all(path.is_file() for path in readings):
+            problems += slips.of_little_noise(instruments, *map(store.read, readings))
         refuse(problems, "The campaign was not begun")
     unsure = prediction_check.unsure(
         calibration, points, instruments, given["point"], limits.implausible_mm
