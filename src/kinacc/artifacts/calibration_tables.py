@@ -252,7 +252,19 @@ RESIDUALS = Artefact(
     ),
     ("comparison", "subset", "fold", "quantity"),
 )
-_BODY = ("mass of", "x of the centre of", "y of the centre of", "z of the centre of")
+
+
+def _body(mass: str, centre: str, of: str, nullable: bool = False) -> tuple[Column, ...]:
+    """Columns of a mass, called ``mass``, and of its centre of gravity, ``<centre>_x_mm`` .."""
+    return (
+        real(mass, "kg", f"mass of {of}", 0.0, 1e4, nullable),
+        *(
+            real(f"{centre}_{axis}_mm", "mm", f"{axis} of the centre of {of}", -1e4, 1e4, nullable)
+            for axis in "xyz"
+        ),
+    )
+
+
 _COEFFICIENTS = (
     ("compliance_rad_per_nm", "rad/(N m)", "turn of the joint by a moment of gravity about it"),
     (
@@ -281,30 +293,12 @@ COMPLIANCE_MODEL = Artefact(
                 ),
             )
         ),
-        *(
-            real(name, unit, f"{meaning} the link, DH frame; null if not stated", low, 1e4, True)
-            for name, unit, meaning, low in zip(
-                ("link_mass_kg", "link_x_mm", "link_y_mm", "link_z_mm"),
-                ("kg", "mm", "mm", "mm"),
-                _BODY,
-                (0.0, -1e4, -1e4, -1e4),
-                strict=True,
-            )
-        ),
+        *_body("link_mass_kg", "link", "the link, DH frame; null if not stated", True),
         *(
             real(f"gravity_{axis}", "1", f"{axis} of gravity's direction, first DH frame", -1, 1)
             for axis in "xyz"
         ),
-        *(
-            real(name, unit, f"{meaning} the payload where a row states none", low, 1e4)
-            for name, unit, meaning, low in zip(
-                ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm"),
-                ("kg", "mm", "mm", "mm"),
-                _BODY,
-                (0.0, -1e4, -1e4, -1e4),
-                strict=True,
-            )
-        ),
+        *_body("payload_kg", "payload", "the payload where a row states none"),
     ),
     ("joint",),
 )
