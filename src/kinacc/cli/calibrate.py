@@ -70,8 +70,7 @@ def carried_out(
     Snakemake's exit code where that is not 0. Raises InputError for bad configuration.
     """
     from kinacc.errors import InputError, Problem
-    from kinacc.workflow.plan import planned
-    from kinacc.workflow.verification.mending import SNAKEFILE
+    from kinacc.workflow.plan import SNAKEFILE, planned
 
     first = next((i for i, word in enumerate(words) if word.startswith("-")), len(words))
     configs, more = words[:first], list(words[first:])

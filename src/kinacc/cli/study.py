@@ -27,7 +27,7 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
     from kinacc.workflow.answer import answer, read
-    from kinacc.workflow.verification.mending import SNAKEFILE
+    from kinacc.workflow.plan import SNAKEFILE
 
     paper = SNAKEFILE.parent / "config.yaml"
     configs, plan = carried_out("all", words, cores, default=paper)

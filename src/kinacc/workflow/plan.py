@@ -10,6 +10,7 @@ import os
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from kinacc.artifacts.error_models import ERROR_MODELS, asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
@@ -18,6 +19,9 @@ from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, TOURNAMENT, Stage, 
 from kinacc.workflow.runner import Job
 
 RESULTS = "results"
+# Installed, the rules stand in the package; in a clone beside src/.
+_INSTALLED = Path(__file__).parent / "snakemake"
+SNAKEFILE = (_INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[3]) / "Snakefile"
 
 
 def planned(

@@ -15,13 +15,10 @@ from typing import NamedTuple
 from kinacc.artifacts.provenance import config_hash
 from kinacc.errors import InputError
 from kinacc.workflow.catalogue import STAGES, maker_of
-from kinacc.workflow.plan import RESULTS, Plan, planned
+from kinacc.workflow.plan import RESULTS, SNAKEFILE, Plan, planned
 
 CONFIG = "config.yaml"
 
-# Installed, the workflow stands in the package; in a clone beside src/.
-_INSTALLED = Path(__file__).parents[1] / "snakemake"
-SNAKEFILE = (_INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[4]) / "Snakefile"
 
 Marks = Mapping[str, Mapping[str, str]]
 
