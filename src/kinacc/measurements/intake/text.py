@@ -57,8 +57,8 @@ def look(path: str | Path, answers: Mapping[str, str] | None = None) -> Looked:
     kind = path.suffix.lower()
     if kind in PARQUET:
         return Looked(Written(), load(path))
-    if kind not in EXCEL and robot_programs.read(path) is not None:
-        return Looked(Written(), load(path))
+    if kind not in EXCEL and (program := robot_programs.read(path)) is not None:
+        return Looked(Written(), program)
     if kind in EXCEL:
         written, head, rows, told = _workbook(path, answers)
     else:
