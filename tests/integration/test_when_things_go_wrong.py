@@ -50,7 +50,7 @@ def test_a_data_file_that_is_not_there(project):
 
 @pytest.mark.parametrize(
     ("row", "column", "value", "said"),
-    [(3, 6, "nan", "x_mm"), (5, 9, "0.2", "quaternion"), (9, 1, "500", "q2")],
+    [(3, 6, "123o.4", "x_mm"), (5, 9, "0.2", "quaternion"), (9, 1, "500", "q2")],
 )
 def test_a_row_that_cannot_be_right(project, row, column, value, said):
     before = project.digests()

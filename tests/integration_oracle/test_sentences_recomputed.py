@@ -14,8 +14,8 @@ from oracles import tables
 
 
 @pytest.fixture(scope="module")
-def claims(finished):
-    return {row["claim"]: row for row in tables.rows(finished, "claims")}
+def claims(papers_arm):
+    return {row["claim"]: row for row in tables.rows(papers_arm, "claims")}
 
 
 def check(claims, name, value, holds):
@@ -28,9 +28,9 @@ def check(claims, name, value, holds):
     assert row["verdict"] == ("agrees" if holds else "differs")
 
 
-def lines(finished):
+def lines(papers_arm):
     """Rows of the summary per assessor, by rising noise."""
-    rows = sorted(tables.rows(finished, "study_summary"), key=lambda r: r["noise_mm"])
+    rows = sorted(tables.rows(papers_arm, "study_summary"), key=lambda r: r["noise_mm"])
     names = ("maximum", "outlier_rejection", "model_invalidation")
     return {name: [r for r in rows if r["assessor"] == name] for name in names}
 
@@ -56,11 +56,11 @@ def reach(rows) -> float:
     return max(r["mean_mm"] for r in rows) - min(r["mean_mm"] for r in rows)
 
 
-def test_sentences_about_the_study(finished, claims):
-    by = lines(finished)
+def test_sentences_about_the_study(papers_arm, claims):
+    by = lines(papers_arm)
     top, cut, mi = by["maximum"], by["outlier_rejection"], by["model_invalidation"]
     truth = top[0]["mean_mm"] - top[0]["bias_mm"]
-    errors = [r["true_error_mm"] for r in tables.rows(finished, "assessment_points")]
+    errors = [r["true_error_mm"] for r in tables.rows(papers_arm, "assessment_points")]
     assert truth == pytest.approx(max(errors), rel=1e-12)
 
     near = sum(e > 0.9 * max(errors) for e in errors) / len(errors)
@@ -96,13 +96,13 @@ def test_sentences_about_the_study(finished, claims):
     check(claims, "model_invalidation_less_sensitive", ratio, ratio < 1)
 
 
-def history(finished, name):
-    rows = [r for r in tables.rows(finished, "histories") if r["example"] == name]
+def history(papers_arm, name):
+    rows = [r for r in tables.rows(papers_arm, "histories") if r["example"] == name]
     return sorted(rows, key=lambda r: r["iteration"])
 
 
-def test_sentences_about_the_history_that_rejects(finished, claims):
-    rows = history(finished, "rejected")
+def test_sentences_about_the_history_that_rejects(papers_arm, claims):
+    rows = history(papers_arm, "rejected")
     eta, alpha = rows[0]["eta_mm"], rows[0]["alpha"]
     last = rows[-1]["rejection_probability"] - alpha
     check(claims, "fig5_rejected", last, last > 0)
@@ -119,13 +119,13 @@ def test_sentences_about_the_history_that_rejects(finished, claims):
     again = [r["true_mm"] > eta for r in rows if r["repeat"] > 1]
     share = fmean(again) if again else math.nan
     check(claims, "fig5_prioritises_bad_points", share, share > 0.5)
-    larger = history(finished, "rejected_larger_eta")[-1]
+    larger = history(papers_arm, "rejected_larger_eta")[-1]
     excess = larger["rejection_probability"] - alpha
     check(claims, "fig5_larger_eta_not_rejected", excess, excess <= 0)
 
 
-def test_sentences_about_the_history_that_cannot_reject(finished, claims):
-    rows = history(finished, "not_rejected")
+def test_sentences_about_the_history_that_cannot_reject(papers_arm, claims):
+    rows = history(papers_arm, "not_rejected")
     eta, alpha = rows[0]["eta_mm"], rows[0]["alpha"]
     last = rows[-1]["rejection_probability"] - alpha
     check(claims, "fig6_not_rejected", last, last <= 0)
@@ -134,23 +134,23 @@ def test_sentences_about_the_history_that_cannot_reject(finished, claims):
     check(claims, "fig6_resampling_by_noise", excess, excess < 0 and repeated)
 
 
-def slices(finished, column):
+def slices(papers_arm, column):
     result: dict[float, dict[tuple[float, float], float]] = {}
-    for row in tables.rows(finished, "accuracy_map"):
+    for row in tables.rows(papers_arm, "accuracy_map"):
         if row[column] is not None:
             place = row["radius_mm"], row["height_mm"]
             result.setdefault(row["slice_deg"], {})[place] = row[column]
     return result
 
 
-def test_sentences_about_where_the_largest_errors_lie(finished, claims):
-    rows = tables.rows(finished, "accuracy_map")
+def test_sentences_about_where_the_largest_errors_lie(papers_arm, claims):
+    rows = tables.rows(papers_arm, "accuracy_map")
     radii = sorted({row["radius_mm"] for row in rows})
     heights = sorted({row["height_mm"] for row in rows})
 
     def places(column):
         found = []
-        for _, cells in sorted(slices(finished, column).items()):
+        for _, cells in sorted(slices(papers_arm, column).items()):
             radius, height = max(cells, key=cells.get)
             found.append(
                 (
@@ -170,7 +170,7 @@ def test_sentences_about_where_the_largest_errors_lie(finished, claims):
     outer = [
         place[0]
         for place, angle in zip(
-            places("position_max_mm"), sorted(slices(finished, "position_max_mm")), strict=True
+            places("position_max_mm"), sorted(slices(papers_arm, "position_max_mm")), strict=True
         )
         if angle in {0.0, 60.0}
     ]

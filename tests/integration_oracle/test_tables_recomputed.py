@@ -354,8 +354,10 @@ def test_histories_are_runs_of_the_studys_worlds(finished):
 # --- claims ---------------------------------------------------------------------------------------
 
 
-def test_numbers_of_the_claims(finished, models, measurements):
-    claims = {row["claim"]: row for row in tables.rows(finished, "claims")}
+def test_numbers_of_the_claims(papers_arm):
+    models = tables.models(papers_arm)
+    measurements = tables.rows(papers_arm, "measurements")
+    claims = {row["claim"]: row for row in tables.rows(papers_arm, "claims")}
     train = [row for row in measurements if row["subset"] == "train"]
     for (table, comparison, quantity), paper in PAPER.items():
         both = tables.magnitudes(models, train, comparison)
@@ -367,7 +369,7 @@ def test_numbers_of_the_claims(finished, models, measurements):
             assert row["reproduced"] == pytest.approx(expected[name], rel=1e-7)
             agrees = abs(row["reproduced"] - value) <= value / 10
             assert row["verdict"] == ("agrees" if agrees else "differs")
-    truth = max(assessors.norm(e) for e in true_errors(finished).tolist())
+    truth = max(assessors.norm(e) for e in true_errors(papers_arm).tolist())
     assert claims["true_accuracy"]["paper"] == 0.906
     assert claims["true_accuracy"]["reproduced"] == pytest.approx(truth, rel=1e-12)
     d = [row[1] for row in models.dh]

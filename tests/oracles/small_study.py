@@ -76,7 +76,7 @@ def write_measurements(path: Path) -> Written:
 def run_stages(config: Path, dataset: str, results: Path, names: tuple[str, ...] = ()) -> Path:
     """Every stage of a data set but its figures, or those named; its folder."""
     from kinacc.workflow.plan import planned
-    from kinacc.workflow.runner import Job, perform
+    from kinacc.workflow.runner import perform
 
     plan = planned([str(config)], results=str(results))
     stages = [s for s in plan.stages(dataset).values() if not s.is_figure and not s.on_request]
@@ -87,15 +87,5 @@ def run_stages(config: Path, dataset: str, results: Path, names: tuple[str, ...]
         if names and stage.name not in names:
             continue
         for part in plan.part_names(stage.name, dataset):
-            perform(
-                Job(
-                    stage.module,
-                    plan.inputs(stage.name, dataset),
-                    plan.outputs(stage.name, dataset, part),
-                    plan.settings(stage.name, dataset),
-                    plan.seed(dataset),
-                    part=part,
-                    log=plan.log(stage.name, dataset, part),
-                )
-            )
+            perform(plan.job(stage.name, dataset, part))
     return results / dataset
