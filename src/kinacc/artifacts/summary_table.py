@@ -16,6 +16,7 @@ TOPICS = (
     "held_out_model_difference",
     "selection",
     "range",
+    "like_measured",
     "undetermined",
 )
 SUMMARY = Artefact(

@@ -36,10 +36,11 @@ class Fact(NamedTuple):
     text: str | None = None
 
 
-def facts(tables: Mapping[str, Columns], robot: Robot) -> list[Fact]:
+def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np.nan) -> list[Fact]:
     """Everything ``summary`` holds of the tables ``TABLES`` and, where there, of models and data.
 
-    ``robot``: the one the tables were made with.
+    ``robot``: the one the tables were made with; ``like_measured``: share of the box of the ranges
+    of the joints where the selected model was measured, NaN where it is not known.
     """
     return [
         *_data(tables["measurements"], robot),
@@ -55,6 +56,7 @@ def facts(tables: Mapping[str, Columns], robot: Robot) -> list[Fact]:
         ),
         *_excluded(tables.get("excluded_rows"), selected(tables["model_selection"])),
         *_range(tables["measurements"], robot),
+        *_like_measured(like_measured),
         *(
             Fact("undetermined", str(number), "statement", text=text)
             for number, text in enumerate(blind_words.listed(tables["dh_identified"]), 1)
@@ -198,16 +200,26 @@ def _excluded(table: Mapping | None, model: str) -> Iterator[Fact]:
 
 def _range(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
     """Range of each reported joint that the poses cover, and its share of the joint's travel."""
-    for joint in range(len(robot.q_min_rad)):
+    for joint, (low, high) in enumerate(zip(*covered(measurements, robot), strict=True)):
         slides = bool(robot.dh.prismatic[joint])
         scale, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
-        reported = np.asarray(measurements[f"q{joint + 1}"], dtype=float)
-        low, high = reported.min(), reported.max()
         share = (high - low) / (robot.q_max_rad[joint] - robot.q_min_rad[joint])
         item = f"joint {joint + 1}"
         yield Fact("range", item, "low", float(scale * low), unit)
         yield Fact("range", item, "high", float(scale * high), unit)
         yield Fact("range", item, "share", float(share), "1")
+
+
+def covered(measurements: Mapping, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Ends (k,), (k,) of the reported joints of all poses."""
+    numbers = range(1, len(robot.q_min_rad) + 1)
+    reported = np.stack([np.asarray(measurements[f"q{n}"], dtype=float) for n in numbers])
+    return reported.min(axis=1), reported.max(axis=1)
+
+
+def _like_measured(share: float) -> Iterator[Fact]:
+    if np.isfinite(share):
+        yield Fact("like_measured", "ranges of all joints", "share", share, "1")
 
 
 def of(found: Iterable[Fact], topic: str) -> dict[str, dict[str, Fact]]:

@@ -32,7 +32,7 @@ def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str
         *_errors(facts, whole),
         *paragraph("selected", _selected(facts)),
         *paragraph("bending", _bending(of(facts, "bending"))),
-        *paragraph("valid where", _range(of(facts, "range"))),
+        *paragraph("valid where", _range(facts)),
         *paragraph("undetermined", _undetermined(facts, most, more)),
     ]
 
@@ -206,14 +206,20 @@ def _bending(joints: Mapping[str, Mapping[str, Fact]]) -> list[str]:
     return lines
 
 
-def _range(joints: Mapping[str, Mapping[str, Fact]]) -> list[str]:
+def _range(facts: Sequence[Fact]) -> list[str]:
+    """Ranges of the joints, and how much of the box they span was measured."""
+    joints, known = of(facts, "range"), of(facts, "like_measured")
+    head = "near the measured poses; range of each joint by itself (share of its travel):"
+    if known:
+        share = next(iter(known.values()))["share"].value
+        many = f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
+        head = f"of poses in these ranges (share of travel), {many} are like those measured:"
     told = [
         f"{name.replace('joint ', 'J')} {known['low'].value:.0f} to {known['high'].value:.0f} "
         f"{known['low'].unit} ({known['share'].value:.0%})".ljust(_JOINT_WIDTH)
         for name, known in joints.items()
     ]
     lines = [told[i : i + _JOINTS_PER_LINE] for i in range(0, len(told), _JOINTS_PER_LINE)]
-    head = "near the measured poses; range of each joint by itself (share of its travel):"
     return [head, *("".join(line).rstrip().replace(" ", _KEPT) for line in lines)]
 
 

@@ -43,9 +43,10 @@ def campaign() -> None:
         help="Candidates drawn where there is no file.")  # fmt: skip
 @option(
     "--region",
-    type=click.Choice(["configured", "fitted", "limits"]),
-    help="Draw from the configured evaluation space, the joints the calibration covers, or the "
-    "joint limits. [configured if there is a configuration, else fitted]",
+    type=click.Choice(["measured", "configured", "fitted", "limits"]),
+    help="Draw between neighbouring measured poses, or evenly from the configured evaluation "
+    "space, the joint ranges the calibration covers, or the joint limits. [configured if there is "
+    "a configuration with a space, fitted with --joints-deg, else measured]",
 )
 @option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...".')
 @option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')
@@ -68,7 +69,7 @@ def start(out, **given) -> None:
     Candidates are the joint configurations the statement is about: rows of a file (q1_deg .. or
     q1_rad ..; q1_mm where a joint slides; a `pose` column names them, s1 .. are directions of
     travel), or drawn. Their order is random, by the seed, and knows nothing of the errors. Where
-    the calibration is too unsure of them for readings to be judged, that is said.
+    more than a tenth of them lie where the calibration was not measured, that is asked about.
 
     The noise must hold all that differs between readings of one pose: the instrument, its target,
     and how well the arm repeats the pose.

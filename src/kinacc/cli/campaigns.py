@@ -72,16 +72,17 @@ def start(given: Mapping, out: Output) -> None:
         calibration, points, assessor, instruments, limits, given["seed"], joints_now, about,
         by_travel=given["visit"] == "travel",
     )  # fmt: skip
+    unsure = prediction_check.unsure(
+        calibration, points, instruments, given["point"], limits.implausible_mm
+    )
     if not given["sure"]:
         left_mm = calibration.residual.position_mm if calibration.residual else math.nan
         problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
         readings = [Path(given["calibration"]) / f"{name}.parquet" for name in _READINGS]
         if all(path.is_file() for path in readings):
             problems += slips.of_little_noise(instruments, *map(store.read, readings))
+        problems += [] if unsure is None else unsure.asked()
         refuse(problems, "The campaign was not begun")
-    unsure = prediction_check.unsure(
-        calibration, points, instruments, given["point"], limits.implausible_mm
-    )
     for line in [] if unsure is None else unsure.in_words():
         click.echo(line, err=True)
     folders.start(given["folder"], begun)

@@ -222,8 +222,11 @@ STAGES: dict[str, Stage] = {
             ("summary",),
             ("robot",),
             files=("robot",),
-            uses=(_ROBOT,),
-            optional=("data_check", "excluded_rows", "vec_orders", *_FURTHER),
+            uses=(_ROBOT, _MODEL),
+            optional=(
+                *("data_check", "excluded_rows", "vec_orders", *_FURTHER),
+                *(f"{kind}_{what}" for kind in FITTED for what in ("fit", "covariance")),
+            ),
         ),
         Stage(
             "accuracy_map",
