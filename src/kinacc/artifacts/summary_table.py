@@ -8,6 +8,7 @@ from kinacc.artifacts.columns import Artefact, real, text
 TOPICS = (
     "robot",
     "data",
+    "left_out",
     "check",
     "excluded_rows",
     "held_out_error",

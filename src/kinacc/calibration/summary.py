@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, SELECTABLE, SUBSETS
+from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSETS
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.calibration import blind_words
 from kinacc.kinematics.robot import Robot
+from kinacc.measurements.row_names import RowNames
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
 TABLES = ("measurements", "robot", "frames", "dh_identified", "pose_errors", "model_selection")
@@ -45,6 +47,10 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
     return [
         *_data(tables["measurements"], robot),
         *_frames(tables["frames"]),
+        *(
+            Fact(LEFT_OUT, str(number), "statement", text=text)
+            for number, text in enumerate(left_out(tables.get("data_check")), 1)
+        ),
         *_findings(tables.get("data_check")),
         *_errors(tables["pose_errors"]),
         *_selection(tables),
@@ -88,6 +94,14 @@ def findings(table: Mapping) -> list[str]:
     return [each.text for each in _findings(table) if each.text]
 
 
+def left_out(table: Mapping | None) -> list[str]:
+    """What is not used of the measured file, in words, from a ``data_check`` table."""
+    if table is None:
+        return []
+    pairs = zip(table["finding"], table["what"], strict=True)
+    return [str(what) for kind, what in pairs if kind == LEFT_OUT]
+
+
 def excluded_errors(table: Mapping, model: str) -> list[tuple[int, str, float]]:
     """Line, reason and position error in mm of every row left out; NaN where it has none."""
     size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
@@ -123,10 +137,13 @@ def _findings(table: Mapping | None) -> Iterator[Fact]:
     if table is None:
         return
     note = FINDING_LEVELS[-1]
-    order = sorted(range(len(table["finding"])), key=lambda i: table["level"][i] == note)
+    order = [i for i, kind in enumerate(table["finding"]) if kind != LEFT_OUT]
+    order.sort(key=lambda i: table["level"][i] == note)
     for i in order:
         text = f"{table['finding'][i]}: {table['what'][i]}"
-        text += f" ({table['lines'][i]})" if table["lines"][i] else ""
+        lines = str(table["lines"][i] or "")
+        told = re.search(rf"{re.escape(lines)}(?![\w-])", text)
+        text += "" if told else f"; {lines}"
         text += f"; accepted: {table['accepted'][i]}" if table["accepted"][i] else ""
         count = float(table["rows"][i])
         yield Fact("check", str(table["finding"][i]), str(table["level"][i]), count, "1", text)
@@ -193,9 +210,12 @@ def _orders(name: str, table: Mapping | None) -> Iterator[Fact]:
 
 
 def _excluded(table: Mapping | None, model: str) -> Iterator[Fact]:
-    for line, reason, error in [] if table is None else excluded_errors(table, model):
+    if table is None:
+        return
+    names = RowNames.of_columns({**table, "row": table["line"]})
+    for line, reason, error in excluded_errors(table, model):
         unit = "mm" if np.isfinite(error) else None
-        yield Fact("excluded_rows", f"line {line}", "error", error, unit, reason)
+        yield Fact("excluded_rows", names.one(line), "error", error, unit, reason)
 
 
 def _range(measurements: Mapping, robot: Robot) -> Iterator[Fact]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
+from kinacc.artifacts.allowed import LEFT_OUT
 from kinacc.artifacts.error_models import NOMINAL, PLAINEST
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
@@ -12,6 +13,7 @@ from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 WIDTH = 100
 MARGIN = 17  # where the text of a paragraph begins
 _MOST, _LINES = 3, 5  # findings, excluded rows, sentences that are told, and lines they may take
+_LINES_EACH = 2  # of what is left out: a list of columns may be long
 _JOINTS_PER_LINE, _JOINT_WIDTH = 3, 27
 _KEPT = "\u00a0"  # a space that no line is broken at
 _FIGURES = ("mean", "quantile_99", "largest")
@@ -26,7 +28,7 @@ def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str
     """
     most = None if whole else _MOST
     return [
-        *paragraph("data", _data(facts)),
+        *paragraph("data", [*_data(facts), *_left_out(facts, most, more)]),
         *paragraph("check", _checked(facts, most, more)),
         *paragraph("excluded", _excluded(facts, most, more)),
         *_errors(facts, whole),
@@ -69,6 +71,14 @@ def _data(facts: Sequence[Fact]) -> list[str]:
         told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} kept out"
         lines.append(f"{told} (measurements.validation_fold)")
     return lines
+
+
+def _left_out(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
+    told = [each.text for each in facts if each.topic == LEFT_OUT and each.text]
+    if most is None:
+        return told
+    room = _LINES_EACH * (WIDTH - MARGIN)
+    return _first([textwrap.shorten(each, room, placeholder=" ..") for each in told], most, more)
 
 
 def _checked(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
