@@ -6,6 +6,7 @@ import click
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
+from kinacc.cli.file_options import joint_file_options
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import answers
 
@@ -39,6 +40,7 @@ def campaign() -> None:
 @choice.SESSION
 @choice.POINT
 @option("--candidates", type=click.Path(), help="File of joints that may be measured.")
+@joint_file_options
 @option("--drawn", default=200, type=click.IntRange(1, 20_000),
         help="Candidates drawn where there is no file.")  # fmt: skip
 @option(
@@ -66,10 +68,10 @@ def campaign() -> None:
 def start(out, **given) -> None:
     """Begin a campaign in FOLDER: nothing of this can be changed once there are readings.
 
-    Candidates are the joint configurations the statement is about: rows of a file (q1_deg .. or
-    q1_rad ..; q1_mm where a joint slides; a `pose` column names them, s1 .. are directions of
-    travel), or drawn. Their order is random, by the seed, and knows nothing of the errors. Where
-    more than a tenth of them lie where the calibration was not measured, that is asked about.
+    Candidates are the joint configurations the statement is about: rows of a file in any form that
+    `kinacc init` reads, robots' programs included (of q1_deg .. also s1 .., directions of travel),
+    or drawn. Their order is random, by the seed, and knows nothing of the errors. Where more than a
+    tenth of them lie where the calibration was not measured, that is asked about.
 
     The noise must hold all that differs between readings of one pose: the instrument, its target,
     and how well the arm repeats the pose.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,10 +57,15 @@ class CandidatePoses:
     source: str
 
 
-def candidates(wanted: Region, calibration: Calibration) -> CandidatePoses:
-    """The candidates the options ask for. Raises InputError."""
+def candidates(
+    wanted: Region, calibration: Calibration, answers: Mapping | None = None
+) -> CandidatePoses:
+    """The candidates the options ask for. Raises InputError.
+
+    ``answers`` to what a file leaves open, by option.
+    """
     if wanted.candidates is not None:
-        file = rows.candidates(wanted.candidates, calibration.robot, _MOST_CANDIDATES)
+        file = rows.candidates(wanted.candidates, calibration.robot, _MOST_CANDIDATES, answers)
         label = [str(each) for each in file.label]
         source = f"rows of {Path(wanted.candidates).name}"
         return CandidatePoses(file.joints, label, file.directions, source)

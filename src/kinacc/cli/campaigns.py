@@ -28,6 +28,7 @@ def start(given: Mapping, out: Output) -> None:
     from kinacc.artifacts import store
     from kinacc.campaign import begin, prediction_check, slips
     from kinacc.cli import campaign_candidates, campaign_options, rows
+    from kinacc.cli.file_options import joint_answers
 
     problems = folders.in_the_way(given["folder"])
     noise = (given[each] for each in ("noise_mm", "covariance_mm2", "instrument", "frame"))
@@ -43,7 +44,7 @@ def start(given: Mapping, out: Output) -> None:
         given["calibration"], given["model"], given["robot"], given["config"], given["session"]
     )
     region = choice.record_of(campaign_candidates.Region, given)
-    found = campaign_candidates.candidates(region, calibration)
+    found = campaign_candidates.candidates(region, calibration, joint_answers(given))
     points = begin.points_of(
         calibration, found.joints, found.label, found.directions, given["point"]
     )
