@@ -89,6 +89,10 @@ def assert_same(some, others):
         ("study: {search: bisection}", {"study", "robustness_chunk"}),
         ("study: {repetitions: 7}", {"study_chunk", "robustness_chunk"}),
         ("evaluation: {points: 7}", {"assessment_points", "robustness_chunk"}),
+        (
+            "evaluation: {reference_frame: base}",
+            {"measurements", "accuracy_map", "assessment_points", "robustness_chunk"},
+        ),
         ("map: {grid_mm: 50}", {"accuracy_map", "robustness_chunk"}),
         ("robustness: {draws: 3}", {"robustness_chunk"}),
         ("measurements: {file: {decimal: ','}}", set()),

@@ -19,10 +19,11 @@ from kinacc.synthetic import columns
 from kinacc.synthetic.accepted import GEOMETRY, AcceptedDraw, geometry_columns
 from kinacc.synthetic.draw import TABLE_II, Scales
 from kinacc.synthetic.response import Response, linearise
+from kinacc.synthetic.tracker import Run, calibration_run
 from kinacc.synthetic.tuning import Targets, targets_of, tuned
 from kinacc.workflow import arm_acceptance as acceptance
 from kinacc.workflow import in_memory
-from kinacc.workflow.stages.measurements import split
+from kinacc.workflow.stages.measurements import attitude, split
 
 _UNTUNED = AcceptedDraw(0, Scales(1.0, 1.0, 1.0, 1.0), TABLE_II)
 
@@ -55,6 +56,10 @@ class Bench:
         """Standard deviation of the tracker per axis."""
         return float(self.config["measurements"]["synthetic"]["tracker_noise_mm"])
 
+    def run(self, seed: int) -> Run:
+        """The calibration run with the chance of draw ``seed``, as the workflow plans it."""
+        return calibration_run(self.robot, self.poses, seed, attitude(self.config["evaluation"]))
+
 
 def bench_of(config: Mapping) -> Bench:
     """The bench for the complete configuration of a data set of the synthetic arm."""
@@ -84,9 +89,8 @@ def bench_of(config: Mapping) -> Bench:
 
 def trial(bench: Bench, seed: int) -> Trial:
     """Draw, tune, measure and fit the arm of ``seed``, and judge it."""
-    draw = tuned(
-        bench.robot, seed, bench.response, bench.targets, bench.poses, bench.tracker_noise_mm
-    )
+    run = bench.run(seed)
+    draw = tuned(seed, run, bench.response, bench.targets, bench.tracker_noise_mm)
     return judged(bench, draw)
 
 
@@ -98,7 +102,7 @@ def judged(bench: Bench, draw: AcceptedDraw) -> Trial:
 
 def measured(bench: Bench, draw: AcceptedDraw) -> dict[str, np.ndarray]:
     """Columns of ``measurements`` of an arm, split as the workflow splits them."""
-    seen = columns(bench.robot, draw, bench.poses, bench.tracker_noise_mm)
+    seen = columns(draw, bench.run(draw.seed), bench.tracker_noise_mm)
     return split(seen, bench.config)
 
 

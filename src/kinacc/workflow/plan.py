@@ -265,8 +265,9 @@ class Plan:
 
     def settings(self, name: str, dataset: str) -> dict[str, object]:
         """The configuration values a stage depends on, nested as in the configuration."""
-        config, chosen = self._config(dataset), {}
-        for path in STAGES[name].settings:
+        config, chosen, stage = self._config(dataset), {}, STAGES[name]
+        synthetic = not stage.joint and config["measurements"]["source"] == "synthetic"
+        for path in (*stage.settings, *(stage.synthetic_settings if synthetic else ())):
             _copy({**config, "dataset": dataset}, chosen, path.split("."))
         return chosen
 
