@@ -96,9 +96,20 @@ def _figure(
     settings: tuple[str, ...] = (),
     files: tuple[str, ...] = (),
     uses: tuple[str, ...] = (),
+    on_request: bool = False,
 ) -> Stage:
     """The stage that draws ``figures/<name>`` by the ``run`` of ``kinacc.figures.<name>``."""
-    return Stage(name, message, inputs, (name,), settings, files=files, uses=uses, is_figure=True)
+    return Stage(
+        name,
+        message,
+        inputs,
+        (name,),
+        settings,
+        files=files,
+        uses=uses,
+        on_request=on_request,
+        is_figure=True,
+    )
 
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
@@ -375,6 +386,40 @@ STAGES: dict[str, Stage] = {
             on_request=True,
         ),
         Stage(
+            "map_readings_chunk",
+            "judging the sentences on Fig. 3 under another reading, over arms drawn anew",
+            (),
+            ("map_readings_chunk",),
+            (
+                "seed",
+                "robot",
+                "measurements",
+                "calibration",
+                "evaluation",
+                "map",
+                "map_readings",
+            ),
+            files=("robot",),
+            uses=(_ROBOT, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
+            scattered=True,
+            on_request=True,
+            shared=True,
+        ),
+        Stage(
+            "map_readings",
+            "gathering the sentences on Fig. 3 under its readings",
+            ("map_readings_chunk",),
+            ("map_readings",),
+            on_request=True,
+        ),
+        _figure(
+            "fig3_readings",
+            "drawing what holds of Fig. 3 under its readings",
+            ("map_readings",),
+            ("dataset",),
+            on_request=True,
+        ),
+        Stage(
             "tournament_chunk",
             "campaigns of every assessor",
             ("assessment_points",),
@@ -412,6 +457,8 @@ CALIBRATION = (
     "excluded_rows",
     "summary",
 )
+# Made on request beside the claims on further draws: Fig. 3 under every reading of it.
+MAP_READINGS = ("map_readings_chunk", "map_readings", "fig3_readings")
 
 
 def maker_of(artefact: str) -> Stage:
