@@ -35,6 +35,8 @@ WORDS = {
 FRAMES = {"slice": "turning with the slice", "base": "held in the robot's base"}
 TURNS = {"signs_and_zero": "9 turns", "all_27": "27 turns"}
 _ROW_IN, _GAP = 0.185, 0.8  # height of a row; free space between the two frames, in rows
+_COUNTS_AT = tuple(len(SENTENCES) + np.array([0.0, 0.85, 1.55]))  # columns of the counts
+_FORMS = ("{:.1f}", "{:.0f} %", "{:.0f}")
 _DARK = 0.55  # shares above this are dark cells
 
 
@@ -62,18 +64,19 @@ def draw(table: Columns, *, dataset: str | None = None) -> Figure:
         ax = figure.subplots()
         for number, (reading, y) in enumerate(zip(READINGS, heights, strict=True)):
             _row(ax, y, reading, found.holds[number])
-            _number(ax, len(SENTENCES) + 0.55, y, found.sentences[number], "{:.1f}")
-            _number(ax, len(SENTENCES) + 1.25, y, 100 * found.reached[number], "{:.0f} %")
-            _number(ax, len(SENTENCES) + 1.9, y, found.arms[number], "{:.0f}")
+            counts = found.sentences[number], 100 * found.reached[number], found.arms[number]
+            for x, value, form in zip(_COUNTS_AT, counts, _FORMS, strict=True):
+                words = "–" if np.isnan(value) else form.format(value)
+                ax.text(x, y, words, ha="center", va="center", fontsize=style.SMALL_PT)
             if number == 0 or READINGS[number - 1].reference_frame != reading.reference_frame:
                 words = f"flange attitude {FRAMES[reading.reference_frame]}"
                 ax.text(-2.35, y - 0.85, words, weight="bold", va="center", fontsize=style.SMALL_PT)
         heads = [WORDS[name] for name in SENTENCES]
         heads += ["sentences\nof 7\nthat hold", "combi-\nnations\nreached", "arms"]
-        at = [*np.arange(len(SENTENCES)), *(len(SENTENCES) + np.array([0.35, 1.1, 1.8]))]
+        at = [*np.arange(len(SENTENCES)), *_COUNTS_AT]
         for x, words in zip(at, heads, strict=True):
             ax.text(x, -0.15, words, ha="center", va="bottom", fontsize=style.SMALL_PT)
-        ax.set(xlim=(-2.4, len(SENTENCES) + 2.0), ylim=(heights[-1] + 0.55, -0.2))
+        ax.set(xlim=(-2.4, _COUNTS_AT[-1] + 0.3), ylim=(heights[-1] + 0.55, -0.2))
         ax.axis("off")
         figure.supxlabel(
             "Share of arms on which a sentence of the paper holds; each reading has its own "
@@ -104,8 +107,3 @@ def _patch(corner: tuple[float, float], width: float, height: float, value: floa
     from matplotlib.patches import Rectangle
 
     return Rectangle(corner, width, height, fc=colormaps["Blues"](0.9 * value), ec="none")
-
-
-def _number(ax: Axes, x: float, y: float, value: float, form: str) -> None:
-    words = "–" if np.isnan(value) else form.format(value)
-    ax.text(x, y, words, ha="right", va="center", fontsize=style.SMALL_PT)
