@@ -83,16 +83,24 @@ def assert_same(some, others):
             np.testing.assert_array_equal(values, others[name][column], f"{name}.{column}")
 
 
+AGAIN = ("robustness_chunk", "map_readings_chunk")  # go through fits and maps with other arms
+
+
 @pytest.mark.parametrize(
     ("change", "stages"),
     [
         ("study: {search: bisection}", {"study", "robustness_chunk"}),
         ("study: {repetitions: 7}", {"study_chunk", "robustness_chunk"}),
-        ("evaluation: {points: 7}", {"assessment_points", "robustness_chunk"}),
-        ("map: {grid_mm: 50}", {"accuracy_map", "robustness_chunk"}),
+        ("evaluation: {points: 7}", {"assessment_points", *AGAIN}),
+        (
+            "evaluation: {reference_frame: base}",
+            {"measurements", "accuracy_map", "assessment_points", *AGAIN},
+        ),
+        ("map: {grid_mm: 50}", {"accuracy_map", *AGAIN}),
         ("robustness: {draws: 3}", {"robustness_chunk"}),
+        ("map_readings: {arms: 3}", {"map_readings_chunk"}),
         ("measurements: {file: {decimal: ','}}", set()),
-        ("measurements: {synthetic: {poses: 700}}", {"measurements", "robustness_chunk"}),
+        ("measurements: {synthetic: {poses: 700}}", {"measurements", *AGAIN}),
         ("figures: {formats: [svg]}", set()),
         ("study: {chunks: 5}", set()),
     ],

@@ -144,7 +144,10 @@ def _claims(folder: Path, facts: Sequence[Fact], tables: Tables) -> list[str]:
     """What became of the paper's claims, where they are held to these results."""
     if "claims" not in tables or not _is_synthetic(facts):
         return []
-    claims, figures = tables["claims"], [each.name for each in STAGES.values() if each.is_figure]
+    claims, figures = (
+        tables["claims"],
+        [stage.name for stage in STAGES.values() if stage.is_figure and not stage.on_request],
+    )
     pictures = f"{folder}/{FIGURE_FOLDER}: {figures[0]} to {figures[-1]}"
     return [
         f"{folder.resolve().name}: the paper reproduced",

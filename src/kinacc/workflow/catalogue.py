@@ -22,7 +22,8 @@ class Stage:
     """One step of the study.
 
     ``message`` says in words what it does. ``inputs`` and ``outputs`` are artefact names of the
-    data set. ``settings`` are dotted key paths of the data set's configuration, ``files`` those
+    data set. ``settings`` are dotted key paths of the data set's configuration, with
+    ``synthetic_settings`` where its arm is synthetic, ``files`` those
     whose values name files it reads; nothing else of the configuration reaches the stage.
     ``uses`` are files of the package and registries of modules that its module does not import
     (:func:`kinacc.artifacts.provenance.code_hash`); ``{robot}`` stands for the value, or each of
@@ -44,6 +45,7 @@ class Stage:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     settings: tuple[str, ...] = ()
+    synthetic_settings: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
@@ -94,14 +96,26 @@ def _figure(
     settings: tuple[str, ...] = (),
     files: tuple[str, ...] = (),
     uses: tuple[str, ...] = (),
+    on_request: bool = False,
 ) -> Stage:
     """The stage that draws ``figures/<name>`` by the ``run`` of ``kinacc.figures.<name>``."""
-    return Stage(name, message, inputs, (name,), settings, files, uses, is_figure=True)
+    return Stage(
+        name,
+        message,
+        inputs,
+        (name,),
+        settings,
+        files=files,
+        uses=uses,
+        on_request=on_request,
+        is_figure=True,
+    )
 
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
 _DRAWS = "synthetic/accepted_draws.csv"
 _READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.search")
+_ATTITUDE = ("evaluation.reference_orientation_deg", "evaluation.reference_frame")
 _CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
 _MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
@@ -119,6 +133,7 @@ STAGES: dict[str, Stage] = {
             (),
             ("measurements", "robot"),
             ("seed", "robot", "measurements"),
+            synthetic_settings=_ATTITUDE,  # of the poses planned
             files=("robot", "measurements.file.path", "measurements.file.joints.path"),
             uses=(_ROBOT, _DRAWS),
         ),
@@ -236,7 +251,7 @@ STAGES: dict[str, Stage] = {
             (
                 "robot",
                 "evaluation.cylinder",
-                "evaluation.reference_orientation_deg",
+                *_ATTITUDE,
                 "evaluation.rotation_deg",
                 "evaluation.rotations",
                 "evaluation.tool_mm",
@@ -374,6 +389,40 @@ STAGES: dict[str, Stage] = {
             on_request=True,
         ),
         Stage(
+            "map_readings_chunk",
+            "judging the sentences on Fig. 3 under another reading, over arms drawn anew",
+            (),
+            ("map_readings_chunk",),
+            (
+                "seed",
+                "robot",
+                "measurements",
+                "calibration",
+                "evaluation",
+                "map",
+                "map_readings",
+            ),
+            files=("robot",),
+            uses=(_ROBOT, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
+            scattered=True,
+            on_request=True,
+            shared=True,
+        ),
+        Stage(
+            "map_readings",
+            "gathering the sentences on Fig. 3 under its readings",
+            ("map_readings_chunk",),
+            ("map_readings",),
+            on_request=True,
+        ),
+        _figure(
+            "fig3_readings",
+            "drawing what holds of Fig. 3 under its readings",
+            ("map_readings",),
+            ("dataset",),
+            on_request=True,
+        ),
+        Stage(
             "tournament_chunk",
             "campaigns of every assessor",
             ("assessment_points",),
@@ -411,6 +460,8 @@ CALIBRATION = (
     "excluded_rows",
     "summary",
 )
+# Made on request beside the claims on further draws: Fig. 3 under every reading of it.
+MAP_READINGS = ("map_readings_chunk", "map_readings", "fig3_readings")
 
 
 def maker_of(artefact: str) -> Stage:
