@@ -69,9 +69,17 @@ for stage in STAGES.values():
 # The whole study and the claims on further draws, whose shares go into claims.parquet.
 rule robustness:
     input:
-        [plan.targets(dataset, on_request=True) for dataset in plan.datasets],
+        [plan.targets(dataset, also=["robustness_table"]) for dataset in plan.datasets],
     message:
         "every table and figure is up to date, and robustness.parquet with the claims on further draws"
+
+
+# The claims over every choice that the paper leaves open: each alone, and all at once.
+rule choices:
+    input:
+        [plan.targets(dataset, only=(), also=["choices_table"]) for dataset in plan.datasets],
+    message:
+        "choices.parquet has the claims over every choice the paper leaves open"
 
 
 rule tournament:

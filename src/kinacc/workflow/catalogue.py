@@ -104,6 +104,10 @@ _DRAWS = "synthetic/accepted_draws.csv"
 _READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.search")
 _CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
+_WHOLE_STUDY = (
+    *("seed", "robot", "measurements", "calibration", "evaluation", "map", "study", "histories"),
+    "robustness",
+)
 _MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 _FURTHER = tuple(f"{kind}_model" for kind in FITTED if kind not in ALWAYS)
 _MODEL = "kinacc.artifacts.error_models:MODELS[{models}]"
@@ -346,17 +350,7 @@ STAGES: dict[str, Stage] = {
             "going through fits, study and claims with further draws of the arm",
             (),
             ("robustness_chunk",),
-            (
-                "seed",
-                "robot",
-                "measurements",
-                "calibration",
-                "evaluation",
-                "map",
-                "study",
-                "histories",
-                "robustness",
-            ),
+            _WHOLE_STUDY,
             files=("robot",),
             uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
             scattered=True,
@@ -368,6 +362,25 @@ STAGES: dict[str, Stage] = {
             "gathering the claims on further draws of the arm",
             ("robustness_chunk",),
             ("robustness",),
+            on_request=True,
+        ),
+        Stage(
+            "choices_chunk",
+            "going through fits, study and claims with every choice the paper leaves open",
+            (),
+            ("choices_chunk", "choices_factors_chunk"),
+            (*_WHOLE_STUDY, "choices"),
+            files=("robot",),
+            uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
+            scattered=True,
+            on_request=True,
+            shared=True,
+        ),
+        Stage(
+            "choices_table",
+            "gathering the claims over the paper's open choices",
+            ("choices_chunk", "choices_factors_chunk"),
+            ("choices", "choices_factors"),
             on_request=True,
         ),
         Stage(

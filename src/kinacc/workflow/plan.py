@@ -56,7 +56,10 @@ def planned(
     refuse(problems)
     return Plan(
         {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
-        {name: config["study"]["chunks"] for name, config in full.items()},
+        {
+            name: {section: config[section]["chunks"] for section in ("study", "choices")}
+            for name, config in full.items()
+        },
         first,
         results,
         tournament,
@@ -68,15 +71,15 @@ class Plan:
     """The validated configuration of every data set, and where results go.
 
     ``datasets`` maps a data set's name to its complete configuration (defaults filled in, without
-    values that only say how a run is carried out); ``parts`` to the number of parts its scattered
-    stages are computed in; ``formats`` are the picture formats; ``tournament`` is the
-    configuration's section of that name, which is one for all data sets. ``files_absolute``: files
-    from outside are named in full, as a module of another workflow needs them, whose results may
-    have a folder put before them.
+    values that only say how a run is carried out); ``parts`` to the numbers of parts its scattered
+    stages are computed in, those of the study and those of the choices; ``formats`` are the
+    picture formats; ``tournament`` is the configuration's section of that name, which is one for
+    all data sets. ``files_absolute``: files from outside are named in full, as a module of another
+    workflow needs them, whose results may have a folder put before them.
     """
 
     datasets: Mapping[str, Mapping[str, object]]
-    parts: Mapping[str, int]
+    parts: Mapping[str, Mapping[str, int]]
     formats: tuple[str, ...]
     results: str = RESULTS
     tournament: Mapping[str, object] = field(default_factory=dict)
@@ -130,7 +133,7 @@ class Plan:
                 reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
         if config["measurements"]["source"] != "synthetic":
             reasons["claims"] = "the paper's claims are about the paper's arm"
-            for name in ("robustness_chunk", "robustness_table"):
+            for name in ("robustness_chunk", "robustness_table", "choices_chunk", "choices_table"):
                 reasons[name] = "no further draws of a measured arm"
             if "exclude" not in config["measurements"]["file"]:
                 reasons["excluded_rows"] = "no row is excluded"
@@ -143,16 +146,16 @@ class Plan:
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
     def targets(
-        self, dataset: str, on_request: bool = False, only: Collection[str] = STAGES
+        self, dataset: str, only: Collection[str] = STAGES, also: Collection[str] = ()
     ) -> list[str]:
-        """Every file the data set leaves in a run, a plain one or with what is made on request.
+        """Every file the data set leaves in a plain run, and what the stages ``also`` leave.
 
-        ``only``: the stages whose files are meant.
+        ``only``: the stages of a plain run whose files are meant.
         """
         return [
             path
             for name, stage in self.stages(dataset).items()
-            if name in only and stage.on_request <= on_request and not stage.scattered
+            if (name in only and not stage.on_request and not stage.scattered) or name in also
             for path in self.outputs(name, dataset).values()
         ]
 
@@ -247,10 +250,14 @@ class Plan:
             return [None]
         if STAGES[name].joint:
             count = self.tournament["chunks"]
+        elif name == "choices_chunk":
+            count = self.parts[dataset]["choices"]
         else:
             config = self.datasets[dataset]
             draws, repetitions = config["robustness"]["draws"], config["study"]["repetitions"]
-            count = min(self.parts[dataset], draws if "robustness" in name else repetitions)
+            count = min(
+                self.parts[dataset]["study"], draws if "robustness" in name else repetitions
+            )
         return [f"{number}-of-{count}" for number in range(1, count + 1)]
 
     def message(self, name: str, dataset: str) -> str:
