@@ -17,6 +17,9 @@ from kinacc.workflow import in_memory
 from kinacc.workflow.plan import planned
 from kinacc.workflow.stages import choices_chunk, choices_table, robustness_chunk
 
+# A choice of the fits, one of the space, one that both depend on, one of the study.
+NAMES = ["vec_order", "inner_radius", "reference_orientation", "search"]
+
 
 @pytest.fixture(scope="module")
 def config() -> dict:
@@ -26,7 +29,7 @@ def config() -> dict:
     config["evaluation"]["points"] = 40
     config["histories"]["simulations_searched"] = 20
     config["robustness"]["draws"] = 2
-    config["choices"] |= {"runs": 2, "names": ["inner_radius", "search", "vec_order"]}
+    config["choices"] |= {"runs": 2, "names": NAMES}
     return config
 
 
@@ -69,7 +72,7 @@ def test_every_value_alone_every_arm_and_all_at_once(config, made):
     assert followed.tolist() == [name for name in wanted if name.startswith(("fig5", "fig6"))] * 6
 
 
-@pytest.mark.parametrize("varied", ["default", "search", "vec_order", "arm", "all"])
+@pytest.mark.parametrize("varied", ["default", *NAMES, "arm", "all"])
 def test_a_choice_gets_the_verdicts_it_would_get_as_the_data_set(config, made, varied):
     """What runs share is made once, and no run takes what another has made differently."""
     found = gathered([made])["choices"]

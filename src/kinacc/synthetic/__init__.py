@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
-from kinacc.synthetic.draw import TABLE_II, physical_robot
+from kinacc.synthetic.draw import AS_TUNED, TABLE_II, physical_robot
 from kinacc.synthetic.tracker import calibration_run, measured
 
 # How far a nominal arm may be from Table II and still be the arm the draws were made for.
@@ -20,13 +21,15 @@ _SAME_ARM_MM, _SAME_ARM_RAD = 5.0, 0.02
 def measure(robot: Robot, settings: Mapping) -> dict[str, np.ndarray]:
     """Columns of ``measurements``, but for fold and subset, of an accepted draw of the arm.
 
-    ``settings``: ``draw``, ``poses`` and ``tracker_noise_mm`` of ``measurements.synthetic``. All
-    chance belongs to the draw. Raises InputError for an unknown draw and for another arm.
+    ``settings``: those of ``measurements.synthetic``; without a roughness the draw has the one it
+    was accepted with. All chance belongs to the draw. Raises InputError for an unknown draw and
+    for another arm.
     """
     _require_the_arm(robot)
+    stated = {name: settings[name] for name in AS_TUNED._fields if name in settings}
     return columns(
         robot,
-        accepted_draw(int(settings["draw"])),
+        replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated)),
         int(settings["poses"]),
         float(settings["tracker_noise_mm"]),
     )
@@ -37,7 +40,7 @@ def columns(
 ) -> dict[str, np.ndarray]:
     """Columns of the calibration run of ``poses`` poses on the arm of ``draw``."""
     run = calibration_run(robot, poses, draw.seed)
-    arm = physical_robot(draw.seed, draw.scales, draw.geometry)
+    arm = physical_robot(draw.seed, draw.scales, draw.geometry, draw.roughness)
     seen = measured(arm, run, tracker_noise_mm)
     quaternion = quaternion_from_rotation(seen.rotation)
     joints = range(robot.dh.joints)
