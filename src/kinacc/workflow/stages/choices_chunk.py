@@ -9,7 +9,7 @@ from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.provenance import config_hash
 from kinacc.errors import InputError
 from kinacc.study.choices.design import FIG_5, Run, runs
-from kinacc.study.choices.properties import of_points
+from kinacc.study.choices.properties import of_tables
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.workflow import in_memory
 
@@ -68,9 +68,7 @@ def _judged(
     factors = [
         (each.number, name, "choice", word, None) for name, word in sorted(each.chosen.items())
     ]
-    if "assessment_points" in tables:
-        factors += [
-            (each.number, name, "property", None, number)
-            for name, number in of_points(tables["assessment_points"]).items()
-        ]
+    factors += [
+        (each.number, name, "property", None, number) for name, number in of_tables(tables).items()
+    ]
     return judged, factors
