@@ -77,9 +77,9 @@ rule robustness:
 # The claims over every choice that the paper leaves open: each alone, and all at once.
 rule choices:
     input:
-        [plan.targets(dataset, only=(), also=["choices_table"]) for dataset in plan.datasets],
+        [plan.targets(dataset, only=(), also=CHOICES) for dataset in plan.datasets],
     message:
-        "choices.parquet has the claims over every choice the paper leaves open"
+        "choices.parquet has the claims over every open choice, claim_reasons.parquet what decides them"
 
 
 rule tournament:

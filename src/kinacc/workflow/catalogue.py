@@ -94,9 +94,11 @@ def _figure(
     settings: tuple[str, ...] = (),
     files: tuple[str, ...] = (),
     uses: tuple[str, ...] = (),
+    on_request: bool = False,
 ) -> Stage:
     """The stage that draws ``figures/<name>`` by the ``run`` of ``kinacc.figures.<name>``."""
-    return Stage(name, message, inputs, (name,), settings, files, uses, is_figure=True)
+    drawn = {"on_request": on_request, "is_figure": True}
+    return Stage(name, message, inputs, (name,), settings, files, uses, **drawn)
 
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
@@ -384,6 +386,19 @@ STAGES: dict[str, Stage] = {
             on_request=True,
         ),
         Stage(
+            "choices_reasons",
+            "saying what every claim hangs on",
+            ("choices", "choices_factors"),
+            ("claim_shares", "claim_reasons"),
+            on_request=True,
+        ),
+        _figure(
+            "claims_over_choices",
+            "drawing which claims hold whatever one chooses, and which hang on what",
+            ("claim_shares", "claim_reasons"),
+            on_request=True,
+        ),
+        Stage(
             "tournament_chunk",
             "campaigns of every assessor",
             ("assessment_points",),
@@ -421,6 +436,9 @@ CALIBRATION = (
     "excluded_rows",
     "summary",
 )
+
+# The claims over every choice that the paper leaves open, made on request.
+CHOICES = ("choices_chunk", "choices_table", "choices_reasons", "claims_over_choices")
 
 
 def maker_of(artefact: str) -> Stage:

@@ -15,7 +15,7 @@ from pathlib import Path
 from kinacc.artifacts.error_models import ERROR_MODELS, asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.errors import InputError, Problem, gathered, refuse
-from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, TOURNAMENT, Stage, maker_of
+from kinacc.workflow.catalogue import CHOICES, FIGURE_FOLDER, STAGES, TOURNAMENT, Stage, maker_of
 from kinacc.workflow.runner import Job
 
 RESULTS = "results"
@@ -133,7 +133,7 @@ class Plan:
                 reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
         if config["measurements"]["source"] != "synthetic":
             reasons["claims"] = "the paper's claims are about the paper's arm"
-            for name in ("robustness_chunk", "robustness_table", "choices_chunk", "choices_table"):
+            for name in ("robustness_chunk", "robustness_table", *CHOICES):
                 reasons[name] = "no further draws of a measured arm"
             if "exclude" not in config["measurements"]["file"]:
                 reasons["excluded_rows"] = "no row is excluded"
@@ -155,7 +155,7 @@ class Plan:
         return [
             path
             for name, stage in self.stages(dataset).items()
-            if (name in only and not stage.on_request and not stage.scattered) or name in also
+            if not stage.scattered and (name in also or (name in only and not stage.on_request))
             for path in self.outputs(name, dataset).values()
         ]
 
