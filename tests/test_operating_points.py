@@ -38,6 +38,17 @@ def test_points_in_space_lie_in_it_with_the_orientations_of_the_set(sequence):
     assert limits.within(q, *RANGE).all()
 
 
+def test_points_of_one_wrist_have_joint_5_on_one_side():
+    side = {
+        wrist: set(
+            np.sign(operating_points.in_space(ARM, MODELS, WANTED, "sobol", 60, wrist)[:, 4])
+        )
+        for wrist in ("both", "noflip", "flip")
+    }
+    assert sorted(map(len, side.values())) == [1, 1, 2]
+    assert side["noflip"] | side["flip"] == side["both"]
+
+
 def test_a_longer_set_begins_with_the_shorter_one():
     short = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 64)
     long = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 128)

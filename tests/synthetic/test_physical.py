@@ -9,7 +9,7 @@ import pytest
 
 from kinacc.kinematics import dh, robot
 from kinacc.synthetic import physical, plan
-from kinacc.synthetic.draw import TABLE_II, Scales, physical_robot
+from kinacc.synthetic.draw import TABLE_II, Roughness, Scales, physical_robot
 from kinacc.synthetic.physical import Visits
 from kinacc.synthetic.tracker import calibration_run, measured
 
@@ -141,6 +141,30 @@ def test_smooth_errors_are_waves_over_the_working_range():
                 for k in range(1, smooth.amplitude.shape[-1] + 1)
             )
             assert found[joint, error] == pytest.approx(wanted, abs=1e-15)
+
+
+@pytest.mark.parametrize("decay", [0.5, 2.0])
+def test_a_rougher_arm_has_larger_fast_waves_and_errors_of_the_same_size(decay):
+    scales = Scales(1.0, 1.0, 1.0, 1.0)
+    tuned, other = (
+        physical_robot(0, scales),
+        physical_robot(0, scales, TABLE_II, Roughness(decay, 1.0)),
+    )
+    waves = other.smooth.amplitude / tuned.smooth.amplitude
+    assert np.all((np.diff(waves, axis=-1) > 0) == (decay < 1.0))
+    sizes = [np.sqrt(np.sum(1.0 / np.arange(1, 9) ** (2 * power))) for power in (1.0, decay)]
+    assert np.allclose(waves[..., 0], sizes[0] / sizes[1])
+    assert np.array_equal(other.beyond.ripple_rad, tuned.beyond.ripple_rad)
+
+
+def test_an_arm_without_gear_errors_differs_from_the_tuned_one_in_them_alone():
+    scales = Scales(1.0, 1.0, 1.0, 1.0)
+    tuned, without = (
+        physical_robot(0, scales, TABLE_II, Roughness(1.0, size)) for size in (1.0, 0.0)
+    )
+    assert not without.beyond.ripple_rad.any()
+    assert np.array_equal(without.smooth.amplitude, tuned.smooth.amplitude)
+    assert np.array_equal(without.beyond.drift, tuned.beyond.drift)
 
 
 def test_angles_that_act_on_a_metre_are_an_order_smaller():

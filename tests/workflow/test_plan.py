@@ -9,6 +9,7 @@ from kinacc.workflow.catalogue import STAGES, TOURNAMENT, maker_of
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.stages import histories, study, study_chunk
 
+OVER_ALL = {"robustness_chunk", "choices_chunk"}  # stages that go through the whole study
 CONFIG = "datasets: {arm: {robot: mh180}}\n"
 
 
@@ -83,26 +84,28 @@ def assert_same(some, others):
             np.testing.assert_array_equal(values, others[name][column], f"{name}.{column}")
 
 
-AGAIN = ("robustness_chunk", "map_readings_chunk")  # go through fits and maps with other arms
+AGAIN = (*OVER_ALL, "map_readings_chunk")  # go through fits and maps with other arms
 
 
 @pytest.mark.parametrize(
     ("change", "stages"),
     [
-        ("study: {search: bisection}", {"study", "robustness_chunk"}),
-        ("study: {repetitions: 7}", {"study_chunk", "robustness_chunk"}),
+        ("study: {search: bisection}", {"study", *OVER_ALL}),
+        ("study: {repetitions: 7}", {"study_chunk", *OVER_ALL}),
         ("evaluation: {points: 7}", {"assessment_points", *AGAIN}),
         (
             "evaluation: {reference_frame: base}",
             {"measurements", "accuracy_map", "assessment_points", *AGAIN},
         ),
         ("map: {grid_mm: 50}", {"accuracy_map", *AGAIN}),
-        ("robustness: {draws: 3}", {"robustness_chunk"}),
+        ("robustness: {draws: 3}", OVER_ALL),
         ("map_readings: {arms: 3}", {"map_readings_chunk"}),
+        ("choices: {runs: 7}", {"choices_chunk"}),
         ("measurements: {file: {decimal: ','}}", set()),
         ("measurements: {synthetic: {poses: 700}}", {"measurements", *AGAIN}),
         ("figures: {formats: [svg]}", set()),
         ("study: {chunks: 5}", set()),
+        ("choices: {chunks: 5}", set()),
     ],
 )
 def test_a_value_is_told_to_the_stages_that_depend_on_it(plan_of, change, stages):
@@ -193,7 +196,7 @@ def test_robustness_counts_for_the_claims_once_it_is_asked_for_or_there(plan_of,
     assert "robustness" not in plan.inputs("claims", "arm")
     table = tmp_path / "arm" / "robustness.parquet"
     assert str(table) not in plan.targets("arm")
-    asked = plan.targets("arm", on_request=True)
+    asked = plan.targets("arm", also=["robustness_table"])
     assert {str(table), str(tmp_path / "arm" / "claims.parquet")} <= set(asked)
     assert plan.inputs("claims", "arm", on_request=True)["robustness"] == str(table)
     table.parent.mkdir()

@@ -17,6 +17,7 @@ from kinacc.artifacts import (
     assessment_tables,
     calibration_tables,
     campaign_tables,
+    choices_tables,
     data_check_tables,
     model_comparison_tables,
     robot_table,
@@ -50,6 +51,7 @@ ARTEFACTS: dict[str, Artefact] = {
         assessment_tables.ROBUSTNESS,
         assessment_tables.MAP_READINGS_CHUNK,
         assessment_tables.MAP_READINGS,
+        *choices_tables.ALL,
         *tournament_tables.ALL,
         *campaign_tables.ALL,
     )

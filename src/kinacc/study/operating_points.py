@@ -14,6 +14,7 @@ from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
 from kinacc.study.accuracy_map import Models, PosesWanted, errors_at, joints_of
 
+_ALL = (None, "both")  # wrists: what is said where none is chosen
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
 
 
@@ -33,20 +34,28 @@ def with_errors(models: Models, q_rad: np.ndarray) -> OperatingPoints:
 
 
 def in_space(
-    robot: Robot, models: Models, wanted: PosesWanted, sequence: str, count: int
+    robot: Robot,
+    models: Models,
+    wanted: PosesWanted,
+    sequence: str,
+    count: int,
+    wrist: str | None = None,
 ) -> np.ndarray:
     """Joints (count, k) of tool poses drawn from a quasi-random sequence, in drawing order.
 
     Five coordinates per draw: radius, angle and height (even over the volume), orientation,
     branch. Draws without a solution within the limits and the fitted range are passed over.
-    Raises InputError, with the reasons counted, where the space holds too few.
+    ``wrist`` keeps to the branches of one wrist configuration, ``noflip`` or ``flip``. Raises
+    InputError, with the reasons counted, where the space holds too few, and where the arm has no
+    such wrist.
     """
+    branches = _branches(robot, wrist)
     found, counts, first = [], np.zeros(len(Status), dtype=int), 1
     while sum(map(len, found)) < count:
         if first > _DRAWS_PER_POINT * count:
             raise _too_few(sum(map(len, found)), count, counts)
         unit = region.points(sequence, count, 5, first)
-        q_rad, status = _solve_draws(robot, models, wanted, unit)
+        q_rad, status = _solve_draws(robot, models, wanted, unit, branches)
         counts += np.bincount(status, minlength=len(Status))
         found.append(q_rad[status == Status.FOUND])
         first += count
@@ -54,16 +63,26 @@ def in_space(
 
 
 def _solve_draws(
-    robot: Robot, models: Models, wanted: PosesWanted, unit: np.ndarray
+    robot: Robot, models: Models, wanted: PosesWanted, unit: np.ndarray, branches: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     cells = region.fill(wanted.cylinder, unit[:, :3])
     turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
-    branch = (unit[:, 4] * len(inverse.machining_branches(robot))).astype(int)
+    branch = branches[(unit[:, 4] * len(branches)).astype(int)]
     turned = wanted.orientations.rotation[turn]
     tool = region.tool_poses(cells, wanted.reference, turned, wanted.frame)
     solved = joints_of(robot, models, tool, wanted.invert_with)
     rows = np.arange(len(unit))
     return solved.q_rad[rows, branch], solved.status[rows, branch]
+
+
+def _branches(robot: Robot, wrist: str | None) -> np.ndarray:
+    """Numbers of the machining branches that have the ``wrist``."""
+    names = inverse.machining_branches(robot)
+    kept = [i for i, name in enumerate(names) if wrist in (*_ALL, name.rpartition("-")[2])]
+    if not kept:
+        what = f"{wrist}, but robot {robot.name} has no branch of that wrist"
+        raise InputError(Problem("evaluation.wrist", what, "both"))
+    return np.array(kept)
 
 
 def in_joints(

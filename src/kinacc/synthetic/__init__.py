@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.region import Attitude
 from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
-from kinacc.synthetic.draw import TABLE_II, physical_robot
+from kinacc.synthetic.draw import AS_TUNED, TABLE_II, physical_robot
 from kinacc.synthetic.plan import DOWN
 from kinacc.synthetic.tracker import Run, calibration_run, measured
 
@@ -22,19 +23,20 @@ _SAME_ARM_MM, _SAME_ARM_RAD = 5.0, 0.02
 def measure(robot: Robot, settings: Mapping, attitude: Attitude = DOWN) -> dict[str, np.ndarray]:
     """Columns of ``measurements``, but for fold and subset, of an accepted draw of the arm.
 
-    ``settings``: ``draw``, ``poses`` and ``tracker_noise_mm`` of ``measurements.synthetic``;
-    ``attitude``: that of the flange about which the poses are planned. All chance belongs to the
-    draw. Raises InputError for an unknown draw and for another arm.
+    ``settings``: those of ``measurements.synthetic``; without a roughness the draw has the one it
+    was accepted with. ``attitude``: that of the flange about which the poses are planned. All
+    chance belongs to the draw. Raises InputError for an unknown draw and for another arm.
     """
     _require_the_arm(robot)
-    draw = accepted_draw(int(settings["draw"]))
+    stated = {name: settings[name] for name in AS_TUNED._fields if name in settings}
+    draw = replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated))
     run = calibration_run(robot, int(settings["poses"]), draw.seed, attitude)
     return columns(draw, run, float(settings["tracker_noise_mm"]))
 
 
 def columns(draw: AcceptedDraw, run: Run, tracker_noise_mm: float) -> dict[str, np.ndarray]:
     """Columns of a calibration run on the arm of ``draw``."""
-    arm = physical_robot(draw.seed, draw.scales, draw.geometry)
+    arm = physical_robot(draw.seed, draw.scales, draw.geometry, draw.roughness)
     seen = measured(arm, run, tracker_noise_mm)
     quaternion = quaternion_from_rotation(seen.rotation)
     poses, joints = len(seen.position_mm), range(arm.dh.joints)

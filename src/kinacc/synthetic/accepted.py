@@ -11,7 +11,7 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.dh import DHModel
-from kinacc.synthetic.draw import Scales
+from kinacc.synthetic.draw import AS_TUNED, Roughness, Scales
 
 FILE = "accepted_draws.csv"
 GEOMETRY = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")
@@ -20,11 +20,15 @@ JOINTS = 6
 
 @dataclass(frozen=True)
 class AcceptedDraw:
-    """One arm: its ``seed``, the ``scales`` of its effects and its DH ``geometry``."""
+    """One arm: its ``seed``, the ``scales`` of its effects, its DH ``geometry``.
+
+    Another ``roughness`` than the one it was accepted with makes another arm of it.
+    """
 
     seed: int
     scales: Scales
     geometry: DHModel
+    roughness: Roughness = AS_TUNED
 
 
 def geometry_columns() -> list[str]:

@@ -54,10 +54,27 @@ class Scales(NamedTuple):
     beyond_wrist: float
 
 
-def physical_robot(seed: int, scales: Scales, geometry: DHModel = TABLE_II) -> PhysicalRobot:
+class Roughness(NamedTuple):
+    """How rough the errors are over a joint.
+
+    ``wave_decay``: power by which the waves of a smooth error fall with their number; whatever it
+    is, they are of the same size together. ``ripple``: factor on the errors of the gears.
+    """
+
+    wave_decay: float
+    ripple: float
+
+
+AS_TUNED = Roughness(1.0, 1.0)
+
+
+def physical_robot(
+    seed: int, scales: Scales, geometry: DHModel = TABLE_II, roughness: Roughness = AS_TUNED
+) -> PhysicalRobot:
     """The arm of draw ``seed`` with its effects scaled by ``scales`` on ``geometry``."""
     rng = np.random.default_rng([seed, 1])
-    return PhysicalRobot(geometry, _smooth(rng, scales), _beyond(rng, scales))
+    smooth = _smooth(rng, scales, roughness.wave_decay)
+    return PhysicalRobot(geometry, smooth, _beyond(rng, scales, roughness.ripple))
 
 
 def noise_generator(seed: int) -> np.random.Generator:
@@ -65,20 +82,27 @@ def noise_generator(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, 2])
 
 
-def _smooth(rng: np.random.Generator, scales: Scales) -> Smooth:
+def _smooth(rng: np.random.Generator, scales: Scales, decay: float) -> Smooth:
     size = np.empty((6, 6))
     size[:, :3] = _SHIFT_MM * scales.smooth_arm
     size[:, 3:] = _ARM_MRAD * 1e-3 * scales.smooth_arm
     size[3, 5] = size[4:, 3:] = _WRIST_MRAD * 1e-3 * scales.smooth_wrist
     shape = (6, 6, HALF_PERIODS)
-    amplitude = size[..., None] / np.arange(1.0, HALF_PERIODS + 1) * rng.uniform(0.5, 1.5, shape)
+    usual, fallen = _fallen(AS_TUNED.wave_decay), _fallen(decay)
+    same_size = np.linalg.norm(1.0 / usual) / np.linalg.norm(1.0 / fallen)
+    amplitude = size[..., None] * same_size / fallen * rng.uniform(0.5, 1.5, shape)
     low, high = np.deg2rad(RANGE_DEG).T
     return Smooth(low, high, amplitude, rng.uniform(0.0, 2.0 * np.pi, shape))
 
 
-def _beyond(rng: np.random.Generator, scales: Scales) -> Beyond:
+def _fallen(decay: float) -> np.ndarray:
+    """What the waves 1, 2, 3, ... are divided by."""
+    return np.arange(1.0, HALF_PERIODS + 1) ** decay
+
+
+def _beyond(rng: np.random.Generator, scales: Scales, gears: float) -> Beyond:
     factor = np.repeat([scales.beyond_arm, scales.beyond_wrist], 3)
-    ripple = np.outer(_RIPPLE_MRAD * factor, [1.0, _SECOND_HARMONIC])
+    ripple = np.outer(gears * _RIPPLE_MRAD * factor, [1.0, _SECOND_HARMONIC])
     compliance = np.diag(_COMPLIANCE_MRAD_PER_KNM * rng.uniform(0.7, 1.3, 6))
     compliance[1, 2] = compliance[2, 1] = _COUPLING_MRAD_PER_KNM * rng.uniform(0.7, 1.3)
     drift = np.zeros((6, 6))

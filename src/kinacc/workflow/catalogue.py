@@ -118,6 +118,10 @@ _READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.
 _ATTITUDE = ("evaluation.reference_orientation_deg", "evaluation.reference_frame")
 _CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
+_WHOLE_STUDY = (
+    *("seed", "robot", "measurements", "calibration", "evaluation", "map", "study", "histories"),
+    "robustness",
+)
 _MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 _FURTHER = tuple(f"{kind}_model" for kind in FITTED if kind not in ALWAYS)
 _MODEL = "kinacc.artifacts.error_models:MODELS[{models}]"
@@ -364,17 +368,7 @@ STAGES: dict[str, Stage] = {
             "going through fits, study and claims with further draws of the arm",
             (),
             ("robustness_chunk",),
-            (
-                "seed",
-                "robot",
-                "measurements",
-                "calibration",
-                "evaluation",
-                "map",
-                "study",
-                "histories",
-                "robustness",
-            ),
+            _WHOLE_STUDY,
             files=("robot",),
             uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
             scattered=True,
@@ -423,6 +417,38 @@ STAGES: dict[str, Stage] = {
             on_request=True,
         ),
         Stage(
+            "choices_chunk",
+            "going through fits, study and claims with every choice the paper leaves open",
+            (),
+            ("choices_chunk", "choices_factors_chunk"),
+            (*_WHOLE_STUDY, "choices"),
+            files=("robot",),
+            uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
+            scattered=True,
+            on_request=True,
+            shared=True,
+        ),
+        Stage(
+            "choices_table",
+            "gathering the claims over the paper's open choices",
+            ("choices_chunk", "choices_factors_chunk"),
+            ("choices", "choices_factors"),
+            on_request=True,
+        ),
+        Stage(
+            "choices_reasons",
+            "saying what every claim hangs on",
+            ("choices", "choices_factors"),
+            ("claim_shares", "claim_reasons"),
+            on_request=True,
+        ),
+        _figure(
+            "claims_over_choices",
+            "drawing which claims hold whatever one chooses, and which hang on what",
+            ("claim_shares", "claim_reasons"),
+            on_request=True,
+        ),
+        Stage(
             "tournament_chunk",
             "campaigns of every assessor",
             ("assessment_points",),
@@ -462,6 +488,8 @@ CALIBRATION = (
 )
 # Made on request beside the claims on further draws: Fig. 3 under every reading of it.
 MAP_READINGS = ("map_readings_chunk", "map_readings", "fig3_readings")
+# The claims over every choice that the paper leaves open, made on request.
+CHOICES = ("choices_chunk", "choices_table", "choices_reasons", "claims_over_choices")
 
 
 def maker_of(artefact: str) -> Stage:

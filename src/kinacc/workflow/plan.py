@@ -63,7 +63,10 @@ def planned(
     refuse(problems)
     return Plan(
         {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
-        {name: config["study"]["chunks"] for name, config in full.items()},
+        {
+            name: {section: config[section]["chunks"] for section in ("study", "choices")}
+            for name, config in full.items()
+        },
         first,
         results,
         tournament,
@@ -75,15 +78,15 @@ class Plan:
     """The validated configuration of every data set, and where results go.
 
     ``datasets`` maps a data set's name to its complete configuration (defaults filled in, without
-    values that only say how a run is carried out); ``parts`` to the number of parts its scattered
-    stages are computed in; ``formats`` are the picture formats; ``tournament`` is the
-    configuration's section of that name, which is one for all data sets. ``files_absolute``: files
-    from outside are named in full, as a module of another workflow needs them, whose results may
-    have a folder put before them.
+    values that only say how a run is carried out); ``parts`` to the numbers of parts its scattered
+    stages are computed in, those of the study and those of the choices; ``formats`` are the
+    picture formats; ``tournament`` is the configuration's section of that name, which is one for
+    all data sets. ``files_absolute``: files from outside are named in full, as a module of another
+    workflow needs them, whose results may have a folder put before them.
     """
 
     datasets: Mapping[str, Mapping[str, object]]
-    parts: Mapping[str, int]
+    parts: Mapping[str, Mapping[str, int]]
     formats: tuple[str, ...]
     results: str = RESULTS
     tournament: Mapping[str, object] = field(default_factory=dict)
@@ -151,16 +154,16 @@ class Plan:
         return {name: reason for name, reason in reasons.items() if name in STAGES}
 
     def targets(
-        self, dataset: str, on_request: bool = False, only: Collection[str] = STAGES
+        self, dataset: str, only: Collection[str] = STAGES, also: Collection[str] = ()
     ) -> list[str]:
-        """Every file the data set leaves in a run, a plain one or with what is made on request.
+        """Every file the data set leaves in a plain run, and what the stages ``also`` leave.
 
-        ``only``: the stages whose files are meant.
+        ``only``: the stages of a plain run whose files are meant.
         """
         return [
             path
             for name, stage in self.stages(dataset).items()
-            if name in only and stage.on_request <= on_request and not stage.scattered
+            if not stage.scattered and (name in also or (name in only and not stage.on_request))
             for path in self.outputs(name, dataset).values()
         ]
 
@@ -259,10 +262,14 @@ class Plan:
             from kinacc.study.map_readings import READINGS
 
             count = len(READINGS)
+        elif name == "choices_chunk":
+            count = self.parts[dataset]["choices"]
         else:
             config = self.datasets[dataset]
             draws, repetitions = config["robustness"]["draws"], config["study"]["repetitions"]
-            count = min(self.parts[dataset], draws if "robustness" in name else repetitions)
+            count = min(
+                self.parts[dataset]["study"], draws if "robustness" in name else repetitions
+            )
         return [f"{number}-of-{count}" for number in range(1, count + 1)]
 
     def message(self, name: str, dataset: str) -> str:

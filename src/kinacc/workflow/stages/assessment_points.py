@@ -21,12 +21,16 @@ from kinacc.workflow import evaluation as shared
 
 @dataclass(frozen=True)
 class PointSettings:
-    """How many points are drawn, by which sequence, in which space, as poses or as joints."""
+    """How many points are drawn, by which sequence, in which space, as poses or as joints.
+
+    ``wrist``: the wrist configurations of poses.
+    """
 
     space: str
     sequence: str
     points: int
     points_in: str
+    wrist: str | None = None
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
@@ -51,7 +55,7 @@ def _drawn(arm: Robot, models: Models, wanted: PointSettings, section: Mapping) 
         q_rad = operating_points.in_joints(arm, models, limited, *drawn, space)
     else:
         poses = shared.poses_wanted(section)
-        q_rad = operating_points.in_space(arm, models, poses, *drawn)
+        q_rad = operating_points.in_space(arm, models, poses, *drawn, wanted.wrist)
     return operating_points.with_errors(models, q_rad)
 
 

@@ -1,0 +1,90 @@
+"""The paper's sentences over arms and open choices: where they hold, and what decides them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinacc.artifacts.columns import Columns
+from kinacc.figures import style
+from kinacc.figures.columns import floats, require, rows, texts
+
+# Columns of shares: words, colour and marker.
+_SHARES = {
+    "arms": ("further arms", style.VERMILION, "^"),
+    "alone": ("one choice varied", style.SKY, "s"),
+    "all": ("all choices at once", style.BLUE, "o"),
+    "all_and_arm": ("all choices and the arm", style.INK, "D"),
+}
+_NUMBERS = ("table1_", "table2_", "table3_")
+_SAMPLE = "all_and_arm"
+_ROW_IN = 0.155
+
+
+def run(inputs: Mapping, settings: Mapping) -> Figure:
+    """Return the figure of ``claim_shares`` and ``claim_reasons``."""
+    return draw(inputs["claim_shares"], inputs["claim_reasons"])
+
+
+def draw(shares: Columns, reasons: Columns) -> Figure:
+    """Draw a row per sentence: shares of runs in which it holds, and what changes them how much.
+
+    Numbers of Tables I to III are left out: they are about the arm. Raises InputError where a
+    column is missing.
+    """
+    require(shares, ("claim", *(f"{name}_share" for name in _SHARES)), "claim_shares")
+    needed = ("claim", "sample", "factor", "kind", "difference", "decides")
+    require(reasons, needed, "claim_reasons")
+    sentence = np.array([not name.startswith(_NUMBERS) for name in texts(shares, "claim")])
+    shares = rows(shares, sentence)
+    reasons = rows(reasons, texts(reasons, "sample") == _SAMPLE)
+    claims = list(texts(shares, "claim"))
+    factors = _factors(reasons)
+    with style.house():
+        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 1.5 + _ROW_IN * len(claims))
+        left, right = figure.subplots(
+            1, 2, sharey=True, width_ratios=[1, max(len(factors), 1) / 11]
+        )
+        _shares(left, shares)
+        _decisions(right, reasons, claims, factors)
+        left.set_yticks(range(len(claims)), [name.replace("_", " ") for name in claims])
+        left.set_ylim(len(claims) - 0.5, -0.5)
+        handles, labels = left.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower left", ncols=4)
+    return figure
+
+
+def _factors(reasons: Columns) -> list[str]:
+    """Choices, then properties, each in the order of their names."""
+    kinds = dict(zip(texts(reasons, "factor"), texts(reasons, "kind"), strict=True))
+    return sorted(kinds, key=lambda name: (kinds[name], name))
+
+
+def _shares(ax: Axes, shares: Columns) -> None:
+    places = np.arange(len(shares["claim"]))
+    for step, (name, (words, colour, marker)) in enumerate(_SHARES.items()):
+        shift = 0.13 * (step - (len(_SHARES) - 1) / 2)
+        share = 100.0 * floats(shares, f"{name}_share")
+        ax.plot(share, places + shift, marker, color=colour, ms=3, ls="", label=words, mew=0.0)
+    ax.set(xlabel="Runs in which it holds (%)", xlim=(-4, 104))
+    ax.set_xticks([0, 50, 100])
+
+
+def _decisions(ax: Axes, reasons: Columns, claims: Sequence[str], factors: Sequence[str]) -> None:
+    """A square where a factor decides, as large as the difference it makes."""
+    decides = floats(reasons, "decides") > 0
+    told = rows(reasons, decides & np.isin(texts(reasons, "claim"), claims))
+    x = np.array([factors.index(name) for name in texts(told, "factor")], dtype=float)
+    y = np.array([claims.index(name) for name in texts(told, "claim")], dtype=float)
+    difference = floats(told, "difference")
+    ax.scatter(x, y, s=60.0 * difference, marker="s", color=style.PURPLE, linewidths=0)
+    ax.set_xlim(-0.6, len(factors) - 0.4)
+    ax.set_xticks(range(len(factors)), [name.replace("_", " ") for name in factors], rotation=90)
+    ax.tick_params(axis="y", length=0)
+    ax.set_title(
+        "Square: its values change the share (full height 100 %)",
+        loc="left", color=style.MUTED, fontsize=style.SMALL_PT,
+    )  # fmt: skip

@@ -1,0 +1,128 @@
+"""The claims over every choice the paper leaves open: the same answers as the study itself."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+
+from kinacc.config.records import value_at
+from kinacc.config.schema import defaults
+from kinacc.errors import InputError
+from kinacc.study.choices import design
+from kinacc.study.choices.open_choices import OPEN, STATED
+from kinacc.study.claims.evaluate import all_claims, evaluate
+from kinacc.workflow import in_memory
+from kinacc.workflow.plan import planned
+from kinacc.workflow.stages import choices_chunk, choices_table, robustness_chunk
+
+# A choice of the fits, one of the space, one that both depend on, one of the study.
+NAMES = ["vec_order", "inner_radius", "reference_orientation", "search"]
+
+
+@pytest.fixture(scope="module")
+def config() -> dict:
+    config = {"robot": "mh180", **copy.deepcopy(defaults())}
+    config["map"]["grid_mm"] = 300.0
+    config["study"] |= {"repetitions": 3, "measurements": 40}
+    config["evaluation"]["points"] = 40
+    config["histories"]["simulations_searched"] = 20
+    config["robustness"]["draws"] = 2
+    config["choices"] |= {"runs": 2, "names": NAMES}
+    return config
+
+
+@pytest.fixture(scope="module")
+def made(config):
+    return choices_chunk.run({}, config)
+
+
+def gathered(made) -> dict:
+    joined = {
+        name: {column: np.concatenate([part[name][column] for part in made]) for column in whole}
+        for name, whole in made[0].items()
+    }
+    return choices_table.run(joined, {})
+
+
+def assert_same(some: dict, others: dict) -> None:
+    for name, column in others.items():
+        if column.dtype.kind == "f":
+            assert np.array_equal(some[name], column, equal_nan=True)
+        else:
+            assert some[name].tolist() == column.tolist()
+
+
+def test_every_open_choice_has_keys_of_the_configuration_and_its_default_among_its_values():
+    known = {"robot": "mh180", **defaults()}
+    for choice in (*OPEN, *STATED):
+        assert choice.word(known) is not None, choice.name
+        for values in choice.values.values():
+            assert len(values) == len(choice.keys)
+
+
+def test_every_value_alone_every_arm_and_all_at_once(config, made):
+    found = gathered([made])["choices"]
+    wanted = [claim.id for claim in all_claims()]
+    for varied, runs in {"default": 1, "arm": 2, "search": 2, "all": 2, "all_and_arm": 2}.items():
+        mine = found["choice"] == varied
+        assert found["claim"][mine].tolist() == wanted * runs
+    followed = found["claim"][found["choice"] == design.FIG_5]
+    assert followed.tolist() == [name for name in wanted if name.startswith(("fig5", "fig6"))] * 6
+
+
+@pytest.mark.parametrize("varied", ["default", *NAMES, "arm", "all"])
+def test_a_choice_gets_the_verdicts_it_would_get_as_the_data_set(config, made, varied):
+    """What runs share is made once, and no run takes what another has made differently."""
+    found = gathered([made])["choices"]
+    run = [each for each in design.runs(config) if each.varied == varied][-1]
+    stages = ("measurements", *robustness_chunk.STAGES)
+    whole = evaluate(in_memory.run(stages, run.configured(config), {}), paper_arm=True)
+    ours = found["run"] == run.number
+    assert found["verdict"][ours].tolist() == whole["verdict"].tolist()
+    assert np.array_equal(found["statistic"][ours], whole["reproduced"], equal_nan=True)
+
+
+@pytest.mark.parametrize("parts", [2, 5])
+def test_parts_make_the_same_tables(config, made, parts):
+    whole = gathered([made])
+    pieces = [
+        choices_chunk.run({}, {**config, "part": {"number": number, "of": parts}})
+        for number in range(1, parts + 1)
+    ]
+    again = gathered(pieces)
+    for name, table in whole.items():
+        assert_same(again[name], table)
+
+
+def test_a_run_whose_space_is_out_of_reach_says_so_and_the_others_go_on(config):
+    away = copy.deepcopy(config)
+    away["evaluation"]["cylinder"]["inner_radius_mm"] = 4000.0
+    away["choices"] |= {"names": ["inner_radius"], "runs": 1}
+    found = gathered([choices_chunk.run({}, away)])["choices"]
+    at_fault = (found["run"] == 0) & (found["claim"] == "maximum_overestimates")
+    assert found["verdict"][at_fault].tolist() == ["not comparable"]
+    assert "evaluation" in found["why"][at_fault][0]
+    good = (found["choice"] == "inner_radius") & (found["claim"] == "maximum_overestimates")
+    assert "not comparable" not in found["verdict"][good]
+
+
+def test_a_sample_varies_every_choice_at_once(config):
+    many = {**config, "choices": {**config["choices"], "names": [], "runs": 64}}
+    sample = [run for run in design.runs(many) if run.varied == design.ALL]
+    for choice in OPEN:
+        words = [run.chosen[choice.name] for run in sample]
+        counts = [words.count(word) for word in choice.values]
+        assert min(counts) >= 0.5 * len(sample) / len(choice.values)
+    for run in sample:
+        configured = run.configured(many)
+        for choice in OPEN:
+            values = tuple(value_at(configured, key) for key in choice.keys)
+            assert values == choice.values[run.chosen[choice.name]]
+
+
+def test_a_choice_that_does_not_exist_is_named_with_those_that_do(tmp_path):
+    (tmp_path / "a.yaml").write_text("datasets: {arm: {robot: mh180}}\nchoices: {names: [serach]}")
+    with pytest.raises(InputError, match=r"choices\.names.*serach.*\n?.*search"):
+        planned([tmp_path / "a.yaml"])
