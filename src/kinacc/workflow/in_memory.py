@@ -93,7 +93,7 @@ class Memory:
 
 def settings_of(name: str, config: Mapping) -> dict[str, object]:
     """What a stage of :class:`Memory` depends on, by the key paths that the catalogue names."""
-    paths = _stages()[name].settings
+    paths = (*_stages()[name].settings, *_stages()[name].synthetic_settings)
     if name == "study_chunk":  # the only reading simulated is the one that the study is about
         paths += _stages()["study"].settings
     return {path: value_at(config, path) for path in paths}
