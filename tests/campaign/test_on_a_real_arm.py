@@ -98,7 +98,7 @@ def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(ur10_d, tmp
     assert wanted.min() - 0.01 < found.min() <= found.max() < wanted.max() + 0.01
 
 
-def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d):
+def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d, tmp_path):
     measured = store.read(ur10_d[0] / "measurements.parquet")
     joints = np.rad2deg([measured[f"q{joint}"] for joint in range(1, 7)])
     inside, among = joints[:, 0], np.median(joints, axis=1)
@@ -108,6 +108,13 @@ def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d):
     said = [each["status"] for each in json.loads(done.stdout)["rows"]]
     assert said == ["ok", "extrapolated: the joints together are unlike those measured"]
     assert "1 of 2 rows lie where the calibration was not measured" in done.stderr
+    wanted = tmp_path / "wanted.json"
+    wanted.write_text(done.stdout)
+    done = call("compensate", ur10_d[0], wanted, "--model", "dh", "--json")
+    assert done.exit_code == 0, done.output
+    said = [each["status"] for each in json.loads(done.stdout)["rows"]]
+    unlike = "converged, extrapolated: the joints together are unlike those measured"
+    assert said == ["converged", unlike]
 
 
 def same(said, wanted):

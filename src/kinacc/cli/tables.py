@@ -14,7 +14,7 @@ from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.robot import Robot
 
 _MRAD = 1e3
-UNLIKE = "extrapolated: the joints together are unlike those measured"
+UNLIKE = "the joints together are unlike those measured"
 
 
 def given_joints(
@@ -124,7 +124,7 @@ def _where(calibration: Calibration, outside: np.ndarray, measured: np.ndarray) 
         if row.any()
         else "ok"
         if there
-        else UNLIKE
+        else f"extrapolated: {UNLIKE}"
         for row, there in zip(outside, measured, strict=True)
     ]
     return np.array(words, dtype=object)

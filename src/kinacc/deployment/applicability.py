@@ -2,8 +2,9 @@
 
 Ranges of single joints do not tell: where the flange always pointed the same way, nearly all of
 the box they span was never measured. The covariance of the fit tells. Seen on UR10, UR5 and FANUC
-data, DH and VEC models fitted without a part of the poses: errors of the rest are 1.0 to 1.3 times
-the usual held-out ones inside, and up to 8 times outside. Distances to measured poses tell less.
+data, DH and VEC models fitted without a part of the poses: the rms of the rest is 0.9 to 1.2 times
+the usual held-out one inside (1.7 for the 24 poses of the FANUC), 1.0 to 7.7 times outside.
+Distances to measured poses alone call FANUC poses inside that are off by 4.7 times that.
 """
 
 from __future__ import annotations
