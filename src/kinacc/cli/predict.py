@@ -26,7 +26,8 @@ def predict(
     \b
     std_*           standard deviation by the covariance of the fitted parameters
     unexplained_*   rms of what the model left of held-out measurements: add it in mind
-    undetermined_*  movement per mm or mrad along what the calibration could not see
+    undetermined_*  movement per mm or mrad along what the calibration could not see,
+                    the same by every model; poses unlike the measured ones are warned of
 
     Where the base was estimated with the arm, the base frame is that of the DH model, for a VEC
     model as well. Where joints can take its place, it is a convention (undetermined_*):
@@ -49,4 +50,5 @@ def predict(
         )
     out.deliver(tables.predicted(calibration, given, found, frame, point))
     rows.say_unused(given, calibration)
+    rows.say_unlike(found.unlike_mm, calibration)
     rows.end_where_missing(found.pose.position_mm, "a pose")

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
+_UNLIKE = 0.1  # mm per mm or mrad, which measured poses are far below
+_MOST_SAID = 2  # sentences of a warning
 _HEAD = 1_000_000  # characters of a line looked at
 
 
@@ -316,6 +318,26 @@ def say_unused(given: Rows, calibration: Calibration) -> None:
     if given.payload is not None and not calibration.model.knows_loads:
         what = f"the {calibration.choice} model was fitted without loads that change"
         click.echo(f"not used: payload; {what}", err=True)
+
+
+def say_unlike(unlike_mm: np.ndarray, calibration: Calibration) -> None:
+    """Warn on the error stream of poses that what measured poses left open moves.
+
+    ``unlike_mm`` (n,) as in a ``Prediction``.
+    """
+    from kinacc.calibration import blind_words
+
+    moved = unlike_mm[np.nan_to_num(unlike_mm) > _UNLIKE]
+    if not len(moved):
+        return
+    told = "; ".join(blind_words.weak(calibration.left_open or ())[:_MOST_SAID])
+    click.echo(
+        f"warning: {len(moved)} of {len(unlike_mm)} poses are unlike the measured ones: what these "
+        f"left open moves them by up to {moved.max():.2g} mm per mm or mrad"
+        + (f" ({told})" if told else "")
+        + "; state it in calibration.frames or calibration.dh, or calibrate with poses like these",
+        err=True,
+    )
 
 
 def end_where_missing(answers: np.ndarray, what: str) -> None:
