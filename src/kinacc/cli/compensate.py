@@ -40,8 +40,11 @@ def compensate(
       kinacc compensate results/ur10_b target_poses.csv -o joints.csv
       kinacc compensate results/mh180 --program program.csv -o corrected.csv
     """
+    import numpy as np
+
     from kinacc.cli import rows, target_poses
     from kinacc.deployment.compensate import compensate as joints_for
+    from kinacc.deployment.predict import predict
     from kinacc.progress import reporting
 
     calibration = choice.calibration_of(folder, model, robot, config, session)
@@ -53,4 +56,6 @@ def compensate(
     answer = target_poses.compensated(calibration, given, found, frame, point, program is not None)
     out.deliver(answer)
     rows.say_unused(given, calibration)
+    reached = found.q_rad[np.isfinite(found.q_rad).all(axis=1)]
+    rows.say_unlike(predict(calibration, reached, None, frame, point).unlike_mm, calibration)
     rows.end_where_missing(found.q_rad, "joints")

@@ -25,6 +25,7 @@ datasets:
 """
 MEASURED = "53.5,-102.7,87.07,15.63,53.53,-90"
 TURNED_AWAY = "53.5,-102.7,87.07,15.63,13.53,-90"
+POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
 TOLD = "cannot be told from a shift of the tool along z"
 
 
@@ -65,6 +66,19 @@ def test_a_pose_unlike_the_measured_ones_is_warned_of(folder, model, frame):
     said = undetermined(folder, model, frame, MEASURED, TURNED_AWAY)[1]
     assert "1 of 2 poses are unlike the measured ones" in said
     assert TOLD in said
+
+
+@pytest.mark.parametrize("model", ["vec", "dh"])
+def test_a_target_unlike_the_measured_poses_is_warned_of(folder, model):
+    for joints, said in ((MEASURED, False), (TURNED_AWAY, True)):
+        shown = call("predict", folder, "--model", model, "--json", "--joints-deg", joints)
+        (row,) = json.loads(shown.stdout)["rows"]
+        pose = ",".join(str(row[name]) for name in POSE)
+        back = call(
+            "compensate", folder, "--model", model, "--pose", pose, "--near-deg", joints, "--json"
+        )
+        assert back.exit_code == 0, back.output
+        assert (TOLD in back.stderr) == said
 
 
 def test_every_exported_file_says_what_is_left_open(folder, tmp_path):
