@@ -67,9 +67,14 @@ def compensated(
     found: Compensation,
     frame: str,
     point: str | None,
+    unlike: np.ndarray,
     is_program: bool = False,
 ) -> Sheet:
-    """The sheet of ``kinacc compensate``; ``is_program``: the near joints are a program's."""
+    """The sheet of ``kinacc compensate``.
+
+    ``unlike`` (n,): joints that are unlike those measured; ``is_program``: the near joints are a
+    program's.
+    """
     angular = np.where(calibration.robot.dh.prismatic, np.nan, np.rad2deg(np.abs(found.change)))
     largest = np.max(np.nan_to_num(angular, nan=-1.0), axis=1)
     point = point or calibration.default_point
@@ -78,7 +83,7 @@ def compensated(
         *joint_fields(calibration.robot.dh.prismatic, found.q_rad),
         Field(
             "status",
-            _words(calibration, found, is_program, point),
+            _words(calibration, found, unlike, is_program),
             "",
             "why there are joints, or none",
         ),
@@ -102,14 +107,19 @@ def compensated(
     return Sheet(title, facts(calibration, frame, point), fields)
 
 
-def _words(
-    calibration: Calibration, found: Compensation, is_program: bool, point: str
-) -> np.ndarray:
-    words, joints_there = [], np.isfinite(found.q_rad).all(axis=1)
+def unlike_measured(calibration: Calibration, found: Compensation, point: str | None) -> np.ndarray:
+    """True (n,) for joints in their fitted ranges where the calibration was not measured."""
+    there = np.isfinite(found.q_rad).all(axis=1)
+    at = JointState(calibration.robot.dh_joints(found.q_rad[there]))
     unlike = np.zeros(len(found.status), dtype=bool)
-    at = JointState(calibration.robot.dh_joints(found.q_rad[joints_there]))
-    unlike[joints_there] = ~is_measured_there(calibration, at, point)
-    unlike &= ~calibration.outside_range(calibration.robot.dh_joints(found.q_rad)).any(axis=1)
+    unlike[there] = ~is_measured_there(calibration, at, point)
+    return unlike & ~calibration.outside_range(calibration.robot.dh_joints(found.q_rad)).any(axis=1)
+
+
+def _words(
+    calibration: Calibration, found: Compensation, unlike: np.ndarray, is_program: bool
+) -> np.ndarray:
+    words = []
     for row, status in enumerate(found.status):
         joints = joints_in_words(found.offending[row]) if found.offending[row].any() else ""
         off_mm, off_rad = found.position_error_mm[row], found.rotation_error_rad[row]

@@ -31,14 +31,6 @@ class Residual:
 
 
 @dataclass(frozen=True)
-class Anchor:
-    """``base`` and ``targets`` of the DH model, as those of ``Calibration``."""
-
-    base: Pose
-    targets: Mapping[str, Pose]
-
-
-@dataclass(frozen=True)
 class Calibration:
     """One model of one calibrated arm.
 
@@ -48,9 +40,10 @@ class Calibration:
     ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides);
     ``fitted`` how the arm stood at the readings that were fitted, None where that is not known.
     ``base_name`` is what ``known`` calls the base, which differs by session. ``anchor`` is the DH
-    model of the same data where this is a VEC model fitted with its base: errors of a VEC model can
-    turn or shift base and tool against each other by centimetres and no measured pose shows it, so
-    the robot's own base, and the tool programs mean, are those of the DH model.
+    model of the same data where this is another one fitted with its base: errors of a VEC model can
+    turn or shift base and tool against each other by mm and no measured pose shows it, so the
+    robot's own base, the tool programs mean, and what poses leave open are those of the DH model.
+    ``left_open`` says in sentences what that is; None where nobody asked.
     """
 
     name: str
@@ -63,8 +56,9 @@ class Calibration:
     residual: Residual | None = None
     fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None
     base_name: str = "base"
-    anchor: Anchor | None = None
+    anchor: Calibration | None = None
     fitted: JointState | None = None
+    left_open: tuple[str, ...] | None = None
 
     @property
     def default_point(self) -> str:
@@ -87,6 +81,11 @@ class Calibration:
             return self.robot.flange
         known = ", ".join([*self.targets, FLANGE])
         raise InputError(Problem("point", f"{name!r} is none of this calibration", known))
+
+    @property
+    def plainest(self) -> Calibration:
+        """The model whose parameters say what the poses left open."""
+        return self if self.anchor is None or self.anchor.known is None else self.anchor
 
     def origin(self, frame: str) -> Pose:
         """First DH frame in ``frame``: the robot's own base, or the instrument."""
