@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -97,7 +98,7 @@ def test_nominal_says_whether_base_and_tool_were_fitted(folder, measured):
 
 def test_the_page_is_half_a_page(folder, measured, monkeypatch):
     # The second is of poor data: what is wrong with them takes some lines more.
-    for each, most in ((folder, 25), (measured, 28)):
+    for each, most in ((folder, 26), (measured, 29)):
         there = Path(each).absolute()
         monkeypatch.chdir(there.parents[1])  # a long path takes lines of its own
         lines = shown(there.relative_to(there.parents[1])).splitlines()
@@ -179,9 +180,23 @@ def test_what_is_left_open_is_short_and_the_rest_one_command_away(measured):
 def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
     page = shown(folder)
     assert "not assessed" in page
-    (command,) = re.findall(r"kinacc (campaign start .*) --noise-mm NOISE$", page, re.M)
-    done = call(*command.split(), "--noise-mm", 0.05, "--budget", 5, "--drawn", 5)
+    (command,) = re.findall(r"kinacc (campaign start .* --noise-mm NOISE .*)$", page, re.M)
+    done = call(*command.replace("NOISE", "0.05").split())
     assert done.exit_code == 0, done.output
+
+
+def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
+    folder, measured, tmp_path
+):
+    shutil.copytree(measured, tmp_path / "my results" / "own")
+    for each in (folder, "my results/own"):
+        lines = re.findall(r"kinacc (.*)$", shown(each).replace("NOISE", "0.05"), re.M)
+        assert {line.split()[0] for line in lines} >= {"campaign", "export", "compensate"}
+        for line in lines:
+            assert "--help" not in line
+            done = call(*shlex.split(line))
+            assert done.exit_code == 0, f"{line}: {done.output}"
+    assert {path.name for path in tmp_path.iterdir()} >= {"exported", "exported_own", "check"}
 
 
 def campaign(folder, place, readings, noise=0.05):
