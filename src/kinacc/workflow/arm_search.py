@@ -116,7 +116,7 @@ def search(bench: Bench, wanted: int, progress=None) -> list[Trial]:
     ``progress(iterable, what)`` reports on the seeds tried.
     """
     found: list[Trial] = []
-    for each in progress(trials(bench), "seeds") if progress else trials(bench):
+    for each in progress(trials(bench), "random arms tried") if progress else trials(bench):
         found += [each] if each.accepted else []
         if len(found) >= wanted:
             break
