@@ -61,6 +61,32 @@ def measured(tmp_path_factory):
     return base / "results" / "own"
 
 
+@pytest.fixture(scope="module")
+def reflectors(tmp_path_factory):
+    """Results of an arm that carries three reflectors."""
+    base = tmp_path_factory.mktemp("reflectors")
+    arm = robot.load("irb120")
+    draw = np.random.default_rng(0)
+    q = draw.uniform(-1.0, 1.0, (60, 6))
+    flange = robot.forward(arm, q)
+    places = [flange.position_mm + flange.rotation @ (40.0 * np.eye(3)[axis]) for axis in range(3)]
+    names = [f"q{i}_rad" for i in range(1, 7)]
+    names += [f"m{name}_{axis}_mm" for name in "ABC" for axis in "xyz"]
+    rows = np.hstack([q, *places]) + np.hstack([np.zeros((60, 6)), draw.normal(0, 0.05, (60, 9))])
+    np.savetxt(base / "own.csv", rows, "%.9f", ",", header=",".join(names), comments="")
+    (base / "own.yaml").write_text(
+        "measurements: {folds: 4}\ndatasets:\n  own:\n"
+        "    calibration: {base_and_tool: estimated, vec: {order: 1}, dh: {fit_to: measurements}}\n"
+        "    robot: irb120\n    evaluation: {space: measured}\n"
+        "    measurements: {source: file, file: {path: own.csv, orientation: {kind: none}}}\n"
+    )
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
+        words = ("--config", base / "own.yaml", "--results", base / "results")
+        done = call("run", stage, *words)
+        assert done.exit_code == 0, done.output
+    return base / "results" / "own"
+
+
 def shown(*words):
     done = call("fitted", *words)
     assert done.exit_code == 0, done.output
@@ -247,3 +273,22 @@ def test_a_campaign_that_cannot_be_read_does_not_hide_the_answer(folder):
     assert "campaign check cannot be read" in page
     assert "not assessed" in page
     assert "kinacc campaign start check_mh180 " in page  # that one is in the way
+
+
+def test_of_several_reflectors_it_is_said_which_a_campaign_is_about_and_how_to_take_another(
+    reflectors, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    told = "a campaign is about one point: mA, the first of mA, mB, mC; --point names another"
+    assert told in " ".join(shown(reflectors).split())
+    words = ("--calibration", reflectors, "--noise-mm", 0.05, "--drawn", 5, "--budget", 8)
+    first = call("campaign", "start", "first", *words)
+    assert told in first.output
+    other = call("campaign", "start", "other", *words, "--point", "mB")
+    assert "one point: mB, of mA, mB, mC; --point" in other.output
+    assert "other: mB by the" in " ".join(shown(reflectors).split())
+
+
+def test_with_one_target_no_choice_between_points_is_offered(measured, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "--point" not in shown(measured)

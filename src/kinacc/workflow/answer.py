@@ -17,6 +17,7 @@ from kinacc.calibration.summary_words import half_page, model_name, paragraph
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import PLAN
 from kinacc.campaign.of_calibration import Sought
+from kinacc.campaign.words import one_of
 from kinacc.deployment import folder as results
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
@@ -83,10 +84,10 @@ def answer(
     lines = [f"{folder.resolve().name}: what its calibration is worth"]
     lines += half_page(facts, more, whole)
     lines += paragraph("other errors", _other_errors(facts, tables, whole))
-    bound = campaign_of(folder)
-    lines += paragraph("largest error", _bound(bound, folder))
+    bound, arm = campaign_of(folder), _arm(folder, tables)
+    lines += paragraph("largest error", _bound(bound, folder, arm))
     commands = [] if bound.assessed is None else [bound.assessed.next_command]
-    lines += paragraph("next", [*commands, *following, *_uses(folder, tables)])
+    lines += paragraph("next", [*commands, *following, *_uses(folder, arm, tables)])
     return [*_claims(folder, facts, tables), *lines]
 
 
@@ -131,27 +132,32 @@ def _is_synthetic(facts: Sequence[Fact]) -> bool:
     return of(facts, "data")["measurements"]["source"].text == "synthetic"
 
 
-def _bound(bound: Sought, folder: Path) -> list[str]:
+def _arm(folder: Path, tables: Tables) -> Calibration:
+    """The calibration that the commands of campaigns and poses would use."""
+    known = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    return results.calibration(results.read_tables(folder), known)
+
+
+def _bound(bound: Sought, folder: Path, arm: Calibration) -> list[str]:
     if bound.assessed is not None:
         return [*bound.assessed.in_words(), *bound.remarks]
     words = ["kinacc", "campaign", "start", _free("check", folder), "--calibration", str(folder)]
     return [
         *bound.remarks,
         "not assessed; a campaign bounds it (NOISE: standard deviation of one reading, mm):",
+        *one_of(arm.default_point, [*arm.targets]),
         f"{shlex.join(words)} --noise-mm NOISE --budget {_READINGS}",
     ]
 
 
-def _uses(folder: Path, tables: Tables) -> list[str]:
+def _uses(folder: Path, arm: Calibration, tables: Tables) -> list[str]:
     """Commands that use the calibration: files for controllers, and joints for a pose."""
-    known = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    arm = results.calibration(results.read_tables(folder), known)
-    names = [f"q{joint + 1}" for joint in range(len(known.q_min_rad))]
+    names = [f"q{joint + 1}" for joint in range(len(arm.robot.q_min_rad))]
     near = _easy(arm, np.stack([tables["measurements"][name] for name in names], axis=1))
-    pose = arm.pose(JointState(known.dh_joints(near[None])))
+    pose = arm.pose(JointState(arm.robot.dh_joints(near[None])))
     numbers = [f"{each:.1f}" for each in pose.position_mm[0]]
     numbers += [f"{each:.4f}" for each in quaternion_from_rotation(pose.rotation[0])]
-    shown = np.where(known.dh.prismatic, near, np.rad2deg(near)).round() + 0.0  # no minus zero
+    shown = np.where(arm.robot.dh.prismatic, near, np.rad2deg(near)).round() + 0.0  # no minus zero
     export = ["kinacc", "export", str(folder), "--out", _free("exported", folder)]
     use = ["kinacc", "compensate", str(folder), "--pose", ",".join(numbers)]
     use += ["--near-deg", ",".join(f"{each:.0f}" for each in shown)]
