@@ -130,3 +130,12 @@ def test_links_to_a_part_of_a_page_lead_there():
 
 def test_pages_that_walk_a_reader_through_show_commands():
     assert len(shown_commands(ROOT / "docs" / "from-tracker-file-to-compensated-robot.md")) > 5
+
+
+def test_held_out_errors_have_one_name_on_every_page_that_tells_of_them():
+    """The tables' reference has their own older names, which the glossary tells once."""
+    reference, glossary = ROOT / "docs/artifacts.md", ROOT / "docs/glossary.md"
+    others = {*PAGES, ROOT / "config.yaml"} - {reference, glossary}
+    said = re.compile("cross.valid", re.IGNORECASE)
+    assert [page.name for page in others if said.search(page.read_text())] == []
+    assert len(said.findall(glossary.read_text())) == 1

@@ -292,3 +292,21 @@ def test_of_several_reflectors_it_is_said_which_a_campaign_is_about_and_how_to_t
 def test_with_one_target_no_choice_between_points_is_offered(measured, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert "--point" not in shown(measured)
+
+
+def test_every_99_percent_figure_says_whether_it_was_counted_or_fitted(folder):
+    assert re.findall(r"99\W{1,2}(\w+)", shown(folder)) == ["empirical"]
+    done = call("export", folder, "--format", "markdown", "--format", "latex", "--out", "tables")
+    assert done.exit_code == 0, done.output
+    for page in Path("tables").iterdir():
+        assert set(re.findall(r"99[ ~\\,]*%[ ~]*(\w*)", page.read_text())) == {"gamma"}
+
+
+def test_errors_at_poses_no_fit_had_seen_have_one_name_in_all_answers(folder, measured):
+    said = [shown(folder), shown(measured, "--all"), call("plan-campaign", "--help").output]
+    done = call("predict", folder, f"{folder}/measurements.parquet", "--json")
+    said += [done.output, call("export", folder, "--out", "files").output]
+    for text in said:
+        assert "cross-valid" not in text
+        assert "kept out" not in text
+        assert "validation poses" not in text
