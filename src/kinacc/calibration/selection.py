@@ -115,7 +115,7 @@ def choices(
     if len(numbers) < 3:
         held_out = [None]  # nothing would be left to try candidates on
     pairs = [(out, test) for out in held_out for test in numbers if test != out]
-    counted = progress(pairs, "trials of order and prior") if progress else pairs
+    counted = progress(pairs, "orders and priors of the VEC model tried") if progress else pairs
     tried: dict[tuple, np.ndarray] = {}
     for out, test in counted:
         mirror = tried.get((test, out)) if out is not None else None

@@ -68,7 +68,7 @@ def _data(facts: Sequence[Fact]) -> list[str]:
     ]
     if number["fitted"] < number["readings"]:
         rest = number["readings"] - number["fitted"]
-        told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} kept out"
+        told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} held out"
         lines.append(f"{told} (measurements.validation_fold)")
     return lines
 
@@ -114,7 +114,8 @@ def _table(
     chosen = of(facts, "selection")
     rows = next(iter(errors.values()))["n"].value
     head = f"{name} ({where}; {counted(rows, 'row')})"
-    lines = [f"{head:57}{'mean':>10}{f'{LARGE_SHARE:.0%}':>10}{'largest':>10}"]
+    columns = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}
+    lines = [f"{head:57}" + "".join(f"{name:>{width}}" for name, width in columns.items())]
     for model, figures in errors.items():
         called = model_name(model)
         if model == NOMINAL:
@@ -123,7 +124,8 @@ def _table(
         elif "order" in chosen[model]:
             called += _order(chosen[model])
         mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
-        shown = "".join(f"{figures[each].value:10.3f}" for each in _FIGURES)
+        sizes = zip(_FIGURES, columns.values(), strict=True)
+        shown = "".join(f"{figures[each].value:{width}.3f}" for each, width in sizes)
         lines.append(f"{'':4}{called:53}{shown}{mark}".rstrip())
     return lines
 

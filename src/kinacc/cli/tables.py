@@ -48,8 +48,8 @@ def predicted(
     std = found.std * np.array([1.0, 1.0, 1.0, _MRAD, _MRAD, _MRAD])
     by = "standard deviation by the covariance of the fitted parameters"
     seen = "movement per mm or mrad of displacement along directions the calibration cannot see"
-    subset = calibration.residual.subset if calibration.residual else "no"
-    left = f"rms of what the model left of {subset} poses"
+    poses = calibration.residual.poses if calibration.residual else "no poses"
+    left = f"rms of what the model left of {poses}"
     fields = [
         Field("row", given.label, "", "the file's pose, or its line"),
         *joint_fields(calibration.robot.dh.prismatic, given.joints),

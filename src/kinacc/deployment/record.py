@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.errors import InputError, Problem
@@ -17,6 +18,7 @@ from kinacc.kinematics.robot import Robot
 
 MODELS = (*ERROR_MODELS, NOMINAL)
 FRAMES = ("base", "instrument")
+POSES = dict(zip(SUBSETS, ("training poses", "held-out poses"), strict=True))
 FLANGE, TOOL = "flange", "tool"
 _LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
 
@@ -28,6 +30,11 @@ class Residual:
     position_mm: float
     orientation_rad: float
     subset: str
+
+    @property
+    def poses(self) -> str:
+        """Which rows, in words."""
+        return POSES[self.subset]
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ def note(folder: Path | str) -> str:
         return ""
     return (
         f"note: the {selected} model was selected ({other.position_mm:.3f} mm rms of "
-        f"{other.subset} poses); a DH table cannot hold it and leaves {dh.position_mm:.3f} mm"
+        f"{other.poses}); a DH table cannot hold it and leaves {dh.position_mm:.3f} mm"
     )
 
 

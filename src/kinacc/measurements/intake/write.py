@@ -71,7 +71,7 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         f"      folds: {folds}{held}",
         "    calibration:",
         "      base_and_tool: estimated",
-        "      vec: {order: auto, prior: chosen} # by cross-validation",
+        "      vec: {order: auto, prior: chosen} # chosen by held-out errors",
         "      dh: {fit_to: measurements, hayati_joints: auto}",
         "    evaluation:",
         "      space: measured # the region the measured poses fill",

@@ -91,7 +91,7 @@ def of_points(name: str, robot: Robot | None, points: Mapping) -> ErrorField:
 def of_measurements(
     name: str, robot: Robot | None, errors: Mapping, measurements: Mapping
 ) -> ErrorField:
-    """Cross-validated errors of the DH model at measured configurations, readings averaged.
+    """Held-out errors of the DH model at measured configurations, readings averaged.
 
     errors: ``pose_errors``; measurements: ``measurements``. The errors hold the noise of the
     instrument, which counts as truth here.
@@ -100,7 +100,7 @@ def of_measurements(
         np.asarray(errors["estimate"]) == "cross_validated"
     )
     if not wanted.any():
-        what = "pose_errors holds no cross-validated errors of the DH model"
+        what = "pose_errors holds no held-out errors of the DH model"
         raise InputError(Problem(f"field {name}", what, fix="set measurements.folds"))
     rows = np.flatnonzero(wanted)
     groups = readings_of(np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows])
