@@ -75,6 +75,21 @@ def test_cell_equals_brute_force(arms, models, angle_deg, radius, height):
     assert found.worst_branch[0] == name
 
 
+def test_cell_held_to_a_workpiece_equals_brute_force(arms, models):
+    angle, radius, height = math.radians(40), 1700.0, 300.0
+    tilted = oracle.rot_z(0.3)[:3, :3] @ REFERENCE @ oracle.rot_z(-0.2)[:3, :3]
+    cells = region.Cells(np.array([angle]), np.array([radius]), np.array([height]))
+    rotations = region.orientations(TURN, "signs_and_zero")
+    wanted = accuracy_map.PosesWanted(CYLINDER, tilted, rotations, "dh", "base")
+    found = accuracy_map.accuracy_map(robot.load("mh180"), models, cells, wanted)
+    in_slice = oracle.rot_z(-angle)[:3, :3] @ tilted
+    position, turn, name, count = maps.cell(arms, LIMITS, angle, radius, height, in_slice, TURN)
+    assert found.solutions[0] == count > 0
+    assert found.position_max_mm[0] == pytest.approx(position, abs=1e-7)
+    assert found.orientation_max_mrad[0] == pytest.approx(turn, abs=1e-7)
+    assert found.worst_branch[0] == name
+
+
 def test_errors_at_joints_are_true_minus_model_tool(arms, models):
     q = np.random.default_rng(0).uniform(LOW, HIGH, (30, 6))
     errors = accuracy_map.errors_at(models, q)

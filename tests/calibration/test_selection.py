@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.calibration import frames, selection, vec_fit
+from kinacc.calibration import frames, held, selection, vec_fit
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.selection import Grid
 from kinacc.calibration.vec_fit import Prior
@@ -39,7 +39,8 @@ def empty_model(order):
 
 def choose(seen, orders=(1, 2, 3, 4, 6), priors=PRIORS):
     grid = Grid(orders, priors)
-    return selection.choices(seen, empty_model(max(orders)), frames.known(), False, WEIGHT, grid)
+    at = held.known_frames(seen, frames.known())
+    return selection.choices(seen, empty_model(max(orders)), at, WEIGHT, grid)
 
 
 @pytest.mark.parametrize("order", [1, 3])

@@ -14,6 +14,7 @@ from kinacc.campaign.prediction_check import unsure
 from kinacc.deployment.planning.candidates import spread
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import Residual
+from kinacc.kinematics.model import JointState
 
 USED = instruments(("tracker=0.05",), "base")
 
@@ -51,25 +52,28 @@ def test_a_sure_calibration_is_not_warned_of(calibrated, points):
     assert found.in_words() == []
 
 
-def test_unsure_candidates_are_counted_by_their_predicted_deviation(calibrated, points):
+def test_candidates_known_less_well_than_the_poses_of_the_fit_are_counted(calibrated, points):
     arm = calibrated(1e-3)
     std = predict(arm, points.joints).std_position_mm
     # A turn of the base by 1 mrad moves a point by 1 mm per metre from the axis.
     np.testing.assert_allclose(std, 1e-3 * np.hypot(*points.modelled_mm[:, :2].T), rtol=1e-6)
-    limit = 3.0 * float(np.median(std))
-    found = unsure(arm, points, USED, None, limit)
-    assert found.uncertain == np.sum(std > 0.9)
-    assert 0 < found.uncertain < 30
+    near = arm.robot.dh_joints(points.joints[np.argsort(std)[:15]])
+    arm = replace(arm, fitted=JointState(near))
+    found = unsure(arm, points, USED, None, 3.0 * float(np.median(std)))
+    # The last of the fifteen is beyond what 99 % of them keep.
+    assert found.not_measured == 16
     assert found.refusable == 15
     said = " ".join(found.in_words())
-    assert f"{found.uncertain} of 30 candidates" in said
-    assert "refused at 15 of them" in said
+    assert "16 of 30 candidates lie where the calibration was not measured" in said
+    assert "refused at 15 of 30" in said
     assert f"{std.max():.3g} mm" in said
-    assert "prior" in said
+    assert "--region measured" in str(found.asked()[0])
 
 
 def test_what_no_pose_showed_is_named(calibrated, points):
     found = unsure(calibrated(1e-5, blind_per_unit=1.0), points, USED, None, 6.0)
-    assert (found.uncertain, found.undetermined) == (0, 30)
+    assert (found.not_measured, found.undetermined) == (0, 30)
     assert found.largest_undetermined_mm == pytest.approx(1.0)
     assert "30 of 30 candidates" in found.in_words()[0]
+    assert "prior" in found.in_words()[0]
+    assert found.asked() == []

@@ -60,15 +60,54 @@ def begun(ur10_d, folder, *more):
     return campaigns.open_(folder).plan
 
 
-def test_candidates_the_calibration_is_unsure_of_are_warned_of(ur10_d, tmp_path):
-    """The series does not tell the base's y from the tool's z."""
-    done = call("campaign", "start", tmp_path / "campaign", "--calibration", ur10_d[0], "--robot",
-                "ur10", "--model", "dh", "--region", "fitted", "--drawn", 20, "--noise-mm", 0.05,
-                "--json")  # fmt: skip
+def start(ur10_d, folder, *more):
+    return call("campaign", "start", folder, "--calibration", ur10_d[0], "--model", "dh",
+                "--drawn", 20, "--noise-mm", 0.05, *more)  # fmt: skip
+
+
+def test_a_box_of_joints_that_was_hardly_measured_is_asked_about(ur10_d, tmp_path):
+    """In all poses of the series the flange points the same way, in hardly any of the box."""
+    folder = tmp_path / "campaign"
+    done = start(ur10_d, folder, "--region", "fitted")
+    assert done.exit_code == 2
+    assert "20 of 20 candidates lie where the calibration was not measured" in done.output
+    assert "--region measured" in done.output
+    assert not folder.exists()
+    done = start(ur10_d, folder, "--region", "fitted", "--sure", "--json")
     assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["prediction"]["undetermined"] > 0
-    assert "did not determine moves" in done.stderr
-    assert "docs/fitting.md" in done.stderr
+    assert json.loads(done.stdout)["prediction"]["not_measured"] == 20
+    assert "warning: 20 of 20 candidates" in done.stderr
+
+
+def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(ur10_d, tmp_path):
+    plans = []
+    for name, more in (("one", ()), ("same", ()), ("other", ("--seed", 1))):
+        done = start(ur10_d, tmp_path / name, "--json", *more)
+        assert done.exit_code == 0, done.output
+        assert json.loads(done.stdout)["prediction"]["not_measured"] == 0
+        assert not done.stderr
+        plans.append(campaigns.open_(tmp_path / name).plan)
+    assert plans[0].about["candidates"] == "drawn between neighbouring measured poses"
+    one, same, other = (plan.points.joints for plan in plans)
+    np.testing.assert_array_equal(one, same)
+    assert not np.isin(one, other).any()
+    # Forearm and upper arm are parallel to a plane that the flange keeps to: q2 + q3 + q4 is fixed.
+    measured = store.read(ur10_d[0] / "measurements.parquet")
+    wanted = sum(measured[f"q{joint}"] for joint in (2, 3, 4))
+    found = one[:, 1:4].sum(axis=1)
+    assert wanted.min() - 0.01 < found.min() <= found.max() < wanted.max() + 0.01
+
+
+def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d):
+    measured = store.read(ur10_d[0] / "measurements.parquet")
+    joints = np.rad2deg([measured[f"q{joint}"] for joint in range(1, 7)])
+    inside, among = joints[:, 0], np.median(joints, axis=1)
+    words = [f"--joints-deg={','.join(map(str, each))}" for each in (inside, among)]
+    done = call("predict", ur10_d[0], "--model", "dh", *words, "--json")
+    assert done.exit_code == 0, done.output
+    said = [each["status"] for each in json.loads(done.stdout)["rows"]]
+    assert said == ["ok", "extrapolated: the joints together are unlike those measured"]
+    assert "1 of 2 rows lie where the calibration was not measured" in done.stderr
 
 
 def same(said, wanted):

@@ -95,6 +95,21 @@ def test_a_reading_three_mm_off_where_less_than_one_is_usual_is_asked_about(visi
     assert call("campaign", "record", folder, path, "--accept-implausible").exit_code == 0
 
 
+def test_a_row_of_readings_is_named_by_the_pose_of_its_file_too(calibration, tmp_path):
+    draw = np.random.default_rng(2).uniform(-40.0, 40.0, (12, 6))
+    names = [f"corner {row}" for row in range(len(draw))]
+    lines = [",".join(["pose", *(f"q{i}_deg" for i in range(1, 7))])]
+    lines += [",".join([n, *map(str, q)]) for n, q in zip(names, draw, strict=True)]
+    (tmp_path / "poses.csv").write_text("\n".join(lines) + "\n")
+    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration, "--robot",
+                "mh180", "--candidates", tmp_path / "poses.csv", "--noise-mm", 0.05, "--model",
+                "dh", "--budget", 12, "--sure")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    path = written(tmp_path / "readings.csv", [(name, 9, 9, 9) for name in names])
+    said = call("campaign", "record", tmp_path / "check", path).output
+    assert "readings.csv, line 4 (corner 2): " in said
+
+
 def test_one_reading_at_a_time_is_held_to_those_before_it(visited, tmp_path):
     folder, rows = visited
     path = written(tmp_path / "readings.csv", rows[:20])

@@ -6,7 +6,7 @@ import pytest
 
 from kinacc.workflow.catalogue import STAGES
 
-FIGURES = {stage.name for stage in STAGES.values() if stage.is_figure}
+FIGURES = {stage.name for stage in STAGES.values() if stage.is_figure and not stage.on_request}
 AFTER_POINTS = {"study_chunk", "study", "histories", "claims"} | (FIGURES - {"fig1", "fig3"})
 AFTER_DH = {"residuals", "summary", "accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS
 ALL = {"measurements", "vec", "dh", "fig1"} | AFTER_DH

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kinacc.artifacts.store import to_table
 from kinacc.geometry import quaternion_from_rotation, rotation_z
@@ -13,7 +14,7 @@ from kinacc.kinematics import dh, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.vec import ERRORS
 from kinacc.workflow import evaluation
-from kinacc.workflow.stages import accuracy_map, assessment_points
+from kinacc.workflow.stages import accuracy_map, assessment_points, measurements
 
 ARM = robot.load("mh180")
 PROVENANCE = {
@@ -34,6 +35,7 @@ EVALUATION = {
     },
     "joint_box": {"joints_deg": None},
     "reference_orientation_deg": [180.0, 0.0, 0.0],
+    "reference_frame": "slice",
     "rotation_deg": 45.0,
     "rotations": "signs_and_zero",
     "tool_mm": [0.0, 0.0, 0.0],
@@ -155,6 +157,49 @@ def test_points_fit_their_contract_and_state_the_error_of_their_joints(changed):
     assert np.allclose(stated, error, atol=1e-9)
     assert np.allclose(columns["true_error_mm"], np.linalg.norm(error, axis=1))
     assert limits.within(q, model.q_min_rad, model.q_max_rad).all()
+
+
+def test_held_to_a_workpiece_the_tool_keeps_its_attitude_over_the_whole_space():
+    euler_deg = [180.0, -20.0, 10.0]
+    held = settings(reference_orientation_deg=euler_deg, reference_frame="base")
+    points = assessment_points.run(inputs(), held)["assessment_points"]
+    seen = dh.forward(ARM.dh, joints(points))
+    angles = np.rad2deg(np.arctan2(seen.position_mm[:, 1], seen.position_mm[:, 0]))
+    assert np.ptp(angles) > 50.0
+    in_base = Rotation.from_euler("XYZ", euler_deg, degrees=True).inv()
+    turns = (in_base * Rotation.from_matrix(seen.rotation)).as_euler("XYZ", degrees=True)
+    assert np.allclose(np.sort(np.unique(np.round(turns, 4) + 0.0)), [-45.0, 0.0, 45.0])
+
+
+@pytest.mark.parametrize("slice_deg", [0.0, 15.0, 30.0])
+def test_a_slice_of_the_map_held_to_a_workpiece_is_that_of_a_tool_turned_back(slice_deg):
+    # Rz(-a) Rx(180) = Rx(180) Rz(a): in the frame of slice a the tool stands turned about itself.
+    held = accuracy_map.run(inputs(), settings(reference_frame="base"))["accuracy_map"]
+    turned = settings(reference_orientation_deg=[180.0, 0.0, slice_deg])
+    wanted = accuracy_map.run(inputs(), turned)["accuracy_map"]
+    rows = held["slice_deg"] == slice_deg
+    for name in ("position_max_mm", "orientation_max_mrad"):
+        assert np.allclose(held[name][rows], wanted[name][rows], rtol=0.0, atol=1e-7)
+    assert held["worst_branch"][rows].tolist() == wanted["worst_branch"][rows].tolist()
+
+
+@pytest.mark.parametrize("frame", ["slice", "base"])
+def test_a_calibration_covers_the_attitudes_its_arm_is_judged_in(frame):
+    euler_deg = [180.0, -45.0, 20.0]
+    section = {**EVALUATION, "reference_orientation_deg": euler_deg, "reference_frame": frame}
+    arm = {"robot": "mh180", "seed": 1, "evaluation": section}
+    synthetic = {"draw": 0, "poses": 200, "tracker_noise_mm": 0.0}
+    source = {"source": "synthetic", "folds": None, "validation_fold": None}
+    seen = measurements.run({}, {**arm, "measurements": {**source, "synthetic": synthetic}})
+    columns = seen["measurements"]
+    quaternion = np.stack([columns[name] for name in ("qx", "qy", "qz", "qw")], axis=1)
+    attitude = Rotation.from_euler("XYZ", euler_deg, degrees=True)
+    if frame == "slice":
+        turned = np.arctan2(columns["y_mm"], columns["x_mm"])
+        attitude = Rotation.from_euler("z", turned[:, None]) * attitude
+    turns = (attitude.inv() * Rotation.from_quat(quaternion)).as_euler("XYZ", degrees=True)
+    # Errors of the arm are below a degree; the plan turns the flange by up to 50 degrees.
+    assert 45.0 < np.abs(turns).max() < 51.0
 
 
 def test_a_joint_box_is_in_millimetres_where_a_joint_slides():

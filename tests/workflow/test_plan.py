@@ -84,17 +84,25 @@ def assert_same(some, others):
             np.testing.assert_array_equal(values, others[name][column], f"{name}.{column}")
 
 
+AGAIN = (*OVER_ALL, "map_readings_chunk")  # go through fits and maps with other arms
+
+
 @pytest.mark.parametrize(
     ("change", "stages"),
     [
         ("study: {search: bisection}", {"study", *OVER_ALL}),
         ("study: {repetitions: 7}", {"study_chunk", *OVER_ALL}),
-        ("evaluation: {points: 7}", {"assessment_points", *OVER_ALL}),
-        ("map: {grid_mm: 50}", {"accuracy_map", *OVER_ALL}),
+        ("evaluation: {points: 7}", {"assessment_points", *AGAIN}),
+        (
+            "evaluation: {reference_frame: base}",
+            {"measurements", "accuracy_map", "assessment_points", *AGAIN},
+        ),
+        ("map: {grid_mm: 50}", {"accuracy_map", *AGAIN}),
         ("robustness: {draws: 3}", OVER_ALL),
+        ("map_readings: {arms: 3}", {"map_readings_chunk"}),
         ("choices: {runs: 7}", {"choices_chunk"}),
         ("measurements: {file: {decimal: ','}}", set()),
-        ("measurements: {synthetic: {poses: 700}}", {"measurements", *OVER_ALL}),
+        ("measurements: {synthetic: {poses: 700}}", {"measurements", *AGAIN}),
         ("figures: {formats: [svg]}", set()),
         ("study: {chunks: 5}", set()),
         ("choices: {chunks: 5}", set()),

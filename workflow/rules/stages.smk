@@ -74,6 +74,14 @@ rule robustness:
         "every table and figure is up to date, and robustness.parquet with the claims on further draws"
 
 
+# Fig. 3 under every reading of it, each over arms drawn anew.
+rule readings_of_maps:
+    input:
+        [plan.targets(dataset, only=(), also=MAP_READINGS) for dataset in plan.datasets],
+    message:
+        "the sentences on Fig. 3 under every reading of it are in map_readings.parquet"
+
+
 # The claims over every choice that the paper leaves open: each alone, and all at once.
 rule choices:
     input:

@@ -12,6 +12,7 @@ UNITS_OF_RESIDUALS = ("mm", "mrad")
 COMPARISONS = tuple(each.name for each in error_models.COMPARISONS)
 ESTIMATES = ("train", "cross_validated")
 FINDING_LEVELS = ("stops", "warning", "note")
+LEFT_OUT = "left_out"  # the finding that something of a file is not used
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
 ASSESSORS = ("maximum", "outlier_rejection", "model_invalidation")
 ASSESSOR_PATTERN = "[a-z][a-z0-9_]*"

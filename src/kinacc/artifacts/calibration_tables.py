@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from kinacc.artifacts.allowed import (
     COMPARISONS,
     ERRORS,
@@ -19,11 +17,13 @@ from kinacc.artifacts.columns import (
     JOINTS,
     JOINTS_MAX,
     REACH_MM,
+    ROW_NAME,
     SLIDES,
     TRAVEL_MM,
     TURN_RAD,
     Artefact,
     Column,
+    absent_if_unstated,
     error_vector,
     length,
     magnitude,
@@ -90,17 +90,12 @@ _FIT_COLUMNS = (
     real("value", "see unit", "the value", nullable=True),
     text("unit", "unit of the value; 1 for a pure number"),
 )
-_PAYLOAD = tuple(
-    replace(column, may_be_absent=True)
-    for column in unstated(
-        (
-            real("payload_kg", "kg", "mass of what the last DH frame carries", 0.0, 1e4),
-            *(
-                real(f"payload_{axis}_mm", "mm", f"{axis} of its centre, last DH frame", -1e4, 1e4)
-                for axis in "xyz"
-            ),
-        )
-    )
+_PAYLOAD = absent_if_unstated(
+    real("payload_kg", "kg", "mass of what the last DH frame carries", 0.0, 1e4),
+    *(
+        real(f"payload_{axis}_mm", "mm", f"{axis} of its centre, last DH frame", -1e4, 1e4)
+        for axis in "xyz"
+    ),
 )
 _STATED_BY_FILES = (
     text("session", "session with a base frame of its own; null for one alone"),
@@ -135,6 +130,7 @@ MEASUREMENTS = Artefact(
         whole("fold", "fold in which the row is held out; null without folds", nullable=True),
         *unstated(_STATED_BY_FILES),
         *_PAYLOAD,
+        *ROW_NAME,
     ),
     ("pose", "target", "repeat"),
 )

@@ -166,6 +166,11 @@ def unstated(columns: Iterable[Column]) -> tuple[Column, ...]:
     return tuple(replace(column, optional=True, nullable=True) for column in columns)
 
 
+def absent_if_unstated(*columns: Column) -> tuple[Column, ...]:
+    """The columns as ones that a file has only where a table states them."""
+    return tuple(replace(column, may_be_absent=True) for column in unstated(columns))
+
+
 def length(name: str, meaning: str, limit: float, nullable: bool = False) -> Column:
     return real(name, "mm", meaning, -limit, limit, nullable)
 
@@ -190,6 +195,11 @@ JOINTS = (
         "travel direction of each joint on arrival: -1, +1, or 0 where unknown",
         choices=(-1, 0, 1),
     ),
+)
+
+ROW_NAME = absent_if_unstated(
+    text("pose_name", "the measured file's name of the pose, where it does not only number them"),
+    text("file", "file that the line is of, where joints and points come from two"),
 )
 
 

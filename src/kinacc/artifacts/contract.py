@@ -49,6 +49,8 @@ ARTEFACTS: dict[str, Artefact] = {
         assessment_tables.CLAIMS,
         assessment_tables.ROBUSTNESS_CHUNK,
         assessment_tables.ROBUSTNESS,
+        assessment_tables.MAP_READINGS_CHUNK,
+        assessment_tables.MAP_READINGS,
         *choices_tables.ALL,
         *tournament_tables.ALL,
         *campaign_tables.ALL,

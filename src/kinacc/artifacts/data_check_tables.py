@@ -6,6 +6,7 @@ from kinacc.artifacts.allowed import COMPARISONS, FINDING_LEVELS, IDENTIFIER_PAT
 from kinacc.artifacts.columns import (
     ERROR_MRAD,
     REACH_MM,
+    ROW_NAME,
     Artefact,
     length,
     real,
@@ -54,6 +55,7 @@ EXCLUDED_ROWS = Artefact(
             )
             for axis in "xyz"
         ),
+        *ROW_NAME,
     ),
     ("comparison", "line", "target"),
 )

@@ -8,6 +8,7 @@ from kinacc.artifacts.columns import Artefact, real, text
 TOPICS = (
     "robot",
     "data",
+    "left_out",
     "check",
     "excluded_rows",
     "held_out_error",
@@ -16,6 +17,7 @@ TOPICS = (
     "held_out_model_difference",
     "selection",
     "range",
+    "like_measured",
     "undetermined",
 )
 SUMMARY = Artefact(

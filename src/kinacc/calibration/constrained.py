@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates, left_jacobian, stacked
 from kinacc.calibration.observations import Observations
@@ -148,6 +149,18 @@ class ConstrainedSystem:
         split, change = self.frames.inner.size, self.frames.change(y[: self.frames.size])
         for residual, jacobian in self.system.blocks(self._inner(y)):
             yield residual, np.concatenate([jacobian[:, :split] @ change, jacobian[:, split:]], 1)
+
+    @property
+    def count(self) -> int:
+        """Number of residuals."""
+        return self.system.count
+
+    def gram(self, y: np.ndarray) -> np.ndarray:
+        """Gram matrix (P+1, P+1) of ``[J | r]``."""
+        change = block_diag(
+            self.frames.change(y[: self.frames.size]), np.eye(self.system.model.size + 1)
+        )
+        return change.T @ self.system.gram(self._inner(y)) @ change
 
     def _inner(self, y: np.ndarray) -> np.ndarray:
         split = self.frames.size

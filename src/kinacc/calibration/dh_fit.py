@@ -7,25 +7,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.calibration import reweighted, robust
-from kinacc.calibration.constrained import (
-    ConstrainedFrames,
-    ConstrainedSystem,
-    FrameTerms,
-    constrained,
-)
+from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
 from kinacc.calibration.constraints import free_parameters  # noqa: F401 (the usual mask of a fit)
-from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
+from kinacc.calibration.frames import FrameCoordinates, Frames
 from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.calibration.held import (
+    ANGLE_UNIT_RAD,
+    Kept,
+    Placed,
+    known_frames,
+    placed,
+    pose_system,
+)
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
-from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
+from kinacc.calibration.system import FlangeModel, require_enough
 from kinacc.calibration.truncated_svd import unseen
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
-ANGLE_UNIT_RAD = 1e-3  # one mrad counts as much displacement as one mm
 DH_FIX = "measure more poses"
 UNSEEN_POSES = 60
 UNSEEN_WEIGHT = 500.0  # mm per rad; what is null is so by any weight
@@ -145,23 +147,27 @@ def solved(
     """
     name, flange = unknowns.name, unknowns.flange
     require_enough(observations, flange.size, name, DH_FIX)
-    coords = _frame_coordinates(observations, start, frames, frame_terms)
+    at = _placed(observations, unknowns, start, rotation_weight_mm_per_rad, frames, frame_terms)
+    coords = at.coordinates
     require_enough(observations, coords.size + flange.size, name, DH_FIX)
-    expected, frame_std = np.zeros(coords.size), np.full(coords.size, np.inf)
-    if isinstance(coords, ConstrainedFrames):
-        expected, frame_std = coords.known()
+    expected, frame_std = at.known
     task = reweighted.Task(
-        system=_system(observations, flange, coords, rotation_weight_mm_per_rad),
+        system=pose_system(observations, flange, coords, rotation_weight_mm_per_rad),
         start=np.concatenate([np.zeros(coords.size), unknowns.start]),
         nominal=np.concatenate([expected, unknowns.nominal]),
         prior_std=np.concatenate([frame_std, unknowns.prior_std]),
-        scale=np.concatenate([_units(coords.is_angle()), unknowns.scale]),
+        scale=np.concatenate([at.scale, unknowns.scale]),
         threshold=threshold,
         frames=coords.size,
         name=name,
         is_rotation=observations.is_rotation if observations.has_rotation.any() else None,
     )
-    return coords, *reweighted.minimise(task, observations, loss)
+    if not at.held.any():
+        return coords, *reweighted.minimise(task, observations, loss)
+    keep = np.append(~at.held, np.ones(flange.size, dtype=bool))
+    solution, weights = reweighted.minimise(task.keeping(keep), observations, loss)
+    kept = Kept(task.system, keep, task.start)
+    return coords, kept.solution(solution, at.open, task.scale), weights
 
 
 def fit_frames(
@@ -185,29 +191,20 @@ def fit_frames(
     )
 
 
-def _frame_coordinates(
+def _placed(
     observations: Observations,
+    unknowns: Unknowns,
     start: DHModel,
+    weight: float,
     frames: Frames | None,
     terms: FrameTerms | None,
-) -> FrameCoordinates | ConstrainedFrames:
+) -> Placed:
     if frames is not None:
-        return coordinates(observations, frames, base_free=False, targets_free=False)
+        return known_frames(observations, frames)
     begin = closed_form_start(observations, dh.forward(start, observations.q_rad))
-    if terms is not None:
-        return constrained(observations, begin, terms)
-    return coordinates(observations, begin, base_free=True, targets_free=True)
-
-
-def _system(
-    observations: Observations,
-    flange: FlangeModel,
-    coords: FrameCoordinates | ConstrainedFrames,
-    weight: float,
-) -> PoseSystem | ConstrainedSystem:
-    if isinstance(coords, ConstrainedFrames):
-        return ConstrainedSystem(PoseSystem(observations, flange, coords.inner, weight), coords)
-    return PoseSystem(observations, flange, coords, weight)
+    return placed(
+        observations, lambda at: unknowns.flange.pose(unknowns.nominal, at), begin, terms, weight
+    )
 
 
 def unseen_anywhere(fit: DHFit, observations: Observations, threshold: float) -> np.ndarray:
@@ -219,7 +216,7 @@ def unseen_anywhere(fit: DHFit, observations: Observations, threshold: float) ->
     """
     seen = _everywhere(fit, observations)
     flange = flange_model(fit.model, fit.free)
-    system = _system(seen, flange, fit.coordinates, UNSEEN_WEIGHT)
+    system = pose_system(seen, flange, fit.coordinates, UNSEEN_WEIGHT)
     scale = np.concatenate([_units(fit.coordinates.is_angle()), scales(fit.free)])
     return unseen(system, fit.solution.x, scale, fit.coordinates.size, threshold)
 

@@ -194,11 +194,6 @@ def coordinates(
     return FrameCoordinates(anchor, base_free, targets_free, turns, centroid)
 
 
-def both(free: bool | tuple[bool, bool]) -> tuple[bool, bool]:
-    """Whether base and targets are estimated, from one answer for both or one for each."""
-    return (free, free) if isinstance(free, bool) else free
-
-
 def left_jacobian(w_rad: np.ndarray) -> np.ndarray:
     """Matrix (3, 3) with ``exp(w + dw) = exp(left_jacobian(w) dw) exp(w)`` to first order."""
     angle = float(np.linalg.norm(w_rad))

@@ -11,7 +11,7 @@ from kinacc.calibration.blind_groups import LeftOpen, groups, of_arm
 from kinacc.calibration.constrained import ConstrainedFrames
 from kinacc.calibration.dh_fit import DHFit, unseen_anywhere
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.truncated_svd import TOUCH_SQUARED
+from kinacc.calibration.truncated_svd import MOVES_SQUARED, TOUCH_SQUARED
 from kinacc.calibration.uncertainty import Uncertainty, named_directions
 
 IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
@@ -37,7 +37,8 @@ def parameters(fit: DHFit, known: Uncertainty) -> list[Parameter]:
     """Every parameter of a DH fit, frames first.
 
     Undetermined are those of which directions below the truncation's share of the largest singular
-    value (base and targets projected out) hold more than 1 % (``truncated.TOUCH_SQUARED``).
+    value (base and targets projected out) hold more than 1 % (``truncated.TOUCH_SQUARED``), or half
+    of them where it has a prior (``truncated.MOVES_SQUARED``).
     """
     priors, fixed = _priors(fit), _fixed(fit)
     found = []
@@ -46,7 +47,8 @@ def parameters(fit: DHFit, known: Uncertainty) -> list[Parameter]:
     ):
         status = FIXED if name in fixed else IDENTIFIED
         status = PRIOR if name in priors else status
-        status = UNDETERMINED if share**2 > TOUCH_SQUARED else status
+        most = MOVES_SQUARED if status == PRIOR else TOUCH_SQUARED
+        status = UNDETERMINED if share**2 > most else status
         prior = priors[name] if status == PRIOR else None
         found.append(Parameter(name, status, float(share), prior))
     free = zip(fit.model.parameter_names, fit.free.ravel(), strict=True)

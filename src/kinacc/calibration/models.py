@@ -14,7 +14,7 @@ from kinacc.artifacts.error_models import NOMINAL
 from kinacc.calibration import dh_fit
 from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
 from kinacc.calibration.constraints import frame_terms
-from kinacc.calibration.frames import BASE, FrameCoordinates, Frames, known
+from kinacc.calibration.frames import FrameCoordinates, Frames, known
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.uncertainty import Uncertainty
@@ -79,16 +79,6 @@ class Common:
         if self.frames_estimated:
             return None, self.terms(observations)
         return self.stated(observations), None
-
-    def frames_free(self, observations: Observations) -> tuple[bool, bool]:
-        """Whether anything of bases and of targets is estimated."""
-        if not self.frames_estimated:
-            return False, False
-        terms = self.terms(observations)
-        count = len(observations.session_names)
-        bases = {BASE, *(f"{BASE}{number}" for number in range(2, count + 1))}
-        of_base = np.array([name.partition(".")[0] in bases for name in terms.names])
-        return bool(terms.free[of_base].any()), bool(terms.free[~of_base].any())
 
 
 class Fitted(Protocol):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.calibration import robust
+from kinacc.calibration.held import Kept
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution, System
@@ -36,6 +37,18 @@ class Task:
     frames: int
     name: str
     is_rotation: np.ndarray | None = None
+
+    def keeping(self, keep: np.ndarray) -> Task:
+        """The task in the parameters ``keep`` (P,), the others left where they start."""
+        return replace(
+            self,
+            system=Kept(self.system, keep, self.start),
+            start=self.start[keep],
+            nominal=self.nominal[keep],
+            prior_std=self.prior_std[keep],
+            scale=self.scale[keep],
+            frames=int(keep[: self.frames].sum()),
+        )
 
     def solved(
         self, start: np.ndarray, variance: float, weights: Weights | None = None

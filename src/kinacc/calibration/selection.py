@@ -12,10 +12,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kinacc.calibration import vec_fit
 from kinacc.calibration.basis_expansion import gram
-from kinacc.calibration.frames import Frames, both, coordinates
+from kinacc.calibration.held import Placed
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
@@ -95,22 +96,21 @@ def blocks(fold: np.ndarray) -> np.ndarray:
 def choices(
     observations: Observations,
     empty: VECModel,
-    frames: Frames,
-    frames_free: bool | tuple[bool, bool],
+    frames: Placed,
     rotation_weight_mm_per_rad: float,
     grid: Grid,
     progress=None,
 ) -> list[Choice]:
     """The choice of every block with that block held out, and last one that has seen all.
 
-    ``empty`` is the VEC model at the highest order; ``frames`` those of its arm.
+    ``empty`` is the VEC model at the highest order; ``frames`` as a fit has them.
     """
     block = blocks(observations.fold)
     numbers = [int(each) for each in np.unique(block) if each >= 0]
     if len(numbers) < 2:
         what = f"{len(numbers)} folds hold rows: no order or prior can be tried on held-out ones"
         raise InputError(Problem("measurements", what, "rows in two folds or more", _FIX))
-    sums = _Sums.of(observations, block, empty, frames, frames_free, rotation_weight_mm_per_rad)
+    sums = _Sums.of(observations, block, empty, frames, rotation_weight_mm_per_rad)
     held_out = [*numbers, None]
     if len(numbers) < 3:
         held_out = [None]  # nothing would be left to try candidates on
@@ -163,11 +163,10 @@ class _Sums:
         observations: Observations,
         block: np.ndarray,
         empty: VECModel,
-        frames: Frames,
-        frames_free: bool | tuple[bool, bool],
+        frames: Placed,
         weight: float,
     ) -> _Sums:
-        coords = coordinates(observations, frames, *both(frames_free))
+        coords, kept = frames.inner, frames.kept
         free, flange = vec_fit.flange_model(observations, empty)
         position, everything, rows, components = {}, {}, {}, {}
         for number in np.unique(block[block >= 0]):
@@ -180,11 +179,11 @@ class _Sums:
                 if part.has_rotation.any():
                     all_rows += gram(columns[:, 3:], groups)
             key = int(number)
-            position[key], everything[key] = place, all_rows + place
+            position[key], everything[key] = _in(kept, place), _in(kept, all_rows + place)
             rows[key], components[key] = len(part), part.components
         terms = np.tile(np.arange(empty.order + 1), empty.coefficients.size // (empty.order + 1))
         order = np.concatenate([terms, np.full(empty.direction_offsets_rad.size, -1)])[free]
-        order = np.concatenate([np.full(coords.size, -1), order])
+        order = np.concatenate([np.full(kept.shape[1], -1), order])
         return cls(position, everything, rows, components, order, empty, free)
 
     def trained(self, grid: Grid, left_out: Sequence[int | None]) -> list[np.ndarray]:
@@ -237,6 +236,14 @@ class _Sums:
     def _prior_std(self, prior: Prior) -> np.ndarray:
         frames = len(self.order) - int(self.free.sum())
         return np.concatenate([np.ones(frames), prior.std(self.empty)[self.free]])
+
+
+def _in(kept: np.ndarray, gram: np.ndarray) -> np.ndarray:
+    """A Gram matrix whose first coordinates are those that ``kept`` (E, f) is the derivative by."""
+    if np.array_equal(kept, np.eye(len(kept))):
+        return gram
+    change = block_diag(kept, np.eye(len(gram) - len(kept)))
+    return change.T @ gram @ change
 
 
 def _ridge(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, SELECTABLE, SUBSETS
+from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSETS
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.calibration import blind_words
 from kinacc.kinematics.robot import Robot
+from kinacc.measurements.row_names import RowNames
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
 TABLES = ("measurements", "robot", "frames", "dh_identified", "pose_errors", "model_selection")
@@ -36,14 +38,19 @@ class Fact(NamedTuple):
     text: str | None = None
 
 
-def facts(tables: Mapping[str, Columns], robot: Robot) -> list[Fact]:
+def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np.nan) -> list[Fact]:
     """Everything ``summary`` holds of the tables ``TABLES`` and, where there, of models and data.
 
-    ``robot``: the one the tables were made with.
+    ``robot``: the one the tables were made with; ``like_measured``: share of the box of the ranges
+    of the joints where the selected model was measured, NaN where it is not known.
     """
     return [
         *_data(tables["measurements"], robot),
         *_frames(tables["frames"]),
+        *(
+            Fact(LEFT_OUT, str(number), "statement", text=text)
+            for number, text in enumerate(left_out(tables.get("data_check")), 1)
+        ),
         *_findings(tables.get("data_check")),
         *_errors(tables["pose_errors"]),
         *_selection(tables),
@@ -55,6 +62,7 @@ def facts(tables: Mapping[str, Columns], robot: Robot) -> list[Fact]:
         ),
         *_excluded(tables.get("excluded_rows"), selected(tables["model_selection"])),
         *_range(tables["measurements"], robot),
+        *_like_measured(like_measured),
         *(
             Fact("undetermined", str(number), "statement", text=text)
             for number, text in enumerate(blind_words.listed(tables["dh_identified"]), 1)
@@ -84,6 +92,14 @@ def bending(table: Mapping | None) -> list[dict]:
 def findings(table: Mapping) -> list[str]:
     """Findings of a ``data_check`` table in words, the gravest first."""
     return [each.text for each in _findings(table) if each.text]
+
+
+def left_out(table: Mapping | None) -> list[str]:
+    """What is not used of the measured file, in words, from a ``data_check`` table."""
+    if table is None:
+        return []
+    pairs = zip(table["finding"], table["what"], strict=True)
+    return [str(what) for kind, what in pairs if kind == LEFT_OUT]
 
 
 def excluded_errors(table: Mapping, model: str) -> list[tuple[int, str, float]]:
@@ -121,10 +137,13 @@ def _findings(table: Mapping | None) -> Iterator[Fact]:
     if table is None:
         return
     note = FINDING_LEVELS[-1]
-    order = sorted(range(len(table["finding"])), key=lambda i: table["level"][i] == note)
+    order = [i for i, kind in enumerate(table["finding"]) if kind != LEFT_OUT]
+    order.sort(key=lambda i: table["level"][i] == note)
     for i in order:
         text = f"{table['finding'][i]}: {table['what'][i]}"
-        text += f" ({table['lines'][i]})" if table["lines"][i] else ""
+        lines = str(table["lines"][i] or "")
+        told = re.search(rf"{re.escape(lines)}(?![\w-])", text)
+        text += "" if told else f"; {lines}"
         text += f"; accepted: {table['accepted'][i]}" if table["accepted"][i] else ""
         count = float(table["rows"][i])
         yield Fact("check", str(table["finding"][i]), str(table["level"][i]), count, "1", text)
@@ -191,23 +210,36 @@ def _orders(name: str, table: Mapping | None) -> Iterator[Fact]:
 
 
 def _excluded(table: Mapping | None, model: str) -> Iterator[Fact]:
-    for line, reason, error in [] if table is None else excluded_errors(table, model):
+    if table is None:
+        return
+    names = RowNames.of_columns({**table, "row": table["line"]})
+    for line, reason, error in excluded_errors(table, model):
         unit = "mm" if np.isfinite(error) else None
-        yield Fact("excluded_rows", f"line {line}", "error", error, unit, reason)
+        yield Fact("excluded_rows", names.one(line), "error", error, unit, reason)
 
 
 def _range(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
     """Range of each reported joint that the poses cover, and its share of the joint's travel."""
-    for joint in range(len(robot.q_min_rad)):
+    for joint, (low, high) in enumerate(zip(*covered(measurements, robot), strict=True)):
         slides = bool(robot.dh.prismatic[joint])
         scale, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
-        reported = np.asarray(measurements[f"q{joint + 1}"], dtype=float)
-        low, high = reported.min(), reported.max()
         share = (high - low) / (robot.q_max_rad[joint] - robot.q_min_rad[joint])
         item = f"joint {joint + 1}"
         yield Fact("range", item, "low", float(scale * low), unit)
         yield Fact("range", item, "high", float(scale * high), unit)
         yield Fact("range", item, "share", float(share), "1")
+
+
+def covered(measurements: Mapping, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Ends (k,), (k,) of the reported joints of all poses."""
+    numbers = range(1, len(robot.q_min_rad) + 1)
+    reported = np.stack([np.asarray(measurements[f"q{n}"], dtype=float) for n in numbers])
+    return reported.min(axis=1), reported.max(axis=1)
+
+
+def _like_measured(share: float) -> Iterator[Fact]:
+    if np.isfinite(share):
+        yield Fact("like_measured", "ranges of all joints", "share", share, "1")
 
 
 def of(found: Iterable[Fact], topic: str) -> dict[str, dict[str, Fact]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
+from kinacc.artifacts.allowed import LEFT_OUT
 from kinacc.artifacts.error_models import NOMINAL, PLAINEST
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
@@ -12,6 +13,7 @@ from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 WIDTH = 100
 MARGIN = 17  # where the text of a paragraph begins
 _MOST, _LINES = 3, 5  # findings, excluded rows, sentences that are told, and lines they may take
+_LINES_EACH = 2  # of what is left out: a list of columns may be long
 _JOINTS_PER_LINE, _JOINT_WIDTH = 3, 27
 _KEPT = "\u00a0"  # a space that no line is broken at
 _FIGURES = ("mean", "quantile_99", "largest")
@@ -26,13 +28,13 @@ def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str
     """
     most = None if whole else _MOST
     return [
-        *paragraph("data", _data(facts)),
+        *paragraph("data", [*_data(facts), *_left_out(facts, most, more)]),
         *paragraph("check", _checked(facts, most, more)),
         *paragraph("excluded", _excluded(facts, most, more)),
         *_errors(facts, whole),
         *paragraph("selected", _selected(facts)),
         *paragraph("bending", _bending(of(facts, "bending"))),
-        *paragraph("valid where", _range(of(facts, "range"))),
+        *paragraph("valid where", _range(facts)),
         *paragraph("undetermined", _undetermined(facts, most, more)),
     ]
 
@@ -69,6 +71,14 @@ def _data(facts: Sequence[Fact]) -> list[str]:
         told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} kept out"
         lines.append(f"{told} (measurements.validation_fold)")
     return lines
+
+
+def _left_out(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
+    told = [each.text for each in facts if each.topic == LEFT_OUT and each.text]
+    if most is None:
+        return told
+    room = _LINES_EACH * (WIDTH - MARGIN)
+    return _first([textwrap.shorten(each, room, placeholder=" ..") for each in told], most, more)
 
 
 def _checked(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
@@ -206,14 +216,20 @@ def _bending(joints: Mapping[str, Mapping[str, Fact]]) -> list[str]:
     return lines
 
 
-def _range(joints: Mapping[str, Mapping[str, Fact]]) -> list[str]:
+def _range(facts: Sequence[Fact]) -> list[str]:
+    """Ranges of the joints, and how much of the box they span was measured."""
+    joints, known = of(facts, "range"), of(facts, "like_measured")
+    head = "near the measured poses; range of each joint by itself (share of its travel):"
+    if known:
+        share = next(iter(known.values()))["share"].value
+        many = f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
+        head = f"of poses in these ranges (share of travel), {many} are like those measured:"
     told = [
         f"{name.replace('joint ', 'J')} {known['low'].value:.0f} to {known['high'].value:.0f} "
         f"{known['low'].unit} ({known['share'].value:.0%})".ljust(_JOINT_WIDTH)
         for name, known in joints.items()
     ]
     lines = [told[i : i + _JOINTS_PER_LINE] for i in range(0, len(told), _JOINTS_PER_LINE)]
-    head = "near the measured poses; range of each joint by itself (share of its travel):"
     return [head, *("".join(line).rstrip().replace(" ", _KEPT) for line in lines)]
 
 

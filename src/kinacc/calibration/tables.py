@@ -52,8 +52,11 @@ def frames_of(
     return Frames(stacked(bases), stacked(targets))
 
 
-def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:
-    """``vec_fit``: figures of the fit, the prior of every coefficient, singular values."""
+def vec_fit_columns(fit: VECFit, gauge: Spectrum, uncertainty: Uncertainty) -> Columns:
+    """``vec_fit``: figures of the fit, the prior of every coefficient, singular values.
+
+    And the directions of base and targets that the data do not determine.
+    """
     rows = [*_solution_rows(fit.solution), *_spectrum_rows(gauge)]
     names = fit.model.parameter_names
     units = ["mm" if "delta" in name else "rad" for name in names]
@@ -63,7 +66,7 @@ def vec_fit_columns(fit: VECFit, gauge: Spectrum) -> Columns:
             zip(names, fit.prior_std, units, strict=True), 1
         )
     ]
-    return columns_of("vec_fit", rows)
+    return columns_of("vec_fit", [*rows, *_undetermined_rows(uncertainty)])
 
 
 def vec_orders_columns(choices: Sequence[Choice], stated: tuple[int, Prior]) -> Columns:
@@ -109,12 +112,7 @@ def fit_columns(name: str, fit: DHFit, uncertainty: Uncertainty) -> Columns:
             ("rows_below_half_weight", None, None, int(np.sum(fit.weights.row < 0.5)), "1"),
             ("rows_without_weight", None, None, int(np.sum(fit.weights.row == 0.0)), "1"),
         ]
-    for number, direction in enumerate(uncertainty.undetermined, 1):
-        rows += [
-            ("undetermined_direction", number, name, value, scaled_unit(name))
-            for name, value in zip(uncertainty.names, direction, strict=True)
-        ]
-    return columns_of(name, rows)
+    return columns_of(name, [*rows, *_undetermined_rows(uncertainty)])
 
 
 def identified_columns(
@@ -156,6 +154,12 @@ def _solution_rows(solution: Solution) -> Iterable[tuple]:
     yield ("iterations", None, None, solution.iterations, "1")
     yield ("last_step", None, None, solution.last_step, "mm or mrad")
     yield ("converged", None, None, float(solution.converged), "1")
+
+
+def _undetermined_rows(uncertainty: Uncertainty) -> Iterable[tuple]:
+    for number, direction in enumerate(uncertainty.undetermined, 1):
+        for name, value in zip(uncertainty.names, direction, strict=True):
+            yield ("undetermined_direction", number, name, value, scaled_unit(name))
 
 
 def _spectrum_rows(spectrum: Spectrum) -> Iterable[tuple]:

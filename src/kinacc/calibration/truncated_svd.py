@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr
@@ -14,6 +14,7 @@ from kinacc.calibration.solve import Solution, Spectrum, System
 # fit is not quite the least cost.
 TRUNCATED_GROWTH = 1e-3
 FRAME_THRESHOLD = 1e-6  # frames have no nominal value to keep: only exact ambiguities are cut
+MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
 TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
 
 
@@ -33,9 +34,8 @@ def minimise_truncated(
     Two blocks are judged one after the other: the first ``frames`` parameters (base and targets),
     then the others after what the frames can express is projected out of them. In each, directions
     whose singular value is below a share of the block's largest (``FRAME_THRESHOLD``, then
-    ``threshold``) keep their nominal value, as do frame directions that the arm at ``nominal`` does
-    not show; frame directions between the two are fitted, but count as undetermined in what is
-    said of the solution; ``scale`` (P,) is the unit in which
+    ``threshold``) keep their nominal value; frame directions between the two are fitted, but count
+    as undetermined in what is said of the solution; ``scale`` (P,) is the unit in which
     displacement is measured (mm, and rad of one mrad).
     ``prior`` (P,): residual standard deviation over prior standard deviation of every parameter, 0
     for none. It adds ``prior (x - nominal)`` to the residuals, and a direction that the data leave
@@ -51,19 +51,13 @@ def minimise_truncated(
     def objective(at: np.ndarray) -> float:
         return system.cost(at) + held.cost(at)
 
-    # The errors of an arm tilt axes that are parallel by its description: along what that shows
-    # nothing of, a fit would follow noise by many mm.
-    shown = None
-    if frames:
-        described, _ = solve.triangle(system, nominal, scale)
-        shown = _Split.of(held.joined(described, nominal), held, threshold, None).frames.rank
-    cost, ranks, last = objective(x), (shown, None), np.inf
+    cost, ranks, last = objective(x), None, np.inf
     iterations = 0
     while last > solve.STEP_TOLERANCE and iterations < solve.MAX_ITERATIONS:
         iterations += 1
         factor, count = solve.triangle(system, x, scale)
         # A rank that has been lost is not taken back, so the iteration cannot swing between two.
-        most = ranks if iterations > 3 else (shown, None)
+        most = ranks if iterations > 3 else None
         split = _Split.of(held.joined(factor, x), held, threshold, most)
         ranks = split.ranks
         step = scale * split.step(held.displacement(x))
@@ -84,7 +78,7 @@ def minimise_truncated(
     variance = cost / freedom if freedom > 0 else np.nan
     told = split
     if threshold > FRAME_THRESHOLD:  # fitted as they are, weak frames still count as undetermined
-        told = _Split.of(held.joined(factor, x), held, threshold, (shown, None), threshold)
+        told = _Split.of(held.joined(factor, x), held, threshold, None, threshold)
         root = told.root()
     covariance = variance * (root @ root.T) * np.outer(scale, scale)
     if is_rotation is not None and freedom > 0:
@@ -144,6 +138,11 @@ class _Held:
         return qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
 
     @property
+    def known_frames(self) -> np.ndarray:
+        """Rows (p, frames) that choose the coordinates of frames with a prior."""
+        return np.eye(self.frames)[self.weight[: self.frames] > 0.0]
+
+    @property
     def of_others(self) -> np.ndarray:
         """Rows (p, P - frames) of the prior on the parameters after the frames."""
         weight = self.weight[self.frames :]
@@ -178,10 +177,29 @@ class _Truncated:
         root, unused = kept.T / values[:rank], left[:, rank:]
         if prior is None or not len(prior):
             return cls(left[:, :rank], root, lost, np.zeros((0, len(right))), spectrum, unused)
-        told, lost = _told_by(prior, lost)
+        # Which parameters have a prior counts here, not how tight it is.
+        told, lost = spoken_of(np.sign(prior), lost)
         kept = np.concatenate([kept, told])
         both, upper = np.linalg.qr(np.concatenate([block, prior]) @ kept.T)
         return cls(both, kept.T @ np.linalg.inv(upper), lost, prior, spectrum, unused)
+
+    def keeping(
+        self, block: np.ndarray, known: np.ndarray, least: float = TOUCH_SQUARED
+    ) -> _Truncated:
+        """The same cut of ``block`` and prior with directions kept that change what is ``known``.
+
+        ``known`` (p, P): derivative of it, ``least``: squared change of a direction that counts.
+        """
+        told, lost = spoken_of(known, self.lost, least)
+        if not len(told):
+            return self
+        kept = np.concatenate([np.linalg.qr(self.root)[0].T, told])
+        block = np.concatenate([block, self.prior])
+        left, upper = np.linalg.qr(block @ kept.T, mode="complete")
+        root = kept.T @ np.linalg.inv(upper[: len(kept)])
+        return replace(
+            self, left=left[:, : len(kept)], root=root, lost=lost, unused=left[:, len(kept) :]
+        )
 
     @property
     def rank(self) -> int:
@@ -197,13 +215,17 @@ class _Truncated:
         return np.sum(self.lost**2, axis=0) > TOUCH_SQUARED
 
 
-def _told_by(prior: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The directions ``lost`` (m, P) turned into those ``prior`` speaks of, and the rest."""
-    if not len(lost):
-        return lost, lost
-    # Which parameters have a prior counts here, not how tight it is.
-    _, values, turn = np.linalg.svd(np.sign(prior) @ lost.T)
-    told = int(np.sum(values**2 > TOUCH_SQUARED))
+def spoken_of(
+    known: np.ndarray, lost: np.ndarray, least: float = TOUCH_SQUARED
+) -> tuple[np.ndarray, np.ndarray]:
+    """The directions ``lost`` (m, P) turned into those that change what is known, and the rest.
+
+    ``known`` (p, P): its derivative; a direction counts if it changes that by more than ``least``.
+    """
+    if not len(lost) or not len(known):
+        return lost[:0], lost
+    _, values, turn = np.linalg.svd(known @ lost.T)
+    told = int(np.sum(values**2 > least))
     return turn[:told] @ lost, turn[told:] @ lost
 
 
@@ -229,9 +251,17 @@ class _Split:
         count = held.frames
         upper, lower = factor[:count], factor[count:]
         frames = _Truncated.of(upper[:, :count], frame_threshold, most and most[0])
+        telling = frame_threshold > FRAME_THRESHOLD
+        if telling:
+            frames = frames.keeping(upper[:, :count], held.known_frames)
         # Rows of truncated frame directions are equations the frames do not take up.
         rows = np.concatenate([lower, frames.unused.T @ upper])
         others = _Truncated.of(rows[:, count:-1], threshold, most and most[1], held.of_others)
+        if telling:
+            # What moves a frame that is known is not left open, however little the data show it.
+            followed = -frames.root @ (frames.left.T @ upper[:, count:-1])
+            known = held.known_frames @ followed
+            others = others.keeping(rows[:, count:-1], known, MOVES_SQUARED)
         return cls(frames, others, upper[:, count:-1], upper[:, -1], rows[:, -1])
 
     @property
@@ -247,7 +277,7 @@ class _Split:
     def root(self) -> np.ndarray:
         """Matrix (P, r) whose product with its transpose inverts J'J on the kept directions."""
         seen = -self.frames.root @ (self.frames.left.T @ self.coupling @ self.others.root)
-        blank = np.zeros((len(self.others.root), self.frames.rank))
+        blank = np.zeros((len(self.others.root), self.frames.root.shape[1]))
         return np.block([[self.frames.root, seen], [blank, self.others.root]])
 
     def undetermined(self) -> np.ndarray:

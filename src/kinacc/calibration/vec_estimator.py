@@ -10,7 +10,8 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.calibration import selection, tables, vec_fit
-from kinacc.calibration.frames import coordinates
+from kinacc.calibration.constrained import FrameTerms
+from kinacc.calibration.frames import Frames
 from kinacc.calibration.models import Common, Estimator, Fit, nominal_frames
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.selection import Choice, Grid
@@ -81,10 +82,8 @@ class VECEstimator(Estimator):
     def fit(
         self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
     ) -> VECFit:
-        """The VEC model on the nominal arm; a base or target the rules leave nothing of is held."""
-        frames = self.common.stated(observations)
-        if self.common.frames_estimated:
-            frames = nominal_frames(observations, self.common)
+        """The VEC model on the nominal arm, base and targets starting where that has them."""
+        frames, terms = self._begin(observations)
         start: VECModel | None = near.model if near else None
         # High orders are worth it; the end is the same to a few nm, which the paper's tables keep.
         worth = self.grid is not None and start is not None and start.order == self.order
@@ -94,7 +93,8 @@ class VECEstimator(Estimator):
             prior=self.prior,
             rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
             frames=frames,
-            frames_free=self.common.frames_free(observations),
+            frames_free=terms is not None,
+            frame_terms=terms,
             start=start if worth else None,
         )
 
@@ -108,24 +108,29 @@ class VECEstimator(Estimator):
             fitted.frames,
             self.common.rotation_weight_mm_per_rad,
         )
-        return {"vec_fit": tables.vec_fit_columns(fitted, gauge)}
+        return {"vec_fit": tables.vec_fit_columns(fitted, gauge, known)}
 
     def _tried(self, every: Observations, progress: Callable | None) -> list[Choice]:
-        frames = nominal_frames(every, self.common)
-        frames_free = self.common.frames_free(every)
-        size = coordinates(every, frames, *frames_free).size
+        frames, terms = self._begin(every)
+        weight = self.common.rotation_weight_mm_per_rad
+        at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
+        size = at.coordinates.size
         # A choice trains on three blocks of five at least; every fit of the chosen order on more.
         count = every.select(every.fold >= 0).components * 3 // 5
         grid = self.grid.within(count, self.common.nominal.joints, size)
         return selection.choices(
             self._wanted(every),
             self._empty(max(grid.orders)),
-            frames,
-            frames_free,
-            self.common.rotation_weight_mm_per_rad,
+            at,
+            weight,
             grid,
             progress,
         )
+
+    def _begin(self, observations: Observations) -> tuple[Frames, FrameTerms | None]:
+        """Where base and targets start, and what is taken for granted of those estimated."""
+        stated, terms = self.common.frames(observations)
+        return stated or nominal_frames(observations, self.common), terms
 
     def _empty(self, order: int) -> VECModel:
         return vec.without_errors(self.common.nominal, *self.joint_range_rad, order)

@@ -7,8 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.calibration.basis_expansion import Group
-from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
-from kinacc.calibration.frames import FrameCoordinates, Frames, both, coordinates
+from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
+from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
+from kinacc.calibration.held import (
+    ANGLE_UNIT_RAD,
+    Kept,
+    Placed,
+    known_frames,
+    placed,
+    pose_system,
+)
 from kinacc.calibration.map_estimate import minimise_with_prior
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
@@ -66,7 +74,7 @@ class VECFit:
     prior_std: np.ndarray
     free: np.ndarray
     solution: Solution
-    coordinates: FrameCoordinates
+    coordinates: FrameCoordinates | ConstrainedFrames
 
 
 def fit(
@@ -76,37 +84,45 @@ def fit(
     prior: Prior,
     rotation_weight_mm_per_rad: float,
     frames: Frames,
-    frames_free: bool | tuple[bool, bool],
+    frames_free: bool,
+    frame_terms: FrameTerms | None = None,
     start: VECModel | None = None,
 ) -> VECFit:
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
-    Base and targets are ``frames``, or start there if ``frames_free`` (both, or base and
-    targets apart); coefficients start at those
-    of ``start``, a model like ``empty``, or at zero. Direction offsets that no
-    observation shows are left at zero, std NaN; the two of a joint that always travelled sum to
-    zero, so that the model at an unknown direction is the mean of both.
+    Base and targets are ``frames``, or start there if ``frames_free``, under ``frame_terms``;
+    coefficients start at those of ``start``, a model like ``empty``, or at zero. Direction offsets
+    that no observation shows are left at zero, std NaN; the two of a joint that always travelled
+    sum to zero, so that the model at an unknown direction is the mean of both.
     Raises FitError, and InputError where there are fewer residuals than parameters.
     """
     free, flange = flange_model(observations, empty)
     require_enough(observations, flange.size, "VEC fit", VEC_FIX)
-    coords = coordinates(observations, frames, *both(frames_free))
+    at = frames_of(
+        observations, empty, frames, frames_free, frame_terms, rotation_weight_mm_per_rad
+    )
+    coords = at.coordinates
     require_enough(observations, coords.size + flange.size, "VEC fit", VEC_FIX)
-    system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
+    system = pose_system(observations, flange, coords, rotation_weight_mm_per_rad)
     prior_std = prior.std(empty)
-    frame_std = FRAME_PRIOR_UNITS * _units(coords.is_angle())
-    nothing = np.zeros(system.size)
-    begin = nothing.copy()
+    expected, stated_std = at.known
+    frame_std = np.where(np.isfinite(stated_std), stated_std, FRAME_PRIOR_UNITS * at.scale)
+    begin = np.zeros(system.size)
     if start is not None:
         begin[coords.size :] = vec.to_vector(start)[free]
+    scale = np.concatenate([at.scale, _units(_is_angle(empty)[free])])
+    keep = np.append(~at.held, np.ones(flange.size, dtype=bool))
+    kept = Kept(system, keep, begin)
     solution = minimise_with_prior(
-        system,
-        start=begin,
-        prior_mean=nothing,
-        prior_std=np.concatenate([frame_std, prior_std[free]]),
-        scale=np.concatenate([_units(coords.is_angle()), _units(_is_angle(empty)[free])]),
+        kept if at.held.any() else system,
+        start=begin[keep],
+        prior_mean=np.concatenate([expected, np.zeros(flange.size)])[keep],
+        prior_std=np.concatenate([frame_std, prior_std[free]])[keep],
+        scale=scale[keep],
         name="VEC fit",
     )
+    if at.held.any():
+        solution = kept.solution(solution, at.open, scale)
     solution = _with_centred_offsets(solution, observations, empty, free, coords.size)
     vector, std = np.zeros(free.size), np.full(free.size, np.nan)
     vector[free] = solution.x[coords.size :]
@@ -120,6 +136,20 @@ def fit(
         solution=solution,
         coordinates=coords,
     )
+
+
+def frames_of(
+    observations: Observations,
+    empty: VECModel,
+    frames: Frames,
+    frames_free: bool,
+    terms: FrameTerms | None,
+    rotation_weight_mm_per_rad: float,
+) -> Placed:
+    """Coordinates of base and targets of a fit, none where these are known."""
+    if not frames_free:
+        return known_frames(observations, frames)
+    return placed(observations, empty.dh.pose, frames, terms, rotation_weight_mm_per_rad)
 
 
 def gauge(

@@ -10,6 +10,7 @@ import numpy as np
 from kinacc.artifacts.columns import texts
 from kinacc.checks import tails
 from kinacc.geometry import rotation_from_quaternion
+from kinacc.measurements.row_names import RowNames
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Cells:
     ``q`` (n, k) reported joints (rad, mm where one slides); ``position_mm`` (n, 3) and ``rotation``
     (n, 3, 3), NaN where not measured, in the instrument's frame; ``target``, ``session``, ``pose``,
     ``repeat`` (n,) indices; ``line`` (n,) of the file, the first where readings were drawn
-    together, ``drawn`` (n,) tuples of all their lines.
+    together, ``drawn`` (n,) tuples of all their lines, ``row_names`` what these are called.
     """
 
     q: np.ndarray
@@ -33,6 +34,7 @@ class Cells:
     drawn: np.ndarray
     target_names: tuple[str, ...]
     session_names: tuple[str, ...]
+    row_names: RowNames
 
     def __len__(self) -> int:
         return len(self.q)
@@ -56,7 +58,7 @@ class Cells:
         return replace(self, **columns)
 
 
-def of_columns(columns: Mapping[str, np.ndarray], joints: int) -> Cells:
+def of_columns(columns: Mapping[str, np.ndarray], joints: int, row_names: RowNames) -> Cells:
     """Cells of the columns of a reading."""
     target_names, target = _numbered(columns["target"])
     session_names, session = _numbered(columns["session"])
@@ -73,6 +75,7 @@ def of_columns(columns: Mapping[str, np.ndarray], joints: int) -> Cells:
         drawn=texts([(line,) for line in columns["row"].tolist()]),
         target_names=target_names,
         session_names=session_names,
+        row_names=row_names,
     )
 
 

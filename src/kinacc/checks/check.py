@@ -22,7 +22,7 @@ from kinacc.checks import (
     turns,
 )
 from kinacc.checks.cells import Cells
-from kinacc.checks.facts import coverage_of, facts_of, remarks_of
+from kinacc.checks.facts import coverage_of, facts_of, left_out, remarks_of
 from kinacc.checks.fitting import Fitted, Jump
 from kinacc.checks.report import Report
 from kinacc.checks.suspicion import Suspicion, suspicion
@@ -55,7 +55,7 @@ def check(
     reading: MeasuredFile, layout: Layout, robot: Robot, dataset: str, path: str, progress: Progress
 ) -> Report:
     """Report on what was read."""
-    every = cells.of_columns(reading.columns, robot.dh.joints)
+    every = cells.of_columns(reading.columns, robot.dh.joints, reading.row_names)
     if len(np.unique(every.pose)) < _FEWEST_POSES:
         what = f"{len(np.unique(every.pose))} poses"
         raise InputError(Problem(path, what, f"at least {_FEWEST_POSES}, to compare them"))
@@ -91,9 +91,12 @@ def check(
         dataset,
         path,
         facts,
-        remarks_of(every, reading, repeats, distances),
-        tuple(each.held_to(gross) for each in _once(known, np.unique(every.line).size)),
-        coverage_of(facts["joint_coverage"]),
+        remarks_of(every, repeats, distances),
+        tuple(
+            replace(each.held_to(gross), row_names=reading.row_names)
+            for each in _once(known, np.unique(every.line).size)
+        ),
+        (*left_out(reading), *coverage_of(facts["joint_coverage"])),
         *(() if fitted is None else (fitted.seen.cells.line, fitted.left_mm)),
     )
 
@@ -253,17 +256,18 @@ def _of_other_lengths(one: Cells, fitted: Fitted, robot: Robot) -> list[Suspicio
 
 def _jump(fitted: Fitted, jump: Jump) -> Suspicion:
     seen, line = fitted.seen.cells, int(fitted.seen.cells.line[jump.row])
+    called = seen.row_names.one(line)
     by = ", ".join(f"{value:+.3g}" for value in jump.shift_mm)
     if jump.target is None:
         what = (
-            f"the base frame jumps before line {line}, by {by} mm (x, y, z) and "
+            f"the base frame jumps before {called}, by {by} mm (x, y, z) and "
             f"{1e3 * jump.turn_rad:.3g} mrad"
         )
         fix = "give the rows before and after a session each (column session)"
         kind = "base_jump"
     else:
         name = seen.target_names[seen.target[jump.row]]
-        what = f"target {name} moved before line {line}, by {by} mm in the flange frame"
+        what = f"target {name} moved before {called}, by {by} mm in the flange frame"
         fix, kind = "give the target another name from there on", "target_moved"
     return suspicion(
         kind,

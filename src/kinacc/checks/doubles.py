@@ -29,7 +29,7 @@ def found(cells: Cells, noise_mm: float) -> list[Suspicion]:
         suspicion(
             "duplicate_rows",
             f"{again.size} row{'s are' if again.size > 1 else ' is'} equal to an earlier one in "
-            f"every joint and reading, the first of them to line {first}",
+            f"every joint and reading, the first of them to {cells.row_names.one(first)}",
             line[again],
             "take the copies out: they count as measurements that were never made",
             first_copied_line=first,
@@ -47,7 +47,8 @@ def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Suspicion]:
     if not again.size or not _unlikely(cells, noise_mm):
         return []
     first = equal[there[at]]
-    pairs = [f"line {line} repeats {of}" for line, of in zip(again, first, strict=True)]
+    called = cells.row_names.one
+    pairs = [f"{called(line)} repeats {called(of)}" for line, of in zip(again, first, strict=True)]
     return [
         suspicion(
             "repeated_reading",

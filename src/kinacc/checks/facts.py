@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinacc.artifacts.allowed import LEFT_OUT
 from kinacc.checks.cells import Cells
 from kinacc.checks.fitting import Fitted
 from kinacc.checks.noise import Distance, Repeats, Revisits, revisits
@@ -126,11 +127,15 @@ def coverage_of(coverage: list[dict[str, object]]) -> tuple[Suspicion, ...]:
     )
 
 
-def remarks_of(
-    every: Cells, reading: MeasuredFile, repeats: Repeats, distances: list[Distance]
-) -> tuple[str, ...]:
+def left_out(reading: MeasuredFile) -> tuple[Suspicion, ...]:
+    """A note on everything in the file that is not used: rows first, columns last."""
+    told = dict.fromkeys((*reading.notes, *reading.left_out()))
+    return tuple(Suspicion(LEFT_OUT, words, (), level=NOTE) for words in told)
+
+
+def remarks_of(every: Cells, repeats: Repeats, distances: list[Distance]) -> tuple[str, ...]:
     """What else to know about the file, in words."""
-    remarks = list(reading.left_out())
+    remarks = []
     if len(every.target_names) > 1:
         how = (
             f": their repeats go together (correlation {repeats.common:.2f})"

@@ -65,6 +65,7 @@ class Report:
                     "what": each.what,
                     "fix": each.fix,
                     "lines": list(each.lines),
+                    "where": each.where if each.lines else None,
                     **plain(each.values),
                 }
                 for each in self.suspicions

@@ -177,13 +177,14 @@ def _outliers(fitted: Fitted, rows: np.ndarray) -> list[Suspicion]:
     rest = rows[joint < 0]
     if rest.size:
         worst = rest[np.argmax(fitted.left_mm[rest])]
+        called = cells.row_names.one(cells.line[worst])
         angle = fitted.left_rad[rest].max()
         turned = f" and {1e3 * angle:.3g} mrad" if angle > fitted.limit_rad else ""
         suspicions.append(
             suspicion(
                 "outliers",
                 f"{_count(rest, 'reading')} too far from where all others put the arm: up to "
-                f"{fitted.left_mm[worst]:.3g} mm (line {cells.line[worst]}){turned}, where "
+                f"{fitted.left_mm[worst]:.3g} mm{turned} at {called}, where "
                 f"{fitted.limit_mm:.3g} mm is the most to be expected",
                 cells.lines(rest),
                 "measure them again; take out slips, keep what repeats: that is the arm",

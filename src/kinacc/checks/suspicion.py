@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from kinacc.errors import and_more
+from kinacc.artifacts.allowed import LEFT_OUT
+from kinacc.measurements.row_names import RowNames
 
 KINDS = {
     "outside_limits": "joints outside the robot's limits",
@@ -33,6 +32,7 @@ KINDS = {
     "does_not_fit": "a robot that is not the one described",
     "few_poses": "fewer poses than the model asks for",
     "thin_coverage": "joints that hardly move",
+    LEFT_OUT: "what is left out of the file",
 }
 STOPS, WARNING, NOTE = "stops", "warning", "note"
 # Numbers that mean something else, a base or target that moved, a model that asks for more.
@@ -41,11 +41,10 @@ _WRONG = {
     *("euler_convention", "orientations", "joint_sign", "joint_coupling", "joint_zero"),
     *("joint_order", "target_moved", "base_jump", "does_not_fit", "few_poses"),
 }
-_NEVER_STOP = {"largest_rows", "thin_coverage"}
+_NEVER_STOP = {"largest_rows", "thin_coverage", LEFT_OUT}
 _OF_ROWS = {"outliers", "repeated_reading", "duplicate_rows", "outside_limits", "target_swapped"}
 _LINES_SHOWN = 20
 STOPPING = tuple(kind for kind in KINDS if kind not in _NEVER_STOP)  # some of them by their size
-_RANGES_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -54,6 +53,7 @@ class Suspicion:
 
     ``fix`` says what to do about it; ``values`` are the numbers behind it, units in their names.
     ``level``: whether it stops a workflow that fits the data, warns, or is a note beside it.
+    ``row_names`` say what the rows at its lines are called.
     """
 
     kind: str
@@ -62,11 +62,12 @@ class Suspicion:
     fix: str = ""
     values: Mapping[str, object] = field(default_factory=dict)
     level: str = WARNING
+    row_names: RowNames = field(default_factory=RowNames)
 
     @property
     def where(self) -> str:
         """The lines in words."""
-        return lines_in_words(self.lines)
+        return self.row_names.spans(self.lines)
 
     @property
     def to_go_on(self) -> str:
@@ -90,15 +91,3 @@ def suspicion(kind: str, what: str, lines: Iterable[int], fix: str = "", **value
     """A suspicion of any lines, each named once and in order."""
     unique = tuple(sorted({int(line) for line in lines}))
     return Suspicion(kind, what, unique, fix, values)
-
-
-def lines_in_words(lines: tuple[int, ...], shown: int = _RANGES_SHOWN) -> str:
-    """``lines 2-9, 12 and 17 more``; runs of lines are drawn together."""
-    if not lines:
-        return "no line"
-    numbers = np.array(lines)
-    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
-    words = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
-    text = ", ".join(words[:shown])
-    rest = sum(len(run) for run in runs[shown:])
-    return f"line{'s' if len(lines) > 1 else ''} {text}{and_more(rest)}"

@@ -24,6 +24,7 @@ def found(cells: Cells, distances: list[Distance]) -> tuple[list[Suspicion], np.
         mine = [step for step in steps if target in (step[0].one, step[0].other)]
         first = int(mine[0][0].rows[mine[0][1]][0])
         line = int(cells.line[first])
+        called = cells.row_names.one(line)
         rows = (cells.target == target) & (cells.line >= line)
         numbers[rows] = numbers.max() + 1
         name = cells.target_names[target]
@@ -35,7 +36,7 @@ def found(cells: Cells, distances: list[Distance]) -> tuple[list[Suspicion], np.
         suspicions.append(
             suspicion(
                 "target_moved",
-                f"target {name}{sure} moved before line {line}: its distances change by {sizes}",
+                f"target {name}{sure} moved before {called}: its distances change by {sizes}",
                 cells.line[rows],
                 "give the target another name from there on",
                 target=name,

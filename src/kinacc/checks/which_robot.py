@@ -43,7 +43,7 @@ def _left(reading: MeasuredFile, arm) -> float:
     """
     from kinacc.checks import cells, changes, hand_eye, meaning, robust_fit
 
-    every = cells.merged(cells.of_columns(reading.columns, arm.dh.joints))[0]
+    every = cells.merged(cells.of_columns(reading.columns, arm.dh.joints, reading.row_names))[0]
     few = every.select(hand_eye.thinned(np.arange(len(every)), _ROWS))
     point = few.position_mm - np.median(few.position_mm, axis=0)
     spread = float(np.median(np.linalg.norm(point, axis=1)))

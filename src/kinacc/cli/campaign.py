@@ -6,6 +6,7 @@ import click
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
+from kinacc.cli.file_options import joint_file_options
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import answers
 
@@ -39,13 +40,15 @@ def campaign() -> None:
 @choice.SESSION
 @choice.POINT
 @option("--candidates", type=click.Path(), help="File of joints that may be measured.")
+@joint_file_options
 @option("--drawn", default=200, type=click.IntRange(1, 20_000),
         help="Candidates drawn where there is no file.")  # fmt: skip
 @option(
     "--region",
-    type=click.Choice(["configured", "fitted", "limits"]),
-    help="Draw from the configured evaluation space, the joints the calibration covers, or the "
-    "joint limits. [configured if there is a configuration, else fitted]",
+    type=click.Choice(["measured", "configured", "fitted", "limits"]),
+    help="Draw between neighbouring measured poses, or evenly from the configured evaluation "
+    "space, the joint ranges the calibration covers, or the joint limits. [configured if there is "
+    "a configuration with a space, fitted with --joints-deg, else measured]",
 )
 @option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...".')
 @option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')
@@ -65,10 +68,10 @@ def campaign() -> None:
 def start(out, **given) -> None:
     """Begin a campaign in FOLDER: nothing of this can be changed once there are readings.
 
-    Candidates are the joint configurations the statement is about: rows of a file (q1_deg .. or
-    q1_rad ..; q1_mm where a joint slides; a `pose` column names them, s1 .. are directions of
-    travel), or drawn. Their order is random, by the seed, and knows nothing of the errors. Where
-    the calibration is too unsure of them for readings to be judged, that is said.
+    Candidates are the joint configurations the statement is about: rows of a file in any form that
+    `kinacc init` reads, robots' programs included (of q1_deg .. also s1 .., directions of travel),
+    or drawn. Their order is random, by the seed, and knows nothing of the errors. Where more than a
+    tenth of them lie where the calibration was not measured, that is asked about.
 
     The noise must hold all that differs between readings of one pose: the instrument, its target,
     and how well the arm repeats the pose.

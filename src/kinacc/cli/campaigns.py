@@ -28,6 +28,7 @@ def start(given: Mapping, out: Output) -> None:
     from kinacc.artifacts import store
     from kinacc.campaign import begin, prediction_check, slips
     from kinacc.cli import campaign_candidates, campaign_options, rows
+    from kinacc.cli.file_options import joint_answers
 
     problems = folders.in_the_way(given["folder"])
     noise = (given[each] for each in ("noise_mm", "covariance_mm2", "instrument", "frame"))
@@ -43,7 +44,7 @@ def start(given: Mapping, out: Output) -> None:
         given["calibration"], given["model"], given["robot"], given["config"], given["session"]
     )
     region = choice.record_of(campaign_candidates.Region, given)
-    found = campaign_candidates.candidates(region, calibration)
+    found = campaign_candidates.candidates(region, calibration, joint_answers(given))
     points = begin.points_of(
         calibration, found.joints, found.label, found.directions, given["point"]
     )
@@ -72,16 +73,17 @@ def start(given: Mapping, out: Output) -> None:
         calibration, points, assessor, instruments, limits, given["seed"], joints_now, about,
         by_travel=given["visit"] == "travel",
     )  # fmt: skip
+    unsure = prediction_check.unsure(
+        calibration, points, instruments, given["point"], limits.implausible_mm
+    )
     if not given["sure"]:
         left_mm = calibration.residual.position_mm if calibration.residual else math.nan
         problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
         readings = [Path(given["calibration"]) / f"{name}.parquet" for name in _READINGS]
         if all(path.is_file() for path in readings):
             problems += slips.of_little_noise(instruments, *map(store.read, readings))
+        problems += [] if unsure is None else unsure.asked()
         refuse(problems, "The campaign was not begun")
-    unsure = prediction_check.unsure(
-        calibration, points, instruments, given["point"], limits.implausible_mm
-    )
     for line in [] if unsure is None else unsure.in_words():
         click.echo(line, err=True)
     folders.start(given["folder"], begun)

@@ -183,6 +183,8 @@ def _of_file(given: Asked, before: State) -> _Made:
             option = option.replace("_", "-")
             raise InputError(Problem(f"--{option}", "is given with a file", "a column of the file"))
     table = open_table(path)
+    if "pose" in table.columns:
+        table = table.with_pose_names("pose")
     mark = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
     place = Path(os.path.relpath(Path(path).resolve(), Path(given.folder).resolve())).as_posix()
     rows, problems = _rows(table, given.instrument, before)
@@ -194,7 +196,8 @@ def _of_file(given: Asked, before: State) -> _Made:
     unusual_mm = _unusual_mm(before, read.values())
     good = []
     for number, row in enumerate(rows):
-        where = f"{table.path}, line {table.line[number]}"
+        called = table.row_names.one(table.line[number])
+        where = f"{table.path}, {called}"
         if isinstance(row, Problem):
             wrong = [row]
         elif number in compared.known:
@@ -211,7 +214,7 @@ def _of_file(given: Asked, before: State) -> _Made:
                 wrong += _repeated(row, where, earlier)
             good += [] if wrong else [row]
         if isinstance(row, Reading):
-            earlier.setdefault(imports.digits(row), f"line {table.line[number]}")
+            earlier.setdefault(imports.digits(row), called)
         problems += wrong
     if not good and not problems:
         what = f"was recorded before: {_listed(compared.known.values())}, no row is new"

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import click
 
 from kinacc.cli.choice import option, together, values_of
 
 _FILE = "measurements.file"
 
-file_options = together(
+_text = (
     option("--encoding", type=values_of(f"{_FILE}.encoding"), help="Characters of a text file."),
     option("--sheet", help="Sheet of an Excel workbook."),
     option("--decimal", type=values_of(f"{_FILE}.decimal"), help="Decimal mark."),
@@ -18,6 +21,9 @@ file_options = together(
         help="Mark between thousands.",
     ),
     option("--names", metavar="A,B,..", help="Names of the columns of a file without any."),
+)
+file_options = together(
+    *_text,
     option(
         "--no-reading",
         metavar="NUMBER",
@@ -49,3 +55,22 @@ ANSWERS = (
     *("encoding", "sheet", "decimal", "thousands", "names", "no_reading", "sigma"),
     *("direction_unit", "vertical", "horizontal"),
 )
+
+# What a file of joints alone may leave open.
+joint_file_options = together(
+    *_text,
+    option("--take", multiple=True, metavar="COLUMN",
+           help="Read these joints of a file that names several; one column of them."),
+    option("--joint-unit", type=values_of(f"{_FILE}.joint_unit"),
+           help="Unit of the joints of a file."),
+    option("--pulses-per-deg", metavar="A,B,..", help="Pulses of each joint in a degree."),
+)  # fmt: skip
+JOINT_ANSWERS = (
+    *("encoding", "sheet", "decimal", "thousands", "names", "take", "joint_unit"),
+    "pulses_per_deg",
+)
+
+
+def joint_answers(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What the options of a command say of a file of joints."""
+    return {name: given[name] for name in JOINT_ANSWERS if given.get(name)}

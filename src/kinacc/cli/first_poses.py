@@ -23,10 +23,12 @@ def first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> list[dict[str, 
     shown = []
     for pose in list(dict.fromkeys(columns["pose"].tolist()))[:_POSES]:
         rows = np.flatnonzero(columns["pose"] == pose)
+        line = int(columns["row"][rows[0]])
         q = np.array([columns[f"q{i + 1}"][rows[0]] for i in range(len(prismatic))])
         shown.append(
             {
-                "line": int(columns["row"][rows[0]]),
+                "line": line,
+                "where": reading.row_names.one(line),
                 "joints": [
                     float(f"{value:.4f}") for value in np.where(prismatic, q, np.rad2deg(q))
                 ],
@@ -70,7 +72,7 @@ def in_words(shown: list[dict]) -> list[str]:
     lines = ["the first poses, as they are understood (joints in deg, positions in mm):"]
     for pose in shown:
         joints = ", ".join(f"{value:.3f}" for value in pose["joints"])
-        lines.append(f"  line {pose['line']}: joints {joints}")
+        lines.append(f"  {pose['where']}: joints {joints}")
         for each in pose["targets"]:
             point = ", ".join(f"{each[f'{axis}_mm']:.3f}" for axis in "xyz")
             turn = ""

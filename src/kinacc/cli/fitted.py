@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, NOMINAL, PLAINEST
 from kinacc.cli.output import Output, answers, plain
+
+if TYPE_CHECKING:
+    from kinacc.measurements.row_names import RowNames
 
 _FURTHER = (*(f"{kind}_model" for kind in ALWAYS), "residuals", "worst_rows")
 _MODELS = (NOMINAL, *ERROR_MODELS)
@@ -59,12 +63,13 @@ def read(folder: Path | str, whole: bool = True) -> dict[str, dict]:
 def summary(folder: Path | str) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
     from kinacc.calibration import blind_words
-    from kinacc.calibration.summary import bending, findings, of, selected
+    from kinacc.calibration.summary import bending, findings, left_out, of, selected
+    from kinacc.measurements.row_names import RowNames
     from kinacc.workflow.answer import campaign_of, facts_of
 
     tables = read(folder)
     facts, bound = facts_of(tables), campaign_of(folder).assessed
-    excluded = tables.get("excluded_rows")
+    excluded, names = tables.get("excluded_rows"), RowNames.of_columns(tables["measurements"])
     choice, told = tables["model_selection"], tables["dh_identified"]
     best = selected(choice)
     gain = choice["gain_mm2"][list(choice["model"]).index("vec")]
@@ -88,7 +93,8 @@ def summary(folder: Path | str) -> dict:
         },
         "parameters": _statuses(told),
         "undetermined": blind_words.listed(told),
-        "worst_rows": _worst(tables["worst_rows"], best),
+        "worst_rows": _worst(tables["worst_rows"], best, names),
+        "left_out": left_out(tables.get("data_check")),
         "data": findings(tables["data_check"]) if "data_check" in tables else [],
         "excluded": None if excluded is None else _excluded(excluded, best),
         "position_error_with_excluded_mm": None
@@ -134,9 +140,11 @@ def _errors(table: Mapping, model: str, subset: str) -> dict | None:
 def _excluded(table: Mapping, model: str) -> list[dict]:
     """The rows of one model, each with its error: null where it could not be read."""
     from kinacc.calibration.summary import excluded_errors
+    from kinacc.measurements.row_names import RowNames
 
+    names = RowNames.of_columns({**table, "row": table["line"]})
     return [
-        {"line": line, "reason": reason, "error_mm": plain(error)}
+        {"line": line, "where": names.one(line), "reason": reason, "error_mm": plain(error)}
         for line, reason, error in excluded_errors(table, model)
     ]
 
@@ -160,7 +168,7 @@ def _with_excluded(residuals: Mapping, excluded: Mapping, model: str) -> dict | 
     }
 
 
-def _worst(table: Mapping, model: str) -> list[dict]:
+def _worst(table: Mapping, model: str, names: RowNames) -> list[dict]:
     rows = [
         i
         for i, comparison in enumerate(table["comparison"])
@@ -172,6 +180,7 @@ def _worst(table: Mapping, model: str) -> list[dict]:
         {
             "line": plain(table["line"][i]),
             "row": int(table["row"][i]),
+            "where": _called(table, i, names),
             "pose": int(table["pose"][i]),
             "target": str(table["target"][i]),
             "error_mm": plain(table["error_mm"][i]),
@@ -180,17 +189,27 @@ def _worst(table: Mapping, model: str) -> list[dict]:
     ]
 
 
+def _called(table: Mapping, i: int, names: RowNames) -> str:
+    """What a person calls a row: by its line, or by its number where the arm is synthetic."""
+    line, pose = table["line"][i], int(table["pose"][i])
+    if line != line:
+        return f"row {int(table['row'][i])}, pose {pose}"
+    return names.one(line) if int(line) in names.pose else f"{names.one(line)}, pose {pose}"
+
+
 def _further(tables: Mapping[str, Mapping]) -> list[str]:
     """What does not stand on the half page."""
     from kinacc.calibration.summary import selected
     from kinacc.calibration.summary_words import counted, model_name, paragraph
+    from kinacc.measurements.row_names import RowNames
 
     best = selected(tables["model_selection"])
     statuses = [f"{len(each)} {name}" for name, each in _statuses(tables["dh_identified"]).items()]
-    worst = []
-    for row in _worst(tables["worst_rows"], best):
-        where = f"row {row['row']}" if row["line"] is None else f"line {row['line']:.0f}"
-        worst.append(f"{where}, pose {row['pose']}, {row['target']}: {row['error_mm']:.3f} mm")
+    names = RowNames.of_columns(tables["measurements"])
+    worst = [
+        f"{row['where']}, {row['target']}: {row['error_mm']:.3f} mm"
+        for row in _worst(tables["worst_rows"], best, names)
+    ]
     return [
         *paragraph("parameters", [f"of the DH fit: {', '.join(statuses)}"]),
         *paragraph(

@@ -6,6 +6,7 @@ import click
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
+from kinacc.cli.file_options import joint_file_options
 from kinacc.cli.output import answers
 from kinacc.config import schema
 
@@ -19,6 +20,7 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 @option("--poses", "count", default=40, type=click.IntRange(1, 2000), help="Poses chosen.")
 @option("--index", type=click.Choice(INDICES), default="O1", help="What is best.")
 @option("--candidates", type=click.Path(), help="File of joints to choose from.")
+@joint_file_options
 @option("--drawn", default=1000, type=click.IntRange(10, MOST_CANDIDATES), help="Candidates drawn.")
 @option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...". [limits]')
 @option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')
@@ -37,9 +39,10 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 def plan_poses(out, **given) -> None:
     """Choose poses that tell most of an arm, in an order with little travel.
 
-    ROBOT is a shipped name or a robot file (not needed with --dataset). Poses come from a file with
-    q1_deg and so on, or are drawn evenly over the joints and kept where the tool may be. Collisions
-    and the instrument's view are not known here: leave such poses out of the candidates.
+    ROBOT is a shipped name or a robot file (not needed with --dataset). Poses come from a file in
+    any form that `kinacc init` reads, or are drawn evenly over the joints and kept where the tool
+    may be. Collisions and the instrument's view are not known here: leave such poses out of the
+    candidates.
 
     \b
     O1  geometric mean of the singular values / sqrt(poses)  (D-optimal; Borm, Menq)

@@ -10,6 +10,7 @@ import numpy as np
 
 from kinacc.calibration.blind_words import sentences
 from kinacc.cli import rows
+from kinacc.cli.file_options import joint_answers
 from kinacc.cli.plan_poses import MOST_CANDIDATES
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.cli.spaces import inside_box, joint_ranges, ranges, settings_of, without_dataset
@@ -92,7 +93,7 @@ def question(given: Mapping) -> PoseTask:
         threshold=given["threshold"],
     )
     if given["candidates"] is not None:
-        file = rows.candidates(given["candidates"], robot, MOST_CANDIDATES)
+        file = rows.candidates(given["candidates"], robot, MOST_CANDIDATES, joint_answers(given))
         joints, label = file.joints, file.label
     else:
         inside = settings.inside if space is None else inside_box(space)

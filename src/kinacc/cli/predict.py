@@ -27,6 +27,7 @@ def predict(
     std_*           standard deviation by the covariance of the fitted parameters
     unexplained_*   rms of what the model left of held-out measurements: add it in mind
     undetermined_*  movement per mm or mrad along what the calibration could not see
+    status          whether the calibration was measured at such joints
 
     Where the base was estimated with the arm, the base frame is that of the DH model, for a VEC
     model as well. Where joints can take its place, it is a convention (undetermined_*):
@@ -37,8 +38,12 @@ def predict(
       kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
       kinacc predict results/ur10_b plan.csv --frame instrument -o predicted.csv
     """
+    import numpy as np
+
     from kinacc.cli import rows, tables
+    from kinacc.deployment.applicability import is_measured_there
     from kinacc.deployment.predict import predict as poses_at
+    from kinacc.kinematics.model import JointState
     from kinacc.progress import reporting
 
     calibration = choice.calibration_of(folder, model, robot, config, session)
@@ -47,6 +52,15 @@ def predict(
         found = poses_at(
             calibration, given.joints, given.directions, frame, point, progress, given.payload
         )
-    out.deliver(tables.predicted(calibration, given, found, frame, point))
+        at = JointState(calibration.robot.dh_joints(given.joints), given.directions, given.payload)
+        measured = is_measured_there(calibration, at, point)
+    out.deliver(tables.predicted(calibration, given, found, measured, frame, point))
     rows.say_unused(given, calibration)
+    if not measured.all():
+        many = f"{int(np.sum(~measured))} of {len(measured)} rows"
+        click.echo(
+            f"{many} lie where the calibration was not measured: status says why; errors there may "
+            "be larger than those held out",
+            err=True,
+        )
     rows.end_where_missing(found.pose.position_mm, "a pose")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.kinematics.robot import Robot, outside_limits
-from kinacc.measurements.files import load
+from kinacc.measurements.files import EXCEL, PARQUET, load
 from kinacc.measurements.layout import (
     ANGLE,
     LENGTH,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
+_OWN_JOINT = re.compile(r"(?<![^\s,;\"'])q1_(?:deg|rad|mm|m)(?![^\s,;\"'])")
 _HEAD = 1_000_000  # characters of a line looked at
 
 
@@ -123,13 +125,38 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
     return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
 
 
-def candidates(path: str, robot: Robot, most: int) -> Rows:
-    """Joints of a file to choose from; InputError outside the limits, or for more than ``most``."""
-    given = read(path, robot)
+def candidates(path: str, robot: Robot, most: int, answers: Mapping | None = None) -> Rows:
+    """Joints of a file to choose from, in whatever form ``kinacc init`` reads.
+
+    ``answers`` to what the file leaves open, by option. Raises InputError outside the limits, for
+    more than ``most``, and where the file can be read in more than one way.
+    """
+    given = read(path, robot) if _has_own_names(Path(path)) else _of_any_form(path, robot, answers)
     require_within_limits(robot, given, path, "Candidates")
     if given.count > most:
         raise InputError(Problem(path, f"{given.count} candidates", f"at most {most}"))
     return given
+
+
+def _has_own_names(path: Path) -> bool:
+    """Whether a file is written as the commands write: its names state q1 and a unit."""
+    if not path.is_file() or path.suffix.lower() in (".json", *PARQUET):
+        return True
+    if path.suffix.lower() in EXCEL:
+        return False
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        return bool(_OWN_JOINT.search(file.readline(_HEAD)))
+
+
+def _of_any_form(path: str, robot: Robot, answers: Mapping | None) -> Rows:
+    """Joints of a file as others write it; how it was read is told on the error stream."""
+    from kinacc.measurements.intake import joint_files
+
+    given = {key: value for key, value in (answers or {}).items() if value}
+    found = joint_files.read(path, robot.dh.prismatic, given)
+    for line in found.told:
+        click.echo(f"{path}: {line}", err=True)
+    return Rows(len(found.joints), found.label, found.joints, None, None, ())
 
 
 def require_within_limits(robot: Robot, given: Rows, where: str, what: str = "Joints") -> None:

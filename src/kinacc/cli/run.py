@@ -60,7 +60,7 @@ def run() -> None:
 def _help(stage: Stage) -> str:
     reads = ", ".join((*stage.inputs, *(f"{name} (if there)" for name in stage.optional)))
     words = stage.message[0].upper() + stage.message[1:]
-    settings = ", ".join(stage.settings) or "nothing"
+    settings = ", ".join((*stage.settings, *stage.synthetic_settings)) or "nothing"
     return (
         f"{words}.\n\nReads: {reads or 'no artefact'}.\n\nLeaves: {', '.join(stage.outputs)}."
         f"\n\nConfiguration used: {settings}."

@@ -14,6 +14,7 @@ from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.robot import Robot
 
 _MRAD = 1e3
+UNLIKE = "extrapolated: the joints together are unlike those measured"
 
 
 def given_joints(
@@ -36,9 +37,14 @@ def given_joints(
 
 
 def predicted(
-    calibration: Calibration, given: Rows, found: Prediction, frame: str, point: str | None
+    calibration: Calibration,
+    given: Rows,
+    found: Prediction,
+    measured: np.ndarray,
+    frame: str,
+    point: str | None,
 ) -> Sheet:
-    """The sheet of ``kinacc predict``."""
+    """The sheet of ``kinacc predict``; ``measured`` (n,): where the calibration was measured."""
     std = found.std * np.array([1.0, 1.0, 1.0, _MRAD, _MRAD, _MRAD])
     by = "standard deviation by the covariance of the fitted parameters"
     seen = "movement per mm or mrad of displacement along directions the calibration cannot see"
@@ -60,7 +66,10 @@ def predicted(
         Field("undetermined_mm", found.blind_mm, "mm per mm or mrad", seen),
         Field("undetermined_mrad", _MRAD * found.blind_rad, "mrad per mm or mrad", seen, False),
         Field(
-            "status", _where(calibration, found.outside), "", "whether the data cover these joints"
+            "status",
+            _where(calibration, found.outside, measured),
+            "",
+            "whether the calibration was measured at such joints",
         ),
     ]
     point = point or calibration.default_point
@@ -108,10 +117,14 @@ def joints_in_words(outside: np.ndarray) -> str:
     return f"joint{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"
 
 
-def _where(calibration: Calibration, outside: np.ndarray) -> np.ndarray:
+def _where(calibration: Calibration, outside: np.ndarray, measured: np.ndarray) -> np.ndarray:
     said = "extrapolated" if calibration.model.domain is None else "no prediction"
     words = [
-        f"{said}: {joints_in_words(row)} outside the range the data cover" if row.any() else "ok"
-        for row in outside
+        f"{said}: {joints_in_words(row)} outside the range the data cover"
+        if row.any()
+        else "ok"
+        if there
+        else UNLIKE
+        for row, there in zip(outside, measured, strict=True)
     ]
     return np.array(words, dtype=object)

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, PLAINEST
+from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.record import MODELS, Anchor, Calibration, Residual
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
@@ -22,7 +25,7 @@ _NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 # Used where they are there.
 _WANTED = (
     *(f"{kind}_{what}" for kind in ERROR_MODELS for what in ("model", "fit", "covariance")),
-    *("dh_identified", "residuals", "model_selection"),
+    *("measurements", "dh_identified", "residuals", "model_selection"),
 )
 _SAME = 1e-9
 
@@ -93,7 +96,16 @@ def calibration(
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
         fitted_range_rad=bounded.domain,
+        fitted=_fitted(tables, robot),
     )
+
+
+def _fitted(tables: Tables, robot: Robot) -> JointState | None:
+    """How the arm stood at the readings that were fitted."""
+    if "measurements" not in tables:
+        return None
+    fitted = np.asarray(tables["measurements"]["subset"]) == SUBSETS[0]
+    return from_columns(tables["measurements"], robot).at.select(fitted)
 
 
 def _anchor(

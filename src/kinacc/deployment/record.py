@@ -45,7 +45,8 @@ class Calibration:
     ``choice`` is one of ``MODELS``. ``base`` is the first DH frame in the instrument's frame,
     ``targets`` are tool and other targets in the last DH frame. ``known`` is the uncertainty of the
     fit (None for the nominal model), ``residual`` what the model does not explain.
-    ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides).
+    ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides);
+    ``fitted`` how the arm stood at the readings that were fitted, None where that is not known.
     ``base_name`` is what ``known`` calls the base, which differs by session. ``anchor`` is the DH
     model of the same data where this is a VEC model fitted with its base: errors of a VEC model can
     turn or shift base and tool against each other by centimetres and no measured pose shows it, so
@@ -63,6 +64,7 @@ class Calibration:
     fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None
     base_name: str = "base"
     anchor: Anchor | None = None
+    fitted: JointState | None = None
 
     @property
     def default_point(self) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
 
 SEQUENCES = ("sobol", "halton")
+SLICE, BASE = "slice", "base"  # frames a flange orientation may be given in
 
 _ROUND_OFF_MM = 1e-9
 
@@ -46,6 +47,13 @@ class Cells(NamedTuple):
     angle_rad: np.ndarray
     radius_mm: np.ndarray
     height_mm: np.ndarray
+
+
+class Attitude(NamedTuple):
+    """Flange orientation (3, 3) before the rotations, in the frame ``SLICE`` or ``BASE``."""
+
+    reference: np.ndarray
+    frame: str = SLICE
 
 
 class Orientations(NamedTuple):
@@ -118,13 +126,17 @@ def reference_rotation(euler_rad: np.ndarray) -> np.ndarray:
     return rotation_x(euler_rad[0]) @ rotation_y(euler_rad[1]) @ rotation_z(euler_rad[2])
 
 
-def tool_poses(cells: Cells, reference: np.ndarray, relative: np.ndarray) -> Pose:
-    """Tool poses (n, ...) at cells (n,): orientation = Rz(angle) @ reference @ relative.
+def tool_poses(
+    cells: Cells, reference: np.ndarray, relative: np.ndarray, frame: str = SLICE
+) -> Pose:
+    """Tool poses (n, ...) at cells (n,), turned by ``relative``, (n, 3, 3) or (3, 3).
 
-    ``reference`` (3, 3) is given in the slice's frame (x outward, z up), so that a pose keeps its
-    place relative to the arm when the slice turns; ``relative`` is (n, 3, 3) or (3, 3).
+    ``reference`` (3, 3) is given in ``frame``. ``SLICE``: x outward, z up, orientation =
+    Rz(angle) @ reference @ relative, so that a pose keeps its place relative to the arm when the
+    slice turns. ``BASE``: reference @ relative, so that the tool keeps its attitude to a workpiece.
     """
-    rotation = rotation_z(cells.angle_rad) @ reference @ relative
+    turn = rotation_z(cells.angle_rad if frame == SLICE else np.zeros_like(cells.angle_rad))
+    rotation = turn @ reference @ relative
     cosine, sine = np.cos(cells.angle_rad), np.sin(cells.angle_rad)
     position = np.stack(
         [cells.radius_mm * cosine, cells.radius_mm * sine, cells.height_mm], axis=-1

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -55,7 +56,8 @@ def joined(points: RawTable, joints: RawTable, how: Join) -> RawTable:
         what = f"no row belongs to any of {joints.path}, joined by {how.by}"
         fix = "correct measurements.file.joints"
         raise InputError(Problem(points.path, what, "rows of the same poses", fix))
-    table = points.select(kept)
+    named = points.with_pose_names(how.key_of_points or "") if how.by == NAME else points
+    table = replace(named.select(kept), points_file=Path(points.path).name, key=how.key_of_points)
     beside = joints.select(row[kept])
     columns = table.columns | {
         beside_name(name, points): cells for name, cells in beside.columns.items()

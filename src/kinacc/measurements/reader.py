@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from kinacc.measurements import faults
 from kinacc.measurements.files import load
 from kinacc.measurements.layout import STD, TOOL, FoundColumns, Layout, Place, Target, find
 from kinacc.measurements.orientation import quaternions, rotation_std
+from kinacc.measurements.row_names import RowNames
 from kinacc.measurements.table import RawTable, numbers
 from kinacc.measurements.written import TABLE, Written
 
@@ -38,6 +39,7 @@ class MeasuredFile:
     ``unused`` columns of the file; ``notes`` say what else was left out, with its lines. For the
     checks: ``commanded`` (rows, k) the joints as commanded, None where the file does not say;
     ``turns`` (rows, 3 or 4) the orientations as written, in rad, NaN where there is none.
+    ``row_names`` say what its rows are called.
     """
 
     columns: Columns
@@ -45,6 +47,7 @@ class MeasuredFile:
     notes: tuple[str, ...] = ()
     commanded: np.ndarray | None = None
     turns: np.ndarray | None = None
+    row_names: RowNames = field(default_factory=RowNames)
 
     def left_out(self) -> list[str]:
         """All that was not used, in words."""
@@ -119,6 +122,8 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     problems += faults.unit_problems(table, layout, robot.dh.prismatic)
     if found is None or problems:
         raise InputError(problems, title)
+    if "pose" in found.single and not table.pose_name:
+        table = table.with_pose_names(found.single["pose"].column)
     q_rad = _stacked(table, found.joints, problems, gaps=True)
     commanded = _stacked(table, found.commanded, problems, gaps=True) if found.commanded else None
     shared = _numbered(table, found, problems, layout.repeats_in_names)
@@ -148,6 +153,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     if "target" in shared:
         columns["target"] = shared["target"][order]
     columns["row"] = table.line[order]
+    columns |= table.row_names.columns(columns["row"])
     columns |= {name: values[order] for name, values in payload.items()}
     turns = np.concatenate([part["turns"][part["there"]] for part in parts])
     by_row = np.argsort(order, kind="stable")
@@ -162,10 +168,11 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     refuse(problems, title)
     return MeasuredFile(
         columns,
-        found.unused(table),
+        tuple(name for name in found.unused(table) if name != table.key),
         tuple(notes),
         commanded if commanded is None else commanded[order],
         turns,
+        table.row_names,
     )
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kinacc.errors import Problem, first_few
+from kinacc.errors import Problem
+from kinacc.measurements.row_names import RowNames
 
 # What instruments, controllers and spreadsheets write where there is nothing.
 _NOTHING_TEXT = """
@@ -45,7 +46,9 @@ class RawTable:
     file a row stands on (CSV), its row in the sheet (Excel) or its row number from 1 (Parquet).
     ``under`` are the cells of the line left out under the names, such as a line of units.
     ``notes`` say what of the file is no row, ``not_rows`` are the lines of that. ``letters`` are
-    the letters of the columns of a sheet.
+    the letters of the columns of a sheet. ``pose_name`` are the file's names of poses by line, as
+    far as they are known. Where joints stand in another file, ``points_file`` is the one of the
+    lines, ``key`` its column that says which joints are those of a point.
     """
 
     path: str
@@ -57,6 +60,9 @@ class RawTable:
     notes: tuple[str, ...] = ()
     not_rows: tuple[int, ...] = ()
     letters: Mapping[str, str] = field(default_factory=dict)
+    pose_name: Mapping[int, str] = field(default_factory=dict)
+    points_file: str = ""
+    key: str | None = None
 
     def __len__(self) -> int:
         return len(self.line)
@@ -75,14 +81,30 @@ class RawTable:
         columns = {name: [cells[row] for row in rows] for name, cells in self.columns.items()}
         return replace(self, columns=columns, line=self.line[rows])
 
+    @property
+    def row_names(self) -> RowNames:
+        """What its rows are called; a sheet has rows and no lines."""
+        word = "row" if self.letters else "line"
+        return RowNames(self.pose_name, self.points_file, word)
+
     def rows_in_words(self, rows: np.ndarray) -> str:
         """Lines of the rows at indices ``rows``, the first few by number."""
         return self.lines_in_words(self.line[rows])
 
     def lines_in_words(self, lines: Sequence) -> str:
         """Lines, the first few by number; rows where the file is a sheet."""
-        word = "row" if self.letters else "line"
-        return f"{word}{'s' if len(lines) > 1 else ''} {first_few(lines, _SHOWN)}"
+        return self.row_names.few(lines, _SHOWN)
+
+    def with_pose_names(self, column: str) -> RawTable:
+        """The table, with the names of poses in ``column``; mere numbers are none."""
+        cells = self.columns[column]
+        words = ~np.isfinite(_converted(cells, self.decimal, self.thousands))
+        named = {
+            int(self.line[row]): str(cells[row]).strip()
+            for row in np.flatnonzero(words)
+            if not _is_gap(cells[row])
+        }
+        return replace(self, pose_name=named)
 
     def column_in_words(self, name: str) -> str:
         """A column as the person sees it: its name, and its letter in a sheet."""

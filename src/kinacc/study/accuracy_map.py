@@ -17,7 +17,7 @@ from kinacc.kinematics import inverse
 from kinacc.kinematics.inverse import Status
 from kinacc.kinematics.inverse.newton import pose_error
 from kinacc.kinematics.model import ErrorModel, JointState
-from kinacc.kinematics.region import Cells, Cylinder, Orientations, tool_poses
+from kinacc.kinematics.region import SLICE, Cells, Cylinder, Orientations, tool_poses
 from kinacc.kinematics.robot import Robot
 
 _CELLS_PER_BLOCK = 256
@@ -59,12 +59,16 @@ class Models(NamedTuple):
 
 
 class PosesWanted(NamedTuple):
-    """Which tool poses are assessed, and the model whose joints are taken for them."""
+    """Which tool poses are assessed, and the model whose joints are taken for them.
+
+    ``reference`` (3, 3) is the flange orientation before the ``orientations``, in ``frame``.
+    """
 
     cylinder: Cylinder
     reference: np.ndarray
     orientations: Orientations
     invert_with: str
+    frame: str = SLICE
 
 
 class AccuracyMap(NamedTuple):
@@ -132,7 +136,8 @@ def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> A
     turns = len(orientations.names)
     count = len(cells.radius_mm)
     repeated = Cells(*(np.repeat(axis, turns) for axis in cells))
-    tool = tool_poses(repeated, wanted.reference, np.tile(orientations.rotation, (count, 1, 1)))
+    turned = np.tile(orientations.rotation, (count, 1, 1))
+    tool = tool_poses(repeated, wanted.reference, turned, wanted.frame)
     solved = joints_of(robot, models, tool, wanted.invert_with)
     found = solved.status == Status.FOUND
     position, orientation = np.full((2, *found.shape), -np.inf)

@@ -68,7 +68,8 @@ def _solve_draws(
     cells = region.fill(wanted.cylinder, unit[:, :3])
     turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
     branch = branches[(unit[:, 4] * len(branches)).astype(int)]
-    tool = region.tool_poses(cells, wanted.reference, wanted.orientations.rotation[turn])
+    turned = wanted.orientations.rotation[turn]
+    tool = region.tool_poses(cells, wanted.reference, turned, wanted.frame)
     solved = joints_of(robot, models, tool, wanted.invert_with)
     rows = np.arange(len(unit))
     return solved.q_rad[rows, branch], solved.status[rows, branch]

@@ -9,41 +9,37 @@ import numpy as np
 
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import quaternion_from_rotation
+from kinacc.kinematics.region import Attitude
 from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
 from kinacc.synthetic.draw import AS_TUNED, TABLE_II, physical_robot
-from kinacc.synthetic.tracker import calibration_run, measured
+from kinacc.synthetic.plan import DOWN
+from kinacc.synthetic.tracker import Run, calibration_run, measured
 
 # How far a nominal arm may be from Table II and still be the arm the draws were made for.
 _SAME_ARM_MM, _SAME_ARM_RAD = 5.0, 0.02
 
 
-def measure(robot: Robot, settings: Mapping) -> dict[str, np.ndarray]:
+def measure(robot: Robot, settings: Mapping, attitude: Attitude = DOWN) -> dict[str, np.ndarray]:
     """Columns of ``measurements``, but for fold and subset, of an accepted draw of the arm.
 
     ``settings``: those of ``measurements.synthetic``; without a roughness the draw has the one it
-    was accepted with. All chance belongs to the draw. Raises InputError for an unknown draw and
-    for another arm.
+    was accepted with. ``attitude``: that of the flange about which the poses are planned. All
+    chance belongs to the draw. Raises InputError for an unknown draw and for another arm.
     """
     _require_the_arm(robot)
     stated = {name: settings[name] for name in AS_TUNED._fields if name in settings}
-    return columns(
-        robot,
-        replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated)),
-        int(settings["poses"]),
-        float(settings["tracker_noise_mm"]),
-    )
+    draw = replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated))
+    run = calibration_run(robot, int(settings["poses"]), draw.seed, attitude)
+    return columns(draw, run, float(settings["tracker_noise_mm"]))
 
 
-def columns(
-    robot: Robot, draw: AcceptedDraw, poses: int, tracker_noise_mm: float
-) -> dict[str, np.ndarray]:
-    """Columns of the calibration run of ``poses`` poses on the arm of ``draw``."""
-    run = calibration_run(robot, poses, draw.seed)
+def columns(draw: AcceptedDraw, run: Run, tracker_noise_mm: float) -> dict[str, np.ndarray]:
+    """Columns of a calibration run on the arm of ``draw``."""
     arm = physical_robot(draw.seed, draw.scales, draw.geometry, draw.roughness)
     seen = measured(arm, run, tracker_noise_mm)
     quaternion = quaternion_from_rotation(seen.rotation)
-    joints = range(robot.dh.joints)
+    poses, joints = len(seen.position_mm), range(arm.dh.joints)
     return {
         "pose": np.arange(poses),
         **{f"q{j + 1}": run.visits.q_rad[:, j] for j in joints},

@@ -1,8 +1,8 @@
 """The calibration run: which poses the arm is driven to, in which order, and how it arrives.
 
 One plan for every synthetic arm, as a cell has one measuring programme. The poses enclose the
-evaluation space: a sector of a cylinder larger than the space on every side, the flange pointing
-down and turned about its own axes beyond +-45 degrees, both wrist configurations.
+evaluation space: a sector of a cylinder larger than the space on every side, the flange in its
+reference orientation and turned about its own axes beyond +-45 degrees, both wrist configurations.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics.inverse import closed_form
-from kinacc.kinematics.region import Cylinder, fill, tool_poses
+from kinacc.kinematics.region import Attitude, Cylinder, fill, tool_poses
 from kinacc.kinematics.robot import Robot
 
 SPACE = Cylinder(1150.0, 1000.0, -50.0, 600.0, np.deg2rad(-5.0), np.deg2rad(65.0))
@@ -19,22 +19,23 @@ TURN_DEG = 50.0
 # Half of the poses stand at the corners of the turns, where the evaluation space has its poses.
 CORNER_SHARE = 0.5
 CORNER_DEG = (43.0, TURN_DEG)
+DOWN = Attitude(rotation_x(np.pi))
 BRANCHES = ("front-up-noflip", "front-up-flip")
 RUN_H = 6.0
 _PLAN_SEED = 180
 _BLOCK = 256
 
 
-def configurations(robot: Robot, poses: int) -> np.ndarray:
+def configurations(robot: Robot, poses: int, attitude: Attitude = DOWN) -> np.ndarray:
     """Joints (poses, 6) in measuring order, rad, inside the limits of ``robot``.
 
-    A longer plan begins with the shorter one.
+    ``attitude`` is that of the flange before its turns. A longer plan begins with the shorter one.
     """
     rng = np.random.default_rng(_PLAN_SEED)
     form = closed_form.recognise(robot.dh)
     found = np.empty((0, 6))
     while len(found) < poses:
-        q_rad, reached = closed_form.solve(form, _poses(rng), BRANCHES)
+        q_rad, reached = closed_form.solve(form, _poses(rng, attitude), BRANCHES)
         rows, branch = np.arange(_BLOCK), rng.integers(0, len(BRANCHES), _BLOCK)
         chosen, good = q_rad[rows, branch], reached[rows, branch]
         good &= np.all((chosen >= robot.q_min_rad) & (chosen <= robot.q_max_rad), axis=1)
@@ -53,11 +54,11 @@ def time_h(poses: int) -> np.ndarray:
     return RUN_H * (np.arange(poses) + 0.5) / poses
 
 
-def _poses(rng: np.random.Generator) -> Pose:
+def _poses(rng: np.random.Generator, attitude: Attitude) -> Pose:
     cells = fill(SPACE, rng.random((_BLOCK, 3)))
     inside = rng.uniform(-TURN_DEG, TURN_DEG, (_BLOCK, 3))
     corner = rng.uniform(*CORNER_DEG, (_BLOCK, 3)) * rng.choice([-1.0, 1.0], (_BLOCK, 3))
     at_corner = rng.random(_BLOCK) < CORNER_SHARE
     x, y, z = np.deg2rad(np.where(at_corner[:, None], corner, inside)).T
     turned = rotation_x(x) @ rotation_y(y) @ rotation_z(z)
-    return tool_poses(cells, rotation_x(np.pi), turned)
+    return tool_poses(cells, attitude.reference, turned, attitude.frame)

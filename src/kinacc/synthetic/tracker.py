@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.geometry import Pose, exp_so3
+from kinacc.kinematics.region import Attitude
 from kinacc.kinematics.robot import Robot
 from kinacc.synthetic import plan
 from kinacc.synthetic.draw import noise_generator
@@ -27,9 +28,9 @@ class Run:
     rotation: np.ndarray
 
 
-def calibration_run(robot: Robot, poses: int, seed: int) -> Run:
+def calibration_run(robot: Robot, poses: int, seed: int, attitude: Attitude = plan.DOWN) -> Run:
     """The plan's ``poses`` visited in order, with the chance of draw ``seed``."""
-    q_rad = plan.configurations(robot, poses)
+    q_rad = plan.configurations(robot, poses, attitude)
     rng = noise_generator(seed)
     visits = Visits(
         q_rad, plan.directions(q_rad), plan.time_h(poses), rng.standard_normal((poses, 6))

@@ -6,6 +6,8 @@ import shlex
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import ERROR_MODELS
@@ -23,7 +25,7 @@ from kinacc.workflow.plan import Plan
 
 IF_THERE = (
     *(f"{kind}_model" for kind in ERROR_MODELS),
-    *("data_check", "excluded_rows", "vec_orders", "accuracy_map"),
+    *("summary", "data_check", "excluded_rows", "vec_orders", "accuracy_map"),
     *("assessment_points", "claims"),
 )
 Tables = Mapping[str, Columns]
@@ -51,7 +53,9 @@ def read(folder: Path | str, needed: Collection[str] = summary.TABLES) -> dict[s
 def facts_of(tables: Tables) -> list[Fact]:
     """The facts of ``summary`` from the tables of a results folder."""
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    return summary.facts(tables, arm)
+    known = tables.get("summary", {"topic": [], "value": []})
+    share = np.asarray(known["value"])[np.asarray(known["topic"]) == "like_measured"]
+    return summary.facts(tables, arm, float(share[0]) if len(share) else np.nan)
 
 
 def campaign_of(folder: Path | str) -> Sought:
@@ -140,7 +144,10 @@ def _claims(folder: Path, facts: Sequence[Fact], tables: Tables) -> list[str]:
     """What became of the paper's claims, where they are held to these results."""
     if "claims" not in tables or not _is_synthetic(facts):
         return []
-    claims, figures = tables["claims"], [each.name for each in STAGES.values() if each.is_figure]
+    claims, figures = (
+        tables["claims"],
+        [stage.name for stage in STAGES.values() if stage.is_figure and not stage.on_request],
+    )
     pictures = f"{folder}/{FIGURE_FOLDER}: {figures[0]} to {figures[-1]}"
     return [
         f"{folder.resolve().name}: the paper reproduced",

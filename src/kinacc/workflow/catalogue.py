@@ -22,7 +22,8 @@ class Stage:
     """One step of the study.
 
     ``message`` says in words what it does. ``inputs`` and ``outputs`` are artefact names of the
-    data set. ``settings`` are dotted key paths of the data set's configuration, ``files`` those
+    data set. ``settings`` are dotted key paths of the data set's configuration, with
+    ``synthetic_settings`` where its arm is synthetic, ``files`` those
     whose values name files it reads; nothing else of the configuration reaches the stage.
     ``uses`` are files of the package and registries of modules that its module does not import
     (:func:`kinacc.artifacts.provenance.code_hash`); ``{robot}`` stands for the value, or each of
@@ -44,6 +45,7 @@ class Stage:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     settings: tuple[str, ...] = ()
+    synthetic_settings: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
@@ -97,13 +99,23 @@ def _figure(
     on_request: bool = False,
 ) -> Stage:
     """The stage that draws ``figures/<name>`` by the ``run`` of ``kinacc.figures.<name>``."""
-    drawn = {"on_request": on_request, "is_figure": True}
-    return Stage(name, message, inputs, (name,), settings, files, uses, **drawn)
+    return Stage(
+        name,
+        message,
+        inputs,
+        (name,),
+        settings,
+        files=files,
+        uses=uses,
+        on_request=on_request,
+        is_figure=True,
+    )
 
 
 _ROBOT = "kinematics/robots/{robot}.yaml"
 _DRAWS = "synthetic/accepted_draws.csv"
 _READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.search")
+_ATTITUDE = ("evaluation.reference_orientation_deg", "evaluation.reference_frame")
 _CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
 _WHOLE_STUDY = (
@@ -125,6 +137,7 @@ STAGES: dict[str, Stage] = {
             (),
             ("measurements", "robot"),
             ("seed", "robot", "measurements"),
+            synthetic_settings=_ATTITUDE,  # of the poses planned
             files=("robot", "measurements.file.path", "measurements.file.joints.path"),
             uses=(_ROBOT, _DRAWS),
         ),
@@ -228,8 +241,11 @@ STAGES: dict[str, Stage] = {
             ("summary",),
             ("robot",),
             files=("robot",),
-            uses=(_ROBOT,),
-            optional=("data_check", "excluded_rows", "vec_orders", *_FURTHER),
+            uses=(_ROBOT, _MODEL),
+            optional=(
+                *("data_check", "excluded_rows", "vec_orders", *_FURTHER),
+                *(f"{kind}_{what}" for kind in FITTED for what in ("fit", "covariance")),
+            ),
         ),
         Stage(
             "accuracy_map",
@@ -239,7 +255,7 @@ STAGES: dict[str, Stage] = {
             (
                 "robot",
                 "evaluation.cylinder",
-                "evaluation.reference_orientation_deg",
+                *_ATTITUDE,
                 "evaluation.rotation_deg",
                 "evaluation.rotations",
                 "evaluation.tool_mm",
@@ -367,6 +383,40 @@ STAGES: dict[str, Stage] = {
             on_request=True,
         ),
         Stage(
+            "map_readings_chunk",
+            "judging the sentences on Fig. 3 under another reading, over arms drawn anew",
+            (),
+            ("map_readings_chunk",),
+            (
+                "seed",
+                "robot",
+                "measurements",
+                "calibration",
+                "evaluation",
+                "map",
+                "map_readings",
+            ),
+            files=("robot",),
+            uses=(_ROBOT, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
+            scattered=True,
+            on_request=True,
+            shared=True,
+        ),
+        Stage(
+            "map_readings",
+            "gathering the sentences on Fig. 3 under its readings",
+            ("map_readings_chunk",),
+            ("map_readings",),
+            on_request=True,
+        ),
+        _figure(
+            "fig3_readings",
+            "drawing what holds of Fig. 3 under its readings",
+            ("map_readings",),
+            ("dataset",),
+            on_request=True,
+        ),
+        Stage(
             "choices_chunk",
             "going through fits, study and claims with every choice the paper leaves open",
             (),
@@ -436,7 +486,8 @@ CALIBRATION = (
     "excluded_rows",
     "summary",
 )
-
+# Made on request beside the claims on further draws: Fig. 3 under every reading of it.
+MAP_READINGS = ("map_readings_chunk", "map_readings", "fig3_readings")
 # The claims over every choice that the paper leaves open, made on request.
 CHOICES = ("choices_chunk", "choices_table", "choices_reasons", "claims_over_choices")
 

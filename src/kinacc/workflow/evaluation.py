@@ -45,6 +45,7 @@ def poses_wanted(evaluation: Mapping) -> PosesWanted:
         region.reference_rotation(np.deg2rad(evaluation["reference_orientation_deg"])),
         region.orientations(np.deg2rad(evaluation["rotation_deg"]), evaluation["rotations"]),
         evaluation["invert_with"],
+        evaluation["reference_frame"],
     )
 
 

@@ -15,7 +15,14 @@ from pathlib import Path
 from kinacc.artifacts.error_models import ERROR_MODELS, asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.errors import InputError, Problem, gathered, refuse
-from kinacc.workflow.catalogue import CHOICES, FIGURE_FOLDER, STAGES, TOURNAMENT, Stage, maker_of
+from kinacc.workflow.catalogue import (
+    FIGURE_FOLDER,
+    MAP_READINGS,
+    STAGES,
+    TOURNAMENT,
+    Stage,
+    maker_of,
+)
 from kinacc.workflow.runner import Job
 
 RESULTS = "results"
@@ -129,12 +136,13 @@ class Plan:
         space = config["evaluation"]["space"]
         reasons = {}
         if space != "cylinder":
-            for name in ("accuracy_map", "fig3"):
+            for name in ("accuracy_map", "fig3", *MAP_READINGS):
                 reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
         if config["measurements"]["source"] != "synthetic":
             reasons["claims"] = "the paper's claims are about the paper's arm"
-            for name in ("robustness_chunk", "robustness_table", *CHOICES):
-                reasons[name] = "no further draws of a measured arm"
+            for name, stage in STAGES.items():
+                if stage.on_request and not stage.joint:
+                    reasons[name] = "no further draws of a measured arm"
             if "exclude" not in config["measurements"]["file"]:
                 reasons["excluded_rows"] = "no row is excluded"
         else:
@@ -250,6 +258,10 @@ class Plan:
             return [None]
         if STAGES[name].joint:
             count = self.tournament["chunks"]
+        elif name == "map_readings_chunk":
+            from kinacc.study.map_readings import READINGS
+
+            count = len(READINGS)
         elif name == "choices_chunk":
             count = self.parts[dataset]["choices"]
         else:
@@ -272,8 +284,9 @@ class Plan:
 
     def settings(self, name: str, dataset: str) -> dict[str, object]:
         """The configuration values a stage depends on, nested as in the configuration."""
-        config, chosen = self._config(dataset), {}
-        for path in STAGES[name].settings:
+        config, chosen, stage = self._config(dataset), {}, STAGES[name]
+        synthetic = not stage.joint and config["measurements"]["source"] == "synthetic"
+        for path in (*stage.settings, *(stage.synthetic_settings if synthetic else ())):
             _copy({**config, "dataset": dataset}, chosen, path.split("."))
         return chosen
 

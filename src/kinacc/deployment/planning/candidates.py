@@ -1,4 +1,4 @@
-"""Poses that could be measured: spread evenly over joints, kept where the tool may be."""
+"""Poses that could be measured: spread evenly over joints, or drawn between measured poses."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from kinacc.kinematics.region import points
 from kinacc.kinematics.robot import Robot
 
 _MOST_DRAWS_PER_POSE = 400
+_NEIGHBOURS = 10  # of a measured pose, between which and the pose others are drawn
 
 
 def spread(
@@ -42,12 +43,33 @@ def spread(
             raise InputError(Problem("region", what, f"{count} candidates", "enlarge the region"))
         joints = low + points("sobol", block, len(low), first) * (high - low)
         if inside is not None:
-            joints = joints[inside(_tool_positions(robot, joints, tool))]
+            joints = joints[inside(tool_positions(robot, joints, tool))]
         found.append(joints)
         first += block
     return np.concatenate(found)[:count]
 
 
-def _tool_positions(robot: Robot, joints: np.ndarray, tool: Pose | None) -> np.ndarray:
+def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """``count`` joints (count, k) on the way from one of ``measured`` (n, k) to a neighbour.
+
+    ``unit`` (k,): movements of the joints that count alike. Raises InputError where all of
+    ``measured`` are the same.
+    """
+    from scipy.spatial import cKDTree
+
+    different = np.unique(measured, axis=0)
+    if len(different) < 2:
+        what = "all measured poses are at the same joints"
+        raise InputError(Problem("region", what, "at least 2 different poses"))
+    random = np.random.default_rng(seed)
+    near = cKDTree(different / unit).query(different / unit, min(_NEIGHBOURS + 1, len(different)))
+    start = random.integers(len(different), size=count)
+    end = near[1][start, random.integers(1, near[1].shape[1], size=count)]
+    share = random.random((count, 1))
+    return different[start] + share * (different[end] - different[start])
+
+
+def tool_positions(robot: Robot, joints: np.ndarray, tool: Pose | None) -> np.ndarray:
+    """Where the nominal arm puts the tool (m, 3) in its base at reported joints (m, k)."""
     end = compose(robot.base, dh.forward(robot.dh, robot.dh_joints(joints)))
     return end.position_mm if tool is None else compose(end, tool).position_mm

@@ -8,12 +8,16 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
+from kinacc.artifacts.data_check_tables import EXCLUDED_ROWS
 from kinacc.artifacts.error_models import comparisons
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.residuals import Errors, errors
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, excluded_lines, read_excluded
+from kinacc.measurements.row_names import RowNames
 from kinacc.workflow.calibration_settings import delivered_fits
+
+_STATED = tuple(each.name for each in EXCLUDED_ROWS.columns if not each.may_be_absent)
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
@@ -32,7 +36,9 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
         left_out = _known(reading.columns, used)
         count = len(left_out["pose"])
         joined = {
-            name: np.concatenate([np.asarray(used[name]), left_out[name]]) for name in left_out
+            name: np.concatenate([np.asarray(used[name]), left_out[name]])
+            for name in left_out
+            if name in used
         }
         joined["fold"] = np.full(len(joined["pose"]), np.nan)
         seen = errors(fits, from_columns(joined, arm).select(slice(len(every), None)))
@@ -45,7 +51,9 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
             (each.name, line, None, None, reasons[line], *[np.nan] * 6)
             for line in sorted(set(reasons) - told)
         ]
-    return {"excluded_rows": columns_of("excluded_rows", rows)}
+    columns = columns_of("excluded_rows", [dict(zip(_STATED, row, strict=True)) for row in rows])
+    names = RowNames() if reading is None else reading.row_names
+    return {"excluded_rows": columns | names.columns(columns["line"])}
 
 
 def _known(columns: Mapping, used: Mapping) -> Columns:

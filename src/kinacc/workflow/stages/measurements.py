@@ -9,7 +9,7 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.kinematics import robot
+from kinacc.kinematics import region, robot
 from kinacc.measurements import folds
 from kinacc.measurements.reader import UNCERTAINTY
 
@@ -22,7 +22,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     if section["source"] == "synthetic":
         from kinacc import synthetic
 
-        seen = synthetic.measure(arm, section["synthetic"])
+        seen = synthetic.measure(arm, section["synthetic"], attitude(settings["evaluation"]))
     else:
         from kinacc.measurements.reader import read
 
@@ -31,6 +31,12 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
             warnings.warn(words, stacklevel=1)
         seen = reading.columns
     return {"measurements": split(seen, settings), "robot": _robot(arm)}
+
+
+def attitude(evaluation: Mapping) -> region.Attitude:
+    """The flange's attitude in the ``evaluation`` settings, which a calibration has to cover."""
+    euler_rad = np.deg2rad(evaluation["reference_orientation_deg"])
+    return region.Attitude(region.reference_rotation(euler_rad), evaluation["reference_frame"])
 
 
 def split(columns: Mapping, settings: Mapping) -> Columns:

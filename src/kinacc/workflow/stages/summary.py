@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import summary
+from kinacc.deployment import applicability, folder
 from kinacc.kinematics import robot
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     """``summary``: the facts of a half page, one a row."""
     arm = robot.of_text(str(inputs["robot"]["description"][0]), "robot.parquet")
-    return {"summary": columns_of("summary", summary.facts(inputs, arm))}
+    selected = folder.calibration(inputs, arm)
+    share = applicability.share_of_box(selected, *summary.covered(inputs["measurements"], arm))
+    return {"summary": columns_of("summary", summary.facts(inputs, arm, share))}

@@ -356,7 +356,7 @@ def _pictures(
 ) -> Iterator[tuple[str, Path]]:
     formats = FORMATS if plan is None else plan.formats
     for name, stage in STAGES.items():
-        if stage.is_figure and name not in left_out:
+        if stage.is_figure and not stage.on_request and name not in left_out:
             for kind in formats:
                 yield name, folder / FIGURE_FOLDER / f"{name}.{kind}"
 

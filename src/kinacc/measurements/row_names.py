@@ -1,0 +1,71 @@
+"""What a row of measurements is called where a person reads of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kinacc.artifacts.columns import texts
+from kinacc.errors import and_more
+
+_RANGES_SHOWN = 6
+
+
+@dataclass(frozen=True)
+class RowNames:
+    """How rows of a file are called: by their line, with the file's own name for the pose.
+
+    ``pose`` are names by line, none where the file only numbers its poses; ``file`` is the file
+    the lines are of where there are several, else empty; ``word`` says what they are.
+    """
+
+    pose: Mapping[int, str] = field(default_factory=dict)
+    file: str = ""
+    word: str = "line"
+
+    @classmethod
+    def of_columns(cls, columns: Mapping) -> RowNames:
+        """From the columns ``row``, ``pose_name`` and ``file`` of ``measurements``."""
+        names, files = columns.get("pose_name", ()), columns.get("file", ())
+        pairs = zip(columns["row"], names, strict=True) if len(names) else ()
+        pose = {int(line): str(name) for line, name in pairs if line == line and name}
+        return cls(pose, next((str(each) for each in files if each), ""))
+
+    def columns(self, lines: np.ndarray) -> dict[str, np.ndarray]:
+        """What ``of_columns`` reads beside ``lines`` (n,); no column that would say nothing."""
+        found = {}
+        if self.pose:
+            found["pose_name"] = texts(self.pose.get(int(line)) for line in lines)
+        if self.file:
+            found["file"] = texts([self.file] * len(lines))
+        return found
+
+    def one(self, line: int) -> str:
+        """``line 14 (P12_1) of points.csv``."""
+        return self._told(self._run(int(line), int(line)), 1)
+
+    def few(self, lines: Sequence[int], shown: int = 5) -> str:
+        """``lines 4 (P2), 7 (P5) and 3 more``, in the order given."""
+        words = [self._run(int(line), int(line)) for line in lines[:shown]]
+        return self._told(", ".join(words) + and_more(len(lines) - shown), len(lines))
+
+    def spans(self, lines: Iterable[int]) -> str:
+        """``lines 2-9 (P1 to P8), 12 (P11) and 17 more``; ``lines`` come in order."""
+        numbers = np.array(list(lines), dtype=np.int64)
+        if not numbers.size:
+            return f"no {self.word}"
+        runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+        words = [self._run(int(run[0]), int(run[-1])) for run in runs[:_RANGES_SHOWN]]
+        rest = sum(len(run) for run in runs[_RANGES_SHOWN:])
+        return self._told(", ".join(words) + and_more(rest), len(numbers))
+
+    def _told(self, words: str, count: int) -> str:
+        of = f" of {self.file}" if self.file else ""
+        return f"{self.word}{'s' if count > 1 else ''} {words}{of}"
+
+    def _run(self, first: int, last: int) -> str:
+        lines = f"{first}" if first == last else f"{first}-{last}"
+        ends = dict.fromkeys(self.pose[each] for each in (first, last) if each in self.pose)
+        return f"{lines} ({' to '.join(ends)})" if ends else lines

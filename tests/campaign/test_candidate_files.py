@@ -1,0 +1,135 @@
+"""Candidates in the form in which people have them: an export, a sheet, a robot's program."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from command_line import call, small_study
+from openpyxl import Workbook
+
+from kinacc.artifacts import store
+from kinacc.campaign import folder as campaigns
+
+COUNT = 12
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    """Results of a small synthetic study, made by the workflow's own stages."""
+    return small_study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.fixture(scope="module")
+def joints(calibration):
+    """Some of the joints that were measured (12, 6), rad."""
+    measured = store.read(calibration / "measurements.parquet")
+    every = np.stack([measured[f"q{joint}"] for joint in range(1, 7)], axis=1)
+    return every[np.asarray(measured["subset"]) == "train"][:COUNT]
+
+
+@pytest.fixture
+def start(calibration, tmp_path):
+    """Begin a campaign with a file of candidates: its answer, and its plan if there is one."""
+
+    def begin(file, *more):
+        folder = tmp_path / "campaign"
+        done = call("campaign", "start", folder, "--calibration", calibration, "--model", "dh",
+                    "--candidates", file, "--noise-mm", 0.05, "--budget", 20, *more)  # fmt: skip
+        return done, campaigns.open_(folder).plan if folder.exists() else None
+
+    return begin
+
+
+def same(plan, joints, digits=9):
+    np.testing.assert_allclose(plan.points.joints, joints, atol=10.0**-digits)
+
+
+def test_a_german_export_in_degrees_with_decimal_commas(start, joints, tmp_path):
+    file = tmp_path / "posen.csv"
+    lines = ["Messpunkt;Achse 1 [°];Achse 2 [°];Achse 3 [°];Achse 4 [°];Achse 5 [°];Achse 6 [°]"]
+    for number, row in enumerate(np.rad2deg(joints), 1):
+        lines.append(";".join([f"P{number}", *(f"{each:.10f}".replace(".", ",") for each in row)]))
+    file.write_bytes("\n".join(lines).encode("latin-1"))
+    done, plan = start(file)
+    assert done.exit_code == 0, done.output
+    same(plan, joints)
+    assert plan.points.label[:2] == ("P1", "P2")
+    assert "decimal commas" in done.stderr
+
+
+def test_a_sheet_whose_header_says_radians(start, joints, tmp_path):
+    file, book = tmp_path / "candidates.xlsx", Workbook()
+    book.active.append([f"Joint {number} [rad]" for number in range(1, 7)])
+    for row in joints:
+        book.active.append([float(each) for each in row])
+    book.save(file)
+    done, plan = start(file)
+    assert done.exit_code == 0, done.output
+    same(plan, joints)
+
+
+def test_a_program_of_the_robot_with_its_names_of_positions(start, joints, tmp_path):
+    file = tmp_path / "check.mod"
+    lines = [
+        f"CONST jointtarget p{number * 10}:=[[{','.join(f'{each:.6f}' for each in row)}],"
+        "[9E9,9E9,9E9,9E9,9E9,9E9]];"
+        for number, row in enumerate(np.rad2deg(joints), 1)
+    ]
+    file.write_text("MODULE check\n" + "\n".join(lines) + "\nENDMODULE\n")
+    done, plan = start(file)
+    assert done.exit_code == 0, done.output
+    same(plan, joints, 7)
+    assert plan.points.label[0] == "p10"
+
+
+def test_joints_without_a_unit_that_may_be_either_are_asked_about(start, joints, tmp_path):
+    file = tmp_path / "candidates.txt"
+    lines = [" ".join(f"{each:.9f}" for each in row) for row in joints]
+    file.write_text("\n".join(["q1 q2 q3 q4 q5 q6", *lines]) + "\n")
+    done, plan = start(file)
+    assert done.exit_code == 2
+    assert plan is None
+    assert "--joint-unit rad or --joint-unit deg" in done.output
+    done, plan = start(file, "--joint-unit", "rad")
+    assert done.exit_code == 0, done.output
+    same(plan, joints, 8)
+
+
+def test_two_readings_of_the_joints_are_asked_about(start, joints, tmp_path):
+    file = tmp_path / "log.csv"
+    names = [f"{which}_{axis}_deg" for which in ("left_q", "right_q") for axis in range(1, 7)]
+    both = np.rad2deg(np.hstack([joints, joints[::-1]]))
+    lines = [",".join(f"{each:.10f}" for each in row) for row in both]
+    file.write_text("\n".join([",".join(names), *lines]) + "\n")
+    done, plan = start(file)
+    assert done.exit_code == 2
+    assert plan is None
+    assert "--take left_q_1_deg or --take right_q_1_deg" in done.output
+    done, plan = start(file, "--take", "right_q_1_deg")
+    assert done.exit_code == 0, done.output
+    same(plan, joints[::-1])
+
+
+def test_a_file_without_joints_names_what_it_has(start, tmp_path):
+    file = tmp_path / "points.csv"
+    file.write_text("x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n7,8,9\n")
+    done, plan = start(file)
+    assert done.exit_code == 2
+    assert plan is None
+    assert "no columns of 4 to 7 joints" in done.output
+    assert "x_mm, y_mm, z_mm" in done.output
+
+
+def test_poses_are_planned_from_a_robots_program_too(joints, tmp_path):
+    file = tmp_path / "reach.mod"
+    lines = [
+        f"CONST jointtarget a{number}:=[[{','.join(f'{each:.6f}' for each in row)}],[9E9,9E9]];"
+        for number, row in enumerate(np.rad2deg(joints), 1)
+    ]
+    file.write_text("\n".join(lines) + "\n")
+    names = {f"a{number}" for number in range(1, COUNT + 1)}
+    done = call("plan-poses", "mh180", "--candidates", file, "--poses", 10, "--json")
+    assert done.exit_code == 0, done.output
+    assert {each["candidate"] for each in json.loads(done.stdout)["rows"]} <= names

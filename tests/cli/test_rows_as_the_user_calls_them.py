@@ -1,0 +1,102 @@
+"""Rows of measurements are named as the user's own files name them, and none is left out unsaid."""
+
+import json
+
+import numpy as np
+import pytest
+from tracked_arm import call, table, tracked, written
+
+from kinacc.artifacts import store
+
+COUNT = 60
+IT = tracked("ur10", COUNT, 11)
+Q = [f"q{i}_deg" for i in range(1, 7)]
+NAMES = [f"P{i}_1" for i in range(1, COUNT + 1)]
+_STAGES = ("measurements", "data_check", "vec", "dh", "residuals", "excluded_rows", "summary")
+EMPTY, WRONG, AWAY = 4, 20, 33  # rows, from 0: blank, 6 mm off, left out by the configuration
+
+
+@pytest.fixture(scope="module")
+def two_files(tmp_path_factory):
+    """A folder with points in one file, joints in another, described by init; and what it said."""
+    folder = tmp_path_factory.mktemp("two")
+    point = IT.point.copy()
+    point[WRONG, 2] += 6.0
+    cells = point.astype(str).astype(object)
+    cells[EMPTY] = "---"
+    points = table(
+        ["Point", "X [mm]", "Y [mm]", "Z [mm]", "Operator"], NAMES, cells, ["ab"] * COUNT
+    )
+    joints = table(["Name", *Q], [f"P{i}" for i in range(1, COUNT + 1)], IT.q)
+    files = written(folder, tracker_csv=points, robot_csv=joints)
+    said = call("init", *files, "--robot", "ur10", "--out", folder / "cell", "--name", "m")
+    assert said.exit_code in (0, 1), said.output
+    config = folder / "cell" / "m.yaml"
+    quick = folder / "quick.yaml"
+    quick.write_text(
+        "measurements: {folds: 4}\ndatasets: {m: {calibration: {vec: {order: 1}, dh: {fit_to: "
+        "measurements}}, evaluation: {space: measured}, data_check: {accept: {outliers: a test, "
+        "few_poses: a test}}, measurements: {file: {exclude: [{lines: [35], reason: bumped}]}}}}\n"
+    )
+    return folder, (config, quick), said.output
+
+
+@pytest.fixture(scope="module")
+def results(two_files):
+    folder, configs, _ = two_files
+    for stage in _STAGES:
+        done = call("run", stage, *_options(configs), "--results", folder / "results")
+        assert done.exit_code == 0, done.output
+    return folder / "results" / "m"
+
+
+def _options(configs):
+    return [word for each in configs for word in ("--config", each)]
+
+
+def test_the_first_poses_have_the_names_of_the_file(two_files):
+    assert "line 2 (P1_1) of tracker.csv: joints" in two_files[2]
+
+
+def test_a_suspicion_names_the_pose_and_the_file_of_its_line(two_files):
+    done = call("check-data", two_files[1][0])
+    assert done.exit_code == 1, done.output
+    assert f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv" in done.output
+    told = json.loads(call("check-data", two_files[1][0], "--json").stdout)
+    found = next(e for e in told["datasets"][0]["suspicions"] if e["kind"] == "outliers")
+    assert found["lines"] == [WRONG + 2]
+    assert NAMES[WRONG] in found["where"]
+
+
+def test_the_half_page_names_rows_as_the_file_does(results):
+    page = call("fitted", results).output
+    assert " ".join(page.split()).count(f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv") == 1
+    assert f"line {AWAY + 2} ({NAMES[AWAY]}) of tracker.csv, " in page
+    worst = call("fitted", results, "--all").output.split("worst rows")[1]
+    assert f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv, tool: " in worst
+
+
+def test_nothing_is_left_out_without_a_word_on_the_half_page(results):
+    page = call("fitted", results).output
+    data = " ".join(page.split("check  ")[0].split())
+    assert f"1 row holds no reading: line {EMPTY + 2} ({NAMES[EMPTY]}) of tracker.csv" in data
+    assert "columns not used: Operator " in f"{data} "
+    table = store.read(results / "summary.parquet")
+    told = [str(text) for text in table["text"][table["topic"] == "left_out"]]
+    assert any(NAMES[EMPTY] in text for text in told)
+    assert json.loads(call("fitted", results, "--json").stdout)["left_out"] == told
+
+
+def test_many_remarks_of_the_reader_are_counted_and_all_told_on_request(results):
+    found = dict(store.read(results / "data_check.parquet"))
+    more = 7
+    found = {name: np.concatenate([v, np.repeat(v[-1:], more)]) for name, v in found.items()}
+    found["finding"][-more:], found["level"][-more:] = "left_out", "note"
+    found["what"][-more:] = [f"remark {i}" for i in range(more)]
+    from kinacc.calibration.summary_words import half_page
+    from kinacc.workflow.answer import facts_of, read
+
+    facts = facts_of({**read(results), "data_check": found})
+    assert sum("remark" in line for line in half_page(facts, "kinacc fitted m --all")) <= 3
+    assert "more: kinacc fitted m --all" in "\n".join(half_page(facts, "kinacc fitted m --all"))
+    assert sum("remark" in line for line in half_page(facts, "", whole=True)) == more
