@@ -69,6 +69,12 @@ OPEN: tuple[Choice, ...] = (
         *([180.0, 0.0, 0.0], [180.0, -45.0, 0.0], [180.0, -90.0, 0.0], [180.0, -90.0, -30.0]),
     ),
     _one(
+        "reference_frame",
+        "what keeps that attitude: the slice, with which it turns, or the robot's base",
+        "evaluation.reference_frame",
+        *("slice", "base"),
+    ),
+    _one(
         "rotations",
         "combinations of the turns by 45 degrees: the corners and none, or all 27",
         "evaluation.rotations",
