@@ -18,7 +18,7 @@ from kinacc.workflow.plan import planned
 from kinacc.workflow.stages import choices_chunk, choices_table, robustness_chunk
 
 # A choice of the fits, one of the space, one that both depend on, one of the study.
-NAMES = ["vec_order", "inner_radius", "reference_orientation", "search"]
+NAMES = ["vec_order", "inner_radius", "reference_orientation", "reference_frame", "search"]
 
 
 @pytest.fixture(scope="module")

@@ -93,7 +93,9 @@ class Memory:
 
 def settings_of(name: str, config: Mapping) -> dict[str, object]:
     """What a stage of :class:`Memory` depends on, by the key paths that the catalogue names."""
-    paths = (*_stages()[name].settings, *_stages()[name].synthetic_settings)
+    stage = _stages()[name]
+    synthetic = config["measurements"]["source"] == "synthetic"
+    paths = (*stage.settings, *(stage.synthetic_settings if synthetic else ()))
     if name == "study_chunk":  # the only reading simulated is the one that the study is about
         paths += _stages()["study"].settings
     return {path: value_at(config, path) for path in paths}

@@ -76,6 +76,12 @@ OPEN: tuple[Choice, ...] = (
         *("slice", "base"),
     ),
     _one(
+        "reference_frame",
+        "what keeps that attitude: the slice, with which it turns, or the robot's base",
+        "evaluation.reference_frame",
+        *("slice", "base"),
+    ),
+    _one(
         "rotations",
         "combinations of the turns by 45 degrees: the corners and none, or all 27",
         "evaluation.rotations",
