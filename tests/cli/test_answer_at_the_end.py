@@ -117,6 +117,30 @@ def test_errors_before_and_after_are_of_the_same_held_out_rows(folder):
     assert "training error" not in page
 
 
+def test_every_pose_of_an_own_file_fits_the_delivered_models(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arm, draw = robot.load("irb120"), np.random.default_rng(0)
+    q = draw.uniform(-1.0, 1.0, (66, 6))
+    place = robot.forward(arm, q).position_mm + draw.normal(0.0, 0.05, (66, 3))
+    lines = [",".join([*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])]
+    lines += [",".join(f"{value:.9f}" for value in row) for row in np.hstack([q, place])]
+    Path("own.csv").write_text("\n".join(lines) + "\n")
+    assert call("init", "own.csv", "--robot", "irb120", "--yes").exit_code == 0
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
+        done = call("run", stage, "--config", "own.yaml", "--results", "results")
+        assert done.exit_code == 0, done.output
+    page = shown("results/own")
+    assert "kept out" not in page
+    assert "66 readings of 1 target at 66 poses" in page
+    assert "held-out error, mm (poses left out of the fit; 66 rows)" in page
+    table = store.read("results/own/residuals.parquet")
+    pooled = np.isnan(table["fold"]) & (table["comparison"] == "dh_vs_measured")
+    assert dict(zip(table["subset"][pooled], table["n"][pooled], strict=True)) == {
+        "train": 66,
+        "validation": 66,
+    }
+
+
 def test_nominal_says_whether_base_and_tool_were_fitted(folder, measured):
     assert "nominal, with base and tool fitted" in shown(measured)
     assert "base and tool" not in shown(folder)

@@ -102,7 +102,7 @@ def _errors(facts: Sequence[Fact], whole: bool) -> list[str]:
     held_out, trained = of(facts, "held_out_error"), of(facts, "training_error")
     lines = []
     if held_out:
-        lines += _table(facts, "held-out error, mm", "poses no fit had seen", held_out)
+        lines += _table(facts, "held-out error, mm", "poses left out of the fit", held_out)
     if trained and (whole or not held_out):
         lines += _table(facts, "training error, mm", "poses that were fitted", trained)
     return lines

@@ -71,12 +71,6 @@ OPEN: tuple[Choice, ...] = (
     ),
     _one(
         "reference_frame",
-        "frame in which the flange keeps that attitude: the radial slice's, or the robot's base",
-        "evaluation.reference_frame",
-        *("slice", "base"),
-    ),
-    _one(
-        "reference_frame",
         "what keeps that attitude: the slice, with which it turns, or the robot's base",
         "evaluation.reference_frame",
         *("slice", "base"),
