@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import shared_data
 from command_line import call
@@ -17,6 +20,7 @@ from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.world import drawn_world, measured_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
+from kinacc.cli.campaign_plans import field_of
 from kinacc.geometry import invert
 
 SERIES = "ur10_tmac/series_D.csv"
@@ -172,3 +176,21 @@ def test_a_simulated_campaign_on_its_residuals_ends_as_in_memory(ur10_d, tmp_pat
     same(said, wanted.statements())
     measured = np.linalg.norm(errors[rows[wanted.ledger.visited]], axis=1).max()
     assert said[0]["lower_mm"] <= measured <= said[0]["upper_mm"]
+
+
+def test_a_plan_simulates_with_the_errors_of_the_model_a_campaign_would_be_about(ur10_d, tmp_path):
+    results, *_ = ur10_d
+    errors = store.read(results / "pose_errors.parquet")
+    sizes = np.linalg.norm([errors[f"e{axis}_mm"] for axis in "xyz"], axis=0)
+    held_out = errors["estimate"] == "cross_validated"
+    for model in ("dh", "vec"):
+        folder = tmp_path / model
+        shutil.copytree(results, folder)
+        path = folder / "model_selection.parquet"
+        table = pq.read_table(path)
+        chosen = (np.array(table["model"].to_pylist()) == model).astype(int)
+        place = table.column_names.index("selected")
+        column = pa.array(chosen, table.schema.field("selected").type)
+        pq.write_table(table.set_column(place, table.schema.field("selected"), column), path)
+        largest = sizes[held_out & (errors["comparison"] == f"{model}_vs_measured")].max()
+        assert field_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)

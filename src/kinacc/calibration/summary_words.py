@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 from kinacc.artifacts.allowed import LEFT_OUT
-from kinacc.artifacts.error_models import NOMINAL, PLAINEST
+from kinacc.artifacts.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 
@@ -44,11 +44,6 @@ def paragraph(name: str, texts: Iterable[str]) -> list[str]:
     lines = [line for text in texts for line in _wrapped(text)]
     heads = [name, *[""] * len(lines)]
     return [f"{head:{MARGIN}}{line}" for head, line in zip(heads, lines, strict=False)]
-
-
-def model_name(model: str) -> str:
-    """A model as people write it: DH, VEC."""
-    return model if len(model) > 3 else model.upper()
 
 
 def counted(number: float, noun: str) -> str:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.error_models import model_name
 from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
-from kinacc.calibration.summary_words import model_name
 from kinacc.campaign import folder, instrument, words
 from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.campaign.state import State

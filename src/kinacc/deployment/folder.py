@@ -135,7 +135,7 @@ def selected_model(tables: Tables) -> str:
 
     Raises InputError where the tables cannot tell.
     """
-    recorded = _recorded(tables)
+    recorded = recorded_model(tables)
     if recorded:
         return recorded
     rms = {each: residual(tables, each, "validation") for each in ALWAYS}
@@ -145,7 +145,8 @@ def selected_model(tables: Tables) -> str:
     return min(rms, key=lambda each: rms[each].position_mm)
 
 
-def _recorded(tables: Tables) -> str:
+def recorded_model(tables: Tables) -> str:
+    """The model that ``model_selection`` selected; empty where nothing says so."""
     columns = tables.get("model_selection", {})
     chosen = np.flatnonzero(np.asarray(columns.get("selected", [])) == 1)
     return str(columns["model"][chosen[0]]) if len(chosen) else ""

@@ -10,10 +10,10 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import ERROR_MODELS
+from kinacc.artifacts.error_models import ERROR_MODELS, model_name
 from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, of
-from kinacc.calibration.summary_words import half_page, model_name, paragraph
+from kinacc.calibration.summary_words import half_page, paragraph
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import PLAN
 from kinacc.campaign.of_calibration import Sought
