@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simulated import POSE, disturbed, measure
+from simulated import POINT, POSE, THREE, disturbed, measure
 
 from kinacc.calibration import constraints, identified, uncertainty
 from kinacc.calibration.models import estimators
@@ -31,7 +31,7 @@ def stated_arm():
 
 
 @cache
-def pointing_one_way(noise_mm=0.05):
+def pointing_one_way(kind=POSE, sessions=1):
     """Poses of an arm with axes off by a mrad; the last one as described never tilts."""
     arm, rng = stated_arm(), np.random.default_rng(1)
     q = np.zeros((120, 6))
@@ -41,13 +41,14 @@ def pointing_one_way(noise_mm=0.05):
     q[:, 3] = -q[:, 1] - q[:, 2]
     q[:, 5] = rng.uniform(-1.0, 1.0, 120)
     free = constraints.free_parameters(6, (2, 3))
-    return measure(disturbed(arm.dh, free, rng), q, POSE, rng, noise_mm)
+    return measure(disturbed(arm.dh, free, rng), q, kind, rng, sessions=sessions)
 
 
 @cache
-def fitted(**tool_z):
+def fitted(kind=POSE, sessions=1, **tool_z):
     """Every model of the same poses by kind, with ``tool_z`` for the rule of that name."""
-    seen, calibration = pointing_one_way(), deepcopy(settings()["calibration"])
+    seen = pointing_one_way(kind, sessions)
+    calibration = deepcopy(settings()["calibration"])
     calibration["vec"] |= {"order": 2}
     calibration["compliance"] = {
         "joints": [2, 3],
@@ -69,6 +70,15 @@ def test_every_model_leaves_the_tool_where_the_robot_file_has_it():
         assert fit.frames.tool.position_mm[2] == pytest.approx(STATED_MM, abs=1e-9)
     places = np.array([fit.frames.base.position_mm for fit in found.values()])
     assert np.ptp(places, axis=0).max() < 5.0  # gauges of base and joint 1 differ by mm
+
+
+@pytest.mark.parametrize(("kind", "sessions"), [(POINT, 1), (THREE, 2)])
+def test_reflectors_stay_together_and_one_where_the_tool_is_stated(kind, sessions):
+    found = fitted(kind, sessions)
+    places = np.array([fit.frames.targets.position_mm for fit in found.values()])
+    assert np.ptp(places, axis=0).max() < 1.0
+    held = np.abs(places[:, :, 2] - STATED_MM) < 1e-9
+    assert held.sum(axis=1).tolist() == [1] * len(found)
 
 
 def test_every_model_says_that_base_and_tool_go_together():

@@ -12,7 +12,7 @@ from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits
 from kinacc.deployment.planning.candidates import spread
-from kinacc.deployment.record import Anchor, nominal
+from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
@@ -54,7 +54,7 @@ def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
     station = shifted(-2300.0, 1700.0, -640.0, 1.1)
     arm = replace(arm, base=compose(station, shifted(0.4, -1.2, 0.7, 2e-3)))
     if anchored:
-        arm = replace(arm, anchor=Anchor(station, arm.targets))
+        arm = replace(arm, anchor=replace(arm, base=station))
     joints = spread(arm.robot, 6)
     points = begin.points_of(arm, joints, [str(number) for number in range(6)])
     plan = begin.plan_of(

@@ -12,6 +12,7 @@ from command_line import call, small_study
 from kinacc.artifacts import store
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.assess.random_numbers import key_of
+from kinacc.assess.registry import CHOOSING
 from kinacc.assess.simulate import conduct
 from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
@@ -578,3 +579,23 @@ def test_candidates_drawn_for_a_vec_model_are_ones_it_speaks_of(calibration, tmp
                 "mh180", "--model", "vec", "--region", "limits", "--noise-mm", "0.1")  # fmt: skip
     assert done.exit_code == 2
     assert "says nothing beyond" in done.output
+
+
+@pytest.mark.parametrize("assessor", CHOOSING)
+def test_a_campaign_of_any_assessor_begins_as_it_is_offered_and_takes_a_reading(begun, assessor):
+    folder = begun("--noise-mm", SIGMA_MM, "--assessor", assessor, "--sure")
+    asked = standing(folder)["next"]
+    done = call("campaign", "record", folder, "--position-mm", Arm(folder).position(asked))
+    assert done.exit_code == 0, done.output
+    assert standing(folder)["readings"] == 1
+
+
+@pytest.mark.parametrize("assessor", ["gamma_quantile", "model_invalidation_full"])
+def test_a_confidence_asked_of_an_assessor_without_bounds_is_refused_with_the_reason(
+    calibration, tmp_path, assessor
+):
+    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration,
+                "--noise-mm", SIGMA_MM, "--assessor", assessor, "--confidence", 0.9)  # fmt: skip
+    assert done.exit_code != 0
+    said = " ".join(done.output.split())
+    assert f"--confidence: 0.9: {assessor} states a value without bounds" in said

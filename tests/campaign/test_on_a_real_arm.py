@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import shared_data
 from command_line import call
@@ -17,6 +20,7 @@ from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.world import drawn_world, measured_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
+from kinacc.cli.campaign_plans import field_of
 from kinacc.geometry import invert
 
 SERIES = "ur10_tmac/series_D.csv"
@@ -98,7 +102,7 @@ def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(ur10_d, tmp
     assert wanted.min() - 0.01 < found.min() <= found.max() < wanted.max() + 0.01
 
 
-def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d):
+def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d, tmp_path):
     measured = store.read(ur10_d[0] / "measurements.parquet")
     joints = np.rad2deg([measured[f"q{joint}"] for joint in range(1, 7)])
     inside, among = joints[:, 0], np.median(joints, axis=1)
@@ -108,6 +112,13 @@ def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d):
     said = [each["status"] for each in json.loads(done.stdout)["rows"]]
     assert said == ["ok", "extrapolated: the joints together are unlike those measured"]
     assert "1 of 2 rows lie where the calibration was not measured" in done.stderr
+    wanted = tmp_path / "wanted.json"
+    wanted.write_text(done.stdout)
+    done = call("compensate", ur10_d[0], wanted, "--model", "dh", "--json")
+    assert done.exit_code == 0, done.output
+    said = [each["status"] for each in json.loads(done.stdout)["rows"]]
+    unlike = "converged, extrapolated: the joints together are unlike those measured"
+    assert said == ["converged", unlike]
 
 
 def same(said, wanted):
@@ -165,3 +176,21 @@ def test_a_simulated_campaign_on_its_residuals_ends_as_in_memory(ur10_d, tmp_pat
     same(said, wanted.statements())
     measured = np.linalg.norm(errors[rows[wanted.ledger.visited]], axis=1).max()
     assert said[0]["lower_mm"] <= measured <= said[0]["upper_mm"]
+
+
+def test_a_plan_simulates_with_the_errors_of_the_model_a_campaign_would_be_about(ur10_d, tmp_path):
+    results, *_ = ur10_d
+    errors = store.read(results / "pose_errors.parquet")
+    sizes = np.linalg.norm([errors[f"e{axis}_mm"] for axis in "xyz"], axis=0)
+    held_out = errors["estimate"] == "cross_validated"
+    for model in ("dh", "vec"):
+        folder = tmp_path / model
+        shutil.copytree(results, folder)
+        path = folder / "model_selection.parquet"
+        table = pq.read_table(path)
+        chosen = (np.array(table["model"].to_pylist()) == model).astype(int)
+        place = table.column_names.index("selected")
+        column = pa.array(chosen, table.schema.field("selected").type)
+        pq.write_table(table.set_column(place, table.schema.field("selected"), column), path)
+        largest = sizes[held_out & (errors["comparison"] == f"{model}_vs_measured")].max()
+        assert field_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -60,6 +61,32 @@ def measured(tmp_path_factory):
     return base / "results" / "own"
 
 
+@pytest.fixture(scope="module")
+def reflectors(tmp_path_factory):
+    """Results of an arm that carries three reflectors."""
+    base = tmp_path_factory.mktemp("reflectors")
+    arm = robot.load("irb120")
+    draw = np.random.default_rng(0)
+    q = draw.uniform(-1.0, 1.0, (60, 6))
+    flange = robot.forward(arm, q)
+    places = [flange.position_mm + flange.rotation @ (40.0 * np.eye(3)[axis]) for axis in range(3)]
+    names = [f"q{i}_rad" for i in range(1, 7)]
+    names += [f"m{name}_{axis}_mm" for name in "ABC" for axis in "xyz"]
+    rows = np.hstack([q, *places]) + np.hstack([np.zeros((60, 6)), draw.normal(0, 0.05, (60, 9))])
+    np.savetxt(base / "own.csv", rows, "%.9f", ",", header=",".join(names), comments="")
+    (base / "own.yaml").write_text(
+        "measurements: {folds: 4}\ndatasets:\n  own:\n"
+        "    calibration: {base_and_tool: estimated, vec: {order: 1}, dh: {fit_to: measurements}}\n"
+        "    robot: irb120\n    evaluation: {space: measured}\n"
+        "    measurements: {source: file, file: {path: own.csv, orientation: {kind: none}}}\n"
+    )
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
+        words = ("--config", base / "own.yaml", "--results", base / "results")
+        done = call("run", stage, *words)
+        assert done.exit_code == 0, done.output
+    return base / "results" / "own"
+
+
 def shown(*words):
     done = call("fitted", *words)
     assert done.exit_code == 0, done.output
@@ -90,6 +117,30 @@ def test_errors_before_and_after_are_of_the_same_held_out_rows(folder):
     assert "training error" not in page
 
 
+def test_every_pose_of_an_own_file_fits_the_delivered_models(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arm, draw = robot.load("irb120"), np.random.default_rng(0)
+    q = draw.uniform(-1.0, 1.0, (66, 6))
+    place = robot.forward(arm, q).position_mm + draw.normal(0.0, 0.05, (66, 3))
+    lines = [",".join([*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])]
+    lines += [",".join(f"{value:.9f}" for value in row) for row in np.hstack([q, place])]
+    Path("own.csv").write_text("\n".join(lines) + "\n")
+    assert call("init", "own.csv", "--robot", "irb120", "--yes").exit_code == 0
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
+        done = call("run", stage, "--config", "own.yaml", "--results", "results")
+        assert done.exit_code == 0, done.output
+    page = shown("results/own")
+    assert "kept out" not in page
+    assert "66 readings of 1 target at 66 poses" in page
+    assert "held-out error, mm (poses left out of the fit; 66 rows)" in page
+    table = store.read("results/own/residuals.parquet")
+    pooled = np.isnan(table["fold"]) & (table["comparison"] == "dh_vs_measured")
+    assert dict(zip(table["subset"][pooled], table["n"][pooled], strict=True)) == {
+        "train": 66,
+        "validation": 66,
+    }
+
+
 def test_nominal_says_whether_base_and_tool_were_fitted(folder, measured):
     assert "nominal, with base and tool fitted" in shown(measured)
     assert "base and tool" not in shown(folder)
@@ -97,7 +148,7 @@ def test_nominal_says_whether_base_and_tool_were_fitted(folder, measured):
 
 def test_the_page_is_half_a_page(folder, measured, monkeypatch):
     # The second is of poor data: what is wrong with them takes some lines more.
-    for each, most in ((folder, 25), (measured, 28)):
+    for each, most in ((folder, 26), (measured, 29)):
         there = Path(each).absolute()
         monkeypatch.chdir(there.parents[1])  # a long path takes lines of its own
         lines = shown(there.relative_to(there.parents[1])).splitlines()
@@ -179,9 +230,23 @@ def test_what_is_left_open_is_short_and_the_rest_one_command_away(measured):
 def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
     page = shown(folder)
     assert "not assessed" in page
-    (command,) = re.findall(r"kinacc (campaign start .*) --noise-mm NOISE$", page, re.M)
-    done = call(*command.split(), "--noise-mm", 0.05, "--budget", 5, "--drawn", 5)
+    (command,) = re.findall(r"kinacc (campaign start .* --noise-mm NOISE .*)$", page, re.M)
+    done = call(*command.replace("NOISE", "0.05").split())
     assert done.exit_code == 0, done.output
+
+
+def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
+    folder, measured, tmp_path
+):
+    shutil.copytree(measured, tmp_path / "my results" / "own")
+    for each in (folder, "my results/own"):
+        lines = re.findall(r"kinacc (.*)$", shown(each).replace("NOISE", "0.05"), re.M)
+        assert {line.split()[0] for line in lines} >= {"campaign", "export", "compensate"}
+        for line in lines:
+            assert "--help" not in line
+            done = call(*shlex.split(line))
+            assert done.exit_code == 0, f"{line}: {done.output}"
+    assert {path.name for path in tmp_path.iterdir()} >= {"exported", "exported_own", "check"}
 
 
 def campaign(folder, place, readings, noise=0.05):
@@ -232,3 +297,40 @@ def test_a_campaign_that_cannot_be_read_does_not_hide_the_answer(folder):
     assert "campaign check cannot be read" in page
     assert "not assessed" in page
     assert "kinacc campaign start check_mh180 " in page  # that one is in the way
+
+
+def test_of_several_reflectors_it_is_said_which_a_campaign_is_about_and_how_to_take_another(
+    reflectors, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    told = "a campaign is about one point: mA, the first of mA, mB, mC; --point names another"
+    assert told in " ".join(shown(reflectors).split())
+    words = ("--calibration", reflectors, "--noise-mm", 0.05, "--drawn", 5, "--budget", 8)
+    first = call("campaign", "start", "first", *words)
+    assert told in first.output
+    other = call("campaign", "start", "other", *words, "--point", "mB")
+    assert "one point: mB, of mA, mB, mC; --point" in other.output
+    assert "other: mB by the" in " ".join(shown(reflectors).split())
+
+
+def test_with_one_target_no_choice_between_points_is_offered(measured, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "--point" not in shown(measured)
+
+
+def test_every_99_percent_figure_says_whether_it_was_counted_or_fitted(folder):
+    assert re.findall(r"99\W{1,2}(\w+)", shown(folder)) == ["empirical"]
+    done = call("export", folder, "--format", "markdown", "--format", "latex", "--out", "tables")
+    assert done.exit_code == 0, done.output
+    for page in Path("tables").iterdir():
+        assert set(re.findall(r"99[ ~\\,]*%[ ~]*(\w*)", page.read_text())) == {"gamma"}
+
+
+def test_errors_at_poses_no_fit_had_seen_have_one_name_in_all_answers(folder, measured):
+    said = [shown(folder), shown(measured, "--all"), call("plan-campaign", "--help").output]
+    done = call("predict", folder, f"{folder}/measurements.parquet", "--json")
+    said += [done.output, call("export", folder, "--out", "files").output]
+    for text in said:
+        assert "cross-valid" not in text
+        assert "kept out" not in text
+        assert "validation poses" not in text

@@ -1,7 +1,9 @@
 """check-data as a person and a program call it: what is said, and the exit code."""
 
 import json
+import re
 
+import numpy as np
 import pytest
 from command_line import call
 
@@ -11,8 +13,6 @@ ROBOT = "irb120"
 @pytest.fixture
 def configuration(tmp_path):
     """Writes a measured file of a nominal arm, with a change of its text, and its data set."""
-    import numpy as np
-
     from kinacc.kinematics import robot
 
     arm = robot.load(ROBOT)
@@ -96,3 +96,18 @@ def test_help_has_an_example():
     shown = call("check-data", "--help").output
     assert "Example:" in shown
     assert "kinacc check-data " in shown
+
+
+def test_the_noise_of_poses_read_again_is_said_axis_by_axis_and_of_which_frame(configuration):
+    def read_again(rows):
+        again = rows.copy()
+        again[:, 6] += 0.03
+        return np.vstack([rows, again])
+
+    config = configuration(read_again)
+    said = re.search(r"std_mm: (.*)", call("check-data", config).output)[1]
+    number = r"\d[\d.e-]*"
+    assert re.fullmatch(rf"x {number}, y {number}, z {number} \(axes of the instrument\)", said)
+    told = json.loads(call("check-data", config, "--json").stdout)["datasets"][0]["facts"]
+    spread = next(fact["std_mm"] for name, fact in told.items() if name.startswith("noise_from"))
+    assert said.startswith(f"x {spread[0]:.3g}, y {spread[1]:.3g}, z {spread[2]:.3g} ")

@@ -87,7 +87,7 @@ def test_joints_that_a_command_wrote_are_read_by_the_others(
         "plan-poses --candidates": ("plan-poses", "mh180", "--candidates", file, "--poses", 7),
         "campaign start --candidates": (
             "campaign", "start", tmp_path / "new", "--calibration", folder, "--model", "dh",
-            "--noise-mm", 0.05, "--candidates", file,
+            "--noise-mm", 0.05, "--candidates", file, "--sure",
         ),
         "compare --joints": ("compare", "mh180", folder, "--joints", file),
     }[reads]  # fmt: skip

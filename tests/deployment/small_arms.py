@@ -48,7 +48,12 @@ def measured(name: str, count: int = 80, noise_mm: float = 0.03, seed: int = 3) 
 @cache
 def results(name: str, count: int = 80, seed: int = 3) -> dict:
     """Tables of a results folder, as far as a calibration needs them."""
-    arm, seen = robot.load(name), measured(name, count, seed=seed)
+    return results_of(name, measured(name, count, seed=seed))
+
+
+def results_of(name: str, seen: Observations) -> dict:
+    """The tables of what was seen of an arm."""
+    arm = robot.load(name)
     nominal = dh_fit.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
     dh_found = dh_fit.fit(
         seen,
@@ -102,4 +107,14 @@ def _residuals(seen: Observations, of: dict[str, Frames], by_dh, by_vec) -> dict
     }
 
 
-__all__ = ["BASE", "TOOL", "calibrated", "frames", "joints", "measured", "results", "truth"]
+__all__ = [
+    "BASE",
+    "TOOL",
+    "calibrated",
+    "frames",
+    "joints",
+    "measured",
+    "results",
+    "results_of",
+    "truth",
+]

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_arms import calibrated, joints
+from small_arms import calibrated, joints, measured, results_of
 
 from kinacc.config import schema
 from kinacc.deployment import compare as comparison
+from kinacc.deployment.folder import calibration
 from kinacc.deployment.record import nominal
+from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, shared
 from kinacc.errors import InputError
 from kinacc.figures.comparison import draw
 from kinacc.figures.save import render
@@ -16,9 +18,9 @@ from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot
 
 
-def compare(first, second, q_rad):
+def compare(first, second, q_rad, shared=NONE_SHARED):
     weight = schema.key("calibration.rotation_weight_mm_per_rad").default
-    return comparison.compare(first, second, q_rad, weight)
+    return comparison.compare(first, second, q_rad, weight, shared)
 
 
 def changed(arm, **by_name):
@@ -46,6 +48,40 @@ def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
         seen = np.mean([shift.rms_mm**2 for shift in shifts])
         expected = np.mean([shift.chance_mm**2 for shift in shifts])
         assert seen / expected == pytest.approx(1.0, abs=0.6)
+
+
+@pytest.mark.parametrize(("first", "second", "common"), [(60, 60, 30), (50, 90, 50)])
+def test_readings_in_both_calibrations_are_counted_once(first, second, common):
+    q_rad, arm = joints("mh180", 60), robot.load("mh180")
+    found, apart = [], []
+    for seed in range(500, 520):
+        seen = measured("mh180", first + second - common, seed=seed)
+        one, other = (
+            calibration(results_of("mh180", seen.select(rows)), arm, "dh", "mh180")
+            for rows in (slice(0, first), slice(first - common, None))
+        )
+        found.append(compare(one, other, q_rad, SharedReadings(common, first, second)))
+        apart.append(compare(one, other, q_rad))
+    ratio = np.mean([each.statistic / each.directions for each in found])
+    assert ratio == pytest.approx(1.0, abs=0.25)
+    assert np.mean([each.statistic / each.directions for each in apart]) < 0.7
+    shifts = [each.apart_from_frames for each in found]
+    seen, expected = (np.mean([s[i] ** 2 for s in shifts]) for i in (2, 4))
+    assert seen / expected == pytest.approx(1.0, abs=0.6)
+
+
+def test_a_file_read_in_another_unit_still_holds_the_same_readings():
+    seen, rows = measured("mh180", 40), np.arange(40)
+    table = {f"q{i + 1}": seen.q_rad[:, i] for i in range(6)}
+    table |= dict(zip(("x_mm", "y_mm", "z_mm"), seen.position_mm.T, strict=True))
+    table |= {f"q{part}": np.full(40, np.nan) for part in "wxyz"}
+    table |= {"subset": np.array(["train"] * 40, dtype=object), "row": rows + 2}
+    table |= {"target": np.array(["tool"] * 40, dtype=object)}
+    other = table | {"x_mm": 25.4 * table["x_mm"]}
+    assert shared(table, other, same_file=True).all_of_both
+    assert shared(table, other, same_file=False).count == 0
+    held_out = np.where(rows < 10, "validation", "train").astype(object)
+    assert shared(table, table | {"subset": held_out}, False) == SharedReadings(30, 40, 30)
 
 
 @pytest.mark.parametrize(

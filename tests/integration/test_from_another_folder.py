@@ -75,6 +75,16 @@ def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
     assert "ours: reading" in started(project, cell, ["sh", "-c", f"{run} -- -n"])
 
 
+def test_calibrate_says_nothing_of_profiles_and_goes_by_the_workflows_own(project, cell):
+    text = started(project, cell, ["kinacc", "calibrate", "own.yaml", "--", "--dry-run"])
+    assert "own: fitting the DH model" in text
+    assert "profile" not in text
+    assert "host:" not in text  # as the profile of the workflow says
+    theirs = ["--workflow-profile", str(project.folder / "profiles" / "default")]
+    text = started(project, cell, ["kinacc", "calibrate", "own.yaml", "--", "-n", *theirs])
+    assert "Using workflow specific profile" in text
+
+
 MODULE = """\
 configfile: "cell.yaml"
 

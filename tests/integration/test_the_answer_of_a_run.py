@@ -14,7 +14,7 @@ def test_a_run_ends_with_what_the_calibrations_are_worth(project):
         page = paper[paper.index(f"{name}: what its calibration is worth") :]
         for word in ("held-out error", "selected", "valid where", "undetermined", "not assessed"):
             assert word in page
-        assert f"kinacc predict results/{name} --help" in page
+        assert f"kinacc compensate results/{name} --pose " in page
     page = paper[: paper.index("own: what")]
     for word in ("model difference: at most", "map error: at most", "operating-point error: at"):
         assert page.count(word) >= 1

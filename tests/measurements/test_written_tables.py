@@ -69,6 +69,14 @@ def test_characters_are_found_and_named_where_they_are_not_utf_8(case, tmp_path)
     assert_is_truth(reading(path))
 
 
+@pytest.mark.parametrize("lost", ["?", "\ufffd"])
+def test_a_degree_sign_that_an_export_lost_leaves_the_unit_to_the_numbers(lost, tmp_path):
+    names = [*(f"Achse {i} [{lost}]" for i in range(1, 7)), *GERMAN[6:]]
+    path = file(tmp_path, lines(cells(), names, ";"))
+    assert looked(path).section["joint_unit"] == "deg"
+    assert_is_truth(reading(path))
+
+
 def test_a_description_without_the_characters_says_what_to_set(tmp_path):
     path = file(tmp_path, lines(cells(), [*GERMAN[:6], *"XYZ"], ";"), encoding="latin-1")
     section = looked(path).section

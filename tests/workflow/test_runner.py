@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ import pytest
 from kinacc import progress
 from kinacc.artifacts.store import read_metadata, write
 from kinacc.errors import InputError, Problem
+from kinacc.workflow.plan import planned
 from kinacc.workflow.runner import Job, execute, stage_provenance
-from kinacc.workflow.stages import study
+from kinacc.workflow.stages import error_model, study
 
 MARKS = {
     "kinacc_version": "0",
@@ -138,3 +140,21 @@ def test_a_long_stage_says_how_far_it_is_and_a_short_one_nothing(monkeypatch, ca
     with progress.reporting("arm study"):
         pass
     assert capsys.readouterr().err == ""
+
+
+def test_a_long_fit_says_what_is_being_done_and_no_name_of_the_programs(
+    tmp_path, monkeypatch, capsys
+):
+    def run(inputs, settings, progress, kind):
+        for item in progress(range(2), "orders and priors of the VEC model tried"):
+            time.sleep(0.1 if item else 0.0)
+        return {}
+
+    (tmp_path / "small.yaml").write_text("datasets: {cell: {robot: mh180}}\n")
+    planned_job = planned([tmp_path / "small.yaml"]).job("vec", "cell")
+    monkeypatch.setattr(progress, "QUIET_S", 0.05)
+    monkeypatch.setattr(error_model, "run", run)
+    execute(replace(planned_job, inputs={}, outputs={}, log=None))
+    said = capsys.readouterr().err.splitlines()[0]
+    assert said.startswith("cell: fitting the volumetric error compensation (VEC) model")
+    assert "1 of 2 orders and priors" in said

@@ -53,6 +53,9 @@ for stage in STAGES.values():
             label=lambda w, name=stage.name, folder=folder: label(
                 name, w.get("dataset", folder), w.get("part")
             ),
+            doing=lambda w, name=stage.name, folder=folder: doing(
+                name, w.get("dataset", folder), w.get("part")
+            ),
             contents=lambda w, name=stage.name, folder=folder: plan.contents(
                 name, w.get("dataset", folder)
             ),

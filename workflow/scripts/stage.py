@@ -15,6 +15,7 @@ execute(
         seed=snakemake.params.seed,
         part=part,
         label=snakemake.params.label,
+        doing=snakemake.params.doing,
         log=snakemake.log[0],
     )
 )

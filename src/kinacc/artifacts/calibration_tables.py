@@ -187,9 +187,17 @@ VEC_ORDERS = Artefact(
         magnitude("prior_std_mm", "mm", "prior standard deviation of delta coefficients", 1e3),
         magnitude("prior_std_mrad", "mrad", "prior standard deviation of eps coefficients", 1e3),
         real("prior_decay", "1", "factor on both from each order above the first", 0, 1),
-        magnitude("held_out_rms_mm", "mm", "position rms of rows left out of a fit", 1e4, True),
+        magnitude(
+            "held_out_rms_mm",
+            "mm",
+            "position rms of rows left out of a fit, over configurations; far ones count less",
+            1e4,
+            True,
+        ),
         magnitude("excess_mm2", "mm^2", "mean squared error beyond that of the best", 1e8, True),
-        magnitude("excess_std_error_mm2", "mm^2", "standard error of it, by folds", 1e8, True),
+        magnitude(
+            "excess_std_error_mm2", "mm^2", "standard error of it, by configurations", 1e8, True
+        ),
         whole("chosen", "1 = chosen", 0, 1),
     ),
     ("fold", "order"),

@@ -75,6 +75,11 @@ def comparisons(models: Collection[str]) -> tuple[Comparison, ...]:
     return tuple(each for each in COMPARISONS if there >= set(each))
 
 
+def model_name(model: str) -> str:
+    """A model as people write it: DH, VEC."""
+    return model if len(model) > 3 else model.upper()
+
+
 def loaded(place: str) -> Any:
     """The object at ``module:name``."""
     module, _, name = place.partition(":")

@@ -54,6 +54,20 @@ def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     return full
 
 
+def applied(columns: np.ndarray, groups: Sequence[Group], vectors: np.ndarray) -> np.ndarray:
+    """The spread Jacobian of ``columns`` (n, m, E) times ``vectors`` (P, c): (n, m, c)."""
+    result, begin = np.zeros((*columns.shape[:2], vectors.shape[1])), 0
+    for group in groups:
+        part, own = columns[:, :, group.columns], vectors[begin : begin + group.size]
+        begin += group.size
+        if group.basis is None:
+            result += part @ own
+            continue
+        for motion, each in enumerate(own.reshape(group.motions, -1, vectors.shape[1])):
+            result += part[:, :, motion, None] * (group.basis @ each)[:, None, :]
+    return result
+
+
 def gram(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     """Gram matrix (P, P) of the spread Jacobian of ``columns`` (n, m, E), summed over n and m."""
     products = np.swapaxes(columns, 1, 2) @ columns  # (n, E, E)

@@ -68,6 +68,11 @@ def listed(table: Mapping[str, Sequence]) -> list[str]:
     return [text for text in texts if not text.startswith(_MORE)]
 
 
+def weak(sentences: Iterable[str]) -> list[str]:
+    """Those of ``listed`` that other poses than the measured ones would show, without saying so."""
+    return [text.removesuffix(WEAK).rstrip() for text in sentences if text.endswith(WEAK)]
+
+
 def sentence(directions: np.ndarray, names: Sequence[str], frames: Frames) -> str:
     """What it means that no pose shows the m ``directions`` (m, P; mm, mrad) of parameters.
 

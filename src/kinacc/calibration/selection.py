@@ -2,36 +2,47 @@
 
 Errors are small, so poses are linear in the coefficients to parts of a micrometre: one pass over
 the data sums up normal equations by block of folds at the highest order, and every candidate,
-trained on any blocks and tried on another, follows from sums of their parts. What is held out of a
-choice is a whole block of folds; the choice never sees it.
+trained on any blocks, follows from sums of their parts and is tried pose by pose on another block.
+What is held out of a choice is a whole block of folds; the choice never sees it.
+
+A reading that no candidate comes near says nothing of any of them, yet its square would outweigh
+all others, and bend high orders most. It counts less, for all candidates alike: where candidates
+are trained, by an arm with constant errors only, trained on the same rows; where they are tried, by
+the nearest of them. So a candidate that goes astray where others do not gets no pardon.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from kinacc.calibration import vec_fit
-from kinacc.calibration.basis_expansion import gram
+from kinacc.calibration.basis_expansion import Group, applied, gram
 from kinacc.calibration.held import Placed
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.vec import VECModel
+from kinacc.measurements.folds import configurations
 
-ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40)
+ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)
+ALWAYS_TRIED = 12  # above it orders are tried as long as that pays
 PRIOR_STD = (0.01, 0.03, 0.1, 0.3, 1.0)  # mm and mrad
 PRIOR_DECAY = (0.7, 0.85, 1.0)
+LEAST_PRIOR = 0.01  # share of a prior left at an order below which it adds nothing to lower ones
+FAR = 4.0  # medians of the error; a reading farther off than that counts less
 CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
 MOST_BLOCKS = 5
 _FIX = "measure more configurations, or state calibration.vec.order and prior"
+_SCREENINGS = 3  # of the rows trained on; the weights hardly change any more
 _VARIANCE_STEPS = 40
 _VARIANCE_TOLERANCE = 1e-4
 _LEAST_SHARE = 1e-6  # of the mean squared misfit, where the residual variance starts
+_CONSTANT = Prior(1.0, 1e-3, 1.0, 1e-3)  # of what is screened with, which leans on no prior
 _GAUGE_RIDGE = 1e-9  # holds constants no pose shows, as a share of those it does
 
 
@@ -47,11 +58,20 @@ class Grid:
         fit = [n for n in self.orders if 6 * joints * (n + 1) + frames <= components]
         return Grid(tuple(fit) or self.orders[:1], self.priors)
 
+    def priors_of(self, order: int) -> tuple[Prior, ...]:
+        """The priors to try an order with: not those that have fallen to nothing before it."""
+        if len(self.orders) == 1:
+            return self.priors
+        return tuple(p for p in self.priors if p.decay ** (order - 1) >= LEAST_PRIOR)
+
 
 @dataclass(frozen=True)
 class Trial:
-    """How the best prior of one order did: ``squared_mm2`` (b,), the mean squared position error
-    of every block tried on by a fit to the others."""
+    """How the best prior of one order did.
+
+    ``squared_mm2`` (c,): mean squared position error of every configuration tried, by fits that
+    had not seen it, times its weight.
+    """
 
     order: int
     prior: Prior
@@ -59,8 +79,14 @@ class Trial:
 
     @property
     def rms_mm(self) -> float:
-        """Root of the mean over blocks."""
+        """Root of the mean over configurations."""
         return float(np.sqrt(self.squared_mm2.mean()))
+
+    def excess_mm2(self, best: Trial) -> tuple[float, float]:
+        """Mean squared error beyond that of ``best`` and its standard error, by configurations."""
+        worse = self.squared_mm2 - best.squared_mm2
+        error = worse.std(ddof=1) / np.sqrt(worse.size) if worse.size > 1 else np.inf
+        return float(worse.mean()), float(error)
 
 
 @dataclass(frozen=True)
@@ -70,6 +96,11 @@ class Choice:
     held_out: tuple[int, ...]
     trials: tuple[Trial, ...]
     chosen: Trial
+
+    @property
+    def best(self) -> Trial:
+        """The trial of the least error."""
+        return min(self.trials, key=lambda trial: trial.rms_mm)
 
 
 def chosen_priors(offset_rad: float) -> tuple[Prior, ...]:
@@ -111,48 +142,90 @@ def choices(
         what = f"{len(numbers)} folds hold rows: no order or prior can be tried on held-out ones"
         raise InputError(Problem("measurements", what, "rows in two folds or more", _FIX))
     sums = _Sums.of(observations, block, empty, frames, rotation_weight_mm_per_rad)
-    held_out = [*numbers, None]
-    if len(numbers) < 3:
-        held_out = [None]  # nothing would be left to try candidates on
-    pairs = [(out, test) for out in held_out for test in numbers if test != out]
-    counted = progress(pairs, "trials of order and prior") if progress else pairs
-    tried: dict[tuple, np.ndarray] = {}
-    for out, test in counted:
-        mirror = tried.get((test, out)) if out is not None else None
-        tried[out, test] = sums.trained(grid, (out, test)) if mirror is None else mirror
-    found = []
-    for out in held_out:
-        errors = [
-            sums.errors(grid, tried[out, test], test) for test in numbers if (out, test) in tried
-        ]
+    # Of two blocks nothing would be left to try candidates on.
+    held_out = [*numbers, None] if len(numbers) > 2 else [None]
+    searches = {out: _Search.of(observations, block, out) for out in held_out}
+    pairs = {frozenset({out, test}) for out in held_out for test in numbers if test != out}
+    far = {pair: sums.far(pair) for pair in pairs}
+    for order in (
+        progress(grid.orders, "orders of the VEC model tried") if progress else grid.orders
+    ):
+        priors, trained = grid.priors_of(order), {}
+        for out, search in searches.items():
+            if not search.goes_on(order):
+                continue
+            errors = np.empty((len(observations), len(priors)))
+            for test in numbers:
+                if test != out:
+                    pair = frozenset({out, test})
+                    if pair not in trained:
+                        trained[pair] = sums.trained(order, priors, far[pair])
+                    errors[block == test] = sums.errors(trained[pair], test)
+            search.add(order, priors, errors)
+    return [search.choice() for search in searches.values()]
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What was tried with nothing seen of one block: orders, priors and squared errors.
+
+    ``rows`` (r,): those that candidates are tried on; ``configuration`` (r,) numbers from 0.
+    """
+
+    held_out: tuple[int, ...]
+    rows: np.ndarray
+    configuration: np.ndarray
+    tried: list[tuple[int, tuple[Prior, ...], np.ndarray]] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, observations: Observations, block: np.ndarray, out: int | None) -> _Search:
         folds = np.unique(observations.fold[block == out]) if out is not None else ()
-        found.append(_choice(grid, tuple(int(each) for each in folds), np.array(errors)))
-    return found
+        rows = np.flatnonzero((block >= 0) & (block != (-1 if out is None else out)))
+        same = configurations(observations.pose[rows], observations.q_rad[rows])
+        return cls(tuple(int(each) for each in folds), rows, same)
+
+    def add(self, order: int, priors: tuple[Prior, ...], squared_mm2: np.ndarray) -> None:
+        """Squared errors (n, priors) of all rows: kept by configuration."""
+        size = np.bincount(self.configuration)
+        by_prior = [np.bincount(self.configuration, each) for each in squared_mm2[self.rows].T]
+        self.tried.append((order, priors, np.stack(by_prior, axis=1) / size[:, None]))
+
+    def goes_on(self, order: int) -> bool:
+        """Whether to try an order: not where all from half of it on have gained nothing."""
+        return order <= ALWAYS_TRIED or not self.tried or 2 * self.choice().best.order >= order
+
+    def choice(self) -> Choice:
+        """One-standard-error rule, paired by configuration."""
+        nearest = [errors.min(axis=1) for *_, errors in self.tried]
+        weight = _weights(np.min(nearest, axis=0))
+        trials = []
+        for order, priors, errors in self.tried:
+            weighted = weight[:, None] * errors
+            best = int(weighted.mean(axis=0).argmin())
+            trials.append(Trial(order, priors[best], weighted[:, best]))
+        best = min(trials, key=lambda trial: trial.rms_mm)
+        for trial in trials:
+            excess, error = trial.excess_mm2(best)
+            if excess <= error:
+                break
+        return Choice(self.held_out, tuple(trials), trial)
 
 
-def _choice(grid: Grid, held_out: tuple[int, ...], errors: np.ndarray) -> Choice:
-    """One-standard-error rule on ``errors`` (blocks, orders, priors), paired by block."""
-    best_prior = errors.mean(axis=0).argmin(axis=1)
-    trials = tuple(
-        Trial(order, grid.priors[prior], errors[:, i, prior])
-        for i, (order, prior) in enumerate(zip(grid.orders, best_prior, strict=True))
-    )
-    best = min(trials, key=lambda trial: trial.squared_mm2.mean())
-    for trial in trials:
-        worse = trial.squared_mm2 - best.squared_mm2
-        if worse.mean() <= worse.std(ddof=1) / np.sqrt(worse.size):
-            return Choice(held_out, trials, trial)
-    return Choice(held_out, trials, best)
+def _weights(squared_mm2: np.ndarray) -> np.ndarray:
+    """Weights (n,) that bound squared errors (n,)."""
+    far = max(FAR**2 * float(np.median(squared_mm2)), np.finfo(float).tiny)
+    return far / np.maximum(squared_mm2, far)
 
 
 @dataclass(frozen=True)
 class _Sums:
-    """Gram matrices of ``[J | r]`` by block: of positions, of all residuals; and their counts."""
+    """By block: the Gram matrix of ``[J | r]``, the count of residuals, and ``[J | r]`` as motions
+    (rows, 6, E) and their groups, part by part."""
 
-    position: dict[int, np.ndarray]
-    everything: dict[int, np.ndarray]
-    rows: dict[int, int]
+    normal: dict[int, np.ndarray]
     components: dict[int, int]
+    motions: dict[int, list[tuple[np.ndarray, list[Group]]]]
+    kept: np.ndarray  # (E, f) derivative of the frames' motions by what is not held of them
     order: np.ndarray  # (P,) Chebyshev order; -1 for frames and offsets, which stay as they are
     empty: VECModel
     free: np.ndarray
@@ -168,43 +241,64 @@ class _Sums:
     ) -> _Sums:
         coords, kept = frames.inner, frames.kept
         free, flange = vec_fit.flange_model(observations, empty)
-        position, everything, rows, components = {}, {}, {}, {}
-        for number in np.unique(block[block >= 0]):
+        normal, components, motions = {}, {}, {}
+        for number in (int(each) for each in np.unique(block[block >= 0])):
             part = observations.select(block == number)
             system = PoseSystem(part, flange, coords, weight)
-            size = system.size + 1
-            place, all_rows = np.zeros((size, size)), np.zeros((size, size))
-            for columns, groups in system.gram_blocks(np.zeros(system.size)):
-                place += gram(columns[:, :3], groups)
-                if part.has_rotation.any():
-                    all_rows += gram(columns[:, 3:], groups)
-            key = int(number)
-            position[key], everything[key] = _in(kept, place), _in(kept, all_rows + place)
-            rows[key], components[key] = len(part), part.components
+            parts = list(system.gram_blocks(np.zeros(system.size)))
+            normal[number] = _in(kept, sum(gram(columns, groups) for columns, groups in parts))
+            components[number] = part.components
+            motions[number] = parts
         terms = np.tile(np.arange(empty.order + 1), empty.coefficients.size // (empty.order + 1))
         order = np.concatenate([terms, np.full(empty.direction_offsets_rad.size, -1)])[free]
         order = np.concatenate([np.full(kept.shape[1], -1), order])
-        return cls(position, everything, rows, components, order, empty, free)
+        return cls(normal, components, motions, kept, order, empty, free)
 
-    def trained(self, grid: Grid, left_out: Sequence[int | None]) -> list[np.ndarray]:
-        """Per order the coefficients (P, priors) fitted to all blocks but those left out."""
-        kept = [number for number in self.rows if number not in left_out]
-        normal = sum(self.everything[number] for number in kept)
-        count = sum(self.components[number] for number in kept)
-        return [
-            np.stack(list(self._solutions(normal, count, order, grid.priors)), axis=1)
-            for order in grid.orders
+    def far(self, left_out: Collection[int | None]) -> dict[int, np.ndarray]:
+        """Share (rows,) taken from every row of the blocks trained on: 0 but of far ones."""
+        kept = [number for number in self.normal if number not in left_out]
+        shares = {number: np.zeros(1) for number in kept}
+        for _ in range(_SCREENINGS):
+            constant = self.trained(0, (_CONSTANT,), shares)
+            squared = [self.errors(constant, number)[:, 0] for number in kept]
+            ends = np.cumsum([len(each) for each in squared])[:-1]
+            weights = np.split(_weights(np.concatenate(squared)), ends)
+            shares = {number: 1.0 - each for number, each in zip(kept, weights, strict=True)}
+        return shares
+
+    def trained(
+        self, order: int, priors: Sequence[Prior], far: Mapping[int, np.ndarray]
+    ) -> np.ndarray:
+        """Coefficients (P, priors) fitted to the blocks of ``far``, less these shares of rows."""
+        normal = sum(self.normal[number] - self._weighted(number, far[number]) for number in far)
+        count = sum(self.components[number] for number in far)
+        return np.stack(list(self._solutions(normal, count, order, priors)), axis=1)
+
+    def _weighted(self, number: int, share: np.ndarray) -> np.ndarray | float:
+        """Gram matrix of the rows of a block, each times its ``share`` (rows,); 0 for none."""
+        if not share.any():
+            return 0.0
+        found, begin = [], 0
+        for columns, groups in self.motions[number]:
+            own = share[begin : begin + len(columns)]
+            begin += len(columns)
+            rows = np.flatnonzero(own)
+            some = [
+                Group(each.columns, None if each.basis is None else each.basis[rows])
+                for each in groups
+            ]
+            found.append(gram(columns[rows] * np.sqrt(own[rows])[:, None, None], some))
+        return _in(self.kept, sum(found))
+
+    def errors(self, trained: np.ndarray, test: int) -> np.ndarray:
+        """Squared position errors (rows, priors) in block ``test``, mm^2."""
+        frames, rest = np.split(trained, [self.kept.shape[1]])
+        vectors = np.concatenate([self.kept @ frames, rest, np.ones((1, trained.shape[1]))])
+        parts = [
+            np.sum(applied(columns[:, :3], groups, vectors) ** 2, axis=1)
+            for columns, groups in self.motions[test]
         ]
-
-    def errors(self, grid: Grid, trained: list[np.ndarray], test: int) -> np.ndarray:
-        """Mean squared position error (orders, priors) in block ``test``, mm^2."""
-        gram_test, result = self.position[test], np.empty((len(grid.orders), len(grid.priors)))
-        for i, solutions in enumerate(trained):
-            used = np.flatnonzero(self.order <= grid.orders[i])
-            part = solutions[used]
-            moved = gram_test[np.ix_(used, used)] @ part + 2.0 * gram_test[used, -1][:, None]
-            result[i] = gram_test[-1, -1] + np.sum(part * moved, axis=0)
-        return np.maximum(result, 0.0) / self.rows[test]
+        return np.concatenate(parts)
 
     def _solutions(
         self, normal: np.ndarray, count: int, order: int, priors: Sequence[Prior]

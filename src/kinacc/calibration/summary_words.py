@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 from kinacc.artifacts.allowed import LEFT_OUT
-from kinacc.artifacts.error_models import NOMINAL, PLAINEST
+from kinacc.artifacts.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 
@@ -46,11 +46,6 @@ def paragraph(name: str, texts: Iterable[str]) -> list[str]:
     return [f"{head:{MARGIN}}{line}" for head, line in zip(heads, lines, strict=False)]
 
 
-def model_name(model: str) -> str:
-    """A model as people write it: DH, VEC."""
-    return model if len(model) > 3 else model.upper()
-
-
 def counted(number: float, noun: str) -> str:
     """``1 pose``, ``2 poses``."""
     return f"{number:.0f} {noun}{'' if number == 1 else 's'}"
@@ -68,7 +63,7 @@ def _data(facts: Sequence[Fact]) -> list[str]:
     ]
     if number["fitted"] < number["readings"]:
         rest = number["readings"] - number["fitted"]
-        told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} kept out"
+        told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} held out"
         lines.append(f"{told} (measurements.validation_fold)")
     return lines
 
@@ -102,7 +97,7 @@ def _errors(facts: Sequence[Fact], whole: bool) -> list[str]:
     held_out, trained = of(facts, "held_out_error"), of(facts, "training_error")
     lines = []
     if held_out:
-        lines += _table(facts, "held-out error, mm", "poses no fit had seen", held_out)
+        lines += _table(facts, "held-out error, mm", "poses left out of the fit", held_out)
     if trained and (whole or not held_out):
         lines += _table(facts, "training error, mm", "poses that were fitted", trained)
     return lines
@@ -114,7 +109,8 @@ def _table(
     chosen = of(facts, "selection")
     rows = next(iter(errors.values()))["n"].value
     head = f"{name} ({where}; {counted(rows, 'row')})"
-    lines = [f"{head:57}{'mean':>10}{f'{LARGE_SHARE:.0%}':>10}{'largest':>10}"]
+    columns = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}
+    lines = [f"{head:57}" + "".join(f"{name:>{width}}" for name, width in columns.items())]
     for model, figures in errors.items():
         called = model_name(model)
         if model == NOMINAL:
@@ -123,7 +119,8 @@ def _table(
         elif "order" in chosen[model]:
             called += _order(chosen[model])
         mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
-        shown = "".join(f"{figures[each].value:10.3f}" for each in _FIGURES)
+        sizes = zip(_FIGURES, columns.values(), strict=True)
+        shown = "".join(f"{figures[each].value:{width}.3f}" for each, width in sizes)
         lines.append(f"{'':4}{called:53}{shown}{mark}".rstrip())
     return lines
 

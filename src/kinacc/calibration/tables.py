@@ -76,12 +76,9 @@ def vec_orders_columns(choices: Sequence[Choice], stated: tuple[int, Prior]) -> 
     """
     rows = []
     for choice in choices:
-        best = min(choice.trials, key=lambda trial: trial.rms_mm)
         for held_out in choice.held_out or (None,):
             for trial in choice.trials:
-                worse = trial.squared_mm2 - best.squared_mm2
-                error = worse.std(ddof=1) / np.sqrt(worse.size)
-                figures = trial.rms_mm, worse.mean(), error
+                figures = trial.rms_mm, *trial.excess_mm2(choice.best)
                 tried = trial.order, *_stated(trial.prior)
                 rows.append((held_out, *tried, *figures, trial is choice.chosen))
     if not rows:

@@ -20,6 +20,7 @@ from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
+from kinacc.measurements.folds import configurations
 
 _AUTO = "auto"
 
@@ -116,7 +117,10 @@ class VECEstimator(Estimator):
         at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
         size = at.coordinates.size
         # A choice trains on three blocks of five at least; every fit of the chosen order on more.
-        count = every.select(every.fold >= 0).components * 3 // 5
+        # Another reading of the same configuration tells nothing new of the arm.
+        seen = every.select(every.fold >= 0)
+        same = np.stack([configurations(seen.pose, seen.q_rad), seen.target], axis=1)
+        count = seen.select(np.unique(same, axis=0, return_index=True)[1]).components * 3 // 5
         grid = self.grid.within(count, self.common.nominal.joints, size)
         return selection.choices(
             self._wanted(every),

@@ -117,7 +117,7 @@ def forecast(
     left = state.plan.assessor.measurements - len(state.told)
     runs = []
     numbers = range(simulations)
-    for number in progress(numbers, "simulated ends") if progress else numbers:
+    for number in progress(numbers, "simulated ends of the campaign") if progress else numbers:
         rng = np.random.default_rng([state.plan.seed, state.taken, number])
         errors = draw_errors(known, mean, noise, rng)
         entropy = (1, state.plan.seed, state.taken, number)
@@ -153,7 +153,7 @@ def _larger(state, found: Forecast, known, mean, noise, wanted_mm, simulations, 
     """Look for a larger budget of a new campaign that does."""
     simulations = max(simulations // 2, 1)
     tried = None
-    for factor in progress(_FACTORS, "larger budgets") if progress else _FACTORS:
+    for factor in progress(_FACTORS, "larger budgets tried") if progress else _FACTORS:
         tried = math.ceil(factor * state.plan.assessor.measurements)
         assessor = replace(state.plan.assessor, measurements=tried)
         missed = 0

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.error_models import model_name
 from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
-from kinacc.calibration.summary_words import model_name
 from kinacc.campaign import folder, instrument, words
 from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.campaign.state import State
@@ -42,10 +42,11 @@ class Assessed:
         plan, state = self.state.plan, self.state
         noise = ", ".join(f"{each.name} {instrument.noise(each)}" for each in plan.instruments)
         budget = plan.assessor.measurements
+        about, points = plan.about, len(plan.points) - len(state.left_out)
         return [
             words.statement(self.said, state) if self.said else "Nothing can be said yet.",
-            f"campaign {self.place}: {model_name(plan.about['model'])} model, "
-            f"{len(plan.points) - len(state.left_out)} candidates ({plan.about['candidates']}), "
+            f"campaign {self.place}: {about['point']} by the {model_name(about['model'])} model, "
+            f"{points} candidates ({about['candidates']}), "
             f"noise {noise}, {state.taken} of {budget} readings",
         ]
 

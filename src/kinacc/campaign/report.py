@@ -31,7 +31,7 @@ def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dic
     total = len(opened.state().told)
     pause = max(-(-total // _STATEMENTS), 1)
     rows: list[dict] = []
-    done = iter(progress(range(total), "readings")) if progress else iter(range(total))
+    done = iter(progress(range(total), "readings replayed")) if progress else iter(range(total))
 
     def watch(campaign: Campaign, _) -> None:
         next(done, None)

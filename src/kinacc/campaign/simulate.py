@@ -65,7 +65,7 @@ def outcomes(
     root = np.linalg.cholesky(covariance_mm2)
     work = [(number, each) for number in range(len(fields)) for each in range(repetitions)]
     found: list[Outcome] = []
-    for number, repetition in progress(work, "simulated worlds") if progress else work:
+    for number, repetition in progress(work, "simulated sets of readings") if progress else work:
         field = fields[number]
         rng = np.random.default_rng([seed, number, repetition])
         rows = rng.permutation(field.points)[:points]

@@ -77,7 +77,7 @@ def of_little_noise(
 def scatter(measured: Columns, errors: Columns) -> Revisits:
     """Scatter of what the plainest model leaves of readings at one configuration.
 
-    Cross-validated errors where there are: readings of a configuration are held out together.
+    Held-out errors where there are: readings of a configuration are held out together.
     """
     own = np.asarray(errors["comparison"]) == Comparison(MEASURED, PLAINEST).name
     held_out = own & (np.asarray(errors["estimate"]) == ESTIMATES[1])

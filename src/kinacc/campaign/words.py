@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -59,6 +60,16 @@ REASONS = {
 def reason(why: Reason | None) -> str | None:
     """A reason in words; None where there is none."""
     return None if why is None else REASONS[why.code].format(**why.numbers)
+
+
+def one_of(point: str, targets: Sequence[str]) -> list[str]:
+    """Which of several targets a campaign is about, why, and how to mean another."""
+    if len(targets) < 2:
+        return []
+    why = (
+        f"the first of {', '.join(targets)}" if point == targets[0] else f"of {', '.join(targets)}"
+    )
+    return [f"a campaign is about one point: {point}, {why}; --point names another"]
 
 
 def statements(state: State) -> list[str]:

@@ -47,13 +47,14 @@ def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Suspicion]:
     if not again.size or not _unlikely(cells, noise_mm):
         return []
     first = equal[there[at]]
-    called = cells.row_names.one
-    pairs = [f"{called(line)} repeats {called(of)}" for line, of in zip(again, first, strict=True)]
+    called = cells.row_names
+    pairs = zip(again.tolist(), first.tolist(), strict=True)
+    told = [f"{called.one(line)} repeats {called.number(of)}" for line, of in pairs]
     return [
         suspicion(
             "repeated_reading",
             f"{again.size} row{'s hold' if again.size > 1 else ' holds'} the reading of an earlier "
-            f"row, equal in every digit, at other joints: {first_few(pairs, 4)}",
+            f"row, equal in every digit, at other joints: {first_few(told, 4)}",
             again,
             "the instrument was not read anew: measure them again, or exclude the rows",
         )

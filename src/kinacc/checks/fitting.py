@@ -91,7 +91,7 @@ def fit(seen: Seen, model: DHModel) -> Fitted:
 def with_jumps(seen: Seen, model: DHModel, progress: Progress) -> Fitted:
     """The fit with every jump of base or target taken out, one after the other."""
     fitted, jumps = fit(seen, model), []
-    for _ in progress(range(_MOST_SPLITS), "jumps looked for"):
+    for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
         split = _next(fitted, model)
         if split is None:
             break

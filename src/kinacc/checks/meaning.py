@@ -21,6 +21,7 @@ from kinacc.checks.robust_fit import Seen, Trial
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 
+_TRIED = "ways to read the columns tried (units, angles, signs)"
 _TRIED_ROWS = 80
 _FITTED_ROWS = 360
 _GOOD = 0.01  # of the points' spread: what an arm as described may leave, uncalibrated
@@ -92,7 +93,7 @@ def find(cells: Cells, robot: Robot, written: Trial, progress: Progress) -> Find
     many = part.select(hand_eye.thinned(np.arange(len(part)), _FITTED_ROWS))
     fitted = [
         (_left(many, robot, each), each)
-        for _, each in progress(close[:_FITTED], "meanings of the file fitted")
+        for _, each in progress(close[:_FITTED], "likely ways to read the columns fitted")
     ]
     smallest = min(value for value, _ in fitted)
     if smallest >= _BETTER * _left(many, robot, as_it_is) or smallest > FAR * spread:
@@ -119,12 +120,15 @@ def _searched(misfit, as_it_is: Meaning, robot: Robot, good: bool, progress: Pro
     """Meanings tried with their misfits; the whole search only where the file as written fails."""
     slides = robot.dh.prismatic
     if good:
-        for each in progress(list(changes.single(as_it_is, slides)), "meanings of the file"):
+        for each in progress(
+            list(changes.single(as_it_is, slides)),
+            _TRIED,
+        ):
             yield misfit(each), each
         return
     tried: list[tuple[float, Meaning]] = []
     for rivals in _rounds(misfit, as_it_is, robot, tried):
-        found = [(misfit(each), each) for each in progress(rivals, "meanings of the file")]
+        found = [(misfit(each), each) for each in progress(rivals, _TRIED)]
         yield from found
         tried += found
         if tried and min(value for value, _ in tried) < _SURE:

@@ -101,7 +101,7 @@ def _fact(name: str, value: object) -> list[str]:
     if name == "joint coverage":
         return [f"  {name}", *(f"    {_covered(joint)}" for joint in value)]
     if isinstance(value, Mapping):
-        return [f"  {name}", *(f"    {key}: {_word(each)}" for key, each in value.items())]
+        return [f"  {name}", *(f"    {key}: {_by_axis(each)}" for key, each in value.items())]
     if isinstance(value, list) and value and isinstance(value[0], Mapping):
         rows = [", ".join(f"{k} {_word(v)}" for k, v in row.items()) for row in value]
         return [f"  {name}", *(f"    {row}" for row in rows)]
@@ -113,6 +113,14 @@ def _covered(joint: Mapping) -> str:
         f"joint {joint['joint']}: {joint['low']:.1f} to {joint['high']:.1f} {joint['unit']}, "
         f"{100 * joint['share']:.0f} % of its limits {joint['least']:g} to {joint['most']:g}"
     )
+
+
+def _by_axis(value: object) -> str:
+    """A value of a fact; of three numbers, which are per axis of the instrument, each named."""
+    if not isinstance(value, list):
+        return _word(value)
+    named = (f"{axis} {_word(each)}" for axis, each in zip("xyz", value, strict=True))
+    return f"{', '.join(named)} (axes of the instrument)"
 
 
 def _word(value: object) -> str:

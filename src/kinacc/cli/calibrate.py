@@ -86,6 +86,8 @@ def carried_out(
     plan.check_files()
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores or os.cpu_count() or 1), "--configfile", *configs]
+    if "--workflow-profile" not in more:
+        command += profile_options()  # Snakemake would say that it uses them
     command += more or ["--quiet", "all"]  # stages say how far they are, and what goes wrong
     command += ["--no-hooks"]  # what a run ends with is said by the command
     done = subprocess.run([*command, "--", target], env=os.environ | ONE_THREAD, check=False)
@@ -93,6 +95,20 @@ def carried_out(
         raise SystemExit(done.returncode)
     ran = not {"-n", "--dry-run", "--dryrun", "--unlock", "--lint"} & set(more)
     return configs, plan if ran else None
+
+
+def profile_options() -> list[str]:
+    """The workflow's own profile as options."""
+    import yaml
+
+    from kinacc.workflow.plan import SNAKEFILE
+
+    profile = SNAKEFILE.parent / "profiles" / "default" / "config.yaml"
+    options = ["--workflow-profile", "none"]
+    for name, value in yaml.safe_load(profile.read_text("utf-8")).items():
+        values = value if isinstance(value, list) else [value]
+        options += [f"--{name}", *(str(each) for each in values if each is not True)]
+    return options
 
 
 # More BLAS threads change the last bits of a sum, and jobs share the cores as they are.

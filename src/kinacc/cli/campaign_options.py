@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from kinacc.assess.adaptive import AdaptiveAssessor
-from kinacc.assess.registry import RECOMMENDED
+from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
+from kinacc.assess.statement import CONFIDENCE
 from kinacc.campaign import instrument, plan
 from kinacc.errors import InputError, Problem
 
@@ -31,10 +32,20 @@ def instruments(
 
 
 def assessor(
-    name: str | None, budget: int, confidence: float, stated: Sequence[str]
+    name: str | None, budget: int, confidence: float | None, stated: Sequence[str]
 ) -> AdaptiveAssessor:
-    """The assessor of ``--assessor``, ``--budget``, ``--confidence`` and ``--set``."""
-    settings: dict[str, object] = {"measurements": budget, "confidence": confidence}
+    """The assessor of ``--assessor``, ``--budget``, ``--confidence`` and ``--set``.
+
+    Raises InputError also for a confidence of an assessor that states a value without bounds.
+    """
+    name = name or RECOMMENDED
+    settings: dict[str, object] = {"measurements": budget}
+    if name not in ADAPTIVE or "confidence" in {each.name for each in fields(ADAPTIVE[name])}:
+        settings["confidence"] = CONFIDENCE if confidence is None else confidence
+    elif confidence is not None:
+        what = f"{confidence:g}: {name} states a value without bounds, which has no confidence"
+        fix = "leave it out, or choose another --assessor"
+        raise InputError(Problem("--confidence", what, fix=fix))
     for text in stated:
         key, mark, value = text.partition("=")
         if not mark:
@@ -44,7 +55,7 @@ def assessor(
         except (ValueError, RecursionError):
             settings[key.strip()] = value.strip()
     try:
-        return plan.assessor_of(name or RECOMMENDED, settings)
+        return plan.assessor_of(name, settings)
     except InputError as error:
         # An assessor knows its settings, not the options they came from.
         options = {"measurements": "--budget", "confidence": "--confidence"}

@@ -118,13 +118,16 @@ def field_of(name: str) -> ErrorField:
 
 def _of_folder(path: Path) -> ErrorField:
     from kinacc.artifacts import store
-    from kinacc.deployment.folder import recorded_robot
+    from kinacc.artifacts.error_models import PLAINEST
+    from kinacc.deployment.folder import recorded_model, recorded_robot
 
     name, robot = path.resolve().name, recorded_robot(path)
     needed = ("pose_errors", "measurements")
     if all((path / f"{each}.parquet").is_file() for each in needed):
         errors, seen = (store.read(path / f"{each}.parquet") for each in needed)
-        return fields.of_measurements(name, robot, errors, seen)
+        selection = path / "model_selection.parquet"
+        tables = {selection.stem: store.read(selection)} if selection.is_file() else {}
+        return fields.of_measurements(name, robot, errors, seen, recorded_model(tables) or PLAINEST)
     if (path / "assessment_points.parquet").is_file():
         return fields.of_points(name, robot, store.read(path / "assessment_points.parquet"))
     what = "holds neither pose_errors with measurements nor assessment_points"

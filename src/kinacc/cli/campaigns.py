@@ -89,7 +89,9 @@ def start(given: Mapping, out: Output) -> None:
     folders.start(given["folder"], begun)
     out.say(
         answers.begun_facts(given["folder"], begun, unsure),
-        answers.begun_in_words(given["folder"], begun, len(found.joints) - len(points)),
+        answers.begun_in_words(
+            given["folder"], begun, len(found.joints) - len(points), [*calibration.targets]
+        ),
     )
 
 

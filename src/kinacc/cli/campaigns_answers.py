@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,8 +40,11 @@ def begun_facts(folder: str, begun: Plan, unsure: Unsure | None) -> dict[str, ob
     }
 
 
-def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
-    """What was begun, of candidates of which ``merged`` repeated the joints of others."""
+def begun_in_words(folder: str, begun: Plan, merged: int, targets: Sequence[str]) -> str:
+    """What was begun, of candidates of which ``merged`` repeated the joints of others.
+
+    ``targets``: those of the calibration, one of which the campaign may be about.
+    """
     too_few = words.reason(begun.assessor.shortfall(*begun.points.joints.shape))
     named = ", ".join(f"{each.name} ({instrument.noise(each)})" for each in begun.instruments)
     lines = [
@@ -49,6 +53,7 @@ def begun_in_words(folder: str, begun: Plan, merged: int) -> str:
         + (f"; {merged} rows repeat the joints of others" if merged else ""),
         f"the {begun.about['point']} of {begun.about['robot']}, {begun.about['model']} model of "
         f"{begun.about['calibration']}",
+        *words.one_of(begun.about["point"], targets),
         f"instruments: {named}",
         f"{begun.assessor.name}: {begun.assessor.measurements} readings, the first at "
         f"{len(begun.route)} points whatever they say",

@@ -81,9 +81,7 @@ campaign_options = together(
     option("--covariance-mm2", help="Covariance of a reading: nine numbers, row by row."),
     option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]"),
     option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
-    option(
-        "--confidence", default=CONFIDENCE, type=float, help="How surely each bound is to hold."
-    ),
+    option("--confidence", type=float, help=f"How surely each bound is to hold. [{CONFIDENCE}]"),
     option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have."),
     option("--width-mm", type=float, help="Wanted distance of upper from lower bound."),
     option(

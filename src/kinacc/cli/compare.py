@@ -42,7 +42,7 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
         ]
         q_rad = comparison_report.joints(calibrations, (first, second), joints, count)
         weight = schema.key("calibration.rotation_weight_mm_per_rad").default
-        found = compared(*calibrations, q_rad, weight)
+        found = compared(*calibrations, q_rad, weight, comparison_report.shared((first, second)))
     answer = comparison_report.answer(found, calibrations, len(q_rad))
     if out.picture is not None:
         from kinacc.figures.comparison import draw

@@ -8,11 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.calibration.uncertainty import unit_of
 from kinacc.cli import choice, rows
 from kinacc.cli.sheet import Field, Sheet, number
+from kinacc.deployment import shared_readings
 from kinacc.deployment.compare import Difference, Shift, require_alike
 from kinacc.deployment.record import Calibration, nominal
+from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.region import points
@@ -42,9 +45,10 @@ def joints(
     robot = calibrations[0].robot
     if path is not None:
         return rows.read(path, robot).joints
-    found = [_measured(Path(place), robot) for place in places]
-    found = [each for each in found if each is not None]
-    if found:
+    names = [f"q{i + 1}" for i in range(robot.dh.joints)]
+    tables = [table for place in places if (table := _measured(place)) is not None]
+    if tables:
+        found = [np.stack([t[name] for name in names], axis=1).astype(float) for t in tables]
         share = max(1, count // len(found))
         return np.concatenate([each[np.sort(spread_rows(len(each), share))] for each in found])
     low = np.maximum(calibrations[0].robot.q_min_rad, calibrations[1].robot.q_min_rad)
@@ -52,14 +56,25 @@ def joints(
     return low + points("sobol", count, len(low)) * (high - low)
 
 
-def _measured(folder: Path, robot: robots.Robot) -> np.ndarray | None:
+def shared(places: Sequence[str]) -> SharedReadings:
+    """The readings that the calibrations of two results folders were both fitted to."""
+    tables = [_measured(place) for place in places]
+    if tables[0] is None or tables[1] is None:
+        return NONE_SHARED
     from kinacc.artifacts import store
 
-    path = folder / "measurements.parquet"
-    if not path.is_file():
-        return None
-    table = store.read(path)
-    return np.stack([table[f"q{i + 1}"] for i in range(robot.dh.joints)], axis=1).astype(float)
+    origins = {store.read_metadata(_file(place)).get("inputs_hash") for place in places}
+    return shared_readings.shared(tables[0], tables[1], len(origins) == 1)
+
+
+def _file(place: str) -> Path:
+    return Path(place) / "measurements.parquet"
+
+
+def _measured(place: str) -> Columns | None:
+    from kinacc.artifacts import store
+
+    return store.read(_file(place)) if _file(place).is_file() else None
 
 
 def answer(found: Difference, calibrations: Sequence[Calibration], poses: int) -> Sheet:
@@ -70,6 +85,9 @@ def answer(found: Difference, calibrations: Sequence[Calibration], poses: int) -
         "model": calibrations[0].choice,
         "same_robot": found.same_robot,
         "poses": poses,
+        "shared_readings": found.shared.count,
+        "first_fitted_to": found.shared.first,
+        "second_fitted_to": found.shared.second,
         "statistic": found.statistic,
         "directions": found.directions,
         "probability": found.probability,
@@ -114,7 +132,7 @@ def short_names(calibrations: Sequence[Calibration]) -> tuple[str, str]:
 
 def in_words(found: Difference, calibrations: Sequence[Calibration]) -> str:
     """What moved, in sentences."""
-    lines = []
+    lines = _of_readings(found.shared, calibrations)
     if not found.same_robot:
         first, second = (calibration.robot.name for calibration in calibrations)
         lines.append(
@@ -129,9 +147,26 @@ def in_words(found: Difference, calibrations: Sequence[Calibration]) -> str:
             f"{found.statistic:.1f}, probability of more by chance {found.probability:.2g}: "
             f"{verdict}, if the residuals are independent noise"
         )
-    lines.append(_moved("flange poses moved", found.as_they_stand))
+    words = "flange poses differ" if found.shared.all_of_both else "flange poses moved"
+    lines.append(_moved(words, found.as_they_stand))
     lines.append(_moved("after the best base and tool", found.apart_from_frames))
     return "\n".join(lines)
+
+
+def _of_readings(shared: SharedReadings, calibrations: Sequence[Calibration]) -> list[str]:
+    """What readings in both calibrations mean for a verdict."""
+    if not shared.count:
+        return []
+    if shared.all_of_both:
+        return [
+            f"both are fitted to the same {shared.count} readings: nothing can have moved between "
+            "them; what differs comes from the settings of the fits"
+        ]
+    first, second = short_names(calibrations)
+    return [
+        f"{shared.count} readings are in both, of {shared.first} in {first} and {shared.second} in "
+        f"{second}: they show no change, and are counted once"
+    ]
 
 
 def _moved(words: str, shift: Shift) -> str:

@@ -50,7 +50,11 @@ def compensate(
         found = joints_for(
             calibration, given.pose, given.joints, given.directions, frame, point, given.payload
         )
-    answer = target_poses.compensated(calibration, given, found, frame, point, program is not None)
+        unlike = target_poses.unlike_measured(calibration, found, point)
+    answer = target_poses.compensated(
+        calibration, given, found, frame, point, unlike, program is not None
+    )
     out.deliver(answer)
     rows.say_unused(given, calibration)
+    rows.say_unlike(unlike, calibration)
     rows.end_where_missing(found.q_rad, "joints")

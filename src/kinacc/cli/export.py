@@ -50,7 +50,7 @@ def export(
       kinacc export results/mh180 --out exported
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --out exported
     """
-    from kinacc.deployment.export.files import CARRY_ALL, contents, note, write
+    from kinacc.deployment.export.files import CARRY_ALL, contents, note, warning, write
     from kinacc.errors import Problem, refuse
 
     wanted = formats or (FORMATS if model == PLAINEST else CARRY_ALL)
@@ -75,6 +75,6 @@ def export(
     )
     paths = write(made, target, out.force)
     out.say({"files": paths}, "\n".join(paths))
-    said = note(folder) if model == PLAINEST else ""
-    if said:
-        click.echo(said, err=True)
+    for said in (warning(folder), note(folder) if model == PLAINEST else ""):
+        if said:
+            click.echo(said, err=True)

@@ -199,8 +199,9 @@ def _called(table: Mapping, i: int, names: RowNames) -> str:
 
 def _further(tables: Mapping[str, Mapping]) -> list[str]:
     """What does not stand on the half page."""
+    from kinacc.artifacts.error_models import model_name
     from kinacc.calibration.summary import selected
-    from kinacc.calibration.summary_words import counted, model_name, paragraph
+    from kinacc.calibration.summary_words import counted, paragraph
     from kinacc.measurements.row_names import RowNames
 
     best = selected(tables["model_selection"])

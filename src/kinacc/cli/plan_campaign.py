@@ -29,7 +29,7 @@ def plan_campaign(out, **given) -> None:
 
     \b
     Errors to simulate with (--errors):
-      a results folder       its cross-validated residuals, or the points of its study
+      a results folder       its held-out errors, or the points of its study
       a .csv, .parquet file  columns ex_mm, ey_mm, ez_mm
       smooth, gravity, ripple, thermal, workshop, defect, rare
                              families of synthetic arms after a DH calibration

@@ -170,7 +170,7 @@ def drawn(asked: PoseTask, found: PosePlan, progress: Callable | None = None) ->
     least = -(-found.information.rank // rows_.shape[1])
     most = min(max(asked.count, least + 1), len(rows_))
     counts = np.unique(np.linspace(least, most, _SIZES).astype(int))
-    sizes = progress(counts, "numbers of poses") if progress else counts
+    sizes = progress(counts, "numbers of poses compared") if progress else counts
     chosen = np.array(
         [
             found.plan.value if size == asked.count else exchange.choose(rows_, int(size), index)[1]

@@ -26,7 +26,8 @@ def predict(
     \b
     std_*           standard deviation by the covariance of the fitted parameters
     unexplained_*   rms of what the model left of held-out measurements: add it in mind
-    undetermined_*  movement per mm or mrad along what the calibration could not see
+    undetermined_*  movement per mm or mrad along what the calibration could not see, the same by
+                    every model
     status          whether the calibration was measured at such joints
 
     Where the base was estimated with the arm, the base frame is that of the DH model, for a VEC
@@ -38,8 +39,6 @@ def predict(
       kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
       kinacc predict results/ur10_b plan.csv --frame instrument -o predicted.csv
     """
-    import numpy as np
-
     from kinacc.cli import rows, tables
     from kinacc.deployment.applicability import is_measured_there
     from kinacc.deployment.predict import predict as poses_at
@@ -56,11 +55,5 @@ def predict(
         measured = is_measured_there(calibration, at, point)
     out.deliver(tables.predicted(calibration, given, found, measured, frame, point))
     rows.say_unused(given, calibration)
-    if not measured.all():
-        many = f"{int(np.sum(~measured))} of {len(measured)} rows"
-        click.echo(
-            f"{many} lie where the calibration was not measured: status says why; errors there may "
-            "be larger than those held out",
-            err=True,
-        )
+    rows.say_unlike(~measured, calibration)
     rows.end_where_missing(found.pose.position_mm, "a pose")

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
 _OWN_JOINT = re.compile(r"(?<![^\s,;\"'])q1_(?:deg|rad|mm|m)(?![^\s,;\"'])")
+_MOST_SAID = 2  # sentences of a warning
 _HEAD = 1_000_000  # characters of a line looked at
 
 
@@ -343,6 +344,24 @@ def say_unused(given: Rows, calibration: Calibration) -> None:
     if given.payload is not None and not calibration.model.knows_loads:
         what = f"the {calibration.choice} model was fitted without loads that change"
         click.echo(f"not used: payload; {what}", err=True)
+
+
+def say_unlike(unlike: np.ndarray, calibration: Calibration) -> None:
+    """Warn on the error stream of rows, True in ``unlike`` (n,), where it was not measured.
+
+    What the measured poses left open is said with it: elsewhere it shows.
+    """
+    from kinacc.calibration import blind_words
+
+    if not unlike.any():
+        return
+    told = blind_words.weak(calibration.left_open or ())
+    click.echo(
+        f"warning: {int(unlike.sum())} of {len(unlike)} poses lie where the calibration was not "
+        "measured: status says why; errors there may be larger than those held out"
+        + (f"; measured poses left open: {'; '.join(told[:_MOST_SAID])}" if told else ""),
+        err=True,
+    )
 
 
 def end_where_missing(answers: np.ndarray, what: str) -> None:

@@ -14,7 +14,7 @@ from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.robot import Robot
 
 _MRAD = 1e3
-UNLIKE = "extrapolated: the joints together are unlike those measured"
+UNLIKE = "the joints together are unlike those measured"
 
 
 def given_joints(
@@ -48,8 +48,8 @@ def predicted(
     std = found.std * np.array([1.0, 1.0, 1.0, _MRAD, _MRAD, _MRAD])
     by = "standard deviation by the covariance of the fitted parameters"
     seen = "movement per mm or mrad of displacement along directions the calibration cannot see"
-    subset = calibration.residual.subset if calibration.residual else "no"
-    left = f"rms of what the model left of {subset} poses"
+    poses = calibration.residual.poses if calibration.residual else "no poses"
+    left = f"rms of what the model left of {poses}"
     fields = [
         Field("row", given.label, "", "the file's pose, or its line"),
         *joint_fields(calibration.robot.dh.prismatic, given.joints),
@@ -124,7 +124,7 @@ def _where(calibration: Calibration, outside: np.ndarray, measured: np.ndarray) 
         if row.any()
         else "ok"
         if there
-        else UNLIKE
+        else f"extrapolated: {UNLIKE}"
         for row, there in zip(outside, measured, strict=True)
     ]
     return np.array(words, dtype=object)

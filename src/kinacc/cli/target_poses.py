@@ -9,12 +9,14 @@ import numpy as np
 from kinacc.cli import rows
 from kinacc.cli.rows import Rows
 from kinacc.cli.sheet import Field, Sheet
-from kinacc.cli.tables import facts, joint_fields, joints_in_words, pose_fields
+from kinacc.cli.tables import UNLIKE, facts, joint_fields, joints_in_words, pose_fields
+from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.compensate import Compensation, programmed
 from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, PoseStatus
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, rotation_from_quaternion
+from kinacc.kinematics.model import JointState
 from kinacc.measurements.table import numbers_of
 
 _FAR_FROM_PROGRAM_RAD = np.deg2rad(20.0)  # a calibration moves joints by less
@@ -65,9 +67,14 @@ def compensated(
     found: Compensation,
     frame: str,
     point: str | None,
+    unlike: np.ndarray,
     is_program: bool = False,
 ) -> Sheet:
-    """The sheet of ``kinacc compensate``; ``is_program``: the near joints are a program's."""
+    """The sheet of ``kinacc compensate``.
+
+    ``unlike`` (n,): joints that are unlike those measured; ``is_program``: the near joints are a
+    program's.
+    """
     angular = np.where(calibration.robot.dh.prismatic, np.nan, np.rad2deg(np.abs(found.change)))
     largest = np.max(np.nan_to_num(angular, nan=-1.0), axis=1)
     point = point or calibration.default_point
@@ -75,7 +82,10 @@ def compensated(
         Field("row", given.label, "", "the file's pose, or its line"),
         *joint_fields(calibration.robot.dh.prismatic, found.q_rad),
         Field(
-            "status", _words(calibration, found, is_program), "", "why there are joints, or none"
+            "status",
+            _words(calibration, found, unlike, is_program),
+            "",
+            "why there are joints, or none",
         ),
         Field("solver_residual_mm", found.position_error_mm, "mm", "of the search for the joints"),
         Field(
@@ -97,7 +107,18 @@ def compensated(
     return Sheet(title, facts(calibration, frame, point), fields)
 
 
-def _words(calibration: Calibration, found: Compensation, is_program: bool) -> np.ndarray:
+def unlike_measured(calibration: Calibration, found: Compensation, point: str | None) -> np.ndarray:
+    """True (n,) for joints in their fitted ranges where the calibration was not measured."""
+    there = np.isfinite(found.q_rad).all(axis=1)
+    at = JointState(calibration.robot.dh_joints(found.q_rad[there]))
+    unlike = np.zeros(len(found.status), dtype=bool)
+    unlike[there] = ~is_measured_there(calibration, at, point)
+    return unlike & ~calibration.outside_range(calibration.robot.dh_joints(found.q_rad)).any(axis=1)
+
+
+def _words(
+    calibration: Calibration, found: Compensation, unlike: np.ndarray, is_program: bool
+) -> np.ndarray:
     words = []
     for row, status in enumerate(found.status):
         joints = joints_in_words(found.offending[row]) if found.offending[row].any() else ""
@@ -115,6 +136,7 @@ def _words(calibration: Calibration, found: Compensation, is_program: bool) -> n
             PoseStatus.NOT_REACHED: f"no joints: not reached{left}",
         }[PoseStatus(status)]
         if status <= PoseStatus.OTHER_POSTURE:
+            said += f", extrapolated: {UNLIKE}" if unlike[row] else ""
             said += _remarks(calibration, found, row, is_program)
         words.append(said)
     return np.array(words, dtype=object)

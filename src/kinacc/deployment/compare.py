@@ -16,6 +16,7 @@ from scipy.special import chdtrc
 from kinacc.calibration.uncertainty import scale_of
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
+from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
 from kinacc.errors import Problem, refuse
 from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import robot as robots
@@ -68,6 +69,7 @@ class Difference:
     ``as_they_stand`` are shifts of the flange in the base, ``apart_from_frames`` after the best
     base and tool. ``robots_apart_mm`` is the rms by which the arms they were calibrated from differ
     after the best base and tool, and ``same_robot`` whether that is no more than calibrations do.
+    ``shared`` are readings that both were fitted to, which are counted once.
     """
 
     parameters: Parameters | None
@@ -78,6 +80,7 @@ class Difference:
     apart_from_frames: Shift
     robots_apart_mm: float
     same_robot: bool
+    shared: SharedReadings = NONE_SHARED
 
 
 def compare(
@@ -85,12 +88,15 @@ def compare(
     second: Calibration,
     q_rad: np.ndarray,
     rotation_weight_mm_per_rad: float,
+    shared: SharedReadings = NONE_SHARED,
 ) -> Difference:
     """What moved from ``first`` to ``second``, over reported joints ``q_rad`` (n, k), rad and mm.
 
+    ``shared``: readings that both were fitted to; without it they count as apart.
     Raises InputError where the two are of different kinds of arm.
     """
     require_alike(first, second)
+    first, second = counted_once(first, second, shared)
     parameters, test = None, (np.nan, 0, np.nan)
     if first.model.comparable is not None and second.model.comparable is not None:
         parameters = _parameters(first, second)
@@ -115,6 +121,7 @@ def compare(
         _shift(aligned, left),
         apart_mm,
         apart_mm <= _ANOTHER * _length(first.robot.dh),
+        shared,
     )
 
 

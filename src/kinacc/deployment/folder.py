@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, PLAINEST
+from kinacc.calibration import blind_words
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
-from kinacc.deployment.record import MODELS, Anchor, Calibration, Residual
+from kinacc.deployment.record import MODELS, Calibration, Residual
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.kinematics import tables as model_tables
@@ -84,6 +85,8 @@ def calibration(
     names = [str(each) for each in np.asarray(frames["frame"])[of_model]]
     targets = [each for each in names if each != "base"]
     number = _session_number(frames, of_model, session)
+    anchored = made[choice].table is None and not _same_base(frames, choice, session)
+    told = tables.get(f"{PLAINEST}_identified")
     return Calibration(
         name=name,
         robot=robot,
@@ -91,7 +94,8 @@ def calibration(
         model=made[choice],
         base=model_tables.frame(frames, choice, "base", session),
         base_name="base" if number == 0 else f"base{number + 1}",
-        anchor=_anchor(frames, choice, targets, session) if made[choice].table is None else None,
+        anchor=calibration(tables, robot, PLAINEST, name, session) if anchored else None,
+        left_open=None if told is None else tuple(blind_words.listed(told)),
         targets={each: model_tables.frame(frames, choice, each) for each in targets},
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
@@ -108,15 +112,10 @@ def _fitted(tables: Tables, robot: Robot) -> JointState | None:
     return from_columns(tables["measurements"], robot).at.select(fitted)
 
 
-def _anchor(
-    frames: Mapping, choice: str, targets: Sequence[str], session: str | None
-) -> Anchor | None:
-    """Base and targets of the DH model; None where the model chosen has the very same base."""
+def _same_base(frames: Mapping, choice: str, session: str | None) -> bool:
+    """Whether a model has the very base of the DH model, so that neither was fitted with it."""
     bases = [model_tables.frame(frames, each, "base", session) for each in (PLAINEST, choice)]
-    if all(np.array_equal(one, other) for one, other in zip(*bases, strict=True)):
-        return None
-    tools = {each: model_tables.frame(frames, PLAINEST, each) for each in targets}
-    return Anchor(bases[0], tools)
+    return all(np.array_equal(one, other) for one, other in zip(*bases, strict=True))
 
 
 def _session_number(frames: Mapping, of_model: np.ndarray, session: str | None) -> int:
@@ -136,7 +135,7 @@ def selected_model(tables: Tables) -> str:
 
     Raises InputError where the tables cannot tell.
     """
-    recorded = _recorded(tables)
+    recorded = recorded_model(tables)
     if recorded:
         return recorded
     rms = {each: residual(tables, each, "validation") for each in ALWAYS}
@@ -146,7 +145,8 @@ def selected_model(tables: Tables) -> str:
     return min(rms, key=lambda each: rms[each].position_mm)
 
 
-def _recorded(tables: Tables) -> str:
+def recorded_model(tables: Tables) -> str:
+    """The model that ``model_selection`` selected; empty where nothing says so."""
     columns = tables.get("model_selection", {})
     chosen = np.flatnonzero(np.asarray(columns.get("selected", [])) == 1)
     return str(columns["model"][chosen[0]]) if len(chosen) else ""

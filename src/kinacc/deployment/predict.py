@@ -22,7 +22,8 @@ class Prediction(NamedTuple):
     turns about x, y, z (rad), in the frame of the pose; NaN where the model has no covariance.
     ``std_position_mm`` and ``std_orientation_rad`` (n,): roots of the summed variances.
     ``blind_mm`` and ``blind_rad`` (n,): how far the pose moves when the parameters move by one unit
-    (1 mm or 1 mrad) along the directions the calibration could not see, root of the summed squares.
+    (1 mm or 1 mrad) along the directions the calibration could not see, root of the summed squares;
+    by the DH model, which other models follow along these.
     ``residual_mm`` and ``residual_rad`` (n,): rms of what the model left unexplained.
     ``outside`` (n, k): joints outside the range the data cover; where the model
     has a domain it says nothing there, and all else is NaN.
@@ -61,22 +62,20 @@ def predict(
     said = np.flatnonzero(~silent)
     pose = Pose(np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan))
     std, blind = np.full((count, 6), np.nan), np.full((count, 2), np.nan)
-    undetermined = None
-    if calibration.known is not None:
-        undetermined = (calibration.known.undetermined * calibration.units).T
     starts = range(0, len(said), BLOCK)
     for begin in progress(starts, f"blocks of {BLOCK} poses") if progress else starts:
         rows = said[begin : begin + BLOCK]
         part = at.select(rows)
         found = calibration.pose(part, frame, point)
         pose.rotation[rows], pose.position_mm[rows] = found
-        if undetermined is None:
+        if calibration.known is None:
             continue
         slopes = sensitivity(calibration, part, frame, point)
         std[rows] = np.sqrt(np.sum((slopes @ calibration.root) ** 2, axis=2))
-        unseen = (slopes @ undetermined) ** 2
-        blind[rows, 0] = np.sqrt(unseen[:, :3].sum(axis=(1, 2)))
-        blind[rows, 1] = np.sqrt(unseen[:, 3:].sum(axis=(1, 2)))
+        plainest = calibration.plainest
+        if plainest is not calibration:
+            slopes = sensitivity(plainest, part, frame, point)
+        blind[rows] = along_open(plainest, slopes)
     left = calibration.residual
     return Prediction(
         pose,
@@ -89,6 +88,12 @@ def predict(
         np.where(silent, np.nan, left.orientation_rad if left else np.nan),
         outside,
     )
+
+
+def along_open(calibration: Calibration, slopes: np.ndarray) -> np.ndarray:
+    """Movement (n, 2), mm and rad, of poses by ``slopes`` along what is undetermined."""
+    moved = (slopes @ (calibration.known.undetermined * calibration.units).T) ** 2
+    return np.sqrt(np.stack([moved[:, :3].sum(axis=(1, 2)), moved[:, 3:].sum(axis=(1, 2))], 1))
 
 
 def sensitivity(

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.errors import InputError, Problem
@@ -17,6 +18,7 @@ from kinacc.kinematics.robot import Robot
 
 MODELS = (*ERROR_MODELS, NOMINAL)
 FRAMES = ("base", "instrument")
+POSES = dict(zip(SUBSETS, ("training poses", "held-out poses"), strict=True))
 FLANGE, TOOL = "flange", "tool"
 _LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
 
@@ -29,13 +31,10 @@ class Residual:
     orientation_rad: float
     subset: str
 
-
-@dataclass(frozen=True)
-class Anchor:
-    """``base`` and ``targets`` of the DH model, as those of ``Calibration``."""
-
-    base: Pose
-    targets: Mapping[str, Pose]
+    @property
+    def poses(self) -> str:
+        """Which rows, in words."""
+        return POSES[self.subset]
 
 
 @dataclass(frozen=True)
@@ -48,9 +47,10 @@ class Calibration:
     ``fitted_range_rad`` (k,), (k,) are the DH joints the data cover (mm where a joint slides);
     ``fitted`` how the arm stood at the readings that were fitted, None where that is not known.
     ``base_name`` is what ``known`` calls the base, which differs by session. ``anchor`` is the DH
-    model of the same data where this is a VEC model fitted with its base: errors of a VEC model can
-    turn or shift base and tool against each other by centimetres and no measured pose shows it, so
-    the robot's own base, and the tool programs mean, are those of the DH model.
+    model of the same data where this is another one fitted with its base: errors of a VEC model can
+    turn or shift base and tool against each other by mm and no measured pose shows it, so the
+    robot's own base, the tool programs mean, and what poses leave open are those of the DH model.
+    ``left_open`` says in sentences what that is; None where nobody asked.
     """
 
     name: str
@@ -63,8 +63,9 @@ class Calibration:
     residual: Residual | None = None
     fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None
     base_name: str = "base"
-    anchor: Anchor | None = None
+    anchor: Calibration | None = None
     fitted: JointState | None = None
+    left_open: tuple[str, ...] | None = None
 
     @property
     def default_point(self) -> str:
@@ -87,6 +88,11 @@ class Calibration:
             return self.robot.flange
         known = ", ".join([*self.targets, FLANGE])
         raise InputError(Problem("point", f"{name!r} is none of this calibration", known))
+
+    @property
+    def plainest(self) -> Calibration:
+        """The model whose parameters say what the poses left open."""
+        return self if self.anchor is None or self.anchor.known is None else self.anchor
 
     def origin(self, frame: str) -> Pose:
         """First DH frame in ``frame``: the robot's own base, or the instrument."""

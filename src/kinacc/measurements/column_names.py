@@ -151,6 +151,7 @@ _HUMP = re.compile(
     r"(?<=[a-zà-öø-ÿ]{2})(?=[A-ZÀ-ÖØ-Þ])|(?<=[A-ZÀ-ÖØ-Þ])(?=[A-ZÀ-ÖØ-Þ][a-zà-öø-ÿ]{2})"
 )
 _SIGNS = str.maketrans({"º": "°", "˚": "°", "∆": "Δ", "µ": "μ", "ß": "ss"})
+_NO_UNIT = "-/ ?\ufffd"  # no more is left of a degree sign in the wrong encoding
 _AXIS = re.compile(r"(?:r|q)?[xyzw]|q|j")
 _COVERAGE = re.compile(r"(?<![^\W_])k\s*=\s*([123])(?!\d|[.,]\d)", re.IGNORECASE)  # (k=2)
 _T_MAC = re.compile(r"t-mac", re.IGNORECASE)
@@ -228,7 +229,7 @@ def unit_of(text: str) -> str:
     text = in_english(text)
     inside = _BRACKET.search(text)
     word = (inside[1] if inside else text).strip()
-    if not word.strip("-/ "):
+    if not word.strip(_NO_UNIT):
         return ""
     named = UNITS.get(plain(word.translate(_SIGNS)), "")
     return named if named not in ("", "?") else word

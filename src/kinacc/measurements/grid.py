@@ -126,6 +126,16 @@ def is_blank(cells: Sequence) -> bool:
     return not any(cell.strip() if isinstance(cell, str) else cell is not None for cell in cells)
 
 
+def _filled(cells: Sequence) -> list:
+    """The cells that hold something."""
+    return [cell for cell in cells if cell is not None and str(cell).strip()]
+
+
+def _is_name_alone(filled: Sequence) -> bool:
+    """Whether a row holds one text and nothing else."""
+    return len(filled) == 1 and isinstance(filled[0], str)
+
+
 def is_comment(cells: Sequence, delimiter: str = "") -> bool:
     """Whether a row is a remark, or a rule of dashes, by what it begins with."""
     first = cells[0].lstrip() if isinstance(cells[0], str) else ""
@@ -220,10 +230,10 @@ class Sorted:
 
     def name_blocks(self) -> None:
         """Give rows of X, Y, Z the name that stands in a line of its own above them."""
-        filled = [[c for c in cells if c is not None and str(c).strip()] for cells in self.rows]
-        alone = [len(each) == 1 and isinstance(each[0], str) for each in filled]
-        if len(alone) < _BLOCK or not alone[0]:
+        if len(self.rows) < _BLOCK or not _is_name_alone(_filled(self.rows[0])):
             return
+        filled = [_filled(cells) for cells in self.rows]
+        alone = [_is_name_alone(each) for each in filled]
         last, rows, lines = "", [], []
         for cells, name, own, line in zip(self.rows, filled, alone, self.lines, strict=True):
             if own:
@@ -325,9 +335,10 @@ def _units_behind(columns: dict[str, list], under: list) -> tuple[str, ...]:
     """Take the unit off columns whose every number carries the same; the units by column."""
     units = ["" if cell is None else str(cell) for cell in under]
     for place, (name, cells) in enumerate(columns.items()):
-        filled = [cell for cell in cells if not RawTable.is_gap(cell)]
-        if not filled or not isinstance(filled[0], str) or not number_of(filled[0].strip())[1]:
+        first = next((cell for cell in cells if not RawTable.is_gap(cell)), None)
+        if not isinstance(first, str) or not number_of(first.strip())[1]:
             continue
+        filled = [cell for cell in cells if not RawTable.is_gap(cell)]
         parts = [number_of(cell.strip()) if isinstance(cell, str) else ("", "") for cell in filled]
         unit = parts[0][1]
         if all(each[1] == unit for each in parts):

@@ -236,7 +236,9 @@ def _target(table: RawTable, target: Target, layout: Layout, problems) -> Column
     """Columns (n,) of one target, and ``there`` (n,): where it was measured."""
     count = len(table)
     position = _stacked(table, target.position, problems, gaps=True)
-    gaps = np.stack([table.gaps(place.column) for place in target.position], axis=1)
+    gaps = np.zeros(position.shape, dtype=bool)
+    for row, axis in np.argwhere(~np.isfinite(position)):  # looking at every cell takes longer
+        gaps[row, axis] = table.is_gap(table.columns[target.position[axis].column][row])
     factors = np.array([place.factor for place in target.position])
     void = gaps.any(axis=1) & ~gaps.all(axis=1)
     for number in layout.no_reading:

@@ -44,11 +44,15 @@ class RowNames:
 
     def one(self, line: int) -> str:
         """``line 14 (P12_1) of points.csv``."""
-        return self._told(self._run(int(line), int(line)), 1)
+        return self._told(self.number(line), 1)
+
+    def number(self, line: int) -> str:
+        """``14 (P12_1)``, behind a word that says what it is."""
+        return self._run(int(line), int(line))
 
     def few(self, lines: Sequence[int], shown: int = 5) -> str:
         """``lines 4 (P2), 7 (P5) and 3 more``, in the order given."""
-        words = [self._run(int(line), int(line)) for line in lines[:shown]]
+        words = [self.number(line) for line in lines[:shown]]
         return self._told(", ".join(words) + and_more(len(lines) - shown), len(lines))
 
     def spans(self, lines: Iterable[int]) -> str:

@@ -138,7 +138,9 @@ def examples(
         second = None
         simulations = range(settings.simulations_searched)
         memory = None
-        for simulation in progress(simulations, "simulations") if progress else simulations:
+        for simulation in (
+            progress(simulations, "simulations searched") if progress else simulations
+        ):
             world = world_of(error_mm, settings.noise_mm, simulation, visits, seed, memory)
             memory = world.readings_mm
             if wanted(world):

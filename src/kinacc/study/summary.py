@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kinacc.artifacts.allowed import VERDICTS
+from kinacc.calibration.observations import TOOL
 
 _VERDICTS = dict(zip(VERDICTS, ("agree", "differ", "cannot be compared"), strict=True))
 
@@ -16,20 +17,32 @@ def differences(
 ) -> list[str]:
     """The largest errors of the map and of the operating points, each population in a line."""
     lines = []
+    targets = list(dict.fromkeys(map(str, measurements["target"])))
+    each = f", of {', '.join(targets)}" if len(targets) > 1 else ""
+    modelled = _of_tool(targets)
     if accuracy_map is not None:
         largest = accuracy_map["position_max_mm"]
         cells = np.isfinite(largest)
         if cells.any():
             where = f"over the evaluation space ({cells.sum()} cells)"
-            lines.append(f"map error: at most {largest[cells].max():.3f} mm {where}, DH to VEC")
+            told = f"map error: at most {largest[cells].max():.3f} mm {where}, DH to VEC"
+            lines.append(told + modelled)
     error, count = float(np.max(points["true_error_mm"])), len(points["point"])
     told = f"operating-point error: at most {error:.3f} mm at the {count} points of the study"
     if _are_measured(points, measurements):
-        return [
-            *lines,
-            f"{told}: measured poses, so it is a held-out error of DH, of mean readings",
-        ]
-    return [*lines, f"{told}, DH to VEC"]
+        told += f": measured poses, so it is a held-out error of DH, of mean readings{each}"
+        return [*lines, told]
+    return [*lines, f"{told}, DH to VEC{modelled}"]
+
+
+def _of_tool(targets: Sequence[str]) -> str:
+    """Which point errors between models are of, where several targets were measured."""
+    if len(targets) < 2:
+        return ""
+    if TOOL in targets:
+        return f", of target {TOOL} alone"
+    told = f", of the tool of the robot's file, none of {', '.join(targets)}"
+    return f"{told} (evaluation.tool_mm chooses another)"
 
 
 def _are_measured(points: Mapping, measurements: Mapping) -> bool:

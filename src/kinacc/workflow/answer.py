@@ -10,15 +10,20 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import ERROR_MODELS
+from kinacc.artifacts.error_models import ERROR_MODELS, model_name
 from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, of
-from kinacc.calibration.summary_words import half_page, model_name, paragraph
+from kinacc.calibration.summary_words import half_page, paragraph
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import PLAN
 from kinacc.campaign.of_calibration import Sought
+from kinacc.campaign.words import one_of
+from kinacc.deployment import folder as results
+from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
+from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics import robot
+from kinacc.kinematics.model import JointState
 from kinacc.study.summary import claims_counted, claims_that_differ, differences
 from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES
 from kinacc.workflow.plan import Plan
@@ -28,6 +33,8 @@ IF_THERE = (
     *("summary", "data_check", "excluded_rows", "vec_orders", "accuracy_map"),
     *("assessment_points", "claims"),
 )
+_READINGS = 300  # for the 200 candidates that are drawn: bounds as wide as repeats make them
+_LEAST_RANGE, _METRE_MM = 1e-9, 1e3
 Tables = Mapping[str, Columns]
 
 
@@ -79,11 +86,10 @@ def answer(
     lines = [f"{folder.resolve().name}: what its calibration is worth"]
     lines += half_page(facts, more, whole)
     lines += paragraph("other errors", _other_errors(facts, tables, whole))
-    bound = campaign_of(folder)
-    lines += paragraph("largest error", _bound(bound, folder))
+    bound, arm = campaign_of(folder), _arm(folder, tables)
+    lines += paragraph("largest error", _bound(bound, folder, arm))
     commands = [] if bound.assessed is None else [bound.assessed.next_command]
-    commands += [*following, shlex.join(["kinacc", "predict", str(folder), "--help"])]
-    lines += paragraph("next", commands)
+    lines += paragraph("next", [*commands, *following, *_uses(folder, arm, tables)])
     return [*_claims(folder, facts, tables), *lines]
 
 
@@ -128,16 +134,50 @@ def _is_synthetic(facts: Sequence[Fact]) -> bool:
     return of(facts, "data")["measurements"]["source"].text == "synthetic"
 
 
-def _bound(bound: Sought, folder: Path) -> list[str]:
+def _arm(folder: Path, tables: Tables) -> Calibration:
+    """The calibration that the commands of campaigns and poses would use."""
+    known = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    return results.calibration(results.read_tables(folder), known)
+
+
+def _bound(bound: Sought, folder: Path, arm: Calibration) -> list[str]:
     if bound.assessed is not None:
         return [*bound.assessed.in_words(), *bound.remarks]
-    name = "check" if not Path("check").exists() else f"check_{folder.resolve().name}"
-    words = ["kinacc", "campaign", "start", name, "--calibration", str(folder)]
+    words = ["kinacc", "campaign", "start", _free("check", folder), "--calibration", str(folder)]
     return [
         *bound.remarks,
         "not assessed; a campaign bounds it (NOISE: standard deviation of one reading, mm):",
-        f"{shlex.join(words)} --noise-mm NOISE",
+        *one_of(arm.default_point, [*arm.targets]),
+        f"{shlex.join(words)} --noise-mm NOISE --budget {_READINGS}",
     ]
+
+
+def _uses(folder: Path, arm: Calibration, tables: Tables) -> list[str]:
+    """Commands that use the calibration: files for controllers, and joints for a pose."""
+    names = [f"q{joint + 1}" for joint in range(len(arm.robot.q_min_rad))]
+    near = _easy(arm, np.stack([tables["measurements"][name] for name in names], axis=1))
+    pose = arm.pose(JointState(arm.robot.dh_joints(near[None])))
+    numbers = [f"{each:.1f}" for each in pose.position_mm[0]]
+    numbers += [f"{each:.4f}" for each in quaternion_from_rotation(pose.rotation[0])]
+    shown = np.where(arm.robot.dh.prismatic, near, np.rad2deg(near)).round() + 0.0  # no minus zero
+    export = ["kinacc", "export", str(folder), "--out", _free("exported", folder)]
+    use = ["kinacc", "compensate", str(folder), "--pose", ",".join(numbers)]
+    use += ["--near-deg", ",".join(f"{each:.0f}" for each in shown)]
+    return [shlex.join(export), shlex.join(use)]
+
+
+def _easy(arm: Calibration, joints: np.ndarray) -> np.ndarray:
+    """Of measured joints (n, k) the row farthest from singular, well within their ranges."""
+    spread = np.abs(joints - joints.mean(axis=0)) / (np.ptp(joints, axis=0) + _LEAST_RANGE)
+    inner = joints[np.argsort(spread.max(axis=1), kind="stable")[: len(joints) // 4 + 1]]
+    slopes = arm.joint_jacobian(JointState(arm.robot.dh_joints(inner)))
+    slopes[:, :3] /= _METRE_MM  # a millimetre counts as a milliradian
+    return inner[np.argmax(np.linalg.svd(slopes, compute_uv=False)[:, -1])]
+
+
+def _free(name: str, folder: Path) -> str:
+    """The name of a new folder here, with that of the results where it is taken."""
+    return name if not Path(name).exists() else f"{name}_{folder.resolve().name}"
 
 
 def _claims(folder: Path, facts: Sequence[Fact], tables: Tables) -> list[str]:

@@ -128,7 +128,7 @@ def search(bench: Bench, wanted: int, progress=None, seeds: int | None = None) -
     """
     found: list[Trial] = []
     tried = islice(trials(bench), seeds)
-    for each in progress(tried, "seeds") if progress else tried:
+    for each in progress(tried, "random arms tried") if progress else tried:
         found += [each] if each.accepted else []
         if len(found) >= wanted:
             break

@@ -208,7 +208,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "residuals",
-            "comparing models and measurements, cross-validated (Tables I and III)",
+            "comparing models and measurements, at held-out poses too (Tables I and III)",
             ("measurements", *_MODELS, "vec_orders"),
             ("residuals", "pose_errors", "model_selection", "joint_bias", "worst_rows"),
             ("robot", "calibration"),

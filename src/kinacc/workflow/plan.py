@@ -302,6 +302,7 @@ class Plan:
             self.seed(dataset),
             part,
             label=label(name, dataset, part),
+            doing=doing(name, dataset, part),
             log=self.log(name, dataset, part),
             uses=stage.used(settings, inputs),
             kind=stage.fits,
@@ -386,6 +387,11 @@ class Plan:
 def label(name: str, dataset: str, part: str | None = None) -> str:
     """What lines on screen about one run of a stage begin with."""
     return " ".join(filter(None, [dataset, None if STAGES[name].joint else name, part]))
+
+
+def doing(name: str, dataset: str, part: str | None = None) -> str:
+    """What one run of a stage is doing, in words."""
+    return ", ".join(filter(None, [f"{dataset}: {STAGES[name].message}", part and f"part {part}"]))
 
 
 def _fix(role: str, dataset: str | bool) -> str:

@@ -33,6 +33,7 @@ class Job:
     artefact to its file, or a picture format to its file. ``settings`` are the configuration values
     of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2"), ``uses``
     what its results depend on beside what its module imports, ``kind`` the error model it fits.
+    ``label`` begins what is said of faults, ``doing`` what is said of progress.
     """
 
     module: str
@@ -42,6 +43,7 @@ class Job:
     seed: int
     part: str | None = None
     label: str = ""
+    doing: str = ""
     log: str | None = None
     uses: tuple[str, ...] = ()
     kind: str = ""
@@ -50,7 +52,7 @@ class Job:
 def execute(job: Job, bar: bool = False) -> None:
     """Run a stage; on failure print the reason, log it and leave with exit code 1."""
     label = job.label or job.module.rpartition(".")[2]
-    with _recording(job.log, label) as log, reporting(label, bar) as progress:
+    with _recording(job.log, label) as log, reporting(job.doing or label, bar) as progress:
         try:
             perform(job, progress)
             return

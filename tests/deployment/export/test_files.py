@@ -68,16 +68,21 @@ def test_a_coupled_sliding_arm_with_a_base_is_read_back(tmp_path):
 
 
 def test_json_and_csv_say_the_same_of_every_joint():
-    arm = bent("ur10")
+    said = (
+        "d of joint 2 and d of joint 3 appear only as their sum",
+        "a shift of the base along y cannot be told from a shift of the tool along z",
+    )
+    arm = replace(bent("ur10"), left_open=said)
     std = np.abs(np.random.default_rng(2).normal(0.0, 1e-3, (6, 5)))
     std[0, 1] = np.nan
-    said = ("d of joint 2 and d of joint 3 appear only as their sum",)
-    content = json.loads(description.robot_json(arm, std, arm.robot.dh, said, {"seed": "1"}))
+    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {"seed": "1"}))
     rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh))))
     assert content["provenance"] == {"seed": "1"}
     assert content["undetermined"] == list(said)
     assert content["joints"][0]["std_d_mm"] is None
     assert rows[0]["std_d_mm"] == ""
+    told = [row["undetermined"] for row in rows]
+    assert told == ["", said[0], said[0], "", "", said[1]]
     for joint, row in zip(content["joints"], rows, strict=True):
         assert float(row["d_mm"]) == pytest.approx(joint["d_mm"], rel=1e-11)
         alpha = np.rad2deg(joint["alpha_rad"])
@@ -175,7 +180,7 @@ dh:
 """
     arm = replace(nominal(robot.of_text(text, "down.yaml")), choice="dh")
     std = np.full((4, 5), np.nan)
-    content = json.loads(description.robot_json(arm, std, arm.robot.dh, None, {}))
+    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {}))
     rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh))))
     assert [row["type"] for row in rows] == [joint["type"] for joint in content["joints"]]
     q = np.array([0.3, -0.7, 120.0, 0.2])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -46,23 +47,28 @@ def robot_yaml(calibration: Calibration) -> str:
     heading = (
         f"{robot.name} as calibrated by data set {calibration.name} ({calibration.choice} model).",
         f"{CONVENTION}; angles in rad, lengths in mm.",
+        *left_open_lines(calibration),
     )
     return as_yaml(calibrated, heading)
+
+
+def left_open_lines(calibration: Calibration) -> list[str]:
+    """What the poses leave open, under a heading, for a comment; nothing where they do not."""
+    told = calibration.left_open
+    return ["Left open by the poses:", *(f"  {text}" for text in told)] if told else []
 
 
 def robot_json(
     calibration: Calibration,
     std: np.ndarray,
     nominal: DHModel,
-    undetermined: Sequence[str] | None,
     provenance: Mapping[str, str],
     table: Mapping[str, np.ndarray] | None = None,
 ) -> str:
     """Everything the calibration says of the arm: parameters, deviations, frames, residuals.
 
-    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined; ``undetermined`` says in sentences
-    what the poses leave open, None where nobody asked. ``table``: the columns of a model that says
-    more than DH parameters, which then are those of the arm its errors act on.
+    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined. ``table``: the columns of a model
+    that says more than DH parameters, which then are those of the arm its errors act on.
     """
     dh = calibration.model.dh
     joints = []
@@ -98,7 +104,7 @@ def robot_json(
             "position_rms_mm": _number(left.position_mm),
             "orientation_rms_mrad": _number(1e3 * left.orientation_rad),
         },
-        "undetermined": None if undetermined is None else list(undetermined),
+        "undetermined": calibration.left_open,
         "provenance": dict(provenance),
     }
     if table is not None:
@@ -108,7 +114,10 @@ def robot_json(
 
 
 def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> str:
-    """One row per joint: fitted values, their standard deviations and the nominal values."""
+    """One row per joint: fitted values, their standard deviations and the nominal values.
+
+    Last what the poses leave open of the joint; of base and tool in the row of the last one.
+    """
     dh, out = _dh_of(calibration), io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     names = [name.replace("_rad", "_deg") for name in PARAMETERS]
@@ -119,6 +128,7 @@ def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> st
             *names,
             *(f"std_{name}" for name in names),
             *(f"nominal_{n}" for n in names),
+            "undetermined",
         ]
     )
     factor = np.array([180.0 / np.pi if name.endswith("_rad") else 1.0 for name in PARAMETERS])
@@ -129,8 +139,21 @@ def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> st
     for joint in range(dh.joints):
         cells = np.concatenate([fitted[joint], std[joint] * factor, given[joint]])
         kind = _kind(dh, joint)
-        writer.writerow([joint + 1, kind, *("" if np.isnan(x) else f"{x:.12g}" for x in cells)])
+        numbers = ("" if np.isnan(x) else f"{x:.12g}" for x in cells)
+        writer.writerow([joint + 1, kind, *numbers, "; ".join(_of_joint(calibration, joint))])
     return out.getvalue()
+
+
+def _of_joint(calibration: Calibration, joint: int) -> list[str]:
+    """What the poses leave open of a joint; in the last one's also what is of no joint."""
+    told = calibration.left_open or ()
+    named = [set(map(int, re.findall(r"joint (\d+)", text))) for text in told]
+    last = joint + 1 == calibration.robot.dh.joints
+    return [
+        text
+        for text, joints in zip(told, named, strict=True)
+        if joint + 1 in joints or (last and not joints)
+    ]
 
 
 def _dh_of(calibration: Calibration) -> DHModel:

@@ -60,8 +60,6 @@ def contents(
         ]
         refuse(problems, "Nothing was written")
     std = _deviations(found[f"{model}_model"], arm.model.joints)
-    told = found.get(f"{model}_identified")
-    unseen = None if told is None else blind_words.listed(told)
     made = {}
     for each in dict.fromkeys(formats):
         if each == "yaml":
@@ -69,7 +67,7 @@ def contents(
         elif each == "json":
             marks = store.read_metadata(Path(folder) / f"{model}_model.parquet")
             own = None if arm.model.table is not None else found[f"{model}_model"]
-            text = description.robot_json(arm, std, robot.dh, unseen, marks, own)
+            text = description.robot_json(arm, std, robot.dh, marks, own)
         elif each == "csv":
             text = description.robot_csv(arm, std, robot.dh)
         elif each == "urdf" and urdf_file is not None:
@@ -77,9 +75,22 @@ def contents(
         elif each == "urdf":
             text = urdf.generated(arm, dh_joints)
         else:
-            text = _tables(found, robot, dataset, unseen or (), each)
+            text = _tables(found, robot, dataset, arm.left_open or (), each)
         made[f"{dataset if name is None else name}{_ENDINGS[each]}"] = text
     return made
+
+
+def warning(folder: Path | str) -> str:
+    """What the measured poses show too little of, in a line; empty where they show everything."""
+    told = results.read_tables(folder).get(f"{PLAINEST}_identified")
+    weak = [] if told is None else blind_words.weak(blind_words.listed(told))
+    if not weak:
+        return ""
+    more = f" and {len(weak) - 1} more" if len(weak) > 1 else ""
+    return (
+        f"warning: the arm is calibrated for poses like the measured ones only: {weak[0]}{more}; "
+        "the files say so"
+    )
 
 
 def note(folder: Path | str) -> str:
@@ -91,7 +102,7 @@ def note(folder: Path | str) -> str:
         return ""
     return (
         f"note: the {selected} model was selected ({other.position_mm:.3f} mm rms of "
-        f"{other.subset} poses); a DH table cannot hold it and leaves {dh.position_mm:.3f} mm"
+        f"{other.poses}); a DH table cannot hold it and leaves {dh.position_mm:.3f} mm"
     )
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.config.names import in_markdown
+from kinacc.deployment.record import POSES
 from kinacc.kinematics.dh import PARAMETERS
 
-_SUBSETS = {"train": "training poses", "validation": "held-out poses"}
-_FIGURES = (("mean", "mean"), ("max", "max"), ("rms", "rms"), ("gamma99", "99 %"))
+_FIGURES = (("mean", "mean"), ("max", "max"), ("rms", "rms"), ("gamma99", "99 % gamma"))
 _DIGITS_OF_STD = 2
 _MOST_DECIMALS = 6
 
@@ -101,13 +101,13 @@ def _residual_table(columns: Columns, comparison: str, name: str, caption: str) 
     pooled = np.isnan(np.asarray(columns["fold"], dtype=float))
     ours = pooled & (np.asarray(columns["comparison"]) == comparison)
     rows = []
-    for subset, words in _SUBSETS.items():
+    for subset, words in POSES.items():
         for row in np.flatnonzero(ours & (np.asarray(columns["subset"]) == subset)):
             figures = [_figure(columns[key][row]) for key, _ in _FIGURES]
             quantity = f"{columns['quantity'][row]} [{columns['unit'][row]}]"
             rows.append([f"{quantity}, {words}", str(int(columns["n"][row])), *figures])
     heads = [("", ""), ("points", ""), *((head, "") for _, head in _FIGURES)]
-    note = "99 %: quantile of a gamma distribution fitted to the magnitudes."
+    note = "99 % gamma: quantile of a gamma distribution fitted to the magnitudes."
     return PrintedTable(name, caption, heads, rows, [note])
 
 

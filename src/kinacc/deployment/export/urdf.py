@@ -12,7 +12,7 @@ import numpy as np
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.deployment.export.description import robot_name
+from kinacc.deployment.export.description import left_open_lines, robot_name
 from kinacc.deployment.record import TOOL, Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import (
@@ -52,6 +52,8 @@ def generated(calibration: Calibration, dh_joints: bool = False) -> str:
     about = f"calibrated from {robot.name} with data set {calibration.name}"
     about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
     root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
+    for line in left_open_lines(calibration):
+        root.append(etree.Comment(f" {line} "))
     etree.SubElement(root, "link", name="base_link")
     low, high = robot.q_min_rad, robot.q_max_rad
     if dh_joints:
@@ -125,6 +127,8 @@ def corrected(
         _set_origin(elements[tail[0].name], compose(last, invert(rest)))
     else:
         _add_tip(tree.getroot(), moving[-1].child, last)
+    for place, line in enumerate(left_open_lines(calibration)):
+        tree.getroot().insert(place, etree.Comment(f" {line} "))
     return etree.tostring(tree, encoding="unicode") + "\n"
 
 

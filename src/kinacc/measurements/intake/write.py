@@ -69,9 +69,10 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
     held = " # one configuration held out at a time" if configurations < _FEW_POSES else ""
     lines += [
         f"      folds: {folds}{held}",
+        "      validation_fold: null # every row fits the delivered models; folds judge them",
         "    calibration:",
         "      base_and_tool: estimated",
-        "      vec: {order: auto, prior: chosen} # by cross-validation",
+        "      vec: {order: auto, prior: chosen} # chosen by held-out errors",
         "      dh: {fit_to: measurements, hayati_joints: auto}",
         "    evaluation:",
         "      space: measured # the region the measured poses fill",

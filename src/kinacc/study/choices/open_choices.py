@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinacc.config.records import value_at
+from kinacc.study.map_readings import ORIENTATIONS_DEG
 
 # What runs vary beside single choices: nothing, the arm, or several at once.
 DEFAULT, ARM = "default", "arm"
@@ -68,7 +69,7 @@ OPEN: tuple[Choice, ...] = (
         "reference_orientation",
         "attitude of the flange before it is turned, intrinsic XYZ angles, deg",
         "evaluation.reference_orientation_deg",
-        *([180.0, 0.0, 0.0], [180.0, -45.0, 0.0], [180.0, -90.0, 0.0], [180.0, -90.0, -30.0]),
+        *(list(angles) for angles in ORIENTATIONS_DEG),
     ),
     _one(
         "reference_frame",

@@ -141,7 +141,7 @@ def summed(work: Sequence[Job], contest: Contest, progress=None) -> Columns:
     """
     found: list[dict] = []
     size = contest.size
-    for job in progress(work, "cells", len(work)) if progress else work:
+    for job in progress(work, "kinds of campaigns simulated", len(work)) if progress else work:
         for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
             own = tuple(each for each in contest.assessors if ASSESSORS[each].is_slow == is_slow)
             if own:

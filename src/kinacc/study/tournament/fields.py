@@ -14,6 +14,7 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
+from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison, model_name
 from kinacc.assess.error_effects import joint_errors
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
@@ -89,18 +90,22 @@ def of_points(name: str, robot: Robot | None, points: Mapping) -> ErrorField:
 
 
 def of_measurements(
-    name: str, robot: Robot | None, errors: Mapping, measurements: Mapping
+    name: str,
+    robot: Robot | None,
+    errors: Mapping,
+    measurements: Mapping,
+    model: str = PLAINEST,
 ) -> ErrorField:
-    """Cross-validated errors of the DH model at measured configurations, readings averaged.
+    """Held-out errors of a ``model`` at measured configurations, readings averaged.
 
     errors: ``pose_errors``; measurements: ``measurements``. The errors hold the noise of the
     instrument, which counts as truth here.
     """
-    wanted = (np.asarray(errors["comparison"]) == "dh_vs_measured") & (
+    wanted = (np.asarray(errors["comparison"]) == Comparison(MEASURED, model).name) & (
         np.asarray(errors["estimate"]) == "cross_validated"
     )
     if not wanted.any():
-        what = "pose_errors holds no cross-validated errors of the DH model"
+        what = f"pose_errors holds no held-out errors of the {model_name(model)} model"
         raise InputError(Problem(f"field {name}", what, fix="set measurements.folds"))
     rows = np.flatnonzero(wanted)
     groups = readings_of(np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows])
@@ -108,7 +113,7 @@ def of_measurements(
     pose_of = {int(each): row for row, each in reversed([*enumerate(measurements["pose"])])}
     first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
     means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
-    meaning = "held-out errors of the DH model at measured configurations"
+    meaning = f"held-out errors of the {model_name(model)} model at measured configurations"
     q_rad = q_rad[first]
     return ErrorField(name, means, q_rad, _effects(robot, q_rad), "measured", meaning)
 

@@ -235,7 +235,7 @@ def _by_field(cells: Mapping) -> list[str]:
 
 def _fields(table: Mapping) -> list[str]:
     lines = [
-        "| field | kind | meaning | poses | median | 99 % | largest |",
+        "| field | kind | meaning | poses | median | 99 % empirical | largest |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in _rows(table):

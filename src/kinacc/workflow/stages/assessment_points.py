@@ -80,7 +80,7 @@ def _measured(inputs: Mapping, count: int) -> Columns:
     wanted = np.asarray(errors["comparison"]) == "dh_vs_measured"
     held_out = wanted & (np.asarray(errors["estimate"]) == "cross_validated")
     if not held_out.any():
-        warnings.warn("no cross-validated errors: the points use those of the fit", stacklevel=2)
+        warnings.warn("no held-out errors: the points use training errors", stacklevel=2)
         held_out = wanted
     rows = np.flatnonzero(held_out)
     groups = operating_points.readings_of(

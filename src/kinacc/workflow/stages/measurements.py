@@ -60,7 +60,7 @@ def split(columns: Mapping, settings: Mapping) -> Columns:
             fold[rows] = np.nan
             warnings.warn(
                 f"{kind} {value} has fewer than {folds.LEAST_ROWS} rows outside one of its folds: "
-                f"its {int(rows.sum())} rows always train and are not cross-validated",
+                f"its {int(rows.sum())} rows always train and have no held-out error",
                 stacklevel=2,
             )
     held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])

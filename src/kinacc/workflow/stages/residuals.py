@@ -40,7 +40,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
         return fit_all(observations, own, delivered)
 
     folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
-    counted = progress(folds, "folds") if progress else folds
+    counted = progress(folds, "shares of the poses held out") if progress else folds
     held_out, trained = cross_validated(every, refit, counted, delivered)
     seen = errors(delivered, every.select(train))
     return {

@@ -34,7 +34,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     part = settings.get("part") or {"number": 1, "of": 1}
     chosen = draws[part["number"] - 1 :: part["of"]]
     config = {name: value for name, value in settings.items() if name != "part"}
-    counted = progress(chosen, "draws") if progress else chosen
+    counted = progress(chosen, "further synthetic arms studied") if progress else chosen
     parts = [claims_on(draw, config) for draw in counted]
     return {
         "robustness_chunk": {

@@ -1,0 +1,73 @@
+"""Two calibrations from the same readings, or from some of the same, are no proof of a change."""
+
+import json
+
+import numpy as np
+import pytest
+from tracked_arm import call, table, tracked
+
+Q = [f"q{i}_deg" for i in range(1, 7)]
+HEAD = ["pose", *Q, "x_mm", "y_mm", "z_mm"]
+STAGES = ("measurements", "data_check", "vec", "dh", "residuals")
+ROWS = 50
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Calibrations of one arm: of a file, of it with other settings, grown, and measured anew."""
+    base = tmp_path_factory.mktemp("moved")
+    it, draw = tracked("ur10", 80, 21), np.random.default_rng(9)
+    anew = np.round(it.point + draw.normal(0.0, 0.04, it.point.shape), 4)
+    sets = {
+        "before": ("before", ROWS, "{fit_to: measurements}"),
+        "settings": ("before", ROWS, "{fit_to: measurements, truncation: 0.2}"),
+        "grown": ("grown", 80, "{fit_to: measurements}"),
+        "anew": ("anew", ROWS, "{fit_to: measurements}"),
+    }
+    lines = ["measurements: {validation_fold: null, folds: 3}", "datasets:"]
+    for name, (file, rows, dh) in sets.items():
+        point = anew if name == "anew" else it.point
+        numbers = np.column_stack([np.arange(rows), it.q[:rows], point[:rows]])
+        (base / f"{file}.csv").write_text(table(HEAD, numbers))
+        lines.append(
+            f"  {name}: {{robot: ur10, evaluation: {{space: measured}}, data_check: "
+            "{accept: {few_poses: a test}}, calibration: "
+            f"{{base_and_tool: estimated, vec: {{order: 1}}, dh: {dh}}}, measurements: {{source: "
+            f"file, file: {{path: {file}.csv, orientation: {{kind: none}}}}}}}}"
+        )
+    (base / "sets.yaml").write_text("\n".join(lines) + "\n")
+    for name in sets:
+        for stage in STAGES:
+            done = call("run", stage, "--config", base / "sets.yaml", "--dataset", name,
+                        "--results", base / "results")  # fmt: skip
+            assert done.exit_code == 0, done.output
+    return base / "results"
+
+
+def compared(results, first, second, *more):
+    done = call("compare", results / first, results / second, *more)
+    assert done.exit_code == 0, done.output
+    return done.output if "--json" not in more else json.loads(done.stdout)
+
+
+def test_one_file_fitted_twice_shows_no_change_of_the_arm(results, tmp_path):
+    said = compared(results, "before", "settings", "--picture", tmp_path / "moved.svg")
+    assert f"both are fitted to the same {ROWS} readings: nothing can have moved" in said
+    assert "the arm has changed" not in said
+    assert "no change is proven" not in said
+    assert (tmp_path / "moved.svg").is_file()
+    told = compared(results, "before", "settings", "--json")
+    assert told["shared_readings"] == told["first_fitted_to"] == told["second_fitted_to"] == ROWS
+    assert told["probability"] is None
+    assert told["moved_rms_mm"] > 0.0
+    assert told["by_chance_mm"] == 0.0
+
+
+def test_a_file_that_grew_is_told_from_one_that_was_measured_anew(results):
+    said = compared(results, "before", "grown")
+    assert f"{ROWS} readings are in both, of {ROWS} in before and 80 in grown" in said
+    assert "no change is proven" in said
+    told = compared(results, "before", "anew", "--json")
+    assert told["shared_readings"] == 0
+    assert told["probability"] > 1e-3
+    assert "readings are in both" not in compared(results, "before", "anew")

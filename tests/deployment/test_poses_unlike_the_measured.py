@@ -1,0 +1,98 @@
+"""A measured UR10 whose flange pointed one way: what its poses left open, wherever it is used."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+import shared_data
+from command_line import call
+from oracles import small_study
+
+from kinacc.kinematics import robot
+
+SERIES = shared_data.place("ur10_tmac/series_D.csv")
+SETTINGS = f"""
+datasets:
+  arm:
+    robot: ur10
+    measurements: {{source: file, file: {{path: {SERIES}}}, folds: 5, validation_fold: 0}}
+    calibration:
+      base_and_tool: estimated
+      vec: {{order: 2}}
+      dh: {{fit_to: measurements, hayati_joints: auto}}
+"""
+MEASURED = "53.5,-102.7,87.07,15.63,53.53,-90"
+TURNED_AWAY = "53.5,-102.7,87.07,15.63,13.53,-90"
+POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+TOLD = "cannot be told from a shift of the tool along z"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("series")
+    config = place / "config.yaml"
+    config.write_text(SETTINGS, encoding="utf-8")
+    stages = ("measurements", "vec", "dh", "residuals")
+    return small_study.run_stages(config, "arm", place / "results", stages)
+
+
+def undetermined(folder, model, frame, *joints):
+    """``undetermined_mm`` of every pose, and everything that was printed."""
+    shown = call(
+        "predict", folder, "--model", model, "--frame", frame, "--json",
+        *(word for each in joints for word in ("--joints-deg", each)),
+    )  # fmt: skip
+    assert shown.exit_code == 0, shown.output
+    rows = json.loads(shown.stdout)["rows"]
+    return [float(row["undetermined_mm"]) for row in rows], shown.stderr
+
+
+@pytest.mark.parametrize("frame", ["instrument", "base"])
+def test_every_model_says_how_far_a_pose_can_move(folder, frame):
+    by_vec, by_dh = (
+        undetermined(folder, model, frame, MEASURED, TURNED_AWAY)[0] for model in ("vec", "dh")
+    )
+    assert by_vec == pytest.approx(by_dh, rel=1e-6)
+    assert by_vec[1] > 0.5
+
+
+@pytest.mark.parametrize("model", ["vec", "dh"])
+@pytest.mark.parametrize("frame", ["instrument", "base"])
+def test_a_pose_unlike_the_measured_ones_is_warned_of(folder, model, frame):
+    quiet = undetermined(folder, model, frame, MEASURED)[1]
+    assert "warning" not in quiet
+    said = undetermined(folder, model, frame, MEASURED, TURNED_AWAY)[1]
+    assert "1 of 2 poses lie where the calibration was not measured" in said
+    assert TOLD in said
+
+
+@pytest.mark.parametrize("model", ["vec", "dh"])
+def test_a_target_unlike_the_measured_poses_is_warned_of(folder, model):
+    for joints, said in ((MEASURED, False), (TURNED_AWAY, True)):
+        shown = call("predict", folder, "--model", model, "--json", "--joints-deg", joints)
+        (row,) = json.loads(shown.stdout)["rows"]
+        pose = ",".join(str(row[name]) for name in POSE)
+        back = call(
+            "compensate", folder, "--model", model, "--pose", pose, "--near-deg", joints, "--json"
+        )
+        assert back.exit_code == 0, back.output
+        assert (TOLD in back.stderr) == said
+
+
+def test_every_exported_file_says_what_is_left_open(folder, tmp_path):
+    shown = call("export", folder, "--out", tmp_path)
+    assert shown.exit_code == 0, shown.output
+    (warned,) = [line for line in shown.stderr.splitlines() if line.startswith("warning")]
+    assert TOLD in warned
+    files = sorted(tmp_path.iterdir())
+    assert len(files) == 6
+    for path in files:
+        text = " ".join(path.read_text(encoding="utf-8").split())
+        assert TOLD in text, path.name
+    # They are read as before.
+    assert robot.load(str(tmp_path / "arm.yaml")).dh.joints == 6
+    assert robot.load(str(tmp_path / "arm.urdf")).dh.joints == 6
+    with open(tmp_path / "arm.csv", newline="", encoding="utf-8") as file:
+        assert [row["joint"] for row in csv.DictReader(file)] == list("123456")
