@@ -12,7 +12,9 @@ from typing import Any
 from kinacc.config.records import value_at
 from kinacc.study.map_readings import ORIENTATIONS_DEG
 
-ARM = "arm"
+# What runs vary beside single choices: nothing, the arm, or several at once.
+DEFAULT, ARM = "default", "arm"
+SAMPLES = ALL, ALL_AND_ARM, FIG_5 = "all", "all_and_arm", "fig5"
 
 
 @dataclass(frozen=True)
