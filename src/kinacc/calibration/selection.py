@@ -35,6 +35,7 @@ PRIOR_STD = (0.01, 0.03, 0.1, 0.3, 1.0)  # mm and mrad
 PRIOR_DECAY = (0.7, 0.85, 1.0)
 LEAST_PRIOR = 0.01  # share of a prior left at an order below which it adds nothing to lower ones
 FAR = 4.0  # medians of the error; a reading farther off than that counts less
+MOST_EXCESS = 0.25  # of the least squared error: one of few configurations allows any by its own
 CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
 MOST_BLOCKS = 5
 _FIX = "measure more configurations, or state calibration.vec.order and prior"
@@ -206,7 +207,7 @@ class _Search:
         best = min(trials, key=lambda trial: trial.rms_mm)
         for trial in trials:
             excess, error = trial.excess_mm2(best)
-            if excess <= error:
+            if excess <= min(error, MOST_EXCESS * best.rms_mm**2):
                 break
         return Choice(self.held_out, tuple(trials), trial)
 
