@@ -105,7 +105,7 @@ def claims_page(tables: Tables, marks: Mapping[str, str]) -> str:
         ),
         _numbers(shares, reasons),
         _figure_5(tables),
-        _choices(),
+        _choices(tables["choices_factors"]),
         "Written by `python tools/document_claims.py` from the tables in `docs/claims/`; do not "
         "edit. Provenance: " + ", ".join(f"{key} `{value}`" for key, value in marks.items()) + ".",
     ]
@@ -303,10 +303,12 @@ _QUOTED = {
 }
 
 
-def _choices() -> str:
+def _choices(factors: Columns) -> str:
     lines = ["| choice | what is chosen | values (the default first) | key |", "|---|---|---|---|"]
-    lines += [_described(each) for each in OPEN]
-    lines += [_described(each) for each in STATED]
+    lines += [
+        _described(each, set(factors["value"][factors["factor"] == each.name]))
+        for each in (*OPEN, *STATED)
+    ]
     return "\n".join(
         [
             "## The choices",
@@ -320,10 +322,11 @@ def _choices() -> str:
     )
 
 
-def _described(choice: Choice) -> str:
+def _described(choice: Choice, tried: set[str]) -> str:
     known = defaults()
     own = tuple(value_at(known, key) for key in choice.keys)
-    words = sorted(choice.values, key=lambda word: choice.values[word] != own)
+    words = [word for word in choice.values if word in tried]
+    words.sort(key=lambda word: choice.values[word] != own)
     keys = ", ".join(f"`{key}`" for key in choice.keys)
     return f"| `{choice.name}` | {choice.about} | {', '.join(words)} | {keys} |"
 
