@@ -13,7 +13,7 @@ from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison
 from kinacc.campaign import words
 from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
-from kinacc.checks.noise import Revisits, revisits
+from kinacc.checks.noise import Revisits, per_axis_mm, revisits
 from kinacc.errors import Problem
 from kinacc.measurements import folds
 
@@ -56,7 +56,7 @@ def of_little_noise(
     ``measured`` and ``errors``: ``measurements`` and ``pose_errors`` of the calibration.
     """
     again = scatter(measured, errors)
-    scatter_mm = math.sqrt(float(np.mean(again.std_mm**2)))
+    scatter_mm = per_axis_mm(again.std_mm)
     problems = []
     for each in instruments:
         std_mm = math.sqrt(float(np.trace(each.covariance_mm2)) / 3.0)

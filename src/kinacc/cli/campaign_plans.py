@@ -192,6 +192,7 @@ def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
         "repetitions": asked.repetitions,
         "seed": asked.seed,
         "budget": power.smallest_budget(found, aim) if _aims(aim) else None,
+        "budget_shown": power.smallest_budget(found, aim, shown=True) if _aims(aim) else None,
     }
     title = (
         f"{asked.assessors[0].name}: largest error of {_TARGETS[aim.target]} of {asked.points} "
@@ -221,23 +222,37 @@ def in_words(asked: Simulation, found: list[Row]) -> str:
     enough = power.smallest_budget(found, aim)
     if enough is None:
         return _none_did(asked, found, said)
-    share = min(row.reaches(aim) for row in found if row.budget == enough)
-    hits = round(share * asked.repetitions)
-    low, _ = binomial_interval(hits, asked.repetitions)
-    counted = f"{hits} of {asked.repetitions}"
-    if low >= aim.power:
-        return (
-            f"{enough} readings give {said} in at least {aim.power:.0%} of campaigns on all errors "
-            f"simulated: {counted} there (at least {low:.0%} with 97.5 % confidence)"
-        )
-    needed = power.repetitions_to_show(share, aim.power)
+    shown = power.smallest_budget(found, aim, shown=True)
+    proof = "" if shown is None else _shown_by(asked, found, shown, said)
+    if shown == enough:
+        return proof
+    gave = "may be enough:" if shown else f"gave {said} in"
+    hits, low = _hits(asked, found, enough)
+    needed = power.repetitions_to_show(hits / asked.repetitions, aim.power)
     more = "only more readings would" if needed is None else f"--repetitions {needed} would, if"
     more += "" if needed is None else " as large a share of them does"
-    return (
-        f"{enough} readings gave {said} in {counted} simulated campaigns or more on all errors; "
-        f"that shows at least {low:.0%} of campaigns with 97.5 % confidence, not yet "
+    tried = (
+        f"{enough} readings {gave} {hits} of {asked.repetitions} simulated campaigns or more on "
+        f"all errors; that shows at least {low:.0%} of campaigns with 97.5 % confidence, not yet "
         f"{aim.power:.0%}: {more}"
     )
+    return f"{proof}\n{tried}" if proof else tried
+
+
+def _shown_by(asked: Simulation, found: list[Row], budget: int, said: str) -> str:
+    """What a budget is shown to bring."""
+    hits, low = _hits(asked, found, budget)
+    return (
+        f"{budget} readings give {said} in at least {asked.aim.power:.0%} of campaigns on all "
+        f"errors simulated: {hits} of {asked.repetitions} there (at least {low:.0%} with 97.5 % "
+        "confidence)"
+    )
+
+
+def _hits(asked: Simulation, found: list[Row], budget: int) -> tuple[int, float]:
+    """Campaigns of a budget that reach the aim where fewest do, and the share these show."""
+    worst = min((r for r in found if r.budget == budget), key=lambda row: row.reaches(asked.aim))
+    return round(worst.reaches(asked.aim) * asked.repetitions), worst.shows(asked.aim)
 
 
 def _none_did(asked: Simulation, found: list[Row], said: str) -> str:
@@ -269,7 +284,8 @@ def drawn(asked: Simulation, found: list[Row]) -> Figure:
         for name, group in by_errors.items()
     ]
     aim = asked.aim
-    enough = power.smallest_budget(found, aim) if _aims(aim) else None
+    shown = power.smallest_budget(found, aim, shown=True)
+    enough = (shown or power.smallest_budget(found, aim)) if _aims(aim) else None
     return campaign_plan.draw(curves, aim.width_mm, aim.power if _aims(aim) else None, enough)
 
 
