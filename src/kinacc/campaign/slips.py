@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts import store
 from kinacc.artifacts.allowed import ESTIMATES
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison
@@ -46,6 +48,14 @@ def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> li
         fix = f"are micrometres meant? Then it is {1e-3 * std:g} mm. --sure takes it as it is"
         problems.append(Problem(f"noise of {each.name}", what, "millimetres", fix))
     return problems
+
+
+def of_repeats(instruments: Sequence[Instrument], calibration: Path) -> list[Problem]:
+    """The same as :func:`of_little_noise` of a results folder; nothing where it has no readings."""
+    readings = [calibration / f"{name}.parquet" for name in ("measurements", "pose_errors")]
+    if not all(path.is_file() for path in readings):
+        return []
+    return of_little_noise(instruments, *map(store.read, readings))
 
 
 def of_little_noise(
