@@ -12,7 +12,9 @@ import pytest
 from command_line import call, small_study
 
 from kinacc.artifacts import store
+from kinacc.calibration.summary_words import half_page
 from kinacc.kinematics import robot
+from kinacc.workflow import answer
 
 
 @pytest.fixture(scope="module")
@@ -197,6 +199,20 @@ def test_what_is_wrong_with_the_data_stands_beside_them(measured):
     assert "line 19" in page
     assert "accepted: left in on purpose" in " ".join(page.split())
     assert "nothing suspicious" not in page
+
+
+def test_a_joint_that_hardly_moves_is_no_suspicion_here_as_in_check_data(measured):
+    config = measured.parent.parent / "own.yaml"
+    told = json.loads(call("check-data", config, "--json").stdout)["datasets"][0]["remarks"]
+    (note,) = (each for each in told if each.startswith("joint 1 moves through"))
+    assert f"note: {note}" in " ".join(shown(measured).split())
+    tables = answer.read(measured)
+    kept = tables["data_check"]["finding"] == "thin_coverage"
+    alone = {name: values[kept] for name, values in tables["data_check"].items()}
+    page = half_page(answer.facts_of({**tables, "data_check": alone}), "kinacc fitted own --all")
+    (head,) = (line for line in page if line.startswith("check"))
+    assert head.split(maxsplit=1)[1] == "nothing suspicious"
+    assert f"note: {note}" in " ".join(" ".join(page).split())
 
 
 def test_where_the_calibration_is_valid_is_said_joint_by_joint(measured):

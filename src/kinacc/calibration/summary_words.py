@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinacc.artifacts.allowed import LEFT_OUT
+from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.artifacts.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
@@ -77,10 +77,15 @@ def _left_out(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
 
 
 def _checked(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
+    """Suspicions, then notes, which are none: as ``check-data`` tells the two apart."""
     found = [each for each in facts if each.topic == "check"]
     if not found:
         return []
-    return _first([each.text for each in found if each.text], most, more) or ["nothing suspicious"]
+    told = [each for each in found if each.text]
+    notes = [each for each in told if each.statistic == FINDING_LEVELS[-1]]
+    doubts = [each.text for each in told if each not in notes] or ["nothing suspicious"]
+    plain = [f"note: {each.text.removeprefix(f'{each.item}: ')}" for each in notes]
+    return _first([*doubts, *plain], most, more)
 
 
 def _excluded(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
