@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration import reweighted, robust
+from kinacc.calibration import reweighted, robust, variances
 from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
 from kinacc.calibration.constraints import free_parameters  # noqa: F401 (the usual mask of a fit)
 from kinacc.calibration.frames import FrameCoordinates, Frames
@@ -161,6 +161,7 @@ def solved(
         frames=coords.size,
         name=name,
         is_rotation=observations.is_rotation if observations.has_rotation.any() else None,
+        shared=variances.shared_errors(observations),
     )
     if not at.held.any():
         return coords, *reweighted.minimise(task, observations, loss)

@@ -25,7 +25,8 @@ class Task:
     """What ``truncated.minimise_truncated`` is asked, with priors by their standard deviation.
 
     ``prior_std`` (P,) in the parameters' own units about ``nominal``, inf for none.
-    ``is_rotation`` (m,) of the residuals where some are of rotations, else None.
+    ``is_rotation`` (m,) of the residuals where some are of rotations, else None; ``shared``:
+    errors that residuals have in common.
     """
 
     system: System
@@ -37,6 +38,7 @@ class Task:
     frames: int
     name: str
     is_rotation: np.ndarray | None = None
+    shared: tuple[np.ndarray, ...] = ()
 
     def keeping(self, keep: np.ndarray) -> Task:
         """The task in the parameters ``keep`` (P,), the others left where they start."""
@@ -66,6 +68,7 @@ class Task:
             name=self.name,
             prior=np.sqrt(variance) / self.prior_std if known.any() else None,
             is_rotation=self.is_rotation,
+            shared=self.shared,
         )
 
 

@@ -28,6 +28,7 @@ def minimise_truncated(
     name: str = "fit",
     prior: np.ndarray | None = None,
     is_rotation: np.ndarray | None = None,
+    shared: tuple[np.ndarray, ...] = (),
 ) -> Solution:
     """Gauss-Newton with truncated SVD, from ``start`` (P,), leaning on ``nominal`` (P,).
 
@@ -41,7 +42,9 @@ def minimise_truncated(
     for none. It adds ``prior (x - nominal)`` to the residuals, and a direction that the data leave
     open is determined where a prior speaks of it. ``cost`` stays that of the data.
     ``is_rotation`` (m,): residuals of rotations, which have a variance of their own in the
-    covariance (not in the estimates); None where all are of one kind.
+    covariance (not in the estimates); None where all are of one kind. ``shared``: errors that
+    residuals have in common, as ``variances.shared_errors`` has them; where there are any they
+    take the place of ``is_rotation``.
     Converged as ``ridge.minimise_with_prior`` is. Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
@@ -81,9 +84,12 @@ def minimise_truncated(
         told = _Split.of(held.joined(factor, x), held, threshold, None, threshold)
         root = told.root()
     covariance = variance * (root @ root.T) * np.outer(scale, scale)
-    if is_rotation is not None and freedom > 0:
+    if freedom > 0 and (shared or is_rotation is not None):
         roots = scale[:, None] * of_fit, scale[:, None] * root
-        along = variances.along_root(system, x, is_rotation, *roots, variance)
+        if shared:
+            along = variances.along_root_shared(system, x, shared, *roots, variance)
+        else:
+            along = variances.along_root(system, x, is_rotation, *roots, variance)
         covariance = roots[1] @ along @ roots[1].T
     return Solution(
         x=x,
