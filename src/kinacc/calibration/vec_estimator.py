@@ -116,12 +116,12 @@ class VECEstimator(Estimator):
         weight = self.common.rotation_weight_mm_per_rad
         at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
         size = at.coordinates.size
-        # A choice trains on three blocks of five at least; every fit of the chosen order on more.
-        # Another reading of the same configuration tells nothing new of the arm.
+        # Every fit of the chosen order sees more than the least fit of a choice. Another reading of
+        # the same configuration tells nothing new of the arm.
         seen = every.select(every.fold >= 0)
         same = np.stack([configurations(seen.pose, seen.q_rad), seen.target], axis=1)
-        count = seen.select(np.unique(same, axis=0, return_index=True)[1]).components * 3 // 5
-        grid = self.grid.within(count, self.common.nominal.joints, size)
+        count = seen.select(np.unique(same, axis=0, return_index=True)[1]).components
+        grid = self.grid.within(selection.training(count), self.common.nominal.joints, size)
         return selection.choices(
             self._wanted(every),
             self._empty(max(grid.orders)),
