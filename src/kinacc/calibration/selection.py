@@ -56,7 +56,7 @@ class Grid:
 
     def within(self, components: int, joints: int, frames: int) -> Grid:
         """The grid without orders that have more parameters than there are residuals."""
-        fit = [n for n in self.orders if 6 * joints * (n + 1) + frames <= components]
+        fit = [n for n in self.orders if n <= highest_order(components, joints, frames)]
         return Grid(tuple(fit) or self.orders[:1], self.priors)
 
     def priors_of(self, order: int) -> tuple[Prior, ...]:
@@ -64,6 +64,11 @@ class Grid:
         if len(self.orders) == 1:
             return self.priors
         return tuple(p for p in self.priors if p.decay ** (order - 1) >= LEAST_PRIOR)
+
+
+def highest_order(components: int, joints: int, frames: int) -> int:
+    """The highest order with no more parameters than residuals, below 0 where there is none."""
+    return (components - frames) // (6 * joints) - 1
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.artifacts.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
-from kinacc.calibration.summary import LARGE_SHARE, Fact, of
+from kinacc.calibration.summary import LARGE_SHARE, SETTINGS, Fact, of
 
 WIDTH = 100
 MARGIN = 17  # where the text of a paragraph begins
@@ -17,6 +17,8 @@ _LINES_EACH = 2  # of what is left out: a list of columns may be long
 _JOINTS_PER_LINE, _JOINT_WIDTH = 3, 27
 _KEPT = "\u00a0"  # a space that no line is broken at
 _FIGURES = ("mean", "quantile_99", "largest")
+_COLUMNS = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}  # widths
+_CALLED = 53  # of a model's name before them
 _COMPLIANCE, _LEVER = "compliance_rad_per_nm", "lever_coefficient_rad_per_mm"
 _NUMBERS = {2.0: "two"}
 
@@ -103,6 +105,7 @@ def _errors(facts: Sequence[Fact], whole: bool) -> list[str]:
     lines = []
     if held_out:
         lines += _table(facts, "held-out error, mm", "poses left out of the fit", held_out)
+        lines += _orientation(facts, whole)
     if trained and (whole or not held_out):
         lines += _table(facts, "training error, mm", "poses that were fitted", trained)
     return lines
@@ -114,8 +117,7 @@ def _table(
     chosen = of(facts, "selection")
     rows = next(iter(errors.values()))["n"].value
     head = f"{name} ({where}; {counted(rows, 'row')})"
-    columns = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}
-    lines = [f"{head:57}" + "".join(f"{name:>{width}}" for name, width in columns.items())]
+    lines = [f"{head:57}" + "".join(f"{name:>{width}}" for name, width in _COLUMNS.items())]
     for model, figures in errors.items():
         called = model_name(model)
         if model == NOMINAL:
@@ -124,9 +126,24 @@ def _table(
         elif "order" in chosen[model]:
             called += _order(chosen[model])
         mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
-        sizes = zip(_FIGURES, columns.values(), strict=True)
+        sizes = zip(_FIGURES, _COLUMNS.values(), strict=True)
         shown = "".join(f"{figures[each].value:{width}.3f}" for each, width in sizes)
-        lines.append(f"{'':4}{called:53}{shown}{mark}".rstrip())
+        spare = min(0, _CALLED - len(called))  # a long name takes of the blanks behind it
+        lines.append(f"{'':4}{called:{_CALLED}}{shown[-spare:]}{mark}".rstrip())
+    return lines
+
+
+def _orientation(facts: Sequence[Fact], whole: bool) -> list[str]:
+    """Errors of orientation at held-out poses, where it was measured: the selected model's."""
+    chosen, known = of(facts, "selection"), of(facts, "held_out_orientation_error")
+    lines = []
+    for model, figures in known.items():
+        if whole or (model in chosen and chosen[model]["selected"].value):
+            rows = counted(figures["n"].value, "row")
+            called = f"orientation, {model_name(model)}, in mrad ({rows})"
+            sizes = zip(_FIGURES, _COLUMNS.values(), strict=True)
+            shown = "".join(f"{figures[each].value:{width}.3f}" for each, width in sizes)
+            lines.append(f"{'':4}{called:{_CALLED}}{shown}")
     return lines
 
 
@@ -134,10 +151,16 @@ def _order(known: Mapping[str, Fact]) -> str:
     """The order of a model, with those its held-out errors were found with where they differ."""
     order = {name: each.value for name, each in known.items() if "order" in name}
     told = f", order {order['order']:.0f}"
-    if "highest_order_tried" in order and order["order"] == order["highest_order_tried"]:
-        told += ", the highest tried"
     low, high = (order.get(f"{which}_order_held_out", order["order"]) for which in ("low", "high"))
-    return told + (f" (held out: {low:.0f} to {high:.0f})" if low < high else "")
+    folds = f" (held out: {low:.0f} to {high:.0f})" if low < high else ""
+    if order["order"] != order.get("highest_order_tried"):
+        return told + folds
+    by_settings = known["highest_order_set_by"].text == SETTINGS
+    if folds:
+        return f"{told}{folds}, {'the most allowed' if by_settings else 'all the data carry'}"
+    if by_settings:
+        return f"{told}, the highest allowed (vec.order_highest)"
+    return f"{told}, the highest {known['configurations'].value:.0f} configurations carry"
 
 
 def _selected(facts: Sequence[Fact]) -> list[str]:
