@@ -207,8 +207,8 @@ class _Search:
         trials = []
         for order, priors, errors in self.tried:
             weighted = weight[:, None] * errors
-            best = int(weighted.mean(axis=0).argmin())
-            trials.append(Trial(order, priors[best], weighted[:, best]))
+            prior = int(weighted.mean(axis=0).argmin())
+            trials.append(Trial(order, priors[prior], weighted[:, prior]))
         best = min(trials, key=lambda trial: trial.rms_mm)
         for trial in trials:
             excess, error = trial.excess_mm2(best)
