@@ -256,7 +256,8 @@ def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
 ):
     shutil.copytree(measured, tmp_path / "my results" / "own")
     for each in (folder, "my results/own"):
-        lines = re.findall(r"kinacc (.*)$", shown(each).replace("NOISE", "0.05"), re.M)
+        page = shown(each).replace("NOISE", "0.05")
+        lines = re.findall(r"(?:^.{17}|: )kinacc (.*)$", page, re.M)
         assert {line.split()[0] for line in lines} >= {"campaign", "export", "compensate"}
         for line in lines:
             assert "--help" not in line
@@ -418,3 +419,24 @@ def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(
     assert line.count(".") == plain.count(".") + told.count(".")
     assert line.rindex(".") == plain.rindex(".")  # figures stand under each other
     assert len(line) <= 100
+
+
+def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflectors):
+    from kinacc.calibration.blind_words import WEAK
+    from kinacc.calibration.summary_words import half_page
+    from kinacc.workflow.answer import facts_of, read
+
+    def page():
+        return " ".join(" ".join(half_page(facts_of(tables), "kinacc fitted own --all")).split())
+
+    tables = read(reflectors)
+    open_ = tables["dh_identified"]["status"] == "undetermined"
+    tables["dh_identified"]["statement"] = np.where(open_, "a shift of the base is open", None)
+    assert "others may" not in page()
+    assert "plan-poses" not in page()
+    tables["dh_identified"]["statement"][np.flatnonzero(open_)[0]] = f"the tool is open {WEAK}"
+    assert page().count("measure such (kinacc plan-poses) or state it (calibration.frames)") == 1
+    assert "points one way" not in page()
+    for joint in range(1, 6):  # the sixth turns the flange about its own axis
+        tables["measurements"][f"q{joint}"] = np.full_like(tables["measurements"]["q1"], 0.3)
+    assert "the flange points one way in all poses (within" in page()

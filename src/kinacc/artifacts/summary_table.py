@@ -19,6 +19,7 @@ TOPICS = (
     "selection",
     "range",
     "like_measured",
+    "one_way",
     "undetermined",
 )
 SUMMARY = Artefact(

@@ -13,6 +13,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.calibration import blind_words
 from kinacc.calibration.selection import ORDERS, highest_order
+from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations_of
 from kinacc.measurements.row_names import RowNames
@@ -26,6 +27,8 @@ _BENDING = {
     "lever_coefficient_rad_per_mm": "rad/mm",
     "std_lever_coefficient_rad_per_mm": "rad/mm",
 }
+_ONE_WAY_DEG = 5.0  # a flange that turns less far away from its mean direction points one way
+_LEAST_LENGTH = 1e-9
 CONFIGURATIONS, SETTINGS = "configurations", "settings"  # what sets the highest order tried
 _STATISTICS = ("n", "mean", "quantile_99", "largest")
 
@@ -66,6 +69,7 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
         *_excluded(tables.get("excluded_rows"), selected(tables["model_selection"])),
         *_range(tables["measurements"], robot),
         *_like_measured(like_measured),
+        *_pointing(tables["measurements"], robot),
         *(
             Fact("undetermined", str(number), "statement", text=text)
             for number, text in enumerate(blind_words.listed(tables["dh_identified"]), 1)
@@ -264,14 +268,29 @@ def _range(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
 
 def covered(measurements: Mapping, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Ends (k,), (k,) of the reported joints of all poses."""
+    reported = _reported(measurements, robot)
+    return reported.min(axis=0), reported.max(axis=0)
+
+
+def _reported(measurements: Mapping, robot: Robot) -> np.ndarray:
+    """Reported joints (n, k)."""
     numbers = range(1, len(robot.q_min_rad) + 1)
-    reported = np.stack([np.asarray(measurements[f"q{n}"], dtype=float) for n in numbers])
-    return reported.min(axis=1), reported.max(axis=1)
+    return np.stack([np.asarray(measurements[f"q{n}"], dtype=float) for n in numbers], axis=1)
 
 
 def _like_measured(share: float) -> Iterator[Fact]:
     if np.isfinite(share):
         yield Fact("like_measured", "ranges of all joints", "share", share, "1")
+
+
+def _pointing(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
+    """How far the flange turns away from one direction, where that is next to nothing."""
+    axis = dh.forward(robot.dh, robot.dh_joints(_reported(measurements, robot))).rotation[..., 2]
+    middle = axis.mean(axis=0)
+    along = axis @ middle / max(float(np.linalg.norm(middle)), _LEAST_LENGTH)
+    off = float(np.rad2deg(np.arccos(np.clip(along.min(), -1.0, 1.0))))
+    if off < _ONE_WAY_DEG:
+        yield Fact("one_way", "flange", "farthest_off", off, "deg")
 
 
 def of(found: Iterable[Fact], topic: str) -> dict[str, dict[str, Fact]]:

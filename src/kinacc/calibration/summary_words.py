@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.artifacts.error_models import NOMINAL, PLAINEST, model_name
+from kinacc.calibration.blind_words import weak
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, SETTINGS, Fact, of
 
@@ -20,6 +21,7 @@ _FIGURES = ("mean", "quantile_99", "largest")
 _COLUMNS = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}  # widths
 _CALLED = 53  # of a model's name before them
 _COMPLIANCE, _LEVER = "compliance_rad_per_nm", "lever_coefficient_rad_per_mm"
+_SETTLED = '"others may": measure such (kinacc plan-poses) or state it (calibration.frames)'
 _NUMBERS = {2.0: "two"}
 
 
@@ -260,7 +262,17 @@ def _range(facts: Sequence[Fact]) -> list[str]:
 
 def _undetermined(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
     told = [each.text for each in facts if each.topic == "undetermined"]
-    return _first(told, most, more) or ["nothing: the poses determine every parameter"]
+    shown = _first(told, most, more) or ["nothing: the poses determine every parameter"]
+    if not weak(shown):
+        return shown
+    cause = [
+        f"the flange points one way in all poses (within {each.value:.2g} {each.unit}), hence "
+        '"too little"'
+        for each in facts
+        if each.topic == "one_way"
+    ]
+    count = sum(text in told for text in shown)
+    return [*shown[:count], *cause, _SETTLED, *shown[count:]]
 
 
 def _first(texts: list[str], most: int | None, more: str) -> list[str]:
