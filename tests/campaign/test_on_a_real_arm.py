@@ -111,7 +111,7 @@ def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d, tmp_
     assert done.exit_code == 0, done.output
     said = [each["status"] for each in json.loads(done.stdout)["rows"]]
     assert said == ["ok", "extrapolated: the joints together are unlike those measured"]
-    assert "1 of 2 rows lie where the calibration was not measured" in done.stderr
+    assert "1 of 2 poses lie where the calibration was not measured" in done.stderr
     wanted = tmp_path / "wanted.json"
     wanted.write_text(done.stdout)
     done = call("compensate", ur10_d[0], wanted, "--model", "dh", "--json")

@@ -80,7 +80,7 @@ def test_a_campaign_report_shows_names_and_reasons_as_they_were_given(folder, tm
     campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
     done = call("campaign", "start", campaign, "--calibration", folder, "--robot", own,
                 "--candidates", candidates, "--instrument", "a|b=0.05", "--frame", "base",
-                "--budget", 4, "--model", "dh")  # fmt: skip
+                "--budget", 4, "--model", "dh", "--sure")  # fmt: skip
     assert done.exit_code == 0, done.output
     assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
     cells = list(csv.DictReader(visit.open()))
