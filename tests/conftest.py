@@ -62,6 +62,7 @@ SLOW = (
     "test_skipped.py",
     "test_study_oracle.py",
     "workflow/test_calibration_stages.py",
+    "workflow/test_choices.py",
     "workflow/test_map_readings.py",
     "workflow/test_robustness.py",
     "workflow/test_stopping.py",

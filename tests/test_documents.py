@@ -88,13 +88,14 @@ def test_commands_are_there_and_take_what_is_shown(page):
             command.make_context(command.name, list(words), parent=above)
 
 
-GENERATED = ("artifacts", "configuration", "tournament")  # looked up, never read from top to bottom
+# Looked up, never read from top to bottom.
+REFERENCE = ("artifacts", "claims", "configuration", "reading-the-paper", "tournament")
 
 
 def test_pages_written_by_hand_are_short_enough_to_be_read():
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     words = {page.name: len(page.read_text().split()) for page in pages}
-    own = {name: count for name, count in words.items() if name.split(".")[0] not in GENERATED}
+    own = {name: count for name, count in words.items() if name.split(".")[0] not in REFERENCE}
     assert len(own) > 20
     assert {name: count for name, count in own.items() if count >= 1500} == {}
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from command_line import call
 
+from kinacc.assess.binomial import binomial_interval
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
@@ -17,6 +18,7 @@ from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
 from kinacc.assess.world import drawn_world
 from kinacc.campaign.power import Aim, Row, repetitions_to_show, rows, smallest_budget
 from kinacc.campaign.simulate import Outcome, outcomes
+from kinacc.cli.campaign_plans import Simulation, as_sheet, in_words
 from kinacc.errors import InputError
 from kinacc.study.tournament.fields import ErrorField
 
@@ -132,6 +134,27 @@ def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path
     assert [row["budget"] for row in content["rows"]] == [15, 60]
     assert content["units"]["width_median_mm"] == "mm"
     assert call(*words, "--json").stdout == call(*words, "--json").stdout
+
+
+def test_the_budget_named_first_is_the_smallest_that_is_shown_to_be_enough():
+    def row(budget, hits):
+        share = hits / 30
+        interval = binomial_interval(hits, 30)
+        return Row("a", budget, 1.0, 30, 1.0, (0.1, 0.2, 0.3), 0.0, 1.0, 1.0, 0.0, share, interval,
+                   {})  # fmt: skip
+
+    found = [row(72, 10), row(108, 26), row(144, 30), row(216, 30)]
+    aim = Aim(CANDIDATES, width_mm=0.5, power=0.8)
+    asked = Simulation((field(),), 72, np.eye(3), (SingleShot(measurements=72),), aim, 30, 0)
+    first, then = in_words(asked, found).splitlines()
+    assert first.startswith("144 readings give bounds at most 0.5 mm apart in at least 80%")
+    assert "30 of 30" in first
+    assert then.startswith("108 readings may be enough: 26 of 30")
+    (only,) = in_words(asked, found[:2]).splitlines()
+    assert only.startswith("108 readings gave bounds")
+    assert "not yet 80%" in only
+    facts = as_sheet(asked, found).facts
+    assert (facts["budget"], facts["budget_shown"]) == (108, 144)
 
 
 def test_errors_can_be_scaled(errors_file):

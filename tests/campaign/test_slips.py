@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from command_line import call, small_study
 
-from kinacc.campaign import slips
+from kinacc.campaign import folder as folders
+from kinacc.campaign import of_calibration, slips
 from kinacc.campaign.instrument import instruments
 
 
@@ -179,3 +183,93 @@ def test_a_campaign_is_no_results_folder_and_the_command_for_it_is_named(visited
     done = call("fitted", visited[0])
     assert done.exit_code == 2
     assert "kinacc campaign status" in done.output
+
+
+def test_what_a_campaign_was_begun_against_stands_beside_every_bound(start, tmp_path):
+    done = start("--noise-mm", 50, "--budget", 10, "--sure")
+    assert done.exit_code == 0, done.output
+    said = [line for line in done.stdout.splitlines() if line.startswith("begun against: ")]
+    assert "50 mm per axis: the readings would scatter more" in said[0]
+    assert "10 readings for 200 candidates" in said[1]
+    folder = tmp_path / "check"
+    rows = json.loads(call("campaign", "next", folder, "--all", "--json").stdout)["rows"]
+    read = [[row["pose"], *(row[f"expected_{axis}_mm"] + 0.1 for axis in "xyz")] for row in rows]
+    assert call("campaign", "record", folder, written(tmp_path / "r.csv", read)).exit_code == 0
+    for command in ("status", "report"):
+        done = call("campaign", command, folder)
+        assert set(said) <= set(done.stdout.splitlines()), done.output
+    report = (folder / "report" / "report.md").read_text()
+    assert report.count("begun against") == 2
+    assert report.index("begun against") < report.index("## What was measured")
+    told = json.loads(call("campaign", "status", folder, "--json").stdout)["begun_against"]
+    assert [f"begun against: {each}" for each in told] == said
+    assessed = of_calibration.Assessed(folder, folders.open_(folder).state(), None)
+    assert set(said) <= set(assessed.in_words())  # the half page of kinacc fitted
+    assert assessed.as_facts()["begun_against"] == told
+
+
+def test_a_campaign_begun_against_nothing_is_written_and_opens_as_before(visited, tmp_path):
+    folder, _ = visited
+    text = (folder / "campaign.json").read_bytes()
+    assert b"overruled" not in text
+    assert folders.open_(folder).plan.overruled == ()
+    assert "begun against" not in call("campaign", "status", folder).output
+
+
+@pytest.fixture
+def reflectors(tmp_path):
+    """A results folder of 30 poses read four times with two reflectors, scatter 0.06 mm."""
+    measured, errors = readings_of(30, 4, 0.06)
+    rows = len(measured["pose"])
+    measured["pose"] = np.repeat(np.arange(30), 4)
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    for name, columns in (("measurements", measured), ("pose_errors", errors)):
+        both = {key: np.concatenate([values, values]) for key, values in columns.items()}
+        both["target"] = np.repeat(np.array(["smr_b", "smr_a"], dtype=object), rows)
+        both["pose"] = np.tile(measured["pose"], 2)
+        if name == "pose_errors":
+            both["row"] = np.arange(2 * rows)
+            for axis in "xyz":
+                both[f"e{axis}_mm"] = both[f"e{axis}_mm"] * np.repeat([1.0, 2.0], rows)
+        table = pa.table({key: pa.array(list(values)) for key, values in both.items()})
+        pq.write_table(table, folder / f"{name}.parquet")
+    return folder
+
+
+def plan(*words):
+    return call("plan-campaign", "--width-mm", 0.3, "--repetitions", 2, *words)
+
+
+def test_fewer_measured_errors_than_poses_are_refused_with_the_ways_out(reflectors):
+    done = plan("--noise-mm", 0.1, "--errors", reflectors, "--poses", 200)
+    assert done.exit_code == 2
+    assert "30 errors (held-out errors of the DH model" in done.output
+    assert "target smr_b" in done.output
+    assert "give --poses 30" in done.output
+    largest = re.search(r"--errors smooth --largest-mm ([\d.]+)", done.output)[1]
+    assert plan("--noise-mm", 0.1, "--errors", reflectors, "--poses", 30).exit_code == 0
+    ways = ("--errors", "smooth", "--largest-mm", largest, "--poses", 200, "--budget", 200)
+    assert plan("--noise-mm", 0.1, *ways).exit_code == 0
+
+
+def test_a_plan_is_about_one_of_several_reflectors_as_a_campaign_is(reflectors):
+    words = ("--noise-mm", 0.15, "--errors", reflectors, "--poses", 30, "--budget", 30)
+    done = plan(*words)
+    assert "a campaign is about one point: smr_b, the first of smr_b, smr_a" in done.output
+    first, other = (
+        json.loads(plan(*words, *more, "--json").stdout)["rows"][0]["true_mm"]
+        for more in ((), ("--point", "smr_a"))
+    )
+    assert other == pytest.approx(2.0 * first, rel=1e-9)
+    done = plan(*words, "--point", "smr_c")
+    assert done.exit_code == 2
+    assert "allowed: smr_b, smr_a" in done.output
+
+
+def test_a_plan_with_less_noise_than_poses_repeat_is_asked_about(reflectors):
+    words = ("--noise-mm", 0.02, "--errors", reflectors, "--poses", 30, "--budget", 30)
+    done = plan(*words)
+    assert done.exit_code == 2
+    assert "readings of the calibration at equal joints scatter by" in done.output
+    assert plan(*words, "--sure").exit_code == 0

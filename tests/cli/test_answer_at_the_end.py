@@ -12,7 +12,9 @@ import pytest
 from command_line import call, small_study
 
 from kinacc.artifacts import store
+from kinacc.calibration.summary_words import half_page
 from kinacc.kinematics import robot
+from kinacc.workflow import answer
 
 
 @pytest.fixture(scope="module")
@@ -199,6 +201,20 @@ def test_what_is_wrong_with_the_data_stands_beside_them(measured):
     assert "nothing suspicious" not in page
 
 
+def test_a_joint_that_hardly_moves_is_no_suspicion_here_as_in_check_data(measured):
+    config = measured.parent.parent / "own.yaml"
+    told = json.loads(call("check-data", config, "--json").stdout)["datasets"][0]["remarks"]
+    (note,) = (each for each in told if each.startswith("joint 1 moves through"))
+    assert f"note: {note}" in " ".join(shown(measured).split())
+    tables = answer.read(measured)
+    kept = tables["data_check"]["finding"] == "thin_coverage"
+    alone = {name: values[kept] for name, values in tables["data_check"].items()}
+    page = half_page(answer.facts_of({**tables, "data_check": alone}), "kinacc fitted own --all")
+    (head,) = (line for line in page if line.startswith("check"))
+    assert head.split(maxsplit=1)[1] == "nothing suspicious"
+    assert f"note: {note}" in " ".join(" ".join(page).split())
+
+
 def test_where_the_calibration_is_valid_is_said_joint_by_joint(measured):
     rows = pq.read_table(measured / "summary.parquet").to_pylist()
     share = {
@@ -240,7 +256,8 @@ def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
 ):
     shutil.copytree(measured, tmp_path / "my results" / "own")
     for each in (folder, "my results/own"):
-        lines = re.findall(r"kinacc (.*)$", shown(each).replace("NOISE", "0.05"), re.M)
+        page = shown(each).replace("NOISE", "0.05")
+        lines = re.findall(r"(?:^.{17}|: )kinacc (.*)$", page, re.M)
         assert {line.split()[0] for line in lines} >= {"campaign", "export", "compensate"}
         for line in lines:
             assert "--help" not in line
@@ -334,3 +351,92 @@ def test_errors_at_poses_no_fit_had_seen_have_one_name_in_all_answers(folder, me
         assert "cross-valid" not in text
         assert "kept out" not in text
         assert "validation poses" not in text
+
+
+def test_the_export_that_the_page_names_writes_the_model_that_was_selected(folder):
+    path = f"{folder}/model_selection.parquet"
+    choice = store.read(path)
+    choice["selected"] = (choice["model"] == "vec").astype(int)
+    store.write(path, "model_selection", choice, store.read_metadata(path))
+    (command,) = re.findall(r"kinacc (export .*)$", shown(folder), re.M)
+    done = call(*shlex.split(command))
+    assert done.exit_code == 0, done.output
+    assert "without --model writes the plainest one: DH" in done.output
+    (written,) = Path("exported").iterdir()
+    assert json.loads(written.read_text())["error_model"] == "vec"
+    # The files that controllers read go beside it, and say where the selected model is.
+    done = call("export", folder, "--out", "exported")
+    assert done.exit_code == 0, done.output
+    assert "--model vec writes the selected one, as JSON" in done.output
+    page = Path("exported/mh180_tables.md").read_text()
+    assert page.startswith("**VEC model (selected) against measurements")
+
+
+def test_where_orientations_were_measured_their_held_out_errors_are_told(folder, measured):
+    table = store.read(f"{folder}/pose_errors.parquet")
+    best = next(m for m in ("DH", "VEC") if re.search(rf" {m}.*<- selected", shown(folder)))
+    for model in ("nominal", "DH", "VEC"):
+        own = table["comparison"] == f"{model.lower()}_vs_measured"
+        own &= table["estimate"] == "cross_validated"
+        size = np.linalg.norm([table[f"r{axis}_mrad"][own] for axis in "xyz"], axis=0)
+        wanted = [size.mean(), np.quantile(size, 0.99), size.max()]
+        told = json.loads(shown(folder, "--json"))["held_out_orientation_error"][model.lower()]
+        assert [told[each] for each in ("mean", "quantile_99", "largest")] == pytest.approx(wanted)
+        line = re.findall(rf"^    orientation, {model}, in mrad.*$", shown(folder, "--all"), re.M)
+        numbers = [float(each) for each in re.findall(r"\d+\.\d{3}", line[0])]
+        assert numbers == pytest.approx(wanted, abs=6e-4)
+        assert (line[0] in shown(folder)) == (model == best)
+    assert "orientation" not in shown(measured, "--all")
+
+
+@pytest.mark.parametrize(
+    ("tried", "folds", "told"),
+    [
+        # Three reflectors at 60 poses carry order 7; 8 is the next that would be tried.
+        ((1, 2, 6), (6, 6), "VEC, order 6, the highest 60 configurations carry"),
+        ((1, 2, 4), (4, 4), "VEC, order 4, the highest allowed (vec.order_highest)"),
+        ((1, 2, 6), (2, 6), "VEC, order 6 (held out: 2 to 6), all the data carry"),
+        ((1, 2, 4), (1, 4), "VEC, order 4 (held out: 1 to 4), the most allowed"),
+        ((1, 2, 6), (2, 2), "VEC, order 2 "),
+    ],
+)
+def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(
+    tried, folds, told, reflectors
+):
+    from kinacc.calibration.summary_words import half_page
+    from kinacc.workflow.answer import facts_of, read
+
+    tables = read(reflectors)
+    own = max(folds)
+    orders = [(number, order, order == at) for number, at in enumerate(folds) for order in tried]
+    fold, order, chosen = np.array(orders, dtype=float).T
+    tables |= {"vec_orders": {"fold": fold, "order": order, "chosen": chosen}}
+    tables |= {"vec_model": {"order": np.array([own])}}
+    lines = half_page(facts_of(tables), "kinacc fitted own --all")
+    (line,) = (each for each in lines if each.startswith("    VEC"))
+    (plain,) = (each for each in lines if each.startswith("    DH"))
+    assert line.strip().startswith(told)
+    assert line.count(".") == plain.count(".") + told.count(".")
+    assert line.rindex(".") == plain.rindex(".")  # figures stand under each other
+    assert len(line) <= 100
+
+
+def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflectors):
+    from kinacc.calibration.blind_words import WEAK
+    from kinacc.calibration.summary_words import half_page
+    from kinacc.workflow.answer import facts_of, read
+
+    def page():
+        return " ".join(" ".join(half_page(facts_of(tables), "kinacc fitted own --all")).split())
+
+    tables = read(reflectors)
+    open_ = tables["dh_identified"]["status"] == "undetermined"
+    tables["dh_identified"]["statement"] = np.where(open_, "a shift of the base is open", None)
+    assert "others may" not in page()
+    assert "plan-poses" not in page()
+    tables["dh_identified"]["statement"][np.flatnonzero(open_)[0]] = f"the tool is open {WEAK}"
+    assert page().count("measure such (kinacc plan-poses) or state it (calibration.frames)") == 1
+    assert "points one way" not in page()
+    for joint in range(1, 6):  # the sixth turns the flange about its own axis
+        tables["measurements"][f"q{joint}"] = np.full_like(tables["measurements"]["q1"], 0.3)
+    assert "the flange points one way in all poses (within" in page()

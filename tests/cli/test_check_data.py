@@ -18,9 +18,9 @@ def configuration(tmp_path):
     arm = robot.load(ROBOT)
     q_deg = np.round(np.random.default_rng(0).uniform(-60, 60, (20, 6)), 3)
     point = robot.forward(arm, np.deg2rad(q_deg)).position_mm
-    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
+    usual = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
 
-    def write(change=lambda rows: rows):
+    def write(change=lambda rows: rows, names=usual):
         rows = change(np.round(np.column_stack([q_deg, point]), 4))
         path = tmp_path / "poses.csv"
         np.savetxt(path, rows, fmt="%.10g", delimiter=",", header=",".join(names), comments="")
@@ -82,6 +82,28 @@ def test_what_cannot_be_used_ends_with_2(configuration, tmp_path, flag):
     assert "Parquet" in done.output
     if flag:
         assert json.loads(done.stdout)["verdict"] == "unusable"
+
+
+def test_repeats_scatter_by_the_number_a_campaign_is_held_to(configuration):
+    def read_five_times(rows):
+        rng = np.random.default_rng(1)
+        again = np.repeat(rows, 5, axis=0)
+        own = np.column_stack([again, np.repeat(np.arange(20), 5)])
+        own[:, 6:9] += rng.normal(size=(100, 3)) * (0.1, 0.1, 0.01)
+        second = own[:, 6:9] + (30.0, 0.0, 0.0) + rng.normal(size=(100, 3)) * 0.001
+        return np.column_stack([own, second])
+
+    names = [*(f"q{i}_deg" for i in range(1, 7)), "a_x_mm", "a_y_mm", "a_z_mm", "pose"]
+    config = configuration(read_five_times, [*names, "b_x_mm", "b_y_mm", "b_z_mm"])
+    done = call("check-data", config)
+    told = json.loads(call("check-data", config, "--json").stdout)["datasets"][0]["facts"]
+    spread = np.array(told["noise_from_repeats"]["std_mm"])
+    assert f"repeats scatter by {np.sqrt(np.mean(spread**2)):.3g} mm per axis" in done.output
+
+
+def test_the_limit_of_the_quick_fit_is_explained_on_its_line(configuration):
+    said = re.search(r"most_expected_mm: .*", call("check-data", configuration()).output)[0]
+    assert re.fullmatch(r"most_expected_mm: \S+ \(a reading farther off is an outlier\)", said)
 
 
 def test_only_measured_data_sets_can_be_checked(tmp_path):

@@ -222,6 +222,24 @@ def test_the_first_poses_are_shown_as_understood_before_anything_is_written(flag
     assert lines.index(shown[2]) < written_at
 
 
+def test_a_pose_read_ten_times_is_shown_once_and_its_columns_are_named(tmp_path):
+    pose, rows = np.repeat(np.arange(16), 10), np.tile(np.arange(10), 16)
+    drift = np.random.default_rng(0).normal(0.0, 0.03, (160, 6))
+    beside = IT.point + IT.turn.apply([40.0, -30.0, 20.0])
+    points = np.column_stack([IT.point[pose], beside[pose]]) + drift
+    names = ["Messung", "Wiederholung", *joints("q{}_deg")]
+    names += [f"smr{each} {axis} [mm]" for each in "AB" for axis in "XYZ"]
+    text = table(names, pose, rows, IT.q[pose], np.round(points, 4))
+    done = call("init", *written(tmp_path, m_csv=text), "--robot", "ur10", "--yes", "--out",
+                tmp_path / "cell")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    lines = done.output.splitlines()
+    heads = [i for i, line in enumerate(lines) if line.startswith("  line ")]
+    assert [lines[i].split(":")[0] for i in heads] == ["  line 2", "  line 12", "  line 22"]
+    assert all(lines[i + 3] == "    and 9 more readings of it" for i in heads)
+    assert "pose: Messung; repeat: Wiederholung" in lines
+
+
 def test_the_first_poses_are_part_of_the_answer_for_a_program(tmp_path):
     text = table([*joints("q{}_rad"), "x_m", "y_m", "z_m"], np.deg2rad(IT.q), IT.point / 1000.0)
     _, told = described(written(tmp_path, m_csv=text))

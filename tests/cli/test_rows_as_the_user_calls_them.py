@@ -100,3 +100,34 @@ def test_many_remarks_of_the_reader_are_counted_and_all_told_on_request(results)
     assert sum("remark" in line for line in half_page(facts, "kinacc fitted m --all")) <= 3
     assert "more: kinacc fitted m --all" in "\n".join(half_page(facts, "kinacc fitted m --all"))
     assert sum("remark" in line for line in half_page(facts, "", whole=True)) == more
+
+
+def test_the_rows_of_a_workbook_are_called_rows_in_every_answer(tmp_path):
+    from openpyxl import Workbook
+
+    book, point = Workbook(), IT.point.copy()
+    point[WRONG, 2] += 6.0
+    rows = [("Cell 4",), ("No.", *Q, "X [mm]", "Y [mm]", "Z [mm]")]
+    rows += [(i, *IT.q[i].tolist(), *point[i].tolist()) for i in range(COUNT)]
+    rows += [("Mean", *IT.q.mean(axis=0).tolist(), *point.mean(axis=0).tolist())]
+    for row in rows:
+        book.active.append(row)
+    book.save(tmp_path / "m.xlsx")
+    said = call("init", tmp_path / "m.xlsx", "--robot", "ur10", "--out", tmp_path, "--yes")
+    assert said.exit_code == 0, said.output
+    quick = tmp_path / "quick.yaml"
+    quick.write_text(
+        "measurements: {folds: 4}\ndatasets: {m: {calibration: {vec: {order: 1}, dh: {fit_to: "
+        "measurements}}, data_check: {accept: {outliers: a test, few_poses: a test}}, "
+        "measurements: {file: {exclude: [{lines: [35], reason: bumped}]}}}}\n"
+    )
+    for stage in _STAGES:
+        done = call("run", stage, *_options((tmp_path / "m.yaml", quick)), "--results", tmp_path)
+        assert done.exit_code == 0, done.output
+    whole = call("fitted", tmp_path / "m", "--all").output
+    before, worst = whole.split("worst rows")
+    assert f"row {COUNT + 3}: statistics of the rows" in before
+    assert f"row {WRONG + 3}, " in worst
+    assert "is farthest from where it was fitted without them:" in " ".join(worst.split())
+    assert "row 35, " in before
+    assert "line" not in whole

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from kinacc.config.records import value_at
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.study.choices import design
-from kinacc.study.choices.open_choices import OPEN, STATED
+from kinacc.study.choices.open_choices import ALL, FIG_5, OPEN, STATED
 from kinacc.study.claims.evaluate import all_claims, evaluate
 from kinacc.workflow import in_memory
 from kinacc.workflow.plan import planned
@@ -68,7 +69,7 @@ def test_every_value_alone_every_arm_and_all_at_once(config, made):
     for varied, runs in {"default": 1, "arm": 2, "search": 2, "all": 2, "all_and_arm": 2}.items():
         mine = found["choice"] == varied
         assert found["claim"][mine].tolist() == wanted * runs
-    followed = found["claim"][found["choice"] == design.FIG_5]
+    followed = found["claim"][found["choice"] == FIG_5]
     assert followed.tolist() == [name for name in wanted if name.startswith(("fig5", "fig6"))] * 6
 
 
@@ -110,7 +111,7 @@ def test_a_run_whose_space_is_out_of_reach_says_so_and_the_others_go_on(config):
 
 def test_a_sample_varies_every_choice_at_once(config):
     many = {**config, "choices": {**config["choices"], "names": [], "runs": 64}}
-    sample = [run for run in design.runs(many) if run.varied == design.ALL]
+    sample = [run for run in design.runs(many) if run.varied == ALL]
     for choice in OPEN:
         words = [run.chosen[choice.name] for run in sample]
         counts = [words.count(word) for word in choice.values]
@@ -126,3 +127,20 @@ def test_a_choice_that_does_not_exist_is_named_with_those_that_do(tmp_path):
     (tmp_path / "a.yaml").write_text("datasets: {arm: {robot: mh180}}\nchoices: {names: [serach]}")
     with pytest.raises(InputError, match=r"choices\.names.*serach.*\n?.*search"):
         planned([tmp_path / "a.yaml"])
+
+
+def test_a_choice_that_does_not_touch_a_stage_does_not_make_it_again(config, monkeypatch):
+    made: Counter[str] = Counter()
+    for name, stage in in_memory.RUNS.items():
+
+        def counted(*given, name=name, stage=stage, **more):
+            made[name] += 1
+            return stage(*given, **more)
+
+        monkeypatch.setitem(in_memory.RUNS, name, counted)
+    alone = [run for run in design.runs(config) if run.varied in ("default", "search", "vec_order")]
+    monkeypatch.setattr(choices_chunk, "runs", lambda _: alone)
+    choices_chunk.run({}, config)
+    assert len(alone) == 1 + 2 + 3
+    assert (made["measurements"], made["vec"], made["accuracy_map"]) == (1, 4, 4)
+    assert made["study"] == len(alone)

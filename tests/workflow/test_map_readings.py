@@ -7,6 +7,8 @@ import copy
 import numpy as np
 import pytest
 
+from kinacc.artifacts import store
+from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.artifacts.store import to_table
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
@@ -15,6 +17,7 @@ from kinacc.study.map_readings import READINGS, SENTENCES, shares
 from kinacc.synthetic import accepted
 from kinacc.workflow import arm_search, in_memory
 from kinacc.workflow.stages import map_readings, map_readings_chunk, robustness_chunk
+from kinacc.workflow.verification.conformity import check_file
 
 PROVENANCE = {
     **dict.fromkeys(("kinacc_version", "config_hash", "code_hash", "inputs_hash"), "0"),
@@ -65,9 +68,12 @@ def test_another_reading_has_arms_that_meet_the_paper_under_its_own_plan(config)
     assert not np.allclose(seen["q6"], shipped["q6"])
 
 
-def test_a_reading_for_which_no_arm_is_found_has_no_rows_and_no_share(config):
+def test_a_reading_for_which_no_arm_is_found_has_no_rows_and_no_share(config, tmp_path):
     none = part_of({**config, "map_readings": {"arms": 1, "seeds": 2}}, 1)
     assert none["claim"].size == 0
+    path = tmp_path / "1-of-20.parquet"
+    store.write(path, "map_readings_chunk", none, PROVENANCE)
+    assert not check_file(path, ARTEFACTS["map_readings_chunk"])[1]
     found = shares(map_readings.run({"map_readings_chunk": none}, {})["map_readings"])
     assert found.arms.tolist() == [0] * len(READINGS)
     assert np.isnan(found.holds).all()

@@ -233,15 +233,17 @@ _MAP_READINGS = (
 _MAP_READINGS_KEY = ("reference_frame", "reference_orientation", "rotations", "seed", "claim")
 MAP_READINGS_CHUNK = Artefact(
     "map_readings_chunk",
-    "The sentences on Fig. 3 under some of its readings.",
+    "The sentences on Fig. 3 under some of its readings; empty where no arm was found.",
     _MAP_READINGS,
     _MAP_READINGS_KEY,
+    may_be_empty=True,
 )
 MAP_READINGS = Artefact(
     "map_readings",
     "The sentences on Fig. 3 under every reading of it, each over arms drawn anew.",
     _MAP_READINGS,
     _MAP_READINGS_KEY,
+    may_be_empty=True,
 )
 ROBUSTNESS = Artefact(
     "robustness",

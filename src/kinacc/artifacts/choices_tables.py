@@ -95,6 +95,7 @@ ALL = (
             whole("rank", "place among the factors of the claim, deciding ones first", 1),
         ),
         ("claim", "sample", "factor"),
+        may_be_empty=True,  # from a few runs nothing can be said
     ),
     Artefact(
         "choices_factors",

@@ -200,6 +200,9 @@ JOINTS = (
 ROW_NAME = absent_if_unstated(
     text("pose_name", "the measured file's name of the pose, where it does not only number them"),
     text("file", "file that the line is of, where joints and points come from two"),
+    text(
+        "row_kind", "what the line is, where it is none of a text file: a row of a sheet", ("row",)
+    ),
 )
 
 

@@ -12,12 +12,14 @@ TOPICS = (
     "check",
     "excluded_rows",
     "held_out_error",
+    "held_out_orientation_error",
     "training_error",
     "model_difference",
     "held_out_model_difference",
     "selection",
     "range",
     "like_measured",
+    "one_way",
     "undetermined",
 )
 SUMMARY = Artefact(

@@ -35,6 +35,7 @@ PRIOR_STD = (0.01, 0.03, 0.1, 0.3, 1.0)  # mm and mrad
 PRIOR_DECAY = (0.7, 0.85, 1.0)
 LEAST_PRIOR = 0.01  # share of a prior left at an order below which it adds nothing to lower ones
 FAR = 4.0  # medians of the error; a reading farther off than that counts less
+MOST_EXCESS = 0.25  # of the least squared error: one of few configurations allows any by its own
 CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
 MOST_BLOCKS = 5
 _FIX = "measure more configurations, or state calibration.vec.order and prior"
@@ -55,7 +56,7 @@ class Grid:
 
     def within(self, components: int, joints: int, frames: int) -> Grid:
         """The grid without orders that have more parameters than there are residuals."""
-        fit = [n for n in self.orders if 6 * joints * (n + 1) + frames <= components]
+        fit = [n for n in self.orders if n <= highest_order(components, joints, frames)]
         return Grid(tuple(fit) or self.orders[:1], self.priors)
 
     def priors_of(self, order: int) -> tuple[Prior, ...]:
@@ -63,6 +64,11 @@ class Grid:
         if len(self.orders) == 1:
             return self.priors
         return tuple(p for p in self.priors if p.decay ** (order - 1) >= LEAST_PRIOR)
+
+
+def highest_order(components: int, joints: int, frames: int) -> int:
+    """The highest order with no more parameters than residuals, below 0 where there is none."""
+    return (components - frames) // (6 * joints) - 1
 
 
 @dataclass(frozen=True)
@@ -201,12 +207,12 @@ class _Search:
         trials = []
         for order, priors, errors in self.tried:
             weighted = weight[:, None] * errors
-            best = int(weighted.mean(axis=0).argmin())
-            trials.append(Trial(order, priors[best], weighted[:, best]))
+            prior = int(weighted.mean(axis=0).argmin())
+            trials.append(Trial(order, priors[prior], weighted[:, prior]))
         best = min(trials, key=lambda trial: trial.rms_mm)
         for trial in trials:
             excess, error = trial.excess_mm2(best)
-            if excess <= error:
+            if excess <= min(error, MOST_EXCESS * best.rms_mm**2):
                 break
         return Choice(self.held_out, tuple(trials), trial)
 

@@ -12,7 +12,10 @@ from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSE
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.calibration import blind_words
+from kinacc.calibration.selection import ORDERS, highest_order
+from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
+from kinacc.measurements.folds import configurations_of
 from kinacc.measurements.row_names import RowNames
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
@@ -24,6 +27,9 @@ _BENDING = {
     "lever_coefficient_rad_per_mm": "rad/mm",
     "std_lever_coefficient_rad_per_mm": "rad/mm",
 }
+_ONE_WAY_DEG = 5.0  # a flange that turns less far away from its mean direction points one way
+_LEAST_LENGTH = 1e-9
+CONFIGURATIONS, SETTINGS = "configurations", "settings"  # what sets the highest order tried
 _STATISTICS = ("n", "mean", "quantile_99", "largest")
 
 
@@ -63,6 +69,7 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
         *_excluded(tables.get("excluded_rows"), selected(tables["model_selection"])),
         *_range(tables["measurements"], robot),
         *_like_measured(like_measured),
+        *_pointing(tables["measurements"], robot),
         *(
             Fact("undetermined", str(number), "statement", text=text)
             for number, text in enumerate(blind_words.listed(tables["dh_identified"]), 1)
@@ -154,6 +161,7 @@ def _errors(table: Mapping) -> Iterator[Fact]:
     """Statistics of every comparison; held out at rows that every model was tried on."""
     comparison, estimate = (np.asarray(table[name]) for name in ("comparison", "estimate"))
     sizes = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
+    turns = np.linalg.norm([table[f"r{axis}_mrad"] for axis in "xyz"], axis=0)
     populations = {
         "cross_validated": ("held_out_error", "held_out_model_difference"),
         "train": ("training_error", "model_difference"),
@@ -168,12 +176,20 @@ def _errors(table: Mapping) -> Iterator[Fact]:
             continue
         common = set.intersection(*(set(table["row"][rows]) for rows in there.values()))
         for each, rows in there.items():
-            size = sizes[rows[np.isin(table["row"][rows], list(common))]]
+            shared = rows[np.isin(table["row"][rows], list(common))]
             measured = each.reference == MEASURED
             item = each.model if measured else each.name
-            for name, value in zip(_STATISTICS, _statistics(size), strict=True):
-                unit = "1" if name == "n" else "mm"
-                yield Fact(topics[0 if measured else 1], item, name, value, unit)
+            yield from _sized(topics[0 if measured else 1], item, sizes[shared], "mm")
+            if measured and kind == "cross_validated":
+                turned = turns[shared[np.isfinite(turns[shared])]]
+                yield from _sized("held_out_orientation_error", item, turned, "mrad")
+
+
+def _sized(topic: str, item: str, size: np.ndarray, unit: str) -> Iterator[Fact]:
+    """The statistics of magnitudes (n,), none where there are none."""
+    if len(size):
+        for name, value in zip(_STATISTICS, _statistics(size), strict=True):
+            yield Fact(topic, item, name, value, "1" if name == "n" else unit)
 
 
 def _statistics(size: np.ndarray) -> tuple[float, ...]:
@@ -193,10 +209,10 @@ def _selection(tables: Mapping) -> Iterator[Fact]:
         order = tables.get(f"{name}_model", {}).get("order")
         if order is not None:
             yield Fact("selection", name, "order", float(np.max(order)), "1")
-            yield from _orders(name, tables.get(f"{name}_orders"))
+            yield from _orders(name, tables.get(f"{name}_orders"), tables["measurements"])
 
 
-def _orders(name: str, table: Mapping | None) -> Iterator[Fact]:
+def _orders(name: str, table: Mapping | None, measurements: Mapping) -> Iterator[Fact]:
     """The orders that held-out errors were found with, and the highest of several tried."""
     if table is None:
         return
@@ -207,6 +223,26 @@ def _orders(name: str, table: Mapping | None) -> Iterator[Fact]:
         yield Fact("selection", name, "high_order_held_out", float(order[folds].max()), "1")
     if len(np.unique(order)) > 1:
         yield Fact("selection", name, "highest_order_tried", float(order.max()), "1")
+        count, most = _carried(measurements)
+        higher = next((each for each in ORDERS if each > order.max()), most)
+        yield Fact("selection", name, "configurations", float(count), "1")
+        by = SETTINGS if higher <= most else CONFIGURATIONS
+        yield Fact("selection", name, "highest_order_set_by", text=by)
+
+
+def _carried(measurements: Mapping) -> tuple[int, int]:
+    """Number of configurations that folds hold out, and the highest order they carry."""
+    rows = np.flatnonzero(np.isfinite(np.asarray(measurements["fold"], dtype=float)))
+    seen = {name: np.asarray(values)[rows] for name, values in measurements.items()}
+    turned = np.isfinite(np.asarray(seen["qw"], dtype=float))
+    configuration, target = configurations_of(seen), seen["target"].astype(str)
+    pairs = np.stack([configuration.astype(str), target], axis=1)
+    once = np.unique(pairs, axis=0, return_index=True)[1]
+    components = 3 * len(once) + 3 * int(turned[once].sum())
+    size = 6 if turned.any() else 3
+    frames = 6 * len(set(seen["session"].astype(str))) + size * len(set(target))
+    joints = sum(name[:1] == "q" and name[1:].isdigit() for name in seen)
+    return len(np.unique(configuration)), highest_order(components, joints, frames)
 
 
 def _excluded(table: Mapping | None, model: str) -> Iterator[Fact]:
@@ -232,14 +268,29 @@ def _range(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
 
 def covered(measurements: Mapping, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Ends (k,), (k,) of the reported joints of all poses."""
+    reported = _reported(measurements, robot)
+    return reported.min(axis=0), reported.max(axis=0)
+
+
+def _reported(measurements: Mapping, robot: Robot) -> np.ndarray:
+    """Reported joints (n, k)."""
     numbers = range(1, len(robot.q_min_rad) + 1)
-    reported = np.stack([np.asarray(measurements[f"q{n}"], dtype=float) for n in numbers])
-    return reported.min(axis=1), reported.max(axis=1)
+    return np.stack([np.asarray(measurements[f"q{n}"], dtype=float) for n in numbers], axis=1)
 
 
 def _like_measured(share: float) -> Iterator[Fact]:
     if np.isfinite(share):
         yield Fact("like_measured", "ranges of all joints", "share", share, "1")
+
+
+def _pointing(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
+    """How far the flange turns away from one direction, where that is next to nothing."""
+    axis = dh.forward(robot.dh, robot.dh_joints(_reported(measurements, robot))).rotation[..., 2]
+    middle = axis.mean(axis=0)
+    along = axis @ middle / max(float(np.linalg.norm(middle)), _LEAST_LENGTH)
+    off = float(np.rad2deg(np.arccos(np.clip(along.min(), -1.0, 1.0))))
+    if off < _ONE_WAY_DEG:
+        yield Fact("one_way", "flange", "farthest_off", off, "deg")
 
 
 def of(found: Iterable[Fact], topic: str) -> dict[str, dict[str, Fact]]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinacc.artifacts.allowed import LEFT_OUT
+from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.artifacts.error_models import NOMINAL, PLAINEST, model_name
+from kinacc.calibration.blind_words import weak
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
-from kinacc.calibration.summary import LARGE_SHARE, Fact, of
+from kinacc.calibration.summary import LARGE_SHARE, SETTINGS, Fact, of
 
 WIDTH = 100
 MARGIN = 17  # where the text of a paragraph begins
@@ -17,7 +18,10 @@ _LINES_EACH = 2  # of what is left out: a list of columns may be long
 _JOINTS_PER_LINE, _JOINT_WIDTH = 3, 27
 _KEPT = "\u00a0"  # a space that no line is broken at
 _FIGURES = ("mean", "quantile_99", "largest")
+_COLUMNS = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}  # widths
+_CALLED = 53  # of a model's name before them
 _COMPLIANCE, _LEVER = "compliance_rad_per_nm", "lever_coefficient_rad_per_mm"
+_SETTLED = '"others may": measure such (kinacc plan-poses) or state it (calibration.frames)'
 _NUMBERS = {2.0: "two"}
 
 
@@ -77,10 +81,15 @@ def _left_out(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
 
 
 def _checked(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
+    """Suspicions, then notes, which are none: as ``check-data`` tells the two apart."""
     found = [each for each in facts if each.topic == "check"]
     if not found:
         return []
-    return _first([each.text for each in found if each.text], most, more) or ["nothing suspicious"]
+    told = [each for each in found if each.text]
+    notes = [each for each in told if each.statistic == FINDING_LEVELS[-1]]
+    doubts = [each.text for each in told if each not in notes] or ["nothing suspicious"]
+    plain = [f"note: {each.text.removeprefix(f'{each.item}: ')}" for each in notes]
+    return _first([*doubts, *plain], most, more)
 
 
 def _excluded(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
@@ -98,6 +107,7 @@ def _errors(facts: Sequence[Fact], whole: bool) -> list[str]:
     lines = []
     if held_out:
         lines += _table(facts, "held-out error, mm", "poses left out of the fit", held_out)
+        lines += _orientation(facts, whole)
     if trained and (whole or not held_out):
         lines += _table(facts, "training error, mm", "poses that were fitted", trained)
     return lines
@@ -109,8 +119,7 @@ def _table(
     chosen = of(facts, "selection")
     rows = next(iter(errors.values()))["n"].value
     head = f"{name} ({where}; {counted(rows, 'row')})"
-    columns = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}
-    lines = [f"{head:57}" + "".join(f"{name:>{width}}" for name, width in columns.items())]
+    lines = [f"{head:57}" + "".join(f"{name:>{width}}" for name, width in _COLUMNS.items())]
     for model, figures in errors.items():
         called = model_name(model)
         if model == NOMINAL:
@@ -119,9 +128,24 @@ def _table(
         elif "order" in chosen[model]:
             called += _order(chosen[model])
         mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
-        sizes = zip(_FIGURES, columns.values(), strict=True)
+        sizes = zip(_FIGURES, _COLUMNS.values(), strict=True)
         shown = "".join(f"{figures[each].value:{width}.3f}" for each, width in sizes)
-        lines.append(f"{'':4}{called:53}{shown}{mark}".rstrip())
+        spare = min(0, _CALLED - len(called))  # a long name takes of the blanks behind it
+        lines.append(f"{'':4}{called:{_CALLED}}{shown[-spare:]}{mark}".rstrip())
+    return lines
+
+
+def _orientation(facts: Sequence[Fact], whole: bool) -> list[str]:
+    """Errors of orientation at held-out poses, where it was measured: the selected model's."""
+    chosen, known = of(facts, "selection"), of(facts, "held_out_orientation_error")
+    lines = []
+    for model, figures in known.items():
+        if whole or (model in chosen and chosen[model]["selected"].value):
+            rows = counted(figures["n"].value, "row")
+            called = f"orientation, {model_name(model)}, in mrad ({rows})"
+            sizes = zip(_FIGURES, _COLUMNS.values(), strict=True)
+            shown = "".join(f"{figures[each].value:{width}.3f}" for each, width in sizes)
+            lines.append(f"{'':4}{called:{_CALLED}}{shown}")
     return lines
 
 
@@ -129,10 +153,16 @@ def _order(known: Mapping[str, Fact]) -> str:
     """The order of a model, with those its held-out errors were found with where they differ."""
     order = {name: each.value for name, each in known.items() if "order" in name}
     told = f", order {order['order']:.0f}"
-    if "highest_order_tried" in order and order["order"] == order["highest_order_tried"]:
-        told += ", the highest tried"
     low, high = (order.get(f"{which}_order_held_out", order["order"]) for which in ("low", "high"))
-    return told + (f" (held out: {low:.0f} to {high:.0f})" if low < high else "")
+    folds = f" (held out: {low:.0f} to {high:.0f})" if low < high else ""
+    if order["order"] != order.get("highest_order_tried"):
+        return told + folds
+    by_settings = known["highest_order_set_by"].text == SETTINGS
+    if folds:
+        return f"{told}{folds}, {'the most allowed' if by_settings else 'all the data carry'}"
+    if by_settings:
+        return f"{told}, the highest allowed (vec.order_highest)"
+    return f"{told}, the highest {known['configurations'].value:.0f} configurations carry"
 
 
 def _selected(facts: Sequence[Fact]) -> list[str]:
@@ -232,7 +262,17 @@ def _range(facts: Sequence[Fact]) -> list[str]:
 
 def _undetermined(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
     told = [each.text for each in facts if each.topic == "undetermined"]
-    return _first(told, most, more) or ["nothing: the poses determine every parameter"]
+    shown = _first(told, most, more) or ["nothing: the poses determine every parameter"]
+    if not weak(shown):
+        return shown
+    cause = [
+        f"the flange points one way in all poses (within {each.value:.2g} {each.unit}), hence "
+        '"too little"'
+        for each in facts
+        if each.topic == "one_way"
+    ]
+    count = sum(text in told for text in shown)
+    return [*shown[:count], *cause, _SETTLED, *shown[count:]]
 
 
 def _first(texts: list[str], most: int | None, more: str) -> list[str]:

@@ -116,11 +116,11 @@ class VECEstimator(Estimator):
         weight = self.common.rotation_weight_mm_per_rad
         at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
         size = at.coordinates.size
-        # A choice trains on three blocks of five at least; every fit of the chosen order on more.
-        # Another reading of the same configuration tells nothing new of the arm.
+        # Another reading of the same configuration tells nothing new of the arm. That a choice
+        # trains on three blocks of five is no limit: the prior holds what these do not show.
         seen = every.select(every.fold >= 0)
         same = np.stack([configurations(seen.pose, seen.q_rad), seen.target], axis=1)
-        count = seen.select(np.unique(same, axis=0, return_index=True)[1]).components * 3 // 5
+        count = seen.select(np.unique(same, axis=0, return_index=True)[1]).components
         grid = self.grid.within(count, self.common.nominal.joints, size)
         return selection.choices(
             self._wanted(every),

@@ -45,6 +45,7 @@ class Assessed:
         about, points = plan.about, len(plan.points) - len(state.left_out)
         return [
             words.statement(self.said, state) if self.said else "Nothing can be said yet.",
+            *words.begun_against(plan),
             f"campaign {self.place}: {about['point']} by the {model_name(about['model'])} model, "
             f"{points} candidates ({about['candidates']}), "
             f"noise {noise}, {state.taken} of {budget} readings",
@@ -63,6 +64,7 @@ class Assessed:
             "candidates": len(plan.points) - len(self.state.left_out),
             "readings": self.state.taken,
             "noise": {each.name: instrument.noise(each) for each in plan.instruments},
+            "begun_against": list(plan.overruled),
         }
 
 

@@ -71,6 +71,7 @@ class Plan:
     ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
     in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
     ``arm`` tells what errors of its joints do. ``about`` names robot, calibration, model and point.
+    ``overruled``: what spoke against beginning it so, a sentence each.
     """
 
     points: Points
@@ -83,6 +84,7 @@ class Plan:
     limits: Limits
     seed: int
     about: Mapping[str, str]
+    overruled: tuple[str, ...] = ()
 
     @property
     def slides(self) -> np.ndarray:
@@ -202,6 +204,7 @@ def to_json(plan: Plan) -> bytes:
         "seed": plan.seed,
         "order": plan.order.tolist(),
         "route": plan.route.tolist(),
+        **({"overruled": list(plan.overruled)} if plan.overruled else {}),
     }
     lines = [json.dumps({key: content[key]})[1:-1] for key in content]
     rows = ",\n  ".join(json.dumps(each) for each in points)
@@ -251,6 +254,7 @@ def _plan(content: Mapping) -> Plan:
         Limits(**content["limits"]),
         content["seed"],
         content["about"],
+        tuple(map(str, content.get("overruled", ()))),
     )
 
 

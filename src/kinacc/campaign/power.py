@@ -73,6 +73,10 @@ class Row:
             shares.append(1.0 - self.decisions[UNDECIDED])
         return min(shares, default=self.stated)
 
+    def shows(self, aim: Aim) -> float:
+        """Share that so many campaigns show to do what is wanted, with 97.5 % confidence."""
+        return binomial_interval(round(self.reaches(aim) * self.repetitions), self.repetitions)[0]
+
 
 def rows(found: Sequence[Outcome], aim: Aim) -> list[Row]:
     """Summary of simulated campaigns, by errors and budget in the order they came."""
@@ -83,14 +87,16 @@ def rows(found: Sequence[Outcome], aim: Aim) -> list[Row]:
     return [_row(errors, budget, group, aim) for (errors, budget), group in groups.items()]
 
 
-def smallest_budget(found: Sequence[Row], aim: Aim) -> int | None:
+def smallest_budget(found: Sequence[Row], aim: Aim, shown: bool = False) -> int | None:
     """The smallest budget that reaches the aim with the wanted power on all errors; None if none.
 
-    A larger budget that was simulated must reach it as well.
+    A larger budget that was simulated must reach it as well. ``shown``: the campaigns simulated
+    have to show it, and not only to do so often enough.
     """
+    share = Row.shows if shown else Row.reaches
     enough = None
     for budget in sorted({row.budget for row in found}, reverse=True):
-        if any(row.reaches(aim) < aim.power for row in found if row.budget == budget):
+        if any(share(row, aim) < aim.power for row in found if row.budget == budget):
             break
         enough = budget
     return enough

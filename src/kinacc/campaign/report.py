@@ -147,6 +147,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
         f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
         "",
         *(f"- {each}" for each in words.statements(state)),
+        *(f"- {in_markdown(each)}" for each in words.begun_against(plan)),
         *(f"- {in_markdown(each)}" for each in read_above(state, found["campaign_points"])),
         "",
     ]

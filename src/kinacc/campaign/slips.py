@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts import store
 from kinacc.artifacts.allowed import ESTIMATES
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison
 from kinacc.campaign import words
 from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
-from kinacc.checks.noise import Revisits, revisits
+from kinacc.checks.noise import Revisits, per_axis_mm, revisits
 from kinacc.errors import Problem
 from kinacc.measurements import folds
 
@@ -48,6 +50,14 @@ def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> li
     return problems
 
 
+def of_repeats(instruments: Sequence[Instrument], calibration: Path) -> list[Problem]:
+    """The same as :func:`of_little_noise` of a results folder; nothing where it has no readings."""
+    readings = [calibration / f"{name}.parquet" for name in ("measurements", "pose_errors")]
+    if not all(path.is_file() for path in readings):
+        return []
+    return of_little_noise(instruments, *map(store.read, readings))
+
+
 def of_little_noise(
     instruments: Sequence[Instrument], measured: Columns, errors: Columns
 ) -> list[Problem]:
@@ -56,7 +66,7 @@ def of_little_noise(
     ``measured`` and ``errors``: ``measurements`` and ``pose_errors`` of the calibration.
     """
     again = scatter(measured, errors)
-    scatter_mm = math.sqrt(float(np.mean(again.std_mm**2)))
+    scatter_mm = per_axis_mm(again.std_mm)
     problems = []
     for each in instruments:
         std_mm = math.sqrt(float(np.trace(each.covariance_mm2)) / 3.0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Reason, Statement
 from kinacc.campaign import consistency
+from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import State
 
 TARGETS = {MEASURED: "measured points", CANDIDATES: "all candidates", REGION: "share of the region"}
@@ -70,6 +71,11 @@ def one_of(point: str, targets: Sequence[str]) -> list[str]:
         f"the first of {', '.join(targets)}" if point == targets[0] else f"of {', '.join(targets)}"
     )
     return [f"a campaign is about one point: {point}, {why}; --point names another"]
+
+
+def begun_against(plan: Plan) -> list[str]:
+    """What spoke against the campaign as it was begun, which whoever reads a bound has to know."""
+    return [f"begun against: {each}" for each in plan.overruled]
 
 
 def statements(state: State) -> list[str]:

@@ -63,7 +63,7 @@ def check(
     first = np.unique(cell, return_index=True)[1]
     repeats = noise.repeats(every, cell)
     distances = noise.distances(every)
-    scatter = float(np.mean(repeats.std_mm)) if repeats.groups else np.nan
+    scatter = noise.per_axis_mm(repeats.std_mm) if repeats.groups else np.nan
     equal = doubles.earlier(every)
     found = doubles.found(every, scatter)
     moved, numbers = targets.found(every, distances)

@@ -7,7 +7,7 @@ import numpy as np
 from kinacc.artifacts.allowed import LEFT_OUT
 from kinacc.checks.cells import Cells
 from kinacc.checks.fitting import Fitted
-from kinacc.checks.noise import Distance, Repeats, Revisits, revisits
+from kinacc.checks.noise import Distance, Repeats, Revisits, per_axis_mm, revisits
 from kinacc.checks.suspicion import NOTE, Suspicion
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.reader import MeasuredFile
@@ -147,10 +147,10 @@ def remarks_of(every: Cells, repeats: Repeats, distances: list[Distance]) -> tup
         )
     if repeats.groups and distances:
         between = float(np.median([each.std_mm for each in distances])) / np.sqrt(2.0)
-        whole = float(np.mean(repeats.std_mm))
+        whole = per_axis_mm(repeats.std_mm)
         if between < 0.5 * whole:
             remarks.append(
-                f"repeats scatter by {whole:.3g} mm, targets against each other by only "
+                f"repeats scatter by {whole:.3g} mm per axis, targets against each other by only "
                 f"{between:.3g} mm: the scatter is the arm's or the set-up's, not the instrument's"
             )
     return tuple(remarks)

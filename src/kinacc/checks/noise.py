@@ -11,6 +11,11 @@ from kinacc.checks.cells import Cells
 _MEDIAN_1D = 0.6744897501960817  # median of |x| of a standard normal number
 
 
+def per_axis_mm(std_mm: np.ndarray) -> float:
+    """One number for standard deviations (3,) of the axes: their rms, as for equal axes."""
+    return float(np.sqrt(np.mean(np.square(std_mm))))
+
+
 @dataclass(frozen=True)
 class Repeats:
     """Scatter of readings taken at one configuration.

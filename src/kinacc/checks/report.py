@@ -97,11 +97,16 @@ class Report:
         return "\n".join(lines)
 
 
+_MEANT = {"most_expected_mm": "a reading farther off is an outlier"}
+
+
 def _fact(name: str, value: object) -> list[str]:
     if name == "joint coverage":
         return [f"  {name}", *(f"    {_covered(joint)}" for joint in value)]
     if isinstance(value, Mapping):
-        return [f"  {name}", *(f"    {key}: {_by_axis(each)}" for key, each in value.items())]
+        told = {key: f" ({_MEANT[key]})" if key in _MEANT else "" for key in value}
+        rows = [f"    {key}: {_by_axis(each)}{told[key]}" for key, each in value.items()]
+        return [f"  {name}", *rows]
     if isinstance(value, list) and value and isinstance(value[0], Mapping):
         rows = [", ".join(f"{k} {_word(v)}" for k, v in row.items()) for row in value]
         return [f"  {name}", *(f"    {row}" for row in rows)]

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import PLAINEST
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.binomial import binomial_interval
-from kinacc.campaign import power, simulate, slips
+from kinacc.campaign import power, simulate, slips, words
 from kinacc.campaign.power import Aim, Row
 from kinacc.cli import campaign_options, rows
 from kinacc.cli.sheet import Field, Sheet
+from kinacc.deployment.record import default_point
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.table import numbers
 from kinacc.study.tournament import fields
@@ -40,15 +43,23 @@ class Simulation:
     aim: Aim
     repetitions: int
     seed: int
+    remarks: tuple[str, ...] = ()
 
 
 def question(given: Mapping) -> Simulation:
     """The question of the command's options. Raises InputError listing what is wrong."""
     problems: list[Problem] = []
     assessors, chosen = [], []
+    named = given["errors"] or DEFAULT_ERRORS
+    folders = [Path(each) for each in named if each not in fields.FAMILIES and Path(each).is_dir()]
+    if given["point"] is not None and not folders:
+        what = "names a target of a results folder, and --errors names no such folder"
+        problems.append(Problem("--point", what, fix="leave it out, or give --errors FOLDER"))
     with gathered(problems):
         instruments = campaign_options.instruments(given["noise_mm"], given["covariance_mm2"])
-        problems += [] if given["sure"] else slips.of_noise(instruments)
+        if not given["sure"]:
+            problems += slips.of_noise(instruments)
+            problems += [each for path in folders for each in slips.of_repeats(instruments, path)]
     lengths = ("width_mm", "tolerance_mm", "largest_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     points = given["poses"]
@@ -61,9 +72,10 @@ def question(given: Mapping) -> Simulation:
     for budget in sorted(set(budgets)):
         with gathered(problems):
             assessors.append(campaign_options.assessor(name, budget, *method))
-    for errors in given["errors"] or DEFAULT_ERRORS:
+    for errors in named:
         with gathered(problems):
-            chosen.append(field_of(errors))
+            chosen.append(field_of(errors, given["point"]))
+            problems += _too_few(errors, chosen[-1], points)
     refuse(dict.fromkeys(problems), "Nothing was simulated")
     if given["largest_mm"] is not None:
         chosen = [_scaled(each, given["largest_mm"]) for each in chosen]
@@ -76,7 +88,23 @@ def question(given: Mapping) -> Simulation:
         aim,
         given["repetitions"],
         given["seed"],
+        tuple(f"{path}: {each}" for path in folders for each in _one_of(path, given["point"])),
     )
+
+
+def _too_few(named: str, field: ErrorField, points: int) -> list[Problem]:
+    """Fewer errors than poses, with the ways out; nothing where there are enough."""
+    if field.points >= points:
+        return []
+    meaning = f" ({field.meaning})" if field.meaning else ""
+    what = f"holds {field.points} errors{meaning}, fewer than {points} poses"
+    fix = f"give --poses {field.points}"
+    if field.kind != "synthetic":
+        fix += (
+            "; or simulate with a family whose largest error is the one here: --errors smooth "
+            f"--largest-mm {field.size_mm.max():.3g}"
+        )
+    return [Problem(f"--errors {named}", what, fix=fix)]
 
 
 def answer(asked: Simulation, progress: Callable | None = None) -> list[Row]:
@@ -88,13 +116,16 @@ def answer(asked: Simulation, progress: Callable | None = None) -> list[Row]:
     return power.rows(found, asked.aim)
 
 
-def field_of(name: str) -> ErrorField:
-    """Errors by the name of a family, a results folder or a file."""
+def field_of(name: str, point: str | None = None) -> ErrorField:
+    """Errors by the name of a family, a results folder or a file.
+
+    ``point``: the target of a results folder, the one a campaign would be about if not given.
+    """
     path = Path(name)
     if name in fields.FAMILIES:
         return replace(fields.synthetic(name, _DRAW), name=name)
     if path.is_dir():
-        return _of_folder(path)
+        return _of_folder(path, point)
     if path.is_file():
         table, problems = rows.open_table(path), []
         names = ("ex_mm", "ey_mm", "ez_mm")
@@ -116,22 +147,54 @@ def field_of(name: str) -> ErrorField:
     raise InputError(Problem("--errors", f"{name!r} is not there", allowed))
 
 
-def _of_folder(path: Path) -> ErrorField:
+def _of_folder(path: Path, point: str | None) -> ErrorField:
     from kinacc.artifacts import store
-    from kinacc.artifacts.error_models import PLAINEST
-    from kinacc.deployment.folder import recorded_model, recorded_robot
+    from kinacc.deployment.folder import recorded_robot
 
     name, robot = path.resolve().name, recorded_robot(path)
-    needed = ("pose_errors", "measurements")
-    if all((path / f"{each}.parquet").is_file() for each in needed):
-        errors, seen = (store.read(path / f"{each}.parquet") for each in needed)
-        selection = path / "model_selection.parquet"
-        tables = {selection.stem: store.read(selection)} if selection.is_file() else {}
-        return fields.of_measurements(name, robot, errors, seen, recorded_model(tables) or PLAINEST)
+    if measured := _measured(path):
+        errors, seen = measured["pose_errors"], measured["measurements"]
+        model, targets = _model_and_targets(measured)
+        target = point or default_point(targets)
+        if target not in targets:
+            what = f"{target!r} is no target of {path}"
+            raise InputError(Problem("--point", what, ", ".join(targets)))
+        several = len(targets) > 1
+        return fields.of_measurements(name, robot, errors, seen, model, target if several else None)
     if (path / "assessment_points.parquet").is_file():
         return fields.of_points(name, robot, store.read(path / "assessment_points.parquet"))
     what = "holds neither pose_errors with measurements nor assessment_points"
     raise InputError(Problem(str(path), what, "a results folder", "run the workflow first"))
+
+
+def _measured(path: Path) -> dict[str, Columns]:
+    """Tables of a results folder about what was measured; empty where it lacks one needed."""
+    from kinacc.artifacts import store
+
+    needed, wanted = ("pose_errors", "measurements"), ("model_selection", "frames")
+    there = [each for each in (*needed, *wanted) if (path / f"{each}.parquet").is_file()]
+    if not {*needed} <= {*there}:
+        return {}
+    return {each: store.read(path / f"{each}.parquet") for each in there}
+
+
+def _model_and_targets(tables: Mapping[str, Columns]) -> tuple[str, list[str]]:
+    """The model that a campaign would be about, and its targets in their order."""
+    from kinacc.deployment.folder import recorded_model, targets_of
+
+    model = recorded_model(tables) or PLAINEST
+    seen = list(dict.fromkeys(np.asarray(tables["measurements"]["target"]).astype(str)))
+    if "frames" not in tables:
+        return model, seen
+    return model, [each for each in targets_of(tables["frames"], model) if each in seen]
+
+
+def _one_of(path: Path, point: str | None) -> list[str]:
+    """Which of several targets of a results folder the errors are of."""
+    if not (measured := _measured(path)):
+        return []
+    targets = _model_and_targets(measured)[1]
+    return words.one_of(point or default_point(targets), targets)
 
 
 def _scaled(field: ErrorField, largest_mm: float) -> ErrorField:
@@ -192,6 +255,7 @@ def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
         "repetitions": asked.repetitions,
         "seed": asked.seed,
         "budget": power.smallest_budget(found, aim) if _aims(aim) else None,
+        "budget_shown": power.smallest_budget(found, aim, shown=True) if _aims(aim) else None,
     }
     title = (
         f"{asked.assessors[0].name}: largest error of {_TARGETS[aim.target]} of {asked.points} "
@@ -208,6 +272,11 @@ def _counted(row: Row) -> str | None:
 
 
 def in_words(asked: Simulation, found: list[Row]) -> str:
+    """Which errors were meant, and the budget that does."""
+    return "\n".join([*asked.remarks, _verdict(asked, found)])
+
+
+def _verdict(asked: Simulation, found: list[Row]) -> str:
     """The budget that does, or that none did, and how surely so many repetitions show it."""
     aim = asked.aim
     if not _aims(aim):
@@ -221,23 +290,37 @@ def in_words(asked: Simulation, found: list[Row]) -> str:
     enough = power.smallest_budget(found, aim)
     if enough is None:
         return _none_did(asked, found, said)
-    share = min(row.reaches(aim) for row in found if row.budget == enough)
-    hits = round(share * asked.repetitions)
-    low, _ = binomial_interval(hits, asked.repetitions)
-    counted = f"{hits} of {asked.repetitions}"
-    if low >= aim.power:
-        return (
-            f"{enough} readings give {said} in at least {aim.power:.0%} of campaigns on all errors "
-            f"simulated: {counted} there (at least {low:.0%} with 97.5 % confidence)"
-        )
-    needed = power.repetitions_to_show(share, aim.power)
+    shown = power.smallest_budget(found, aim, shown=True)
+    proof = "" if shown is None else _shown_by(asked, found, shown, said)
+    if shown == enough:
+        return proof
+    gave = "may be enough:" if shown else f"gave {said} in"
+    hits, low = _hits(asked, found, enough)
+    needed = power.repetitions_to_show(hits / asked.repetitions, aim.power)
     more = "only more readings would" if needed is None else f"--repetitions {needed} would, if"
     more += "" if needed is None else " as large a share of them does"
-    return (
-        f"{enough} readings gave {said} in {counted} simulated campaigns or more on all errors; "
-        f"that shows at least {low:.0%} of campaigns with 97.5 % confidence, not yet "
+    tried = (
+        f"{enough} readings {gave} {hits} of {asked.repetitions} simulated campaigns or more on "
+        f"all errors; that shows at least {low:.0%} of campaigns with 97.5 % confidence, not yet "
         f"{aim.power:.0%}: {more}"
     )
+    return f"{proof}\n{tried}" if proof else tried
+
+
+def _shown_by(asked: Simulation, found: list[Row], budget: int, said: str) -> str:
+    """What a budget is shown to bring."""
+    hits, low = _hits(asked, found, budget)
+    return (
+        f"{budget} readings give {said} in at least {asked.aim.power:.0%} of campaigns on all "
+        f"errors simulated: {hits} of {asked.repetitions} there (at least {low:.0%} with 97.5 % "
+        "confidence)"
+    )
+
+
+def _hits(asked: Simulation, found: list[Row], budget: int) -> tuple[int, float]:
+    """Campaigns of a budget that reach the aim where fewest do, and the share these show."""
+    worst = min((r for r in found if r.budget == budget), key=lambda row: row.reaches(asked.aim))
+    return round(worst.reaches(asked.aim) * asked.repetitions), worst.shows(asked.aim)
 
 
 def _none_did(asked: Simulation, found: list[Row], said: str) -> str:
@@ -269,7 +352,8 @@ def drawn(asked: Simulation, found: list[Row]) -> Figure:
         for name, group in by_errors.items()
     ]
     aim = asked.aim
-    enough = power.smallest_budget(found, aim) if _aims(aim) else None
+    shown = power.smallest_budget(found, aim, shown=True)
+    enough = (shown or power.smallest_budget(found, aim)) if _aims(aim) else None
     return campaign_plan.draw(curves, aim.width_mm, aim.power if _aims(aim) else None, enough)
 
 

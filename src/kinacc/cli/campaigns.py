@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -20,12 +21,9 @@ from kinacc.cli import choice
 from kinacc.cli.output import Output
 from kinacc.errors import InputError, Problem, gathered, refuse
 
-_READINGS = ("measurements", "pose_errors")
-
 
 def start(given: Mapping, out: Output) -> None:
     """Begin a campaign and say what was begun."""
-    from kinacc.artifacts import store
     from kinacc.campaign import begin, prediction_check, slips
     from kinacc.cli import campaign_candidates, campaign_options, rows
     from kinacc.cli.file_options import joint_answers
@@ -76,14 +74,13 @@ def start(given: Mapping, out: Output) -> None:
     unsure = prediction_check.unsure(
         calibration, points, instruments, given["point"], limits.implausible_mm
     )
+    left_mm = calibration.residual.position_mm if calibration.residual else math.nan
+    problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
+    problems += slips.of_repeats(instruments, Path(given["calibration"]))
+    problems += [] if unsure is None else unsure.asked()
     if not given["sure"]:
-        left_mm = calibration.residual.position_mm if calibration.residual else math.nan
-        problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
-        readings = [Path(given["calibration"]) / f"{name}.parquet" for name in _READINGS]
-        if all(path.is_file() for path in readings):
-            problems += slips.of_little_noise(instruments, *map(store.read, readings))
-        problems += [] if unsure is None else unsure.asked()
         refuse(problems, "The campaign was not begun")
+    begun = replace(begun, overruled=tuple(f"{each.where}: {each.what}" for each in problems))
     for line in [] if unsure is None else unsure.in_words():
         click.echo(line, err=True)
     folders.start(given["folder"], begun)
@@ -142,6 +139,7 @@ def status(
         say_doubts(opened)
     lines = words.standing(found)
     lines += words.statements(found)
+    lines += words.begun_against(opened.plan)
     if tolerance is not None:
         for said in found.statements():
             verdict = decide(said, tolerance)
@@ -198,7 +196,7 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     write_whole(text, report.markdown(opened, state, tables, "campaign.svg").encode())
     written = [each.name for each in made_here]
     facts = answers.as_facts(state, state.plan.limits.tolerance_mm)
-    lines = words.statements(state)
+    lines = [*words.statements(state), *words.begun_against(state.plan)]
     lines += report.read_above(state, tables["campaign_points"])
     lines.append(f"{into}: {', '.join(written)}")
     out.say({**facts, "folder": str(into), "files": written}, "\n".join(lines))

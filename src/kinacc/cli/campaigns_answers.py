@@ -37,6 +37,7 @@ def begun_facts(folder: str, begun: Plan, unsure: Unsure | None) -> dict[str, ob
         "implausible_mm": begun.limits.implausible_mm,
         "joint_tolerance_deg": math.degrees(begun.limits.joint_rad),
         "prediction": None if unsure is None else unsure.as_facts(),
+        "begun_against": list(begun.overruled),
     }
 
 
@@ -58,6 +59,7 @@ def begun_in_words(folder: str, begun: Plan, merged: int, targets: Sequence[str]
         f"{begun.assessor.name}: {begun.assessor.measurements} readings, the first at "
         f"{len(begun.route)} points whatever they say",
         *([too_few] if too_few else []),
+        *words.begun_against(begun),
         f"a reading is refused {_refusals(begun)}",
         f"next: kinacc campaign next {shlex.quote(folder)}",
     ]
@@ -151,6 +153,7 @@ def as_facts(found: State, tolerance: float | None) -> dict[str, object]:
         **found.plan.about,
         "assessor": found.plan.assessor.name,
         "budget": found.plan.assessor.measurements,
+        "begun_against": list(found.plan.overruled),
         "readings": found.taken,
         "readings_used": len(found.told),
         "points": len(label) - len(found.left_out),

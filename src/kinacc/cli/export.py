@@ -22,7 +22,7 @@ FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
     default=PLAINEST,
     help="Model to write; one that is no DH table goes into json alone.",
 )
-@option("--name", help="Name of the files. [the data set's]")
+@option("--name", help="Name of the files. [the data set's, and the --model]")
 @option("--urdf", type=click.Path(), help="A URDF whose origins are corrected.")
 @option("--base-link", help="Link of that file the arm starts at. [its root]")
 @option("--tip-link", help="Link of that file the arm ends at. [the only one it can]")
@@ -75,6 +75,6 @@ def export(
     )
     paths = write(made, target, out.force)
     out.say({"files": paths}, "\n".join(paths))
-    for said in (warning(folder), note(folder) if model == PLAINEST else ""):
+    for said in (warning(folder), note(folder, model)):
         if said:
             click.echo(said, err=True)

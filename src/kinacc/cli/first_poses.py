@@ -15,14 +15,17 @@ _POSES = 3
 
 
 def first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> list[dict[str, object]]:
-    """Line, joints and targets of the first poses, in deg and mm.
+    """Line, joints and targets of the first poses, in deg and mm, each as it was read first.
 
-    Orientations are a turn in deg about an axis of the instrument's frame.
+    ``again`` counts the readings after that. Orientations are a turn in deg about an axis of the
+    instrument's frame.
     """
     columns = reading.columns
     shown = []
     for pose in list(dict.fromkeys(columns["pose"].tolist()))[:_POSES]:
         rows = np.flatnonzero(columns["pose"] == pose)
+        of_target = columns["target"][rows].astype(str)
+        _, first, times = np.unique(of_target, return_index=True, return_counts=True)
         line = int(columns["row"][rows[0]])
         q = np.array([columns[f"q{i + 1}"][rows[0]] for i in range(len(prismatic))])
         shown.append(
@@ -32,7 +35,8 @@ def first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> list[dict[str, 
                 "joints": [
                     float(f"{value:.4f}") for value in np.where(prismatic, q, np.rad2deg(q))
                 ],
-                "targets": [_target(columns, row) for row in rows],
+                "targets": [_target(columns, row) for row in rows[np.sort(first)]],
+                "again": int(times.max()) - 1,
             }
         )
     return shown
@@ -80,4 +84,7 @@ def in_words(shown: list[dict]) -> list[str]:
                 about = ", ".join(f"{part:.3f}" for part in each["about"])
                 turn = f", turned by {each['turned_deg']:.3f} deg about ({about})"
             lines.append(f"    {each['target']} at {point}{turn}")
+        if pose["again"]:
+            more = "more reading" if pose["again"] == 1 else "more readings"
+            lines.append(f"    and {pose['again']} {more} of it")
     return lines

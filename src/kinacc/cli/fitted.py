@@ -89,7 +89,7 @@ def summary(folder: Path | str) -> dict:
                 item: {name: plain(each.value) for name, each in known.items()}
                 for item, known in of(facts, topic).items()
             }
-            for topic in ("held_out_error", "range")
+            for topic in ("held_out_error", "held_out_orientation_error", "range")
         },
         "parameters": _statuses(told),
         "undetermined": blind_words.listed(told),
@@ -211,10 +211,15 @@ def _further(tables: Mapping[str, Mapping]) -> list[str]:
         f"{row['where']}, {row['target']}: {row['error_mm']:.3f} mm"
         for row in _worst(tables["worst_rows"], best, names)
     ]
+    held_out = "cross_validated" in tables["worst_rows"]["estimate"]
+    how = " where it was fitted without them" if held_out else ""
     return [
         *paragraph("parameters", [f"of the DH fit: {', '.join(statuses)}"]),
         *paragraph(
             "worst rows",
-            [f"the {counted(len(worst), 'row')} that {model_name(best)} is farthest from:", *worst],
+            [
+                f"the {counted(len(worst), 'row')} that {model_name(best)} is farthest from{how}:",
+                *worst,
+            ],
         ),
     ]

@@ -444,6 +444,9 @@ def _tell(
     ]
     if guess.found.commanded:
         lines.append(f"joints as commanded: {_listed(guess.found.commanded)}")
+    named = {kind: name.column for kind, name in guess.found.single.items()}
+    if named:
+        lines.append("; ".join(f"{kind}: {column}" for kind, column in named.items()))
     targets = [f"{name} ({_point(each)})" for name, each in guess.found.targets.items()]
     lines.append(f"targets, in {section['length_unit']}: {', '.join(targets)}")
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]

@@ -20,6 +20,8 @@ from kinacc.cli.output import answers
 @option(
     "--errors", multiple=True, help="Errors simulated; may be repeated. [smooth, workshop, defect]"
 )
+@option("--point", help="Target of a results folder whose errors are meant. "
+        "[the tool, else the first]")  # fmt: skip
 @option("--largest-mm", type=float, help="Scale the errors so that the largest is this.")
 @option("--repetitions", default=30, type=click.IntRange(2, 100_000),
         help="Simulated campaigns per budget.")  # fmt: skip
@@ -29,7 +31,7 @@ def plan_campaign(out, **given) -> None:
 
     \b
     Errors to simulate with (--errors):
-      a results folder       its held-out errors, or the points of its study
+      a results folder       held-out errors of one of its targets, or the points of its study
       a .csv, .parquet file  columns ex_mm, ey_mm, ez_mm
       smooth, gravity, ripple, thermal, workshop, defect, rare
                              families of synthetic arms after a DH calibration

@@ -82,8 +82,6 @@ def calibration(
     _require_same_arm(bounded.dh, robot, name)
     frames = tables["frames"]
     of_model = np.asarray(frames["model"]) == choice
-    names = [str(each) for each in np.asarray(frames["frame"])[of_model]]
-    targets = [each for each in names if each != "base"]
     number = _session_number(frames, of_model, session)
     anchored = made[choice].table is None and not _same_base(frames, choice, session)
     told = tables.get(f"{PLAINEST}_identified")
@@ -96,12 +94,20 @@ def calibration(
         base_name="base" if number == 0 else f"base{number + 1}",
         anchor=calibration(tables, robot, PLAINEST, name, session) if anchored else None,
         left_open=None if told is None else tuple(blind_words.listed(told)),
-        targets={each: model_tables.frame(frames, choice, each) for each in targets},
+        targets={
+            each: model_tables.frame(frames, choice, each) for each in targets_of(frames, choice)
+        },
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
         fitted_range_rad=bounded.domain,
         fitted=_fitted(tables, robot),
     )
+
+
+def targets_of(frames: Mapping, model: str) -> list[str]:
+    """Names of the targets that a model was fitted with, from the table ``frames``."""
+    of_model = np.asarray(frames["model"]) == model
+    return [str(each) for each in np.asarray(frames["frame"])[of_model] if each != "base"]
 
 
 def _fitted(tables: Tables, robot: Robot) -> JointState | None:

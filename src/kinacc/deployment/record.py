@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,6 +35,12 @@ class Residual:
     def poses(self) -> str:
         """Which rows, in words."""
         return POSES[self.subset]
+
+
+def default_point(targets: Iterable[str]) -> str:
+    """The point meant where none is named: the tool where there is one, else the first target."""
+    names = [*targets]
+    return TOOL if TOOL in names else next(iter(names), FLANGE)
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,7 @@ class Calibration:
     @property
     def default_point(self) -> str:
         """The tool where there is one, else the first target."""
-        return TOOL if TOOL in self.targets else next(iter(self.targets), FLANGE)
+        return default_point(self.targets)
 
     def point(self, name: str | None) -> Pose:
         """A target by name, or the flange, in the last DH frame. InputError for another name."""

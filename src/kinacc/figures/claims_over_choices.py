@@ -19,7 +19,7 @@ _SHARES = {
     "all": ("all choices at once", style.BLUE, "o"),
     "all_and_arm": ("all choices and the arm", style.INK, "D"),
 }
-_NUMBERS = ("table1_", "table2_", "table3_")
+_NUMBERS = ("table1_", "table2_", "table3_", "true_accuracy")
 _SAMPLE = "all_and_arm"
 _ROW_IN = 0.155
 
@@ -32,8 +32,8 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
 def draw(shares: Columns, reasons: Columns) -> Figure:
     """Draw a row per sentence: shares of runs in which it holds, and what changes them how much.
 
-    Numbers of Tables I to III are left out: they are about the arm. Raises InputError where a
-    column is missing.
+    Numbers of Tables I to III and the true accuracy are left out: they are about the arm. Raises
+    InputError where a column is missing.
     """
     require(shares, ("claim", *(f"{name}_share" for name in _SHARES)), "claim_shares")
     needed = ("claim", "sample", "factor", "kind", "difference", "decides")

@@ -52,7 +52,8 @@ def draw(table: Columns, *, dataset: str | None = None) -> Figure:
     """
     require(table, COLUMNS, "map_readings")
     if not len(table["claim"]):
-        raise InputError(Problem("map_readings", "the table has no row", "at least one"))
+        fix = "try more seeds (map_readings.seeds)"
+        raise InputError(Problem("map_readings", "the table has no row", "at least one", fix))
     found = shares(table)
     heights, place = [], 0.0
     for number, reading in enumerate(READINGS):

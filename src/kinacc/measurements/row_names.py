@@ -27,11 +27,12 @@ class RowNames:
 
     @classmethod
     def of_columns(cls, columns: Mapping) -> RowNames:
-        """From the columns ``row``, ``pose_name`` and ``file`` of ``measurements``."""
+        """From ``row``, ``pose_name``, ``file`` and ``row_kind`` of ``measurements``."""
         names, files = columns.get("pose_name", ()), columns.get("file", ())
         pairs = zip(columns["row"], names, strict=True) if len(names) else ()
         pose = {int(line): str(name) for line, name in pairs if line == line and name}
-        return cls(pose, next((str(each) for each in files if each), ""))
+        word = next((str(each) for each in columns.get("row_kind", ()) if each), cls.word)
+        return cls(pose, next((str(each) for each in files if each), ""), word)
 
     def columns(self, lines: np.ndarray) -> dict[str, np.ndarray]:
         """What ``of_columns`` reads beside ``lines`` (n,); no column that would say nothing."""
@@ -40,6 +41,8 @@ class RowNames:
             found["pose_name"] = texts(self.pose.get(int(line)) for line in lines)
         if self.file:
             found["file"] = texts([self.file] * len(lines))
+        if self.word != type(self).word:
+            found["row_kind"] = texts([self.word] * len(lines))
         return found
 
     def one(self, line: int) -> str:

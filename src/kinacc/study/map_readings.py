@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
+from kinacc.study.choices.open_choices import ORIENTATIONS_DEG
 from kinacc.study.claims.map_sentences import map_claims
 
 
@@ -34,15 +35,6 @@ class Reading(NamedTuple):
         return {**config, "evaluation": {**config["evaluation"], **own}}
 
 
-# Down; leaning outward, where joint 5 reaches every turn, and inward, where its limit takes some
-# away; level and pointing to the arm, as it is and turned about the tool.
-ORIENTATIONS_DEG = (
-    (180.0, 0.0, 0.0),
-    (180.0, 45.0, 0.0),
-    (180.0, -45.0, 0.0),
-    (180.0, -90.0, 0.0),
-    (180.0, -90.0, -30.0),
-)
 READINGS = tuple(
     Reading(frame, angles, rotations)
     for frame, angles, rotations in product(

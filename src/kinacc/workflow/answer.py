@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import ERROR_MODELS, model_name
+from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
 from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
@@ -160,7 +160,8 @@ def _uses(folder: Path, arm: Calibration, tables: Tables) -> list[str]:
     numbers = [f"{each:.1f}" for each in pose.position_mm[0]]
     numbers += [f"{each:.4f}" for each in quaternion_from_rotation(pose.rotation[0])]
     shown = np.where(arm.robot.dh.prismatic, near, np.rad2deg(near)).round() + 0.0  # no minus zero
-    export = ["kinacc", "export", str(folder), "--out", _free("exported", folder)]
+    chosen = [] if arm.choice == PLAINEST else ["--model", arm.choice]
+    export = ["kinacc", "export", str(folder), *chosen, "--out", _free("exported", folder)]
     use = ["kinacc", "compensate", str(folder), "--pose", ",".join(numbers)]
     use += ["--near-deg", ",".join(f"{each:.0f}" for each in shown)]
     return [shlex.join(export), shlex.join(use)]

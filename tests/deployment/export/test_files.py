@@ -195,3 +195,26 @@ dh:
         here = compose(here, Pose(rotation_x(joint["alpha_rad"]), np.array([joint["a_mm"], 0, 0])))
     wanted = arm.pose(JointState(q), "base", "flange")
     np.testing.assert_allclose(here.position_mm, wanted.position_mm[0], rtol=0, atol=1e-9)
+
+
+def test_in_a_paper_the_selected_model_comes_first_and_what_was_not_fitted_is_called_fixed():
+    arm = bent("ur10")
+    fitted = {"joint": np.arange(1, 7)}
+    for name in dh.PARAMETERS:
+        fitted[name] = getattr(arm.model, name).copy()
+        fitted[f"std_{name}"] = np.full(6, 1e-3)
+    fitted["d_mm"][1], fitted["std_d_mm"][[1, 2]] = 0.0, np.nan
+    given = {"joint": np.arange(1, 7)} | {n: getattr(arm.robot.dh, n) for n in dh.PARAMETERS}
+    of_arm = residuals(), fitted, given, "cell"
+    made = tables.paper_tables(*of_arm, fixed={"j2.d_mm"}, selected="dh")
+    page, paper = tables.markdown(made), tables.latex(made)
+    assert page.startswith("**DH model (selected) against measurements, cell**")
+    assert page.count("selected") == 1
+    assert sum(table.name == "dh" for table in made) == 1
+    (second, third) = (line for line in page.splitlines() if line[:4] in ("| 2 ", "| 3 "))
+    assert "| 0 (fixed) |" in second
+    assert "†" not in second
+    assert "†" in third
+    assert "Fixed: not fitted" in page
+    assert "$0$ (fixed)" in paper
+    assert "VEC model (selected)" in tables.markdown(tables.paper_tables(*of_arm, selected="vec"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import document_claims as document
 import numpy as np
 import pytest
 
@@ -10,9 +11,11 @@ from kinacc.figures import claims_over_choices
 from kinacc.study.choices import page, reasons
 from kinacc.study.choices.open_choices import OPEN
 from kinacc.study.claims.evaluate import all_claims
+from kinacc.study.claims.numbers import number_claims
 
 RUNS = 200
 CLAIM = "map_nonlinear"  # any sentence
+NUMBERS = {claim.id for claim in number_claims()}
 
 
 def planted(agrees, *, arms=(True,) * 20, default="agrees") -> tuple[dict, dict, np.ndarray]:
@@ -20,7 +23,7 @@ def planted(agrees, *, arms=(True,) * 20, default="agrees") -> tuple[dict, dict,
     rng = np.random.default_rng(3)
     orders = rng.choice(["4", "5", "8"], RUNS)
     rules = rng.choice(["normal", "iqr"], RUNS)
-    stands_out = rng.uniform(1.0, 1.3, RUNS)
+    stands_out, sizes_mm = rng.uniform(1.0, 1.3, RUNS), rng.uniform(0.5, 2.0, RUNS)
     verdicts = {False: "differs", True: "agrees"}
     judged, factors = [], []
 
@@ -41,6 +44,7 @@ def planted(agrees, *, arms=(True,) * 20, default="agrees") -> tuple[dict, dict,
                 told(run, choice, None, name, holds or name != CLAIM)
             factors.append((run, "vec_order", "choice", orders[place], None))
             factors.append((run, "outlier_rule", "choice", rules[place], None))
+            factors.append((run, "largest_mm", "property", None, sizes_mm[place]))
             factors.append((run, "largest_over_second", "property", None, stands_out[place]))
     return columns_of("choices", judged), columns_of("choices_factors", factors), orders
 
@@ -120,12 +124,13 @@ def test_the_page_says_where_every_sentence_holds_and_what_decides_it():
     text = page.claims_page(tables, {"seed": "7"})
     statements = {claim.id: claim.statement for claim in all_claims()}
     for name, statement in statements.items():
-        assert (f"| {statement} |" in text) == (not name.startswith("table"))
+        assert (f"| {statement} |" in text) == (name not in NUMBERS)
     hangs = text[text.index("## Hang on a choice") : text.index("## Numbers of Tables")]
     assert statements[CLAIM] in hangs
     assert "`vec_order` (8: 0% of" in hangs
     for choice in OPEN:
         assert f"| `{choice.name}` |" in text
+    assert "in 100% of the runs below that and in 100% of those above" in text
     assert "seed `7`" in text
 
 
@@ -134,10 +139,15 @@ def test_the_picture_has_a_row_for_every_sentence_and_a_square_where_a_choice_de
     figure = claims_over_choices.draw(reasons.shares(choices), reasons.reasons(choices, factors))
     left, right = figure.axes
     names = [label.get_text() for label in left.get_yticklabels()]
-    sentences = [claim.id for claim in all_claims() if not claim.id.startswith("table")]
+    sentences = [claim.id for claim in all_claims() if claim.id not in NUMBERS]
     assert names == [name.replace("_", " ") for name in sentences]
     (squares,) = right.collections
     columns = [label.get_text() for label in right.get_xticklabels()]
     assert [(columns[int(x)], sentences[int(y)]) for x, y in squares.get_offsets()] == [
         ("vec order", CLAIM)
     ]
+
+
+def test_the_page_in_the_documentation_is_what_its_tables_say():
+    written = (document.DOCS / "claims.md").read_text(encoding="utf-8")
+    assert written == document.text(), "run python tools/document_claims.py"

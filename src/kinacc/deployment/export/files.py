@@ -9,8 +9,9 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.atomic import replacing
-from kinacc.artifacts.error_models import PLAINEST
+from kinacc.artifacts.error_models import PLAINEST, model_name
 from kinacc.calibration import blind_words
+from kinacc.calibration.identified import FIXED
 from kinacc.config import names
 from kinacc.deployment import folder as results
 from kinacc.deployment.export import description, tables, urdf
@@ -76,7 +77,9 @@ def contents(
             text = urdf.generated(arm, dh_joints)
         else:
             text = _tables(found, robot, dataset, arm.left_open or (), each)
-        made[f"{dataset if name is None else name}{_ENDINGS[each]}"] = text
+        # A name of its own, so that the DH files may stand beside it.
+        own_name = dataset if model == PLAINEST else f"{dataset}_{model}"
+        made[f"{own_name if name is None else name}{_ENDINGS[each]}"] = text
     return made
 
 
@@ -93,16 +96,21 @@ def warning(folder: Path | str) -> str:
     )
 
 
-def note(folder: Path | str) -> str:
-    """What a DH model leaves out where another model was selected; empty where it was not."""
+def note(folder: Path | str, model: str = PLAINEST) -> str:
+    """What the ``model`` written leaves beside the selected one, and how to get the other."""
     found = results.read_tables(folder)
     selected = results.selected_model(found)
-    dh, other = (results.residual(found, each) for each in (PLAINEST, selected))
-    if selected == PLAINEST or dh is None or other is None:
+    other = PLAINEST if model == selected else selected
+    left = {each: results.residual(found, each) for each in (model, other)}
+    if model == other or None in left.values():
         return ""
+    rms = {each: f"{known.position_mm:.3f} mm" for each, known in left.items()}
+    option = "without --model" if other == PLAINEST else f"--model {other}"
+    formats = "" if other == PLAINEST else f", as {' and '.join(CARRY_ALL).upper()}"
+    kind = "plainest" if other == PLAINEST != selected else "selected"
     return (
-        f"note: the {selected} model was selected ({other.position_mm:.3f} mm rms of "
-        f"{other.poses}); a DH table cannot hold it and leaves {dh.position_mm:.3f} mm"
+        f"note: this is the {model_name(model)} model, {rms[model]} rms of {left[model].poses}; "
+        f"{option} writes the {kind} one{formats}: {model_name(other)}, {rms[other]}"
     )
 
 
@@ -126,7 +134,13 @@ def _tables(found: Mapping, robot: Robot, dataset: str, unseen: Sequence[str], f
         raise InputError(Problem(f"{dataset}: residuals.parquet", "no such file", "a finished run"))
     nominal = {"joint": np.arange(1, robot.dh.joints + 1)}
     nominal |= {name: getattr(robot.dh, name) for name in PARAMETERS}
-    made = tables.paper_tables(found["residuals"], found["dh_model"], nominal, dataset, unseen)
+    told = found.get(f"{PLAINEST}_identified", {"parameter": [], "status": []})
+    pairs = zip(told["parameter"], told["status"], strict=True)
+    fixed = {str(parameter) for parameter, status in pairs if status == FIXED}
+    selected = results.recorded_model(found)
+    made = tables.paper_tables(
+        found["residuals"], found["dh_model"], nominal, dataset, unseen, fixed, selected
+    )
     return (tables.markdown if form == "markdown" else tables.latex)(made)
 
 

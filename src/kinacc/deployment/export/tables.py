@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import ERROR_MODELS, MEASURED, Comparison, model_name
 from kinacc.config.names import in_markdown
 from kinacc.deployment.record import POSES
 from kinacc.kinematics.dh import PARAMETERS
@@ -15,6 +16,7 @@ from kinacc.kinematics.dh import PARAMETERS
 _FIGURES = (("mean", "mean"), ("max", "max"), ("rms", "rms"), ("gamma99", "99 % gamma"))
 _DIGITS_OF_STD = 2
 _MOST_DECIMALS = 6
+_FIXED = "(fixed)"
 
 
 @dataclass(frozen=True)
@@ -29,22 +31,34 @@ class PrintedTable:
 
 
 def paper_tables(
-    residuals: Columns, fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str] = ()
+    residuals: Columns,
+    fitted: Columns,
+    nominal: Columns,
+    name: str,
+    unseen: Sequence[str] = (),
+    fixed: Collection[str] = (),
+    selected: str = "",
 ) -> list[PrintedTable]:
     """Tables of a data set from its ``residuals`` and ``dh_model``; ``nominal`` as ``dh_model``.
 
-    ``unseen``: what the poses leave open, in sentences, as a note to the DH parameters.
+    ``unseen``: what the poses leave open, in sentences, as a note to the DH parameters; ``fixed``:
+    those that were not fitted, as ``dh_identified`` names them. The model ``selected`` comes first.
     """
-    return [
-        _residual_table(
-            residuals, "vec_vs_measured", "vec", f"VEC model against measurements, {name}"
-        ),
-        _dh_table(fitted, nominal, name, unseen),
+
+    def measured(model: str) -> PrintedTable:
+        chosen = " (selected)" if model == selected else ""
+        caption = f"{model_name(model)} model{chosen} against measurements, {name}"
+        return _residual_table(residuals, Comparison(MEASURED, model).name, model, caption)
+
+    made = [
+        measured("vec"),
+        _dh_table(fitted, nominal, name, unseen, fixed),
         _residual_table(residuals, "dh_vs_vec", "dh_vec", f"DH model against VEC model, {name}"),
-        _residual_table(
-            residuals, "dh_vs_measured", "dh", f"DH model against measurements, {name}"
-        ),
+        measured("dh"),
     ]
+    if selected in ERROR_MODELS and all(table.name != selected for table in made):
+        made.append(measured(selected))
+    return sorted(made, key=lambda table: table.name != selected)
 
 
 def markdown(tables: Sequence[PrintedTable]) -> str:
@@ -111,7 +125,13 @@ def _residual_table(columns: Columns, comparison: str, name: str, caption: str) 
     return PrintedTable(name, caption, heads, rows, [note])
 
 
-def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str]) -> PrintedTable:
+def _dh_table(
+    fitted: Columns,
+    nominal: Columns,
+    name: str,
+    unseen: Sequence[str],
+    unfitted: Collection[str],
+) -> PrintedTable:
     order = np.argsort(fitted["joint"], kind="stable")
     shown = [each for each in PARAMETERS if each != "beta_rad" or np.any(fitted[each] != 0.0)]
     heads = {
@@ -121,14 +141,19 @@ def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str
         "alpha_rad": ("alpha", "rad"),
         "beta_rad": ("beta", "rad"),
     }
-    rows, blind = [], False
+    rows, blind, held = [], False, False
     for row in order:
-        cells = [str(int(fitted["joint"][row]))]
+        joint = int(fitted["joint"][row])
+        cells = [str(joint)]
         for each in shown:
             value, std = float(fitted[each][row]), float(fitted[f"std_{each}"][row])
             fixed = not np.isfinite(std) and value == float(nominal[each][row])
             if each == "beta_rad" and fixed:
                 cells.append("-")
+                continue
+            if f"j{joint}.{each}" in unfitted:
+                held = True
+                cells.append(f"{value:g} {_FIXED}")
                 continue
             blind |= not np.isfinite(std)
             cells.append(with_deviation(value, std))
@@ -138,6 +163,7 @@ def _dh_table(fitted: Columns, nominal: Columns, name: str, unseen: Sequence[str
         notes.append(
             "† shares a direction the poses do not determine; along it the value is nominal."
         )
+    notes += ["Fixed: not fitted, the value is nominal."] if held else []
     notes += [f"Left open by the poses: {'; '.join(unseen)}."] if unseen else []
     return PrintedTable(
         "dh_parameters",
@@ -157,10 +183,12 @@ def _markdown_row(cells: Sequence[str]) -> str:
 
 
 def _tex_cell(text: str) -> str:
-    number = text.replace("†", "").replace(" ± ", "")
+    number = text.replace("†", "").replace(" ± ", "").removesuffix(f" {_FIXED}")
     if number.lstrip("-").replace(".", "").replace("e-", "").isdigit():
         mark = r"^\dagger" if text.endswith("†") else ""
-        return "$" + text.rstrip("†").replace("±", r"\pm") + mark + "$"
+        held = f" {_FIXED}" if text.endswith(_FIXED) else ""
+        shown = text.removesuffix(held).rstrip("†").replace("±", r"\pm")
+        return f"${shown}{mark}${held}"
     return _tex(text)
 
 

@@ -71,7 +71,7 @@ def look(path: str | Path, answers: Mapping[str, str] | None = None) -> Looked:
         raise Undecided(str(path), marks.choices)
     written = replace(written, decimal=marks.decimal, thousands=marks.thousands)
     table = replace(table, decimal=marks.decimal, thousands=marks.thousands)
-    told += _in_words(written, rows, head, stated)
+    told += _in_words(written, rows, head, stated, bool(table.letters))
     return _laid_out(path, Looked(written, table, tuple(told), {}, stated), answers)
 
 
@@ -338,7 +338,7 @@ def _counted(column: Sequence) -> bool:
 
 
 def _in_words(
-    written: Written, rows: Sequence[Row], head: Head, stated: Mapping[str, str]
+    written: Written, rows: Sequence[Row], head: Head, stated: Mapping[str, str], sheet: bool
 ) -> list[str]:
     """What was found of how the file is written, as far as it is not as usual."""
     told = []
@@ -351,7 +351,8 @@ def _in_words(
     above = [text for text in above if text and not text.lower().startswith(("sep=", '"sep='))]
     if above and head.names is None:
         what = "the names" if head.line else "the rows"
-        count = f"{len(above)} line{'s' if len(above) > 1 else ''}"
+        kind = "row" if sheet else "line"
+        count = f"{last} {kind}{'s' if last > 1 else ''}"  # blank ones too, as skip_lines has it
         told.append(f"{count} above {what}, not read ({_shortened(above[0])})")
     if written.names is not None:
         told.append(f"columns are called {', '.join(written.names)}")

@@ -9,11 +9,18 @@ from typing import Any
 import numpy as np
 
 from kinacc.config.records import with_values
-from kinacc.study.choices.open_choices import ARM, STATED, Choice, named
+from kinacc.study.choices.open_choices import (
+    ALL,
+    ALL_AND_ARM,
+    ARM,
+    DEFAULT,
+    FIG_5,
+    STATED,
+    Choice,
+    named,
+)
 from kinacc.synthetic.accepted import further_draws
 
-DEFAULT, ALL, ALL_AND_ARM, FIG_5 = "default", "all", "all_and_arm", "fig5"
-SAMPLES = (ALL, ALL_AND_ARM, FIG_5)
 _DRAW = "measurements.synthetic.draw"
 # Runs that follow single simulations only take a twentieth of the time of the others.
 _FIG_5_RUNS = 3

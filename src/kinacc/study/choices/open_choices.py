@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinacc.config.records import value_at
-from kinacc.study.map_readings import ORIENTATIONS_DEG
 
-ARM = "arm"
+# What runs vary beside single choices: nothing, the arm, or several at once.
+DEFAULT, ARM = "default", "arm"
+SAMPLES = ALL, ALL_AND_ARM, FIG_5 = "all", "all_and_arm", "fig5"
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,15 @@ def _word(value: Any) -> str:
     return f"{value:g}" if isinstance(value, (int, float)) else str(value)
 
 
+# Down; leaning outward, where joint 5 reaches every turn, and inward, where its limit takes some
+# away; level and pointing to the arm, as it is and turned about the tool.
+ORIENTATIONS_DEG = (
+    (180.0, 0.0, 0.0),
+    (180.0, 45.0, 0.0),
+    (180.0, -45.0, 0.0),
+    (180.0, -90.0, 0.0),
+    (180.0, -90.0, -30.0),
+)
 OPEN: tuple[Choice, ...] = (
     _one(
         "inner_radius",

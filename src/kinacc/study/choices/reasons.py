@@ -16,8 +16,7 @@ import numpy as np
 from kinacc.artifacts.allowed import HOLDS
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.study.choices.design import ALL, ALL_AND_ARM, DEFAULT, FIG_5, SAMPLES
-from kinacc.study.choices.open_choices import ARM
+from kinacc.study.choices.open_choices import ALL, ALL_AND_ARM, ARM, DEFAULT, FIG_5, SAMPLES
 
 EVERYWHERE, ON_ARM, ON_CHOICE, ON_BOTH, NOWHERE, UNKNOWN = HOLDS
 STEADY = 0.95  # share of runs from which on a claim holds everywhere

@@ -95,15 +95,19 @@ def of_measurements(
     errors: Mapping,
     measurements: Mapping,
     model: str = PLAINEST,
+    target: str | None = None,
 ) -> ErrorField:
     """Held-out errors of a ``model`` at measured configurations, readings averaged.
 
-    errors: ``pose_errors``; measurements: ``measurements``. The errors hold the noise of the
-    instrument, which counts as truth here.
+    Of one ``target``, or of all of them where none is named. errors: ``pose_errors``;
+    measurements: ``measurements``. The errors hold the noise of the instrument, which counts as
+    truth here.
     """
     wanted = (np.asarray(errors["comparison"]) == Comparison(MEASURED, model).name) & (
         np.asarray(errors["estimate"]) == "cross_validated"
     )
+    if target is not None:
+        wanted &= np.asarray(errors["target"]).astype(str) == target
     if not wanted.any():
         what = f"pose_errors holds no held-out errors of the {model_name(model)} model"
         raise InputError(Problem(f"field {name}", what, fix="set measurements.folds"))
@@ -114,6 +118,7 @@ def of_measurements(
     first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
     means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
     meaning = f"held-out errors of the {model_name(model)} model at measured configurations"
+    meaning += f", target {target}" if target else ""
     q_rad = q_rad[first]
     return ErrorField(name, means, q_rad, _effects(robot, q_rad), "measured", meaning)
 

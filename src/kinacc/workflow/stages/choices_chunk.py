@@ -8,7 +8,8 @@ from kinacc.artifacts.contract import columns_of
 from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.provenance import config_hash
 from kinacc.errors import InputError
-from kinacc.study.choices.design import FIG_5, Run, runs
+from kinacc.study.choices.design import Run, runs
+from kinacc.study.choices.open_choices import FIG_5
 from kinacc.study.choices.properties import of_tables
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.workflow import in_memory

@@ -9,7 +9,7 @@ import numpy as np
 from kinacc.artifacts.allowed import ASSESSORS, COVARIANCES, DISTANCES, OUTLIER_RULES, SEARCHES
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.errors import Problem
-from kinacc.study.choices import design
+from kinacc.study.choices.open_choices import DEFAULT, SAMPLES
 from kinacc.study.choices.reasons import shares
 from kinacc.workflow.verification.rule import TOLERANCE, Columns, Rule, Tables, mark
 
@@ -204,11 +204,11 @@ def _shares(tables: Tables) -> Iterator[Problem]:
 
 def _choices(tables: Tables) -> Iterator[Problem]:
     table, factors = tables["choices"], tables["choices_factors"]
-    several = np.isin(table["choice"], (design.DEFAULT, *design.SAMPLES))
+    several = np.isin(table["choice"], (DEFAULT, *SAMPLES))
     unstated = np.array([value is None for value in table["value"]], dtype=bool)
     yield from mark("choices", unstated != several, "value null", "null where no single one is")
     unsaid = np.array([why is None for why in table["why"]], dtype=bool)
-    wrong = unsaid & ~np.isin(table["run"], factors["run"]) & (table["choice"] != design.DEFAULT)
+    wrong = unsaid & ~np.isin(table["run"], factors["run"]) & (table["choice"] != DEFAULT)
     yield from mark("choices", wrong, "a run of which nothing is known", "choices_factors.parquet")
 
 
