@@ -242,3 +242,31 @@ def test_results_say_which_robot_they_were_made_with(folder, tmp_path, monkeypat
         assert "--robot" in call(*words).output
     finally:
         (tmp_path / "robot.parquet").rename(folder / "robot.parquet")
+
+
+def test_joints_in_the_words_of_a_german_protocol_are_predicted(folder, tmp_path):
+    ours, theirs = tmp_path / "ours.csv", tmp_path / "Messung.csv"
+    rows = ((0.5, 10.25, -5.0, 20.0, 60.0, 15.0), (3.0, -10.0, 5.0, -20.5, 70.0, -15.0))
+    names = ",".join(f"q{i}_deg" for i in range(1, 7))
+    ours.write_text("\n".join([names, *(",".join(map(str, row)) for row in rows)]))
+    names = ";".join(["Messung", *(f"Achse {i} [°]" for i in range(1, 7)), "Bemerkung"])
+    lines = [";".join([str(i), *map(str, row), ""]).replace(".", ",") for i, row in enumerate(rows)]
+    theirs.write_text("\n".join([names, *lines]) + "\n", encoding="latin-1")
+    asked = ("--robot", "mh180", "--model", "dh", "--json")
+    wanted, found = (json.loads(call("predict", folder, path, *asked).stdout)["rows"]
+                     for path in (ours, theirs))  # fmt: skip
+    for each in ("x_mm", "y_mm", "z_mm", "q1_deg", "q6_deg"):
+        assert [row[each] for row in found] == [row[each] for row in wanted]
+
+
+def test_a_file_without_joints_names_its_columns_once_and_the_way_out(folder, tmp_path):
+    for content, said in (
+        ("x;y;Bemerkung\n1;2;fest\n3;4;lose\n", "--names"),
+        ("q1_deg,q2_deg,Bemerkung\n1,2,fest\n", "columns q3_deg or q3_rad, q4_deg or q4_rad"),
+    ):
+        path = tmp_path / "joints.csv"
+        path.write_text(content)
+        done = call("predict", folder, path, "--robot", "mh180")
+        assert done.exit_code == 2
+        assert done.output.count("Bemerkung") == 1
+        assert said in done.output

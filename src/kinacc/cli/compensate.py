@@ -40,7 +40,7 @@ def compensate(
       kinacc compensate results/ur10_b target_poses.csv -o joints.csv
       kinacc compensate results/mh180 --program program.csv -o corrected.csv
     """
-    from kinacc.cli import rows, target_poses
+    from kinacc.cli import rows, tables, target_poses
     from kinacc.deployment.compensate import compensate as joints_for
     from kinacc.progress import reporting
 
@@ -56,5 +56,6 @@ def compensate(
     )
     out.deliver(answer)
     rows.say_unused(given, calibration)
-    rows.say_unlike(unlike, calibration)
+    tables.say_unlike(unlike, calibration)
+    tables.say_convention(calibration, target_poses.reached(calibration, found), frame, point)
     rows.end_where_missing(found.q_rad, "joints")

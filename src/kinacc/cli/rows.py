@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
 _OWN_JOINT = re.compile(r"(?<![^\s,;\"'])q1_(?:deg|rad|mm|m)(?![^\s,;\"'])")
-_MOST_SAID = 2  # sentences of a warning
 _HEAD = 1_000_000  # characters of a line looked at
 
 
@@ -126,13 +125,21 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
     return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
 
 
-def candidates(path: str, robot: Robot, most: int, answers: Mapping | None = None) -> Rows:
-    """Joints of a file to choose from, in whatever form ``kinacc init`` reads.
+def joints_of(path: str, robot: Robot, answers: Mapping | None = None) -> Rows:
+    """Joints of a file, in whatever form ``kinacc init`` reads.
 
-    ``answers`` to what the file leaves open, by option. Raises InputError outside the limits, for
-    more than ``most``, and where the file can be read in more than one way.
+    ``answers`` to what the file leaves open, by option. Raises InputError where joints are not
+    found, and where the file can be read in more than one way.
     """
-    given = read(path, robot) if _has_own_names(Path(path)) else _of_any_form(path, robot, answers)
+    return read(path, robot) if _has_own_names(Path(path)) else _of_any_form(path, robot, answers)
+
+
+def candidates(path: str, robot: Robot, most: int, answers: Mapping | None = None) -> Rows:
+    """Joints of a file to choose from, as ``joints_of`` reads them.
+
+    Raises InputError outside the limits and for more than ``most``, too.
+    """
+    given = joints_of(path, robot, answers)
     require_within_limits(robot, given, path, "Candidates")
     if given.count > most:
         raise InputError(Problem(path, f"{given.count} candidates", f"at most {most}"))
@@ -196,11 +203,16 @@ class Quantities:
         present = [bool(each) for each in found]
         if not any(present) and not needed:
             return None
-        for name, own, there in zip(names, units, present, strict=True):
-            if not there:
-                where = f"{self.table.path}: column {' or '.join(names_of(name, own))}"
-                self.problems.append(Problem(where, "is missing", fix=listed(self.table)))
         if not all(present):
+            missing = [
+                " or ".join(names_of(name, own))
+                for name, own, there in zip(names, units, present, strict=True)
+                if not there
+            ]
+            many = len(missing) > 1
+            where = f"{self.table.path}: column{'s' * many} {', '.join(missing)}"
+            what = "are missing" if many else "is missing"
+            self.problems.append(Problem(where, what, fix=listed(self.table)))
             return None
         rounded = [ROUNDED_MM if own is LENGTH else ROUNDED_RAD for own in units]
         return np.stack([self._one(*each) for each in zip(names, found, rounded, strict=True)], 1)
@@ -344,24 +356,6 @@ def say_unused(given: Rows, calibration: Calibration) -> None:
     if given.payload is not None and not calibration.model.knows_loads:
         what = f"the {calibration.choice} model was fitted without loads that change"
         click.echo(f"not used: payload; {what}", err=True)
-
-
-def say_unlike(unlike: np.ndarray, calibration: Calibration) -> None:
-    """Warn on the error stream of rows, True in ``unlike`` (n,), where it was not measured.
-
-    What the measured poses left open is said with it: elsewhere it shows.
-    """
-    from kinacc.calibration import blind_words
-
-    if not unlike.any():
-        return
-    told = blind_words.weak(calibration.left_open or ())
-    click.echo(
-        f"warning: {int(unlike.sum())} of {len(unlike)} poses lie where the calibration was not "
-        "measured: status says why; errors there may be larger than those held out"
-        + (f"; measured poses left open: {'; '.join(told[:_MOST_SAID])}" if told else ""),
-        err=True,
-    )
 
 
 def end_where_missing(answers: np.ndarray, what: str) -> None:

@@ -1,32 +1,45 @@
-"""Answers of ``predict`` and ``compensate`` as sheets, and the joints they were asked for."""
+"""Answers of ``predict`` and ``compensate`` as sheets, with warnings, and the joints asked for."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import click
 import numpy as np
 
 from kinacc.cli import rows
 from kinacc.cli.rows import Rows
 from kinacc.cli.sheet import Field, Sheet
-from kinacc.deployment.predict import Prediction
+from kinacc.deployment.predict import Prediction, open_movement
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, quaternion_from_rotation
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 
 _MRAD = 1e3
+_MOST_SAID = 2  # sentences of a warning
+_MUCH_MOVED_MM = 0.1  # per mm or mrad of what is undetermined
 UNLIKE = "the joints together are unlike those measured"
 
 
 def given_joints(
-    robot: Robot, path: str | None, in_deg: tuple[str, ...], in_rad: tuple[str, ...]
+    robot: Robot,
+    path: str | None,
+    in_deg: tuple[str, ...],
+    in_rad: tuple[str, ...],
+    answers: Mapping,
 ) -> Rows:
-    """Joints of a file or of arguments. InputError where there are none, or outside the limits."""
+    """Joints of a file or of arguments. InputError where there are none, or outside the limits.
+
+    ``answers`` to what the file leaves open, by option.
+    """
     sources = [path is not None, bool(in_deg), bool(in_rad)]
     if sum(sources) != 1:
         what = "no joints are given" if not any(sources) else "joints are given more than once"
         raise InputError(Problem("joints", what, "a file, --joints-deg or --joints-rad"))
     if path is not None:
-        given = rows.read(path, robot)
+        given = rows.joints_of(path, robot, answers)
     else:
         unit = "deg" if in_deg else "rad"
         joints = rows.of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")
@@ -115,6 +128,48 @@ def joints_in_words(outside: np.ndarray) -> str:
     """The joints a mask (k,) marks: joint 2, or joints 2, 4."""
     numbers = [str(joint + 1) for joint in np.flatnonzero(outside)]
     return f"joint{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"
+
+
+def say_unlike(unlike: np.ndarray, calibration: Calibration) -> None:
+    """Warn on the error stream of rows, True in ``unlike`` (n,), where it was not measured.
+
+    What the measured poses left open is said with it: elsewhere it shows.
+    """
+    from kinacc.calibration import blind_words
+
+    if not unlike.any():
+        return
+    told = blind_words.weak(calibration.left_open or ())
+    click.echo(
+        f"warning: {int(unlike.sum())} of {len(unlike)} poses lie where the calibration was not "
+        "measured: status says why; errors there may be larger than those held out"
+        + (f"; measured poses left open: {'; '.join(told[:_MOST_SAID])}" if told else ""),
+        err=True,
+    )
+
+
+def say_convention(calibration: Calibration, at: JointState, frame: str, point: str | None) -> None:
+    """Warn on the error stream where poses ``at`` joints hang on where the base is said to be.
+
+    That is what the measured poses left open moves them in the base, and not as the instrument
+    sees them.
+    """
+    if frame != "base" or calibration.known is None or not len(at):
+        return
+    in_base, seen = (
+        open_movement(calibration, at, each, point)[:, 0] for each in (frame, "instrument")
+    )
+    moved = (in_base > _MUCH_MOVED_MM) & (seen < 0.5 * in_base)
+    if not moved.any():
+        return
+    click.echo(
+        "warning: where the robot's base lies is a convention here: each mm or mrad of what the "
+        f"measured poses left open moves {int(moved.sum())} of {len(at)} poses by up to "
+        f"{in_base[moved].max():.2g} mm in the base frame, by {seen[moved].max():.2g} mm as the "
+        "instrument sees them; a pose commanded in the robot's own base may be missed by as "
+        "much, poses in the instrument's frame (--frame instrument) are not",
+        err=True,
+    )
 
 
 def _where(calibration: Calibration, outside: np.ndarray, measured: np.ndarray) -> np.ndarray:

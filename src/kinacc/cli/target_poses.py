@@ -107,10 +107,16 @@ def compensated(
     return Sheet(title, facts(calibration, frame, point), fields)
 
 
+def reached(calibration: Calibration, found: Compensation) -> JointState:
+    """The joints found, where there are any."""
+    there = np.isfinite(found.q_rad).all(axis=1)
+    return JointState(calibration.robot.dh_joints(found.q_rad[there]))
+
+
 def unlike_measured(calibration: Calibration, found: Compensation, point: str | None) -> np.ndarray:
     """True (n,) for joints in their fitted ranges where the calibration was not measured."""
     there = np.isfinite(found.q_rad).all(axis=1)
-    at = JointState(calibration.robot.dh_joints(found.q_rad[there]))
+    at = reached(calibration, found)
     unlike = np.zeros(len(found.status), dtype=bool)
     unlike[there] = ~is_measured_there(calibration, at, point)
     return unlike & ~calibration.outside_range(calibration.robot.dh_joints(found.q_rad)).any(axis=1)

@@ -72,10 +72,10 @@ def predict(
             continue
         slopes = sensitivity(calibration, part, frame, point)
         std[rows] = np.sqrt(np.sum((slopes @ calibration.root) ** 2, axis=2))
-        plainest = calibration.plainest
-        if plainest is not calibration:
-            slopes = sensitivity(plainest, part, frame, point)
-        blind[rows] = along_open(plainest, slopes)
+        if calibration.plainest is calibration:
+            blind[rows] = along_open(calibration, slopes)
+        else:
+            blind[rows] = open_movement(calibration, part, frame, point)
     left = calibration.residual
     return Prediction(
         pose,
@@ -88,6 +88,14 @@ def predict(
         np.where(silent, np.nan, left.orientation_rad if left else np.nan),
         outside,
     )
+
+
+def open_movement(
+    calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
+) -> np.ndarray:
+    """Movement (n, 2), mm and rad, of poses along what the calibration could not see."""
+    plainest = calibration.plainest
+    return along_open(plainest, sensitivity(plainest, at, frame, point))
 
 
 def along_open(calibration: Calibration, slopes: np.ndarray) -> np.ndarray:

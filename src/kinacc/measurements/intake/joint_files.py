@@ -18,6 +18,7 @@ from kinacc.measurements.intake.decimals import shaped_as_number
 from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.table import RawTable, numbers
 
+_NAMING = "name them q1_deg, q2_deg .. in the file, or by --names where it has no names"
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
 
 
@@ -80,8 +81,8 @@ def _found(table: RawTable, found: NamedColumns, names: Sequence[Name], values) 
         raise InputError(Problem(table.path, what, fix=f"give {' or '.join(ways)}"))
     if not found.joints:
         there = f"the file has {', '.join(table.columns)}"
-        what, fix = "no columns of 4 to 7 joints were found", "name them q1_deg, q2_deg .."
-        raise InputError(Problem(table.path, what, there, fix))
+        what = "no columns of 4 to 7 joints were found"
+        raise InputError(Problem(table.path, what, fix=f"{there}; {_NAMING}"))
     return NamedColumns(found.joints, single=found.single)
 
 
