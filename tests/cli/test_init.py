@@ -80,6 +80,43 @@ def test_what_it_cannot_know_is_asked(foreign, tmp_path):
     assert file["orientation"]["convention"] == "ZYX"
 
 
+def test_without_a_terminal_every_question_names_the_option_that_answers_it(foreign, tmp_path):
+    done = call("init", foreign, "--out", tmp_path / "new", input="")
+    assert done.exit_code == 2
+    refusal = done.output[done.output.index("The questions were not answered") :]
+    for option in ("--joint-unit", "--length-unit", "--angle-unit", "--orientation", "--robot"):
+        assert f"give {option}, or --yes" in refusal, option
+    assert not (tmp_path / "new").exists()
+    units = ("--joint-unit", "rad", "--length-unit", "mm", "--angle-unit", "deg")
+    done = call("init", foreign, *units, "--orientation", "ZYX", "--out", tmp_path, input="")
+    assert done.exit_code == 2
+    assert "give --robot, or --yes" in done.output
+    assert "--orientation" not in done.output
+
+
+def test_the_first_poses_are_seen_before_it_is_asked_how_they_are_written(foreign, tmp_path):
+    done = call("init", foreign, "--out", tmp_path, input="rad\nmm\ndeg\nZYX\nirb120\n")
+    shown, asked = (done.output.index(each) for each in ("line 2: joints", "Not stated in the"))
+    assert shown < asked
+    assert "Not stated in the file: how its orientations are written. Guess:" in done.output
+
+
+def test_what_stands_above_the_names_is_counted_as_it_is_written_down(foreign, tmp_path):
+    from openpyxl import Workbook
+
+    book, text = Workbook(), foreign.read_text(encoding="utf-8").replace(",", ".")
+    names, *rows = (line.split(";") for line in text.splitlines())
+    numbers = [[*map(float, row), 20.5] for row in rows]
+    for row in (["Cell 4"], ["UR"], [], [*names, "Temp [C]"], *numbers):
+        book.active.append(row)
+    book.save(tmp_path / "m.xlsx")
+    done = call("init", tmp_path / "m.xlsx", "--robot", "irb120", "--out", tmp_path, "--yes")
+    assert done.exit_code == 0, done.output
+    assert "3 rows above the names, not read" in done.output
+    assert load((tmp_path / "m.yaml",))["m"]["measurements"]["file"]["skip_lines"] == 3
+    assert "also read: temperature (Temp [C])" in done.output
+
+
 def test_an_unknown_robot_gets_a_template_to_fill_in(foreign, tmp_path):
     lines = foreign.read_text(encoding="utf-8").splitlines()
     without = [";".join(line.split(";")[1:]) for line in lines]

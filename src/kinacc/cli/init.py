@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from kinacc.measurements.intake.guess import Guess
     from kinacc.measurements.reader import MeasuredFile
 
-_CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
 _FILE = "measurements.file"
 
 
@@ -86,7 +85,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     """
     from kinacc.artifacts.atomic import replacing
     from kinacc.cli.first_poses import first_poses, poses_without_robot
-    from kinacc.cli.init_questions import looked
+    from kinacc.cli.init_questions import asked, looked
     from kinacc.cli.init_remarks import remarks_on, rounded
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
@@ -98,7 +97,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
     _refuse(paths, name, out.force)
     if ask:
-        guess = _asked(guess)
+        guess = asked(guess, options["robot"])
     robot, chosen = _robot(guess, options["robot"], ask)
     own, text = _robot_file(robot, guess.joints, name, paths[1])
     report, shown = None, []
@@ -148,6 +147,7 @@ def _robot_file(robot: str | None, joints: int, name: str, path: Path) -> tuple[
 
 def _stated(guess: Guess, options: dict) -> Guess:
     """The guess with what the options say, which is no assumption then."""
+    from kinacc.cli.init_questions import orientation_of
     from kinacc.errors import Problem, refuse
 
     units = {name: options[name] for name in ("joint_unit", "length_unit", "angle_unit")}
@@ -167,26 +167,12 @@ def _stated(guess: Guess, options: dict) -> Guess:
     turn = {"unit": units["angle_unit"]} if "angle_unit" in units else {}
     known = set(units)
     if options["orientation"]:
-        turn |= _orientation(options["orientation"])
+        turn |= orientation_of(options["orientation"])
         known |= {"orientation", "order"}
     if turn:
         settings["orientation"] = turn
     kept = {k: v for k, v in guess.assumed.items() if k not in known}
     return replace(guess.but(settings), assumed=kept)
-
-
-def _orientation(word: str) -> dict:
-    from kinacc.checks.turns import CONVENTIONS
-    from kinacc.errors import InputError, Problem
-
-    if word in ("none", "quaternion", "rotation_vector"):
-        return {"kind": word}
-    if word == "quaternion_xyzw":
-        return {"kind": "quaternion", "order": "xyzw"}
-    if word in CONVENTIONS:
-        return {"kind": "euler", "convention": word}
-    allowed = f"none, quaternion, quaternion_xyzw, rotation_vector, {', '.join(CONVENTIONS)}"
-    raise InputError(Problem("--orientation", repr(word), allowed))
 
 
 def _refuse(paths, name: str, force: bool) -> None:
@@ -206,54 +192,10 @@ def _refuse(paths, name: str, force: bool) -> None:
     refuse(problems)
 
 
-def _asked(guess: Guess) -> Guess:
-    """The guess after a person was asked about what it assumes."""
-    for setting, words in guess.assumed.items():
-        click.echo(f"Not stated in the file: {words}.")
-        if setting == "horizontal":
-            ways = guess.section["directions"]
-            answer = _prompt(
-                "Horizontal angles, seen from above",
-                type=click.Choice(["clockwise", "counterclockwise"]),
-                default=ways["horizontal"],
-            )
-            guess = guess.but({"directions": ways | {"horizontal": answer}})
-        elif setting == "orientation":
-            answer = _prompt(
-                "Orientation (Euler capitals: about moving axes, small: about fixed axes)",
-                type=click.Choice(_CONVENTIONS),
-                default=guess.section["orientation"]["convention"],
-            )
-            guess = guess.but({"orientation": _orientation(answer)})
-        elif setting == "order":
-            order = _prompt("Order", type=click.Choice(["wxyz", "xyzw"]), default="wxyz")
-            guess = guess.but({"orientation": {"order": order}})
-        else:
-            units = ["mm", "m"] if setting == "length_unit" else ["deg", "rad"]
-            now = guess.section["orientation"]["unit"]
-            now = now if setting == "angle_unit" else guess.section[setting]
-            unit = _prompt("Unit", type=click.Choice(units), default=now)
-            changed = (
-                {"orientation": {"unit": unit}} if setting == "angle_unit" else {setting: unit}
-            )
-            guess = guess.but(changed)
-    return guess
-
-
-def _prompt(question: str, **how: object) -> str:
-    """The answer to a question. InputError where nobody is there to answer."""
-    from kinacc.errors import InputError, Problem
-
-    try:
-        return click.prompt(question, **how)
-    except click.Abort:
-        fix = "run it in a terminal, give the option, or --yes to take the guesses"
-        raise InputError(Problem(f"question: {question}", "was not answered", fix=fix)) from None
-
-
 def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]:
     """The robot as given, found by fitting, or as answered; None for a template. And why."""
     from kinacc.checks.which_robot import fitting
+    from kinacc.cli.init_questions import refuse_unanswered
     from kinacc.kinematics import robot as robots
     from kinacc.progress import reporting
 
@@ -264,10 +206,11 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     if ask:
         names = [n for n in robots.shipped() if robots.load(n).dh.joints == guess.joints]
         click.echo(f"Shipped robots of {guess.joints} axes: {', '.join(names)}.")
-        answer = _prompt(
-            "Robot (shipped name, robot file, URDF file, or 'new' for a template)",
-            default=found or "new",
-        )
+        question = "Robot (shipped name, robot file, URDF file, or 'new' for a template)"
+        try:
+            answer = click.prompt(question, default=found or "new")
+        except click.Abort:
+            refuse_unanswered(guess, {}, None)
         return (None, "a template to fill in") if answer == "new" else (answer, "as answered")
     if found is None:
         return None, "none of the shipped robots fits; a template to fill in"
@@ -452,6 +395,9 @@ def _tell(
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
     lines.append(f"orientation: {kind}{unit}{_turned(guess)}")
+    if guess.found.single:
+        named = (f"{name} ({each.column})" for name, each in guess.found.single.items())
+        lines.append(f"also read: {', '.join(named)}")
     for words in guess.assumed.values():
         lines.append(f"{_how(report)}: {words}")
     for names, why in guess.unused():

@@ -1,20 +1,23 @@
-"""What ``kinacc init`` asks where the names of a file leave open what was measured."""
+"""What ``kinacc init`` asks where a file leaves open what was measured, and how."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import NoReturn
 
 import click
 
 from kinacc.cli.file_options import ANSWERS
+from kinacc.cli.first_poses import in_words, poses_without_robot
 from kinacc.errors import InputError, Problem
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import Question
 from kinacc.measurements.intake.guess import Guess
 
-# Options that answer a choice, by its key.
+_CONVENTIONS = ("none", "quaternion", "rotation_vector", "XYZ", "ZYX", "xyz", "zyx", "ZYZ")
 _FREE = ("join", "clock_offset", "pulses_per_deg")  # answers that no list holds
 
 
@@ -103,3 +106,92 @@ def _open(path: str, question: Question) -> Problem:
         f"the names do not tell {question.about}: {question.why}: {readings}",
         fix=f"give {' or '.join(options)}",
     )
+
+
+# By what is assumed: what is asked, and the option that answers it.
+_QUESTIONS = {
+    "horizontal": ("which way horizontal angles count", "--horizontal"),
+    "orientation": ("how its orientations are written", "--orientation"),
+    "order": ("the order of the parts of its quaternions", "--orientation"),
+    "joint_unit": ("the unit of its joints", "--joint-unit"),
+    "length_unit": ("the unit of its positions", "--length-unit"),
+    "angle_unit": ("the unit of its orientations", "--angle-unit"),
+}
+
+
+def asked(guess: Guess, robot: str | None) -> Guess:
+    """The guess after a person was asked about what it assumes, with the first poses in view.
+
+    ``robot``: the one given, which needs no question. Raises InputError where nobody answers.
+    """
+    if guess.assumed:
+        with suppress(InputError):  # joints that slide are not to be read without their robot
+            click.echo("\n".join(in_words(poses_without_robot(guess))))
+    try:
+        return _by_person(guess)
+    except click.Abort:
+        refuse_unanswered(guess, guess.assumed, robot)
+
+
+def refuse_unanswered(guess: Guess, assumed: Mapping[str, str], robot: str | None) -> NoReturn:
+    """Raise InputError naming the options that answer what nobody answered."""
+    path = str(guess.section["path"])
+    problems = [
+        Problem(
+            path,
+            f"does not say {_QUESTIONS[each][0]}; the guess: {words}",
+            fix=f"give {_QUESTIONS[each][1]}, or --yes to take the guess",
+        )
+        for each, words in assumed.items()
+    ]
+    if robot is None:
+        fix = "give --robot, or --yes to take the one that fits"
+        problems.append(Problem(path, "does not say which robot was measured", fix=fix))
+    raise InputError(problems, "The questions were not answered, and nothing was written")
+
+
+def _by_person(guess: Guess) -> Guess:
+    for setting, words in guess.assumed.items():
+        click.echo(f"Not stated in the file: {_QUESTIONS[setting][0]}. Guess: {words}.")
+        if setting == "horizontal":
+            ways = guess.section["directions"]
+            answer = click.prompt(
+                "Horizontal angles, seen from above",
+                type=click.Choice(["clockwise", "counterclockwise"]),
+                default=ways["horizontal"],
+            )
+            guess = guess.but({"directions": ways | {"horizontal": answer}})
+        elif setting == "orientation":
+            answer = click.prompt(
+                "Orientation (Euler capitals: about moving axes, small: about fixed axes)",
+                type=click.Choice(_CONVENTIONS),
+                default=guess.section["orientation"]["convention"],
+            )
+            guess = guess.but({"orientation": orientation_of(answer)})
+        elif setting == "order":
+            order = click.prompt("Order", type=click.Choice(["wxyz", "xyzw"]), default="wxyz")
+            guess = guess.but({"orientation": {"order": order}})
+        else:
+            units = ["mm", "m"] if setting == "length_unit" else ["deg", "rad"]
+            now = guess.section["orientation"]["unit"]
+            now = now if setting == "angle_unit" else guess.section[setting]
+            unit = click.prompt("Unit", type=click.Choice(units), default=now)
+            changed = (
+                {"orientation": {"unit": unit}} if setting == "angle_unit" else {setting: unit}
+            )
+            guess = guess.but(changed)
+    return guess
+
+
+def orientation_of(word: str) -> dict:
+    """The settings that an answer or ``--orientation`` stands for; InputError for no such word."""
+    from kinacc.checks.turns import CONVENTIONS
+
+    if word in ("none", "quaternion", "rotation_vector"):
+        return {"kind": word}
+    if word == "quaternion_xyzw":
+        return {"kind": "quaternion", "order": "xyzw"}
+    if word in CONVENTIONS:
+        return {"kind": "euler", "convention": word}
+    allowed = f"none, quaternion, quaternion_xyzw, rotation_vector, {', '.join(CONVENTIONS)}"
+    raise InputError(Problem("--orientation", repr(word), allowed))
