@@ -270,3 +270,14 @@ def test_a_file_without_joints_names_its_columns_once_and_the_way_out(folder, tm
         assert done.exit_code == 2
         assert done.output.count("Bemerkung") == 1
         assert said in done.output
+
+
+def test_the_page_says_which_exported_file_has_the_instruments_base_and_the_targets(
+    folder, tmp_path
+):
+    assert call("export", folder, "--robot", "mh180", "--out", tmp_path).exit_code == 0
+    page = (Path(__file__).parents[2] / "docs/using-a-calibration.md").read_text(encoding="utf-8")
+    for key in ("base_in_instrument", "targets_in_last_dh_frame"):
+        assert f"`{key}`" in page
+        having = [each.suffix for each in tmp_path.iterdir() if key in each.read_text("utf-8")]
+        assert having == [".json"]
