@@ -387,17 +387,29 @@ def test_where_orientations_were_measured_their_held_out_errors_are_told(folder,
         assert numbers == pytest.approx(wanted, abs=6e-4)
         assert (line[0] in shown(folder)) == (model == best)
     assert "orientation" not in shown(measured, "--all")
+    assert "positions only" in shown(measured)
+    assert "positions only" not in shown(folder)
+
+
+def test_what_further_poses_would_settle_is_told_before_what_none_can():
+    from kinacc.calibration.blind_words import WEAK
+    from kinacc.calibration.summary import Fact
+    from kinacc.calibration.summary_words import _undetermined
+
+    texts = ["d of joint 1 is a convention", "a of joint 5 is one", f"y is like z {WEAK}"]
+    facts = [Fact("undetermined", "parameters", "statement", text=text) for text in texts]
+    assert _undetermined(facts, None, "more")[0] == texts[2]
 
 
 @pytest.mark.parametrize(
     ("tried", "folds", "told"),
     [
-        # Three reflectors at 60 poses carry order 7; 8 is the next that would be tried.
-        ((1, 2, 6), (6, 6), "VEC, order 6, the highest 60 configurations carry"),
-        ((1, 2, 4), (4, 4), "VEC, order 4, the highest allowed (vec.order_highest)"),
-        ((1, 2, 6), (2, 6), "VEC, order 6 (held out: 2 to 6), all the data carry"),
-        ((1, 2, 4), (1, 4), "VEC, order 4 (held out: 1 to 4), the most allowed"),
-        ((1, 2, 6), (2, 2), "VEC, order 2 "),
+        # Three reflectors at 60 poses carry order 13; 16 is the next that would be tried after 12.
+        ((1, 2, 12), (12, 12), "VEC, order 12, the highest 60 configurations carry"),
+        ((1, 2, 10), (10, 10), "VEC, order 10, the highest allowed (vec.order_highest)"),
+        ((1, 2, 12), (2, 12), "VEC, order 12 (held out: 2 to 12), all the data carry"),
+        ((1, 2, 10), (1, 10), "VEC, order 10 (held out: 1 to 10), the most allowed"),
+        ((1, 2, 12), (2, 2), "VEC, order 2 "),
     ],
 )
 def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(

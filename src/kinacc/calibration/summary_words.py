@@ -65,6 +65,8 @@ def _data(facts: Sequence[Fact]) -> list[str]:
     lines = [
         f"{counted(number['readings'], 'reading')} of {targets} at {poses}: {robot}, {of_what}"
     ]
+    if of(facts, "held_out_error") and not of(facts, "held_out_orientation_error"):
+        lines.append("positions only: how the tool is turned is judged nowhere on this page")
     if number["fitted"] < number["readings"]:
         rest = number["readings"] - number["fitted"]
         told = f"models fitted to {number['fitted']:.0f} of them, {rest:.0f} held out"
@@ -262,6 +264,7 @@ def _range(facts: Sequence[Fact]) -> list[str]:
 
 def _undetermined(facts: Sequence[Fact], most: int | None, more: str) -> list[str]:
     told = [each.text for each in facts if each.topic == "undetermined"]
+    told.sort(key=lambda text: not weak([text]))  # first what further poses would settle
     shown = _first(told, most, more) or ["nothing: the poses determine every parameter"]
     if not weak(shown):
         return shown

@@ -167,7 +167,7 @@ class Commands(Lazy):
                 facts = [asdict(each) for each in error.problems]
                 click.echo(json.dumps({"problems": facts}, indent=1))
         except Terminated:
-            code, said = 143, "stopped by the system"
+            code, said = 143, "stopped by the system; what was finished is kept"
         except KeyboardInterrupt:
             code, said = 130, "stopped"
         except MemoryError as error:

@@ -111,7 +111,7 @@ def pairs(points: RawTable, joints: RawTable, how: Join) -> tuple[np.ndarray, tu
         return row, (*alone, *_left(joints, spare, points, key=how.key))
     row, moving = by_time(points, joints, how)
     none = np.flatnonzero((row < 0) & ~moving)
-    notes = [*_left(points, none, joints, "no joints at the time of")]
+    notes = [*_left(points, none, joints, "no joints at their time")]
     if moving.any():
         lines = points.rows_in_words(np.flatnonzero(moving))
         notes.append(f"{points.path}: the arm was moving at {lines}, which are left out")
@@ -122,7 +122,7 @@ def _left(
     table: RawTable,
     rows: np.ndarray,
     other: RawTable,
-    what: str = "nothing belongs to",
+    what: str = "no partner",
     key: str | None = None,
 ) -> list[str]:
     """Rows of a table that the other has no partner of, by their lines and names."""
@@ -130,7 +130,10 @@ def _left(
         return []
     names = first_few([str(table.columns[key][row]).strip() for row in rows], 5) if key else ""
     named = f", {key} {names}" if key else ""
-    return [f"{table.path}: {what} {table.rows_in_words(rows)}{named} ({other.path})"]
+    many = len(rows) > 1
+    have = f"{len(rows)} row{'s' if many else ''} of {table.path} {'have' if many else 'has'}"
+    left = f"{'are' if many else 'is'} left out: {table.rows_in_words(rows)}{named}"
+    return [f"{have} {what} in {other.path} and {left}"]
 
 
 def by_name(points: RawTable, joints: RawTable, how: Join) -> np.ndarray:

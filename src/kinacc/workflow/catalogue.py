@@ -190,7 +190,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "dh",
-            "fitting the DH model by least squares (Table II)",
+            "fitting the DH model by least squares",
             ("measurements", "vec_model", "vec_frames"),
             ("dh_model", "frames", "dh_fit", "dh_covariance", "dh_identified"),
             (
@@ -208,7 +208,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage(
             "residuals",
-            "comparing models and measurements, at held-out poses too (Tables I and III)",
+            "comparing models and measurements, at held-out poses too",
             ("measurements", *_MODELS, "vec_orders"),
             ("residuals", "pose_errors", "model_selection", "joint_bias", "worst_rows"),
             ("robot", "calibration"),

@@ -161,7 +161,8 @@ def _dh_table(
     notes = ["One standard deviation behind ±."]
     if blind:
         notes.append(
-            "† shares a direction the poses do not determine; along it the value is nominal."
+            "† the poses show it only together with others: this value is one of many that fit as "
+            "well."
         )
     notes += ["Fixed: not fitted, the value is nominal."] if held else []
     notes += [f"Left open by the poses: {'; '.join(unseen)}."] if unseen else []
