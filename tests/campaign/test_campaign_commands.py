@@ -25,7 +25,6 @@ from kinacc.kinematics.model import JointState
 from kinacc.workflow.verification.conformity import check_file
 
 SIGMA_MM = 0.05
-COMMANDS = ("start", "next", "record", "leave-out", "strike", "status", "report")
 
 
 @pytest.fixture(scope="module")
@@ -87,13 +86,6 @@ def refused(folder, *words):
     assert "Traceback" not in done.output
     assert files_of(folder) == before
     return done.output
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_help_has_an_example(name):
-    shown = call("campaign", name, "--help")
-    assert shown.exit_code == 0
-    assert f"kinacc campaign {name} " in shown.output.split("Example:")[1]
 
 
 def test_a_budget_below_the_candidates_is_told_what_more_would_bring(calibration, tmp_path):

@@ -36,6 +36,22 @@ def folder(study, tmp_path, monkeypatch):
     return "results/mh180"
 
 
+def calibrated(base, accept=""):
+    """Results of ``own.csv`` in a folder; ``accept``: findings of its check, with reasons."""
+    (base / "own.yaml").write_text(
+        "measurements: {folds: 4}\ndatasets:\n  own:\n"
+        "    calibration: {base_and_tool: estimated, vec: {order: 1}, dh: {fit_to: measurements}}\n"
+        "    robot: irb120\n    evaluation: {space: measured}\n"
+        f"    data_check: {{accept: {{{accept}}}}}\n"
+        "    measurements: {source: file, file: {path: own.csv, orientation: {kind: none}}}\n"
+    )
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
+        words = ("--config", base / "own.yaml", "--results", base / "results")
+        done = call("run", stage, *words)
+        assert done.exit_code == 0, done.output
+    return base / "results" / "own"
+
+
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     """Results of a measured arm with one joint that hardly moves, and a file with an outlier."""
@@ -49,18 +65,7 @@ def measured(tmp_path_factory):
     lines = [",".join([*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])]
     lines += [",".join(f"{value:.9f}" for value in row) for row in np.hstack([q, place])]
     (base / "own.csv").write_text("\n".join(lines) + "\n")
-    (base / "own.yaml").write_text(
-        "measurements: {folds: 4}\ndatasets:\n  own:\n"
-        "    calibration: {base_and_tool: estimated, vec: {order: 1}, dh: {fit_to: measurements}}\n"
-        "    robot: irb120\n    evaluation: {space: measured}\n"
-        "    data_check: {accept: {outliers: left in on purpose, few_poses: a test}}\n"
-        "    measurements: {source: file, file: {path: own.csv, orientation: {kind: none}}}\n"
-    )
-    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
-        words = ("--config", base / "own.yaml", "--results", base / "results")
-        done = call("run", stage, *words)
-        assert done.exit_code == 0, done.output
-    return base / "results" / "own"
+    return calibrated(base, accept="outliers: left in on purpose, few_poses: a test")
 
 
 @pytest.fixture(scope="module")
@@ -76,17 +81,7 @@ def reflectors(tmp_path_factory):
     names += [f"m{name}_{axis}_mm" for name in "ABC" for axis in "xyz"]
     rows = np.hstack([q, *places]) + np.hstack([np.zeros((60, 6)), draw.normal(0, 0.05, (60, 9))])
     np.savetxt(base / "own.csv", rows, "%.9f", ",", header=",".join(names), comments="")
-    (base / "own.yaml").write_text(
-        "measurements: {folds: 4}\ndatasets:\n  own:\n"
-        "    calibration: {base_and_tool: estimated, vec: {order: 1}, dh: {fit_to: measurements}}\n"
-        "    robot: irb120\n    evaluation: {space: measured}\n"
-        "    measurements: {source: file, file: {path: own.csv, orientation: {kind: none}}}\n"
-    )
-    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
-        words = ("--config", base / "own.yaml", "--results", base / "results")
-        done = call("run", stage, *words)
-        assert done.exit_code == 0, done.output
-    return base / "results" / "own"
+    return calibrated(base)
 
 
 def shown(*words):

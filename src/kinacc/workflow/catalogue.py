@@ -118,15 +118,36 @@ _READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.
 _ATTITUDE = ("evaluation.reference_orientation_deg", "evaluation.reference_frame")
 _CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
 _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
-_WHOLE_STUDY = (
-    *("seed", "robot", "measurements", "calibration", "evaluation", "map", "study", "histories"),
-    "robustness",
-)
+_FITTED_AND_MAPPED = ("seed", "robot", "measurements", "calibration", "evaluation", "map")
+_WHOLE_STUDY = (*_FITTED_AND_MAPPED, "study", "histories", "robustness")
 _MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 _FURTHER = tuple(f"{kind}_model" for kind in FITTED if kind not in ALWAYS)
 _MODEL = "kinacc.artifacts.error_models:MODELS[{models}]"
 _ESTIMATOR = "kinacc.artifacts.error_models:ESTIMATORS"
 _FITS = (_ROBOT, _MODEL, f"{_ESTIMATOR}[{{fits}}]")
+
+
+def _over_arms(
+    name: str,
+    message: str,
+    settings: tuple[str, ...],
+    outputs: tuple[str, ...] = (),
+    draws: tuple[str, ...] = (_DRAWS,),
+) -> Stage:
+    """A stage on request that goes through fits and more with many synthetic arms, in parts."""
+    return Stage(
+        name,
+        message,
+        (),
+        outputs or (name,),
+        settings,
+        files=("robot",),
+        uses=(_ROBOT, *draws, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
+        scattered=True,
+        on_request=True,
+        shared=True,
+    )
+
 
 STAGES: dict[str, Stage] = {
     stage.name: stage
@@ -363,17 +384,10 @@ STAGES: dict[str, Stage] = {
             ("robot",),
             optional=("accuracy_map", "robustness"),
         ),
-        Stage(
+        _over_arms(
             "robustness_chunk",
             "going through fits, study and claims with further draws of the arm",
-            (),
-            ("robustness_chunk",),
             _WHOLE_STUDY,
-            files=("robot",),
-            uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
-            scattered=True,
-            on_request=True,
-            shared=True,
         ),
         Stage(
             "robustness_table",
@@ -382,25 +396,11 @@ STAGES: dict[str, Stage] = {
             ("robustness",),
             on_request=True,
         ),
-        Stage(
+        _over_arms(
             "map_readings_chunk",
             "judging the sentences on Fig. 3 under another reading, over arms drawn anew",
-            (),
-            ("map_readings_chunk",),
-            (
-                "seed",
-                "robot",
-                "measurements",
-                "calibration",
-                "evaluation",
-                "map",
-                "map_readings",
-            ),
-            files=("robot",),
-            uses=(_ROBOT, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
-            scattered=True,
-            on_request=True,
-            shared=True,
+            (*_FITTED_AND_MAPPED, "map_readings"),
+            draws=(),
         ),
         Stage(
             "map_readings",
@@ -416,17 +416,11 @@ STAGES: dict[str, Stage] = {
             ("dataset",),
             on_request=True,
         ),
-        Stage(
+        _over_arms(
             "choices_chunk",
             "going through fits, study and claims with every choice the paper leaves open",
-            (),
-            ("choices_chunk", "choices_factors_chunk"),
             (*_WHOLE_STUDY, "choices"),
-            files=("robot",),
-            uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
-            scattered=True,
-            on_request=True,
-            shared=True,
+            ("choices_chunk", "choices_factors_chunk"),
         ),
         Stage(
             "choices_table",
