@@ -1,0 +1,113 @@
+"""Pictures of a page, drawn by Bokeh in the reader's browser: one style, one way of embedding."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import bokeh
+import numpy as np
+from bokeh.document import Document
+from bokeh.models import ColumnDataSource, HoverTool, Plot
+from bokeh.plotting import figure as bokeh_figure
+
+# Okabe and Ito's colours, of which those too light on one of the two backgrounds are left out.
+BLUE, ORANGE, GREEN, VERMILION, PURPLE, GREY = (
+    "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#8a8a8a",
+)  # fmt: skip
+COLOURMAP = "Viridis256"
+_HEIGHT_PX = 300
+_ID = re.compile(r'"(p\d+)"')
+
+
+def library() -> str:
+    """The drawing library as text, as it comes with the package."""
+    return (Path(bokeh.__file__).parent / "server/static/js/bokeh.min.js").read_text("utf-8")
+
+
+def source(name: str, columns: Mapping[str, np.ndarray]) -> ColumnDataSource:
+    """Columns of a picture's data under a name; numbers in single precision, as a screen needs."""
+    small = {
+        key: np.asarray(values, dtype=np.float32)
+        if np.asarray(values).dtype.kind == "f"
+        else np.asarray(values)
+        for key, values in columns.items()
+    }
+    plain = {
+        key: values.tolist() if values.dtype.kind in "OUS" else values
+        for key, values in small.items()
+    }
+    return ColumnDataSource(plain, name=name)
+
+
+def figure(
+    x_label: str,
+    y_label: str,
+    title: str = "",
+    height_px: int = _HEIGHT_PX,
+    hover: Sequence[tuple[str, str]] = (),
+    tools: str = "pan,box_zoom,tap,reset,save",
+    **more: object,
+) -> bokeh_figure:
+    """An empty picture as wide as its place, with what hovering over a point says."""
+    plot = bokeh_figure(
+        height=height_px,
+        sizing_mode="stretch_width",
+        title=title or None,
+        x_axis_label=x_label,
+        y_axis_label=y_label,
+        tools=tools,
+        toolbar_location="right",
+        **more,
+    )
+    plot.toolbar.logo = None
+    plot.toolbar.autohide = True
+    plot.background_fill_color = plot.border_fill_color = None
+    plot.outline_line_color = None
+    plot.min_border_right = 12
+    if hover:
+        plot.add_tools(HoverTool(tooltips=list(hover)))
+    return plot
+
+
+def from_zero(plot: bokeh_figure) -> None:
+    """Let the axis of values begin at zero, so that sizes can be compared by eye."""
+    plot.y_range.update(start=0.0)
+
+
+def documents(
+    plots: Sequence[Plot],
+) -> tuple[dict[str, object], list[tuple[str, str]]]:
+    """Documents as plain values by name, and for each plot its document and its root there.
+
+    Plots that share data stand in one document, so that data is embedded once and a point that is
+    selected in one is selected in all. Names count from 1 whatever was drawn before.
+    """
+    groups: list[list[Plot]] = []
+    for plot in plots:
+        shared = {each.id for each in _sources(plot)}
+        near = [
+            group for group in groups if any(shared & {s.id for s in _sources(p)} for p in group)
+        ]
+        if near:
+            near[0].append(plot)
+        else:
+            groups.append([plot])
+    found: dict[str, object] = {}
+    place: dict[str, tuple[str, str]] = {}
+    for number, group in enumerate(groups, start=1):
+        document = Document()
+        for plot in group:
+            document.add_root(plot)
+        text = json.dumps(document.to_json(deferred=False))
+        names = {name: f"k{number}-{i}" for i, name in enumerate(dict.fromkeys(_ID.findall(text)))}
+        text = _ID.sub(lambda match, names=names: f'"{names[match[1]]}"', text)
+        found[f"d{number}"] = json.loads(text)
+        place |= {plot.id: (f"d{number}", names[plot.id]) for plot in group}
+    return found, [place[plot.id] for plot in plots]
+
+
+def _sources(plot: Plot) -> list[ColumnDataSource]:
+    return list(plot.select({"type": ColumnDataSource}))

@@ -1,0 +1,125 @@
+// Draws the pictures when they come near the window, in the colours of the page; sets what a
+// control says; tells what is selected.
+(() => {
+  "use strict";
+  const {documents, places} = JSON.parse(document.getElementById("pictures").textContent);
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  let printing = false;
+  const opened = {};   // documents by name
+  const drawn = {};    // promises by document
+
+  const colours = () => dark.matches && !printing
+    ? {ink: "#ececf0", muted: "#a9a9b2", line: "#3a3b42", paper: "#16171a"}
+    : {ink: "#1d1d1f", muted: "#5a5a5f", line: "#e2e2e6", paper: "#ffffff"};
+
+  function paint(plot) {
+    const {ink, muted, line, paper} = colours();
+    const text = (model, prefix) => { model[`${prefix}_text_color`] = ink; };
+    for (const side of ["left", "right", "above", "below", "center"]) {
+      for (const part of plot[side]) {
+        if (part.type === "Grid") part.grid_line_color = line;
+        if (part.type.endsWith("Axis")) {
+          text(part, "axis_label"); text(part, "major_label");
+          part.axis_label_text_font_style = "normal";
+          part.axis_line_color = part.major_tick_line_color = muted;
+          part.minor_tick_line_color = null;
+        }
+        if (part.type === "Legend") {
+          text(part, "label"); part.background_fill_color = paper;
+          part.background_fill_alpha = 0.8; part.border_line_color = null;
+        }
+        if (part.type === "ColorBar") {
+          text(part, "title"); text(part, "major_label"); part.background_fill_color = null;
+        }
+        if (part.type === "Title") part.text_color = ink;
+        if (part.type === "Label" || part.type === "LabelSet") part.text_color = ink;
+      }
+    }
+    if (plot.title) plot.title.text_color = ink;
+  }
+
+  function open(name) {
+    opened[name] ??= Bokeh.require("document").Document.from_json(documents[name]);
+    return opened[name];
+  }
+
+  function root(key) {
+    const {document: name, root: id} = places[key];
+    return open(name).roots().find((each) => each.id === id);
+  }
+
+  function data(plot) {
+    return plot.renderers.map((each) => each.data_source).find((each) => each.name);
+  }
+
+  function shown(value) {
+    if (typeof value !== "number") return String(value);
+    if (!Number.isFinite(value)) return "none";
+    return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(4)));
+  }
+
+  function tell(key, source) {
+    const place = document.getElementById(`details-${key}`);
+    const row = source.selected.indices[0];
+    if (!place || row === undefined) return;
+    const names = Object.entries(places[key].details).filter(([name]) => source.data[name]);
+    const said = names.map(([name, words]) => words.replace("{}", shown(source.data[name][row])));
+    const more = source.selected.indices.length - 1;
+    place.textContent = said.join("; ") + (more > 0 ? `; and ${more} more at the same place` : "");
+  }
+
+  // Pictures that share data stand in one document, and are drawn together.
+  function draw(key) {
+    const name = places[key].document;
+    drawn[name] ??= (async () => {
+      const keys = Object.keys(places).filter((each) => places[each].document === name);
+      const elements = open(name).roots().map((plot) => {
+        paint(plot);
+        const own = keys.find((each) => places[each].root === plot.id);
+        return document.getElementById(`plot-${own}`);
+      });
+      await Bokeh.embed.add_document_standalone(open(name), elements[0], elements, false);
+      for (const each of keys) {
+        const source = data(root(each));
+        source.selected.properties.indices.change.connect(() => tell(each, source));
+      }
+    })();
+    return drawn[name];
+  }
+
+  const everything = () => Promise.all(Object.keys(places).map(draw));
+  const repaint = () => Object.keys(drawn).forEach((name) => open(name).roots().forEach(paint));
+
+  dark.addEventListener("change", repaint);
+  window.addEventListener("beforeprint", () => { printing = true; everything(); repaint(); });
+  window.addEventListener("afterprint", () => { printing = false; repaint(); });
+
+  const near = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (entry.isIntersecting) {
+        near.unobserve(entry.target);
+        draw(entry.target.id.replace("plot-", ""));
+      }
+    }
+  }, {rootMargin: "600px"});
+  document.querySelectorAll(".plot").forEach((each) => near.observe(each));
+
+  document.addEventListener("change", (event) => {
+    const select = event.target.closest("select[data-picture]");
+    if (!select) return;
+    const {document: name} = places[select.dataset.picture];
+    for (const [model, property, value] of JSON.parse(select.value)) {
+      open(name).get_model_by_name(model)[property] = value;
+    }
+  });
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest("button[data-pick]");
+    if (!button) return;
+    const key = button.dataset.picture;
+    document.getElementById(`plot-${key}`).scrollIntoView({block: "center"});
+    draw(key).then(() => {
+      data(root(key)).selected.indices = [Number(button.dataset.pick)];
+    });
+  });
+  window.kinacc = {everything, root, data};
+})();
