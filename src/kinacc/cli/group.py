@@ -217,6 +217,7 @@ SECTIONS = {
     },
     "A calibrated arm": {
         "fitted": "what the fits are worth, and what the poses leave open",
+        "report": "one page of it all, to read, mail and keep",
         "predict": "joints to the pose of the tool, with uncertainty",
         "compensate": "poses to the joints that put the tool there",
         "export": "write the model for other programs",

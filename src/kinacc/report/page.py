@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from bokeh.models import Plot
 
 TEMPLATES = "templates"
+_DIGITS = 16  # of a digest, as shown
 
 
 @dataclass(frozen=True)
@@ -129,15 +130,18 @@ class FirstScreen:
 
 @dataclass(frozen=True)
 class Page:
-    """A whole page; ``marks`` are what it was made from, for machines."""
+    """A whole page: the answer, then the evidence."""
 
     first: FirstScreen
     sections: tuple[Section, ...]
-    marks: Mapping[str, str] = field(default_factory=dict)
 
 
-def html(page: Page) -> str:
-    """The page as one file: the same bytes for the same page."""
+def html(page: Page, marks: Mapping[str, object], read: Mapping[str, str]) -> str:
+    """The page as one file: the same bytes for the same page.
+
+    ``marks`` are its provenance and ``read`` the digests of the files that were read for it, by
+    what they are; both stand at its end.
+    """
     from kinacc.report.pictures import documents, library
 
     pictures = list(_pictures(page.sections))
@@ -148,6 +152,8 @@ def html(page: Page) -> str:
     }
     return _template().render(
         page=page,
+        marks={name: str(value) for name, value in marks.items()},
+        read={name: digest[:_DIGITS] for name, digest in read.items()},
         style=_text("page.css"),
         script=_text("page.js"),
         library=library() if pictures else "",

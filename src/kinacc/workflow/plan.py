@@ -14,10 +14,12 @@ from pathlib import Path
 
 from kinacc.artifacts.error_models import ERROR_MODELS, asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
+from kinacc.campaign.journal import JOURNAL, PLAN, of_results
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.workflow.catalogue import (
     FIGURE_FOLDER,
     MAP_READINGS,
+    PAGE,
     STAGES,
     TOURNAMENT,
     Stage,
@@ -250,6 +252,8 @@ class Plan:
         if stage.is_figure:
             folder = f"{self.results}/{dataset}/{FIGURE_FOLDER}"
             return {kind: f"{folder}/{name}.{kind}" for kind in self.formats}
+        if stage.leaves == PAGE:
+            return {"html": f"{self.results}/{dataset}/{name}.html"}
         return {artefact: self._table(artefact, dataset, part) for artefact in stage.outputs}
 
     def part_names(self, name: str, dataset: str) -> list[str | None]:
@@ -366,6 +370,8 @@ class Plan:
                 for role, path in self._files(stage, name).items()
             }
         config, found = self.datasets[dataset], {}
+        if stage.leaves == PAGE:
+            found |= campaign_files(Path(self.results) / dataset)
         for path in stage.files:
             value: object = config
             for key in path.split("."):
@@ -382,6 +388,16 @@ class Plan:
         if self.files_absolute:
             return {role: os.path.abspath(file) for role, file in found.items()}
         return found
+
+
+def campaign_files(results: Path) -> dict[str, str]:
+    """Files of the campaigns on the calibration in a results folder, by role."""
+    found = {}
+    for number, campaign in enumerate(of_results(results), 1):
+        found[f"campaign_{number}_file"] = str(campaign / PLAN)
+        if (campaign / JOURNAL).is_file():
+            found[f"readings_{number}_file"] = str(campaign / JOURNAL)
+    return found
 
 
 def label(name: str, dataset: str, part: str | None = None) -> str:
