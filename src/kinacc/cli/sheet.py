@@ -18,6 +18,7 @@ from kinacc.cli.output import plain
 from kinacc.config.names import in_csv
 
 _SHOWN_ROWS = 24
+_PLAIN_UNITS = ("mm", "mrad", "rad", "deg", "kg")
 _NOTHING = 5e-5  # less is no digit of the four shown after the point
 
 
@@ -33,6 +34,12 @@ class Field:
     unit: str = ""
     meaning: str = ""
     on_screen: bool = True
+
+    @property
+    def heading(self) -> str:
+        """The name, with the unit where it does not say it: q1 [rad]."""
+        told = self.unit not in _PLAIN_UNITS or self.name.endswith(f"_{self.unit}")
+        return self.name if told else f"{self.name} [{self.unit}]"
 
 
 @dataclass(frozen=True)
@@ -55,10 +62,10 @@ class Sheet:
         return json.dumps({**plain(self.facts), "units": units, "rows": rows}, indent=1)
 
     def as_csv(self) -> str:
-        """Column names, then one line per row; empty cells for none."""
+        """Column names with units, then one line per row; empty cells for none."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow([field.name for field in self.fields])
+        writer.writerow([in_csv(field.heading) for field in self.fields])
         for i in range(len(self)):
             writer.writerow([_cell(field.values[i]) for field in self.fields])
         return out.getvalue()

@@ -1,0 +1,313 @@
+"""Pictures for ``kinacc show --plot``: curves by plotext, maps of blocks or of characters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rich.style import Style
+from rich.text import Text
+
+from kinacc.artifacts.error_models import MEASURED, NOMINAL, model_name
+from kinacc.cli.screen import Screen, decimals_of, number
+from kinacc.cli.show_table import Shown
+from kinacc.errors import InputError, Problem
+
+_LEVELS = ".:-=+*#%@"
+# Viridis, from dark to bright: also told apart without seeing red or green.
+_COLOURS = (
+    *("#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58"),
+    *("#b5de2b", "#fde725"),
+)
+_MARKS = "oxz+*#@%"  # of lines, where no colour tells them apart
+_BINS = 40
+_HEIGHT, _LOW = 18, 9
+Columns = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Points x (n,), y (n,), joined where there are more than one, and what they are."""
+
+    label: str
+    x: np.ndarray
+    y: np.ndarray
+
+
+def drawn(shown: Shown, columns: str | None) -> Screen:
+    """The picture of a table for the terminal that is there. InputError where it has none.
+
+    ``columns``, as --columns names them, choose the error that a map shows.
+    """
+    name = shown.artefact.name if shown.artefact else ""
+    if name not in PICTURES:
+        raise InputError(
+            Problem(
+                f"{shown.path}",
+                "there is no picture of this table for the terminal",
+                ", ".join(PICTURES),
+                "without --plot it is shown as a table",
+            )
+        )
+    table = {each.name: each.values for each in shown.sheet.fields}
+    table = {name: values if values.dtype.kind != "O" else _numbers(values)
+             for name, values in table.items()}  # fmt: skip
+    screen = Screen.here()
+    screen.words(shown.sheet.title, "bold")
+    PICTURES[name](screen, table, columns)
+    return screen
+
+
+def _numbers(values: np.ndarray) -> np.ndarray:
+    """Whole numbers with gaps as floats with NaN; texts as they are."""
+    if any(isinstance(each, str) for each in values):
+        return values
+    return np.array([np.nan if each is None else each for each in values], dtype=np.float64)
+
+
+def _map(screen: Screen, table: Columns, columns: str | None) -> None:
+    """Heat maps of the largest error, a panel per slice, all on one scale."""
+    errors = {"position_max_mm": "position", "orientation_max_mrad": "orientation"}
+    asked = (columns or "").replace(" ", "").split(",")
+    column = next((each for each in asked if each in errors), "position_max_mm")
+    unit = column.rpartition("_")[2]
+    values = table[column]
+    known = values[np.isfinite(values)]
+    if not known.size:
+        screen.words("no cell of these is reached")
+        return
+    low, high = float(known.min()), float(known.max())
+    decimals = decimals_of(known)
+    blocks = screen.has_colours and screen.has_unicode
+    screen.words(f"largest {errors[column]} error in {unit}; across radius, up height, in mm")
+    angles = np.unique(table["slice_deg"])
+    panels = []
+    for angle in angles:
+        mine = table["slice_deg"] == angle
+        panels.append(
+            _panel(
+                f"slice {angle:g} deg",
+                table["radius_mm"][mine],
+                table["height_mm"][mine],
+                values[mine],
+                lambda grid: (_in_blocks if blocks else _in_characters)(grid, low, high),
+                (lambda size: f"max {number(size, min(decimals, 3))}"),
+            )
+        )
+    margin = max(len(f"{each:g}") for each in np.unique(table["height_mm"])) + 1
+    beside = max(1, (screen.width - margin + 2) // (max(len(each[0]) for each in panels) + 2))
+    for first in range(0, len(panels), beside):
+        heights = table["height_mm"]
+        screen.picture(_beside(panels[first : first + beside], heights, margin))
+    if blocks:
+        bar = Text.assemble(*(("    ", Style(bgcolor=each)) for each in _COLOURS))
+        screen.picture(Text.assemble(f"{number(low, decimals)} ", bar, f" {number(high, decimals)}"))
+    else:
+        step = number((high - low) / len(_LEVELS), max(decimals, 2))
+        least, most = number(low, decimals), number(high, decimals)
+        screen.picture(Text(f"{least} {_LEVELS} {most} {unit}, {step} a step"))
+    if known.size < values.size:
+        screen.words("blank: not reached")
+
+
+def _panel(
+    name: str,
+    radius: np.ndarray,
+    height: np.ndarray,
+    values: np.ndarray,
+    shaded: Callable[[np.ndarray], list[Text]],
+    said: Callable[[float], str],
+) -> list[Text]:
+    """Lines of one slice: its name and largest error, the map, its radii."""
+    radii, heights = np.unique(np.round(radius, 3)), np.unique(np.round(height, 3))
+    grid = np.full((heights.size, radii.size), np.nan)
+    places = np.searchsorted(heights, np.round(height, 3)), np.searchsorted(radii, np.round(radius, 3))
+    grid[places] = values
+    lines = shaded(grid)
+    known = values[np.isfinite(values)]
+    head = f"{name}, {said(known.max())}" if known.size else f"{name}, none"
+    ends = f"{radii[0]:g}", f"{radii[-1]:g}"
+    foot = ends[0] + ends[1].rjust(radii.size - len(ends[0]))
+    width = max(len(head), radii.size, len(foot))
+    panel = [Text(head), *lines, Text(foot)]
+    for line in panel:
+        line.pad_right(width - len(line))
+    return panel
+
+
+def _beside(panels: Sequence[list[Text]], heights: np.ndarray, margin: int) -> Text:
+    """Panels side by side, heights at the left of the first."""
+    rows = max(map(len, panels))
+    side = [""] * rows
+    side[1], side[rows - 2] = f"{heights.max():g}", f"{heights.min():g}"
+    lines = []
+    for row in range(rows):
+        cells = [each[row] if row < len(each) else Text(" " * len(each[0])) for each in panels]
+        lines.append(Text(side[row].rjust(margin - 1) + " ") + Text("  ").join(cells))
+    return Text("\n").join(lines)
+
+
+def _pairs(grid: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Rows of a grid two by two, the highest first; NaN below the last of an odd number."""
+    rows = [*grid[::-1]]
+    rows += [np.full(grid.shape[1], np.nan)] * (len(rows) % 2)
+    return list(zip(rows[::2], rows[1::2], strict=True))
+
+
+def _level(value: float, low: float, high: float, count: int) -> int:
+    share = (value - low) / (high - low) if high > low else 0.0
+    return min(int(share * count), count - 1)
+
+
+def _in_blocks(grid: np.ndarray, low: float, high: float) -> list[Text]:
+    """Two cells a character, one above the other, as colours."""
+
+    def colour(value: float) -> str | None:
+        return None if np.isnan(value) else _COLOURS[_level(value, low, high, len(_COLOURS))]
+
+    def cell(upper: float, lower: float) -> tuple[str, Style]:
+        above, below = colour(upper), colour(lower)
+        if above is None:
+            return (" ", Style()) if below is None else ("▄", Style(color=below))
+        return "▀", Style(color=above, bgcolor=below)
+
+    return [
+        Text.assemble(*(cell(*each) for each in zip(upper, lower, strict=True)))
+        for upper, lower in _pairs(grid)
+    ]
+
+
+def _in_characters(grid: np.ndarray, low: float, high: float) -> list[Text]:
+    """Two cells a character, the larger of them as a level."""
+
+    def cell(upper: float, lower: float) -> str:
+        if np.isnan(upper) and np.isnan(lower):
+            return " "
+        return _LEVELS[_level(float(np.nanmax([upper, lower])), low, high, len(_LEVELS))]
+
+    return [
+        Text("".join(cell(*each) for each in zip(upper, lower, strict=True)))
+        for upper, lower in _pairs(grid)
+    ]
+
+
+def _errors(screen: Screen, table: Columns, _: str | None) -> None:
+    """Histograms of position errors, held out where they are, one per comparison."""
+    size = np.sqrt(sum(table[f"e{axis}_mm"] ** 2 for axis in "xyz"))
+    held_out = table["estimate"] == "cross_validated"
+    kept = held_out if held_out.any() else ~held_out
+    names = list(dict.fromkeys(table["comparison"][kept]))
+    measured = [name for name in names if name.endswith(f"_vs_{MEASURED}")] or names
+    measured.sort(key=lambda name: not name.startswith(NOMINAL))
+    largest = max(size[kept & (table["comparison"] == name)].max() for name in measured)
+    where = "at held-out poses" if held_out.any() else "at poses the models were fitted to"
+    screen.words(f"number of readings by position error in mm, {where}")
+    edges = np.linspace(0.0, float(largest) * (1 + 1e-9) or 1.0, _BINS + 1)
+    middles = (edges[1:] + edges[:-1]) / 2
+    counts = {}
+    for name in measured:
+        mine = size[kept & (table["comparison"] == name)]
+        counts[name] = mine, np.histogram(mine, edges)[0]
+    for name, (mine, count) in counts.items():
+        model, _, of = name.partition("_vs_")
+        says = f"{model_name(model)} against {model_name(of)}: {mine.size:,} readings, mean "
+        says += f"{mine.mean():.3f}, 99 % below {np.quantile(mine, 0.99):.3f}, largest {mine.max():.3f}"
+        screen.words(says, "bold")
+        figure = _figure(screen, _LOW)
+        bars = figure.bar(middles.tolist(), count.tolist(), width=1, **_filled(screen))
+        figure.draw(bars)
+        figure.ruler("x").lim(0.0, float(edges[-1]))
+        _add(screen, figure)
+
+
+def _study(screen: Screen, table: Columns, _: str | None) -> None:
+    """Mean assessed accuracy of every assessor against noise, and the true accuracy."""
+    lines = []
+    for name in dict.fromkeys(table["assessor"]):
+        mine = table["assessor"] == name
+        lines.append(_Line(str(name), table["noise_mm"][mine], table["mean_mm"][mine]))
+    true = table["mean_mm"] - table["bias_mm"]
+    noise = np.unique(table["noise_mm"])
+    truth = np.array([true[table["noise_mm"] == each].mean() for each in noise])
+    lines.append(_Line("true accuracy", noise, truth))
+    screen.words("mean assessed accuracy in mm against noise, standard deviation per axis in mm")
+    _curves(screen, lines)
+
+
+def _orders(screen: Screen, table: Columns, _: str | None) -> None:
+    """Held-out error against the order of the VEC model; the chosen order."""
+    kept = np.isfinite(table["held_out_rms_mm"])
+    if kept.sum() < 2:
+        orders = ", ".join(f"{each:g}" for each in np.unique(table["order"]))
+        screen.words(f"order {orders} was given, and no other was tried: there is no curve")
+        return
+    lines = []
+    folds = table["fold"]
+    for fold in [np.nan, *np.unique(folds[np.isfinite(folds)])]:
+        mine = kept & ((folds == fold) | (np.isnan(folds) & np.isnan(fold)))
+        if np.isnan(fold) and mine.any():
+            best = mine & (table["chosen"] == 1)
+            lines.append(_Line("all rows", table["order"][mine], table["held_out_rms_mm"][mine]))
+            lines.append(_Line("chosen", table["order"][best], table["held_out_rms_mm"][best]))
+    screen.words("position rms in mm at rows left out of the fit, against the order")
+    _curves(screen, lines)
+
+
+def _bounds(screen: Screen, table: Columns, _: str | None) -> None:
+    """Bounds on the largest error as readings came in, of every target."""
+    lines = []
+    for target in dict.fromkeys(table["target"]):
+        mine = (table["target"] == target) & (table["share"] == table["share"].max())
+        for column, words in (("upper_mm", "upper bound"), ("lower_mm", "lower bound")):
+            known = mine & np.isfinite(table[column])
+            if known.any():
+                label = f"{words}, {target}"
+                lines.append(_Line(label, table["readings"][known], table[column][known]))
+    if not lines:
+        screen.words("no bound could be stated so far")
+        return
+    screen.words("bounds on the largest error in mm, against the number of readings")
+    _curves(screen, lines)
+
+
+def _curves(screen: Screen, lines: Sequence[_Line]) -> None:
+    """Lines in one picture, told apart by colour, or by their letters where there is none."""
+    figure = _figure(screen, _HEIGHT)
+    by_marks = not (screen.has_colours and screen.has_unicode)
+    for mark, line in zip(_MARKS, lines, strict=False):
+        more = {"marker": mark} if by_marks else {"marker": "●" if len(line.x) == 1 else "braille"}
+        signal = figure.signal(line.x.tolist(), line.y.tolist(), **more)
+        figure.draw(signal.lines(len(line.x) > 1).label(line.label))
+    _add(screen, figure)
+
+
+def _filled(screen: Screen) -> dict[str, str]:
+    return {} if screen.has_unicode else {"marker": "#"}
+
+
+def _figure(screen: Screen, height: int):
+    """An empty figure as wide as the terminal, without the colours of a theme."""
+    import plotext
+
+    plotext.terminal.limit(False, False)
+    figure = plotext.figure
+    figure.clear()
+    figure.plot_size(min(screen.width, 100), height)
+    figure.canvas("default")
+    return figure
+
+
+def _add(screen: Screen, figure) -> None:
+    plain = not screen.has_colours
+    text = figure.build().string(colorless=plain)
+    screen.picture(Text(text.rstrip("\n")) if plain else Text.from_ansi(text.rstrip("\n")))
+
+
+PICTURES: dict[str, Callable[[Screen, Columns, str | None], None]] = {
+    "accuracy_map": _map,
+    "pose_errors": _errors,
+    "study_summary": _study,
+    "vec_orders": _orders,
+    "campaign_bounds": _bounds,
+}
