@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,6 +21,9 @@ _FLEXIBLE = 24  # a column of longer texts may be made as narrow as this
 _DIGITS_OF_LARGEST, _DIGITS_OF_TYPICAL = 5, 3
 _MOST_DECIMALS = 7
 _NUMERICAL_ZERO = 1e-9  # of the largest in its column
+_DECIMALS = {"mm": 3}  # at least, where there are that many: what instruments resolve
+_MIXED = 1e3  # from the smallest to the largest number of a column that has several units
+_IN_ASCII = str.maketrans("─│┌┐└┘├┤┬┴┼", "-|+++++++++")
 _NONE = "-"
 
 
@@ -40,8 +43,8 @@ class _Shown:
 
     @property
     def is_long(self) -> bool:
-        """Whether it is a text that may be told on several lines."""
-        return self.is_text and self.natural > _FLEXIBLE
+        """Whether it is a text of several words that may be told on several lines."""
+        return self.natural > _FLEXIBLE and self.is_text and any(" " in each for each in self.cells)
 
     @property
     def least(self) -> int:
@@ -87,6 +90,8 @@ class Screen:
 
     def picture(self, text: Text) -> None:
         """Lines that are left as they are."""
+        if not self.has_unicode:
+            text.plain = text.plain.translate(_IN_ASCII)
         text.no_wrap = True
         text.overflow = "crop"
         self.parts.append(text)
@@ -110,9 +115,6 @@ class Screen:
             self.words("no rows")
             return
         fields = [each for each in sheet.fields if each.on_screen]
-        if count == 1:
-            self._one_row(fields)
-            return
         if hoist:
             fields = self._hoisted(fields)
         if rows is None or count <= rows:
@@ -136,8 +138,9 @@ class Screen:
                 "dim",
             )
 
-    def _one_row(self, fields: Sequence[Field]) -> None:
-        cells = [(each.heading, _cells(each, [0])[0]) for each in fields]
+    def record(self, sheet: Sheet) -> None:
+        """A sheet of one row, a line per column."""
+        cells = [(each.heading, _cells(each, [0])[0]) for each in sheet.fields]
         width = max(len(name) for name, _ in cells) + _GAP
         for name, cell in cells:
             lines = cell.split("\n")
@@ -167,7 +170,7 @@ def printable(text: str) -> str:
     return "".join(each if each.isprintable() or each == "\n" else " " for each in text)
 
 
-def decimals_of(values: np.ndarray) -> int:
+def decimals_of(values: np.ndarray, unit: str = "") -> int:
     """Digits after the point for numbers (n,): five of the largest, three of a typical one.
 
     No more than are needed to tell all of them in full.
@@ -177,9 +180,11 @@ def decimals_of(values: np.ndarray) -> int:
         return 0
     sizes = sizes[sizes > _NUMERICAL_ZERO * sizes.max()]
     wanted = max(
-        _DIGITS_OF_LARGEST - 1 - _power(sizes.max()), _DIGITS_OF_TYPICAL - 1 - _power(np.median(sizes))
+        _DIGITS_OF_LARGEST - 1 - _power(sizes.max()),
+        _DIGITS_OF_TYPICAL - 1 - _power(np.median(sizes)),
+        _DECIMALS.get(unit, 0),
     )
-    decimals = min(max(wanted, 0), _MOST_DECIMALS)
+    decimals = min(wanted, _MOST_DECIMALS)
     while decimals and np.allclose(sizes, np.round(sizes, decimals - 1), rtol=1e-9, atol=0.0):
         decimals -= 1
     return decimals
@@ -205,15 +210,24 @@ def number(value: float, decimals: int, largest: float = 0.0) -> str:
 def _cells(column: Field, places: Sequence[int]) -> tuple[str, ...]:
     """Values of a column at some places, written alike."""
     values = [plain(column.values[place]) for place in places]
-    numbers = [each for each in map(plain, column.values) if isinstance(each, float)]
-    decimals = decimals_of(np.array(numbers))
-    largest = max(map(abs, numbers), default=0.0)
+    written = _written(column)
     return tuple(
         _NONE if value is None
-        else number(value, decimals, largest) if isinstance(value, float)
+        else written(value) if isinstance(value, float)
         else printable(str(value)).rstrip("\n")
         for value in values
     )  # fmt: skip
+
+
+def _written(column: Field) -> Callable[[float], str]:
+    """How the numbers of a column are written: with one number of digits, if they are of a kind."""
+    numbers = np.array([each for each in map(plain, column.values) if isinstance(each, float)])
+    sizes = np.abs(numbers[numbers != 0])
+    largest = float(sizes.max(initial=0.0))
+    if column.unit.startswith("see ") and largest > _MIXED * sizes.min(initial=np.inf):
+        return lambda value: number(value, decimals_of(np.array([value])))
+    decimals = decimals_of(numbers, column.unit)
+    return lambda value: number(value, decimals, largest)
 
 
 def _alike(values: np.ndarray) -> bool:

@@ -21,7 +21,7 @@ _ROWS = 20
 
 
 class _Rows(click.ParamType):
-    name = "NUMBER|all"
+    name = "rows"
 
     def convert(self, value, param, ctx) -> int | None:
         """A number of rows; None for all of them."""
@@ -43,7 +43,13 @@ class _Rows(click.ParamType):
     metavar="COLUMN=VALUE",
     help="Take only rows that say so, - where there is no value; may be repeated.",
 )
-@click.option("--rows", type=_Rows(), default=_ROWS, help=f"Rows on the screen. [{_ROWS}]")
+@click.option(
+    "--rows",
+    type=_Rows(),
+    default=_ROWS,
+    metavar="N|all",
+    help=f"Rows on the screen, of both ends. [{_ROWS}]",
+)
 @click.option("--describe", is_flag=True, help="Say what the columns mean, and what they hold.")
 @click.option("--plot", is_flag=True, help="Draw it in the terminal, where there is a picture.")
 @click.option("--csv", "as_csv", is_flag=True, help="Print all rows and digits as CSV.")
@@ -97,7 +103,7 @@ def show(
     if describe:
         answer.give(show_table.described(chosen), None, above, below)
     else:
-        answer.give(chosen.sheet, rows, above, below, hoist=columns is None)
+        answer.give(chosen.sheet, rows, above, below, columns is None, is_table=True)
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,7 @@ class Answer:
         above: Iterable[str] = (),
         below: Iterable[str] = (),
         hoist: bool = False,
+        is_table: bool = False,
     ) -> None:
         """Hand out a sheet; what is said ``above`` and ``below`` is for the screen."""
         from kinacc.cli.screen import Screen
@@ -128,7 +135,10 @@ class Answer:
         screen.words(sheet.title, "bold")
         for line in above:
             screen.words(line)
-        screen.table(sheet, rows, hoist)
+        if is_table and len(sheet) == 1:
+            screen.record(sheet)
+        else:
+            screen.table(sheet, rows, hoist)
         for line in below:
             screen.words(line, "dim")
         self.show(screen)

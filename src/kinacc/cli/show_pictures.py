@@ -1,4 +1,7 @@
-"""Pictures for ``kinacc show --plot``: curves by plotext, maps of blocks or of characters."""
+"""Pictures for ``kinacc show --plot``: curves by plotext; maps and histograms of characters.
+
+A character of a map or histogram is a cell or a bin; plotext's bars spread over their neighbours.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from rich.color import Color
 from rich.style import Style
 from rich.text import Text
 
@@ -20,9 +24,14 @@ _COLOURS = (
     *("#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58"),
     *("#b5de2b", "#fde725"),
 )
-_MARKS = "oxz+*#@%"  # of lines, where no colour tells them apart
-_BINS = 40
-_HEIGHT, _LOW = 18, 9
+# Of lines: colours that are told apart without seeing red or green, on dark and on light; where
+# there are none, characters.
+_INKS = ("#008ed7", "#e68c00", "#009e73", "#cc6ea0", "#969696")
+_MARKS = "oxz+*"
+_HEIGHT, _LOW, _WIDEST = 18, 6, 100
+_EIGHTHS = " ▁▂▃▄▅▆▇█"
+_MARGIN = 8  # characters at the left of a histogram
+_TICKS = 6
 Columns = Mapping[str, np.ndarray]
 
 
@@ -92,7 +101,7 @@ def _map(screen: Screen, table: Columns, columns: str | None) -> None:
                 table["height_mm"][mine],
                 values[mine],
                 lambda grid: (_in_blocks if blocks else _in_characters)(grid, low, high),
-                (lambda size: f"max {number(size, min(decimals, 3))}"),
+                lambda size: f"max {number(size, min(decimals, 3))} {unit}",
             )
         )
     margin = max(len(f"{each:g}") for each in np.unique(table["height_mm"])) + 1
@@ -102,7 +111,8 @@ def _map(screen: Screen, table: Columns, columns: str | None) -> None:
         screen.picture(_beside(panels[first : first + beside], heights, margin))
     if blocks:
         bar = Text.assemble(*(("    ", Style(bgcolor=each)) for each in _COLOURS))
-        screen.picture(Text.assemble(f"{number(low, decimals)} ", bar, f" {number(high, decimals)}"))
+        ends = number(low, decimals), number(high, decimals)
+        screen.picture(Text.assemble(f"{ends[0]} ", bar, f" {ends[1]} {unit}"))
     else:
         step = number((high - low) / len(_LEVELS), max(decimals, 2))
         least, most = number(low, decimals), number(high, decimals)
@@ -122,7 +132,10 @@ def _panel(
     """Lines of one slice: its name and largest error, the map, its radii."""
     radii, heights = np.unique(np.round(radius, 3)), np.unique(np.round(height, 3))
     grid = np.full((heights.size, radii.size), np.nan)
-    places = np.searchsorted(heights, np.round(height, 3)), np.searchsorted(radii, np.round(radius, 3))
+    places = (
+        np.searchsorted(heights, np.round(height, 3)),
+        np.searchsorted(radii, np.round(radius, 3)),
+    )
     grid[places] = values
     lines = shaded(grid)
     known = values[np.isfinite(values)]
@@ -203,22 +216,43 @@ def _errors(screen: Screen, table: Columns, _: str | None) -> None:
     largest = max(size[kept & (table["comparison"] == name)].max() for name in measured)
     where = "at held-out poses" if held_out.any() else "at poses the models were fitted to"
     screen.words(f"number of readings by position error in mm, {where}")
-    edges = np.linspace(0.0, float(largest) * (1 + 1e-9) or 1.0, _BINS + 1)
-    middles = (edges[1:] + edges[:-1]) / 2
-    counts = {}
-    for name in measured:
+    bins = min(screen.width, _WIDEST) - _MARGIN
+    edges = np.linspace(0.0, float(largest) * (1 + 1e-9) or 1.0, bins + 1)
+    for place, name in enumerate(measured):
         mine = size[kept & (table["comparison"] == name)]
-        counts[name] = mine, np.histogram(mine, edges)[0]
-    for name, (mine, count) in counts.items():
         model, _, of = name.partition("_vs_")
-        says = f"{model_name(model)} against {model_name(of)}: {mine.size:,} readings, mean "
-        says += f"{mine.mean():.3f}, 99 % below {np.quantile(mine, 0.99):.3f}, largest {mine.max():.3f}"
-        screen.words(says, "bold")
-        figure = _figure(screen, _LOW)
-        bars = figure.bar(middles.tolist(), count.tolist(), width=1, **_filled(screen))
-        figure.draw(bars)
-        figure.ruler("x").lim(0.0, float(edges[-1]))
-        _add(screen, figure)
+        screen.words(f"{model_name(model)} against {model_name(of)}", "bold")
+        screen.words(
+            f"{mine.size:,} readings, mean {mine.mean():.3f}, 99 % below "
+            f"{np.quantile(mine, 0.99):.3f}, largest {mine.max():.3f}"
+        )
+        screen.picture(_bars(screen, np.histogram(mine, edges)[0], place))
+        screen.picture(_axis(bins, float(edges[-1])))
+
+
+def _bars(screen: Screen, counts: np.ndarray, place: int) -> Text:
+    """Counts (n,) as bars, a character each; what is not nothing is seen."""
+    eighths = np.ceil(counts / max(counts.max(), 1) * _LOW * 8).astype(int)
+    style = Style(color=_ink(place)) if screen.has_colours else Style()
+    lines = []
+    for row in reversed(range(_LOW)):
+        filled = np.clip(eighths - 8 * row, 0, 8)
+        marks = _EIGHTHS if screen.has_unicode else "    #####" if row else " ########"
+        said = f"{counts.max()}" if row == _LOW - 1 else "0" if row == 0 else ""
+        bar = "".join(marks[each] for each in filled)
+        lines.append(Text.assemble(said.rjust(_MARGIN - 2), " |", (bar, style)))
+    return Text("\n").join(lines)
+
+
+def _axis(width: int, high: float) -> Text:
+    """Round numbers from 0 to ``high`` below ``width`` characters."""
+    line = " " * (width + _MARGIN)
+    ticks, said = _ticks(0.0, high, _TICKS)
+    for tick, words in zip(ticks, said, strict=True):
+        start = _MARGIN + int(tick / high * width)
+        if start + len(words) <= len(line):
+            line = line[:start] + words + line[start + len(words) :]
+    return Text(line)
 
 
 def _study(screen: Screen, table: Columns, _: str | None) -> None:
@@ -242,14 +276,13 @@ def _orders(screen: Screen, table: Columns, _: str | None) -> None:
         orders = ", ".join(f"{each:g}" for each in np.unique(table["order"]))
         screen.words(f"order {orders} was given, and no other was tried: there is no curve")
         return
-    lines = []
-    folds = table["fold"]
-    for fold in [np.nan, *np.unique(folds[np.isfinite(folds)])]:
-        mine = kept & ((folds == fold) | (np.isnan(folds) & np.isnan(fold)))
-        if np.isnan(fold) and mine.any():
-            best = mine & (table["chosen"] == 1)
-            lines.append(_Line("all rows", table["order"][mine], table["held_out_rms_mm"][mine]))
-            lines.append(_Line("chosen", table["order"][best], table["held_out_rms_mm"][best]))
+    all_rows = np.isnan(table["fold"])
+    kept &= all_rows if (kept & all_rows).any() else True
+    best = kept & (table["chosen"] == 1)
+    lines = [
+        _Line(name, table["order"][mine], table["held_out_rms_mm"][mine])
+        for name, mine in (("orders tried", kept), ("chosen", best))
+    ]
     screen.words("position rms in mm at rows left out of the fit, against the order")
     _curves(screen, lines)
 
@@ -272,18 +305,54 @@ def _bounds(screen: Screen, table: Columns, _: str | None) -> None:
 
 
 def _curves(screen: Screen, lines: Sequence[_Line]) -> None:
-    """Lines in one picture, told apart by colour, or by their letters where there is none."""
+    """Lines in one picture, told apart by colour, or by their characters where there is none."""
     figure = _figure(screen, _HEIGHT)
     by_marks = not (screen.has_colours and screen.has_unicode)
-    for mark, line in zip(_MARKS, lines, strict=False):
-        more = {"marker": mark} if by_marks else {"marker": "●" if len(line.x) == 1 else "braille"}
-        signal = figure.signal(line.x.tolist(), line.y.tolist(), **more)
-        figure.draw(signal.lines(len(line.x) > 1).label(line.label))
+    legend = []
+    for place, line in enumerate(lines):
+        mark = _MARKS[place % len(_MARKS)] if by_marks else "●" if len(line.x) == 1 else "hd"
+        signal = figure.signal(
+            line.x.tolist(), line.y.tolist(), marker=_marker(screen, place, mark)
+        )
+        figure.draw(signal.lines(len(line.x) > 1))
+        sign = 2 * mark if by_marks else "●" if len(line.x) == 1 else "━━"
+        colour = "" if by_marks else Style(color=_ink(place))
+        legend.append(Text.assemble((sign, colour), f" {line.label}"))
+    every = [np.concatenate([getattr(each, axis) for each in lines]) for axis in "xy"]
+    for axis, values in zip("xy", every, strict=True):
+        _rule(figure, axis, float(values.min()), float(values.max()))
     _add(screen, figure)
+    screen.parts.append(Text("   ").join(legend))
 
 
-def _filled(screen: Screen) -> dict[str, str]:
-    return {} if screen.has_unicode else {"marker": "#"}
+def _ink(place: int) -> str:
+    return _INKS[place % len(_INKS)]
+
+
+def _marker(screen: Screen, place: int, symbol: str):
+    import plotext
+
+    if not screen.has_colours:
+        return plotext.marker(symbol)
+    return plotext.marker(symbol, tuple(Color.parse(_ink(place)).triplet))
+
+
+def _rule(figure, axis: str, low: float, high: float) -> None:
+    """Let an axis go from ``low`` to ``high``, with ticks at round numbers."""
+    if high <= low:
+        low, high = low - 0.5, high + 0.5
+    ticks, said = _ticks(low, high, _TICKS)
+    figure.ruler(axis).lim(low, high).ticks(ticks.tolist(), said)
+
+
+def _ticks(low: float, high: float, most: int) -> tuple[np.ndarray, list[str]]:
+    """Round numbers from ``low`` to ``high``, and how they are written."""
+    rough = (high - low) / most
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = power * next(each for each in (1, 2, 5, 10) if each * power >= rough * (1 - 1e-9))
+    ticks = step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    decimals = max(0, -int(np.floor(np.log10(step) + 1e-9)))
+    return ticks, [f"{each + 0.0:.{decimals}f}" for each in ticks]
 
 
 def _figure(screen: Screen, height: int):
@@ -293,8 +362,8 @@ def _figure(screen: Screen, height: int):
     plotext.terminal.limit(False, False)
     figure = plotext.figure
     figure.clear()
-    figure.plot_size(min(screen.width, 100), height)
-    figure.canvas("default")
+    figure.plot_size(min(screen.width, _WIDEST), height)
+    figure.theme("colorless")
     return figure
 
 

@@ -53,7 +53,7 @@ def read(path: Path) -> Shown:
     """A Parquet file, of kinacc or not. Raises InputError where it is none, or damaged."""
     artefact = contract_of(path)
     try:
-        schema, columns = store.read_schema(path), store.read(path)
+        columns, schema = store.read(path), store.read_schema(path)
     except InputError as error:
         if artefact is not None and path.suffix == ".parquet":
             raise
@@ -65,7 +65,7 @@ def read(path: Path) -> Shown:
         remarks = (f"this is no table {artefact.name} as kinacc makes it: {differs}",)
         artefact = None
     elif artefact is None:
-        told = any("meaning".encode() in (each.metadata or {}) for each in schema)
+        told = any(b"meaning" in (each.metadata or {}) for each in schema)
         own = "units and meanings are what the file says" if told else "nothing says its units"
         remarks = (f"no table of a results folder has this name; {own}",)
     fields = _fields(schema, columns, artefact, path.parent)
@@ -113,7 +113,7 @@ def choose(shown: Shown, columns: str | None) -> Shown:
     chosen: dict[str, Field] = {}
     problems = []
     for wanted in filter(None, (each.strip() for each in columns.split(","))):
-        names = [name for name in fields if name == wanted or fnmatchcase(name, wanted)]
+        names = _named(wanted, fields)
         if not names:
             problems.append(_unknown("--columns", wanted, tuple(fields)))
         chosen |= {name: replace(fields[name], on_screen=True) for name in names}
@@ -121,6 +121,14 @@ def choose(shown: Shown, columns: str | None) -> Shown:
         problems.append(Problem("--columns", "names no column", ", ".join(fields)))
     refuse(problems)
     return replace(shown, sheet=replace(shown.sheet, fields=list(chosen.values())))
+
+
+def _named(wanted: str, names: Iterable[str]) -> list[str]:
+    """The names that one of --columns stands for: q* for q1 .. of the joints, not for qw."""
+    numbered = re.compile(re.escape(wanted.removesuffix("*")) + r"\d+")
+    if wanted.endswith("*") and (joints := [name for name in names if numbered.fullmatch(name)]):
+        return joints
+    return [name for name in names if name == wanted or fnmatchcase(name, wanted)]
 
 
 def described(shown: Shown) -> Sheet:
@@ -148,7 +156,7 @@ def words(shown: Shown, describe: bool) -> tuple[list[str], list[str]]:
                   if key in shown.provenance]  # fmt: skip
         return above, below
     for each in shown.sheet.fields:
-        if " " in each.unit and each.unit != "see unit":
+        if " " in each.unit and not each.unit.startswith("see "):
             below.append(f"unit of {each.name}: {each.unit}")
     return above, below
 
@@ -252,7 +260,9 @@ def _meeting(values: np.ndarray, value: str) -> np.ndarray:
 
 def _said(value: object) -> str:
     value = plain(value)
-    return _NO_VALUE if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+    return (
+        _NO_VALUE if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+    )
 
 
 def _unknown(place: str, name: str, known: tuple[str, ...]) -> Problem:
