@@ -93,12 +93,12 @@ def show(
         answer.give(listed.sheet, None, below=listed.below)
         return
     kept = show_table.where(show_table.read(place), conditions)
+    chosen = show_table.choose(kept, columns)
     if plot:
         from kinacc.cli.show_pictures import drawn
 
         answer.show(drawn(kept, columns))
         return
-    chosen = show_table.choose(kept, columns)
     above, below = show_table.words(chosen, describe)
     if describe:
         answer.give(show_table.described(chosen), None, above, below)

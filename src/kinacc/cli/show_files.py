@@ -6,11 +6,12 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinacc.artifacts import store
+from kinacc.artifacts import campaign_tables, store
 from kinacc.artifacts.columns import texts
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.campaign.journal import PLAN
 from kinacc.cli.sheet import Field, Sheet
+from kinacc.cli.show_pictures import PICTURES
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.workflow.catalogue import CALIBRATION, FIGURE_FOLDER, STAGES
@@ -98,7 +99,7 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
             count = store.read_rows(folder / f"{name}.parquet")
         except InputError as error:
             count, what = None, error.problems[0].what
-        rows.append((name, count, what, _stage(artefact.name) if artefact else None))
+        rows.append((name, count, what, _maker(artefact.name) if artefact else None))
     sheet = Sheet(
         f"{folder}: {len(names)} table{'s' if len(names) != 1 else ''}",
         {"folder": str(folder)},
@@ -106,10 +107,12 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
             Field("table", texts(row[0] for row in rows), "", "name of the table"),
             Field("rows", texts(row[1] for row in rows), "", "number of its rows"),
             Field("what it is", texts(row[2] for row in rows), "", "what it holds"),
-            Field("made by", texts(row[3] for row in rows), "", "stage that makes it"),
+            Field("made by", texts(row[3] for row in rows), "", "stage or command that does"),
         ],
     )
     below = [f"kinacc show {folder} {names[0]} shows one; --describe says what its columns mean"]
+    if drawn := [name for name in names if name in PICTURES]:
+        below.append(f"--plot draws {', '.join(drawn)}")
     pictures = sorted({each.stem for each in (folder / FIGURE_FOLDER).glob("*.*")})
     if pictures:
         below.insert(0, f"{FIGURE_FOLDER}/: {', '.join(pictures)}")
@@ -153,7 +156,10 @@ def _of_folders(folder: Path, within: list[Path]) -> Listing:
             Field("not there", columns[4], "", "tables that other data sets would have"),
         ],
     )
-    return Listing(sheet, (f"kinacc show {within[0]} lists the tables of one",))
+    below = [f"kinacc show {within[0]} lists the tables of one"]
+    if (folder / PLAN).is_file():
+        below.append(f"a campaign: kinacc campaign status {folder} says where it stands")
+    return Listing(sheet, tuple(below))
 
 
 def _of_dataset(folder: Path) -> bool:
@@ -181,6 +187,11 @@ def _short(meaning: str) -> str:
 
 def _stage(name: str) -> str | None:
     return next((each.name for each in STAGES.values() if name in each.outputs), None)
+
+
+def _maker(name: str) -> str | None:
+    is_campaign = any(name == each.name for each in campaign_tables.ALL)
+    return "campaign report" if is_campaign else _stage(name)
 
 
 def _command(name: str) -> str:

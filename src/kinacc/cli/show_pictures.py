@@ -64,7 +64,8 @@ def drawn(shown: Shown, columns: str | None) -> Screen:
              for name, values in table.items()}  # fmt: skip
     screen = Screen.here()
     screen.words(shown.sheet.title, "bold")
-    PICTURES[name](screen, table, columns)
+    if len(shown.sheet):
+        PICTURES[name](screen, table, columns)
     return screen
 
 
