@@ -236,6 +236,32 @@ def test_a_name_that_is_not_there_is_answered_with_the_nearest(tmp_path):
         assert f"did you mean {close}?" in said.output
 
 
+def test_a_table_looked_for_inside_a_file_is_answered_in_words(tmp_path):
+    said = show(residuals(tmp_path), "vec_model")
+    assert said.exit_code == 2
+    assert "residuals.parquet: is a file, and holds no vec_model" in said.output
+
+
+def test_results_are_where_one_looks_without_a_word(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "results: no such file or folder" in show().output
+    measurements(tmp_path / "results" / "arm")
+    assert table_of(show().output)[0][0] == "arm"
+
+
+def test_joints_printed_as_csv_are_understood_without_their_unit_being_told(tmp_path):
+    from kinacc.cli import rows
+    from kinacc.kinematics import robot
+
+    measurements(tmp_path)
+    path = tmp_path / "joints.csv"
+    path.write_text(show(tmp_path, "measurements", "--columns", "pose,q*", "--csv").output)
+    read = rows.joints_of(str(path), robot.load("mh180"), {})
+    table = store.read(tmp_path / "measurements.parquet")
+    expected = np.column_stack([table[f"q{i + 1}"] for i in range(6)])
+    np.testing.assert_allclose(read.joints, expected, rtol=1e-11)
+
+
 def test_a_name_without_its_data_set_is_answered_with_where_there_is_one(tmp_path, monkeypatch):
     residuals(tmp_path / "results" / "arm")
     monkeypatch.chdir(tmp_path)

@@ -176,11 +176,6 @@ def read_schema(path: Path | str) -> pa.Schema:
     return _open(path, lambda file: file.schema_arrow)
 
 
-def read_rows(path: Path | str) -> int:
-    """Number of rows of a table's file; InputError if absent or not Parquet."""
-    return _open(path, lambda file: int(file.metadata.num_rows))
-
-
 def read_metadata(path: Path | str) -> dict[str, str]:
     """Provenance of a table's file as text; InputError if absent or not Parquet."""
     raw = read_schema(path).metadata or {}

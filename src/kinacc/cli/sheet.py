@@ -44,12 +44,16 @@ class Field:
 
 @dataclass(frozen=True)
 class Sheet:
-    """Named columns of equal length and a few facts about all of them."""
+    """Named columns of equal length and a few facts about all of them.
+
+    ``with_units``: CSV has headings instead of names, so that no unit has to be known.
+    """
 
     title: str
     facts: Mapping[str, object]
     fields: Sequence[Field]
     shown_rows: int = _SHOWN_ROWS
+    with_units: bool = False
 
     def __len__(self) -> int:
         return len(self.fields[0].values) if self.fields else 0
@@ -62,10 +66,11 @@ class Sheet:
         return json.dumps({**plain(self.facts), "units": units, "rows": rows}, indent=1)
 
     def as_csv(self) -> str:
-        """Column names with units, then one line per row; empty cells for none."""
+        """Column names, then one line per row; empty cells for none."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow([in_csv(field.heading) for field in self.fields])
+        names = [field.heading if self.with_units else field.name for field in self.fields]
+        writer.writerow([in_csv(name) for name in names])
         for i in range(len(self)):
             writer.writerow([_cell(field.values[i]) for field in self.fields])
         return out.getvalue()

@@ -33,7 +33,7 @@ class _Rows(click.ParamType):
 
 
 @click.command("show")
-@click.argument("path", type=click.Path())
+@click.argument("path", type=click.Path(), default="results")
 @click.argument("name", metavar="[TABLE]", required=False)
 @click.option("--columns", metavar="A,B,..", help="Show these columns, in this order; q* for q1 ..")
 @click.option(
@@ -65,16 +65,16 @@ def show(
     as_csv: bool,
     out: Output,
 ) -> None:
-    """Show a TABLE of results, or what a folder PATH of results, or of a campaign, holds.
+    """Show a TABLE of results, or what is in the folder PATH, of results or of a campaign.
 
-    A table is a Parquet file, named with or without its ending, alone or after its folder. On the
-    screen what is the same in every row stands above the table, long tables lose their middle, and
-    what does not fit is named. There are pictures of accuracy_map, pose_errors,
-    study_summary, vec_orders and campaign_bounds; of the rows of --where and, in a map, of the
-    first error among --columns.
+    A table is a Parquet file, named with or without its ending, alone or after its folder. What is
+    the same in every row stands above the table; what does not fit the screen is named. There are
+    pictures of accuracy_map, pose_errors, study_summary, vec_orders and campaign_bounds. They show
+    the rows of --where and, in a map, the first error among --columns.
 
     \b
     Example:
+      kinacc show
       kinacc show results/ur10_b
       kinacc show results/ur10_b residuals --where fold=-
       kinacc show results/ur10_b/measurements --columns "pose,q*" --csv > joints.csv

@@ -41,6 +41,8 @@ def found(path: str, table: str | None) -> Path:
 def _absent(asked: Path) -> Problem:
     """What to say of a name that is nothing."""
     above = asked.parent
+    if above.is_file():
+        return Problem(str(above), f"is a file, and holds no {asked.name}", "a folder")
     if not above.is_dir():
         return _absent(above)
     name = asked.stem if asked.suffix == ".parquet" else asked.name
@@ -96,7 +98,7 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
         artefact = ARTEFACTS.get(name, part_of)
         what = None if artefact is None else _short(artefact.meaning)
         try:
-            count = store.read_rows(folder / f"{name}.parquet")
+            count = _rows(folder / f"{name}.parquet")
         except InputError as error:
             count, what = None, error.problems[0].what
         rows.append((name, count, what, _maker(artefact.name) if artefact else None))
@@ -175,9 +177,17 @@ def _robot(folder: Path) -> str | None:
 
 def _count(path: Path) -> int | None:
     try:
-        return store.read_rows(path)
+        return _rows(path)
     except InputError:
         return None
+
+
+def _rows(path: Path) -> int:
+    """Number of rows of a table; InputError if it is none."""
+    import pyarrow.parquet as pq
+
+    store.read_schema(path)  # says what is wrong with a file that is no table
+    return int(pq.read_metadata(path).num_rows)
 
 
 def _short(meaning: str) -> str:

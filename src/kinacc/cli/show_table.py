@@ -74,7 +74,7 @@ def read(path: Path) -> Shown:
     facts = {"table": str(path), "meaning": artefact.meaning if artefact else None}
     count = len(next(iter(columns.values()), ()))
     title = f"{path}: {_counted(count, 'row')}, {_counted(len(fields), 'column')}"
-    return Shown(path, artefact, Sheet(title, facts, fields), metadata, remarks)
+    return Shown(path, artefact, Sheet(title, facts, fields, with_units=True), metadata, remarks)
 
 
 def where(shown: Shown, conditions: Iterable[str]) -> Shown:
