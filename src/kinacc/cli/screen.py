@@ -18,6 +18,7 @@ from kinacc.cli.sheet import Field, Sheet
 
 _GAP = 2
 _FLEXIBLE = 24  # a column of longer texts may be made as narrow as this
+_HEADINGS = (40, 16, 13, 10, 8, 0)  # characters before one is broken, as far as there is room
 _DIGITS_OF_LARGEST, _DIGITS_OF_TYPICAL = 5, 3
 _MOST_DECIMALS = 7
 _NUMERICAL_ZERO = 1e-9  # of the largest in its column
@@ -52,9 +53,9 @@ class _Shown:
         """Characters it cannot do without."""
         return max(_FLEXIBLE, *map(len, self.heading)) if self.is_long else self.natural
 
-    def broken(self) -> _Shown:
-        """With a heading on as many lines as it takes not to be wider than its cells."""
-        heading = _broken(" ".join(self.heading), max(map(len, self.cells)))
+    def broken(self, width: int = 0) -> _Shown:
+        """With a heading on as many lines as it takes not to be wider than its cells, or this."""
+        heading = _broken(" ".join(self.heading), max(width, *map(len, self.cells)))
         return replace(self, heading=heading)
 
 
@@ -271,8 +272,11 @@ def _that_fit(columns: Sequence[_Shown], width: int) -> list[_Shown]:
                 break
             taken.append(i)
     taken.sort()
-    whole = [columns[i] for i in taken]
-    return whole if _sum(whole) <= width else [broken[i] for i in taken]
+    for longest in _HEADINGS:
+        kept = [columns[i].broken(longest) for i in taken]
+        if _sum(kept) <= width:
+            break
+    return kept
 
 
 def _sum(columns: Sequence[_Shown]) -> int:

@@ -191,8 +191,10 @@ def _rows(path: Path) -> int:
 
 
 def _short(meaning: str) -> str:
-    """What stands before the first colon, semicolon or full stop of a sentence."""
-    return re.split(r"[:;] |\. |\.$", meaning)[0]
+    """The first sentence, up to a colon or semicolon that comes after some words."""
+    sentence = re.split(r"(?<!Fig)(?<!Figs)\. |\.$", meaning)[0]
+    head = re.split(r"[:;] ", sentence)[0]
+    return head if " " in head else sentence
 
 
 def _stage(name: str) -> str | None:
