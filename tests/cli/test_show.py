@@ -309,12 +309,14 @@ def test_a_program_gets_the_same_rows_as_json(tmp_path):
 def test_a_table_of_another_program_is_shown_and_said_to_be_unknown(tmp_path):
     path = tmp_path / "other.parquet"
     columns = {"when": pa.array([0, 86_400_000_000], pa.timestamp("us")), "ok": [True, None],
-               "list": [[1, 2], []], "name": ["a", "b"]}  # fmt: skip
+               "": [[1, 2], []], "size": [1e300, 2.5], "name": ["a" * 5000, "b"]}  # fmt: skip
     pq.write_table(pa.table(columns), path)
     said = show(path).output
     assert "no table of a results folder has this name; nothing says its units" in said
     assert "1970-01-02 00:00:00" in said
     assert "True" in said
+    assert "1.0000e+300" in said
+    assert max(map(len, said.splitlines())) <= 80
     assert show(path, "--csv").exit_code == 0
     assert show(path, "--json").exit_code == 0
 

@@ -18,11 +18,13 @@ from kinacc.cli.sheet import Field, Sheet
 
 _GAP = 2
 _FLEXIBLE = 24  # a column of longer texts may be made as narrow as this
+_LONGEST_NAME, _LONGEST_TEXT = 40, 300
 _HEADINGS = (40, 16, 13, 10, 8, 0)  # characters before one is broken, as far as there is room
 _DIGITS_OF_LARGEST, _DIGITS_OF_TYPICAL = 5, 3
 _MOST_DECIMALS = 7
 _NUMERICAL_ZERO = 1e-9  # of the largest in its column
 _DECIMALS = {"mm": 3}  # at least, where there are that many: what instruments resolve
+_BEYOND = 1e15  # nobody counts so many digits
 _MIXED = 1e3  # from the smallest to the largest number of a column that has several units
 _IN_ASCII = str.maketrans("─│┌┐└┘├┤┬┴┼", "-|+++++++++")
 _NONE = "-"
@@ -45,8 +47,9 @@ class _Shown:
 
     @property
     def is_long(self) -> bool:
-        """Whether it is a text of several words that may be told on several lines."""
-        return self.natural > _FLEXIBLE and self.is_text and any(" " in each for each in self.cells)
+        """Whether it is a text that may be told on several lines: no name, but words."""
+        words = self.natural > _LONGEST_NAME or any(" " in each for each in self.cells)
+        return self.natural > _FLEXIBLE and self.is_text and words
 
     @property
     def least(self) -> int:
@@ -201,6 +204,8 @@ def number(value: float, decimals: int, largest: float = 0.0) -> str:
 
     Beside one of the size ``largest`` a number may be nothing but rounding: that is 0.
     """
+    if abs(value) >= _BEYOND:
+        return f"{value:.4e}"
     said = f"{value:.{decimals}f}"
     if float(said):
         return said
@@ -238,7 +243,10 @@ def _alike(values: np.ndarray) -> bool:
 
 
 def _shown(column: Field, places: Sequence[int]) -> _Shown:
-    cells = tuple(" ".join(each.split("\n")) for each in _cells(column, places))
+    cells = tuple(
+        each if len(each) <= _LONGEST_TEXT else f"{each[:_LONGEST_TEXT]} .."
+        for each in (" ".join(each.split("\n")) for each in _cells(column, places))
+    )
     is_text = any(isinstance(column.values[place], str) for place in places)
     return _Shown(column.name, (column.heading,), cells, is_text)
 
@@ -246,7 +254,7 @@ def _shown(column: Field, places: Sequence[int]) -> _Shown:
 def _broken(name: str, width: int) -> tuple[str, ...]:
     """A heading on lines no longer than ``width`` where it can be broken after underscores."""
     parts = re.findall(r"[^_ ]+_?|_| ", name)
-    width = max(width, *map(len, parts))
+    width = max([width, *map(len, parts)])
     lines = [""]
     for part in parts:
         if len(lines[-1]) + len(part) > width:

@@ -50,7 +50,9 @@ def _absent(asked: Path) -> Problem:
     others = [each.name for each in above.iterdir() if each.is_dir() and each.name[0] != "."]
     close = nearest(name, (*tables, *others))
     fix = f"did you mean {above / close}?" if close else ""
-    elsewhere = [str(each.parent) for each in sorted(Path().glob(f"results/*/{name}.parquet"))]
+    elsewhere = sorted(
+        str(each) for each in Path().glob("results/*") if (each / f"{name}.parquet").is_file()
+    )
     if name in ARTEFACTS and _of_dataset(above):
         fix = f"{_command(name)} makes it" if _command(name) else ""
     elif name in ARTEFACTS and elsewhere:
