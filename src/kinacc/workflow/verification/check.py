@@ -222,6 +222,19 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
     )
 
 
+def not_there(folder: Path) -> tuple[str, ...]:
+    """Tables that a data set would have beside those in its folder, for all that these say."""
+    tables, marks = {}, {}
+    for name in ARTEFACTS:
+        path = folder / f"{name}.parquet"
+        with suppress(InputError):
+            if path.is_file():
+                marks[name] = store.read_metadata(path)
+                tables |= {name: store.read(path)} if name in ("measurements", "frames") else {}
+    left_out = _left_out(folder, marks, tables, None)
+    return tuple(Path(problem.where).stem for problem, _ in _missing(folder, left_out))
+
+
 def check_tournament(folder: Path) -> DatasetReport:
     """Check the folder of the tournament: every table whole and as the contract says."""
     checked, problems, marks = [], [], {}
