@@ -428,6 +428,29 @@ def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(
     assert len(line) <= 100
 
 
+def test_a_stated_base_and_tool_leave_all_readings_to_the_model(reflectors):
+    from kinacc.workflow.answer import facts_of, read
+
+    tables = read(reflectors)
+    pose, frames = tables["measurements"]["pose"], tables["frames"]
+    kept = np.isin(pose, np.unique(pose)[:36])
+    tables["measurements"] |= {"fold": np.where(kept, tables["measurements"]["fold"], np.nan)}
+    # 324 numbers: as many as a model of order 8 has, which base and targets would take 15 of.
+    tried, fold = np.array([1.0, 2.0, 6.0]), np.zeros(3)
+    tables |= {"vec_orders": {"fold": fold, "order": tried, "chosen": tried == 6}}
+    limits = []
+    for stated in (False, True):
+        if stated:
+            own = {name: values[frames["model"] == "vec"] for name, values in frames.items()}
+            stays = {name: values for name, values in own.items() if name != "model"}
+            tables["frames"] = {
+                name: np.concatenate([values, values]) for name, values in stays.items()
+            } | {"model": np.repeat(["nominal", "vec"], len(own["model"]))}
+        facts = {each.statistic: each.text for each in facts_of(tables) if each.item == "vec"}
+        limits.append(facts["highest_order_set_by"])
+    assert limits == ["configurations", "settings"]
+
+
 def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflectors):
     from kinacc.calibration.blind_words import WEAK
     from kinacc.calibration.summary_words import half_page
