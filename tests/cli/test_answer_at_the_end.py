@@ -246,6 +246,15 @@ def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
     assert done.exit_code == 0, done.output
 
 
+def test_what_repeats_tell_of_the_noise_stands_beside_the_question_for_it(folder, measured):
+    page = " ".join(shown(measured).split())
+    asked, told, command = (
+        page.index(each) for each in ("(NOISE:", "go to one pose ten times", "--noise-mm NOISE")
+    )
+    assert asked < told < command
+    assert "go to one pose" not in shown(folder)  # nobody can go to a pose of a synthetic arm
+
+
 def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
     folder, measured, tmp_path
 ):

@@ -14,7 +14,7 @@ from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
 from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
-from kinacc.campaign import of_calibration
+from kinacc.campaign import of_calibration, slips
 from kinacc.campaign.journal import PLAN
 from kinacc.campaign.of_calibration import Sought
 from kinacc.campaign.words import one_of
@@ -87,7 +87,8 @@ def answer(
     lines += half_page(facts, more, whole)
     lines += paragraph("other errors", _other_errors(facts, tables, whole))
     bound, arm = campaign_of(folder), _arm(folder, tables)
-    lines += paragraph("largest error", _bound(bound, folder, arm))
+    noise = [] if _is_synthetic(facts) else [_noise(tables)]
+    lines += paragraph("largest error", _bound(bound, folder, arm, noise))
     commands = [] if bound.assessed is None else [bound.assessed.next_command]
     lines += paragraph("next", [*commands, *following, *_uses(folder, arm, tables)])
     return [*_claims(folder, facts, tables), *lines]
@@ -140,7 +141,12 @@ def _arm(folder: Path, tables: Tables) -> Calibration:
     return results.calibration(results.read_tables(folder), known)
 
 
-def _bound(bound: Sought, folder: Path, arm: Calibration) -> list[str]:
+def _noise(tables: Tables) -> str:
+    known = (tables[name] for name in ("measurements", "pose_errors", "frames"))
+    return slips.noise_by_repeats(*known)
+
+
+def _bound(bound: Sought, folder: Path, arm: Calibration, noise: Sequence[str]) -> list[str]:
     if bound.assessed is not None:
         return [*bound.assessed.in_words(), *bound.remarks]
     words = ["kinacc", "campaign", "start", _free("check", folder), "--calibration", str(folder)]
@@ -148,6 +154,7 @@ def _bound(bound: Sought, folder: Path, arm: Calibration) -> list[str]:
         *bound.remarks,
         "not assessed; a campaign bounds it (NOISE: standard deviation of one reading, mm):",
         *one_of(arm.default_point, [*arm.targets]),
+        *noise,
         f"{shlex.join(words)} --noise-mm NOISE --budget {_READINGS}",
     ]
 
