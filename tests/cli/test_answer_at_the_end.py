@@ -246,6 +246,15 @@ def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
     assert done.exit_code == 0, done.output
 
 
+def test_what_repeats_tell_of_the_noise_stands_beside_the_question_for_it(folder, measured):
+    page = " ".join(shown(measured).split())
+    asked, told, command = (
+        page.index(each) for each in ("(NOISE:", "go to one pose ten times", "--noise-mm NOISE")
+    )
+    assert asked < told < command
+    assert "go to one pose" not in shown(folder)  # nobody can go to a pose of a synthetic arm
+
+
 def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
     folder, measured, tmp_path
 ):
@@ -426,6 +435,29 @@ def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(
     assert line.count(".") == plain.count(".") + told.count(".")
     assert line.rindex(".") == plain.rindex(".")  # figures stand under each other
     assert len(line) <= 100
+
+
+def test_a_stated_base_and_tool_leave_all_readings_to_the_model(reflectors):
+    from kinacc.workflow.answer import facts_of, read
+
+    tables = read(reflectors)
+    pose, frames = tables["measurements"]["pose"], tables["frames"]
+    kept = np.isin(pose, np.unique(pose)[:36])
+    tables["measurements"] |= {"fold": np.where(kept, tables["measurements"]["fold"], np.nan)}
+    # 324 numbers: as many as a model of order 8 has, which base and targets would take 15 of.
+    tried, fold = np.array([1.0, 2.0, 6.0]), np.zeros(3)
+    tables |= {"vec_orders": {"fold": fold, "order": tried, "chosen": tried == 6}}
+    limits = []
+    for stated in (False, True):
+        if stated:
+            own = {name: values[frames["model"] == "vec"] for name, values in frames.items()}
+            stays = {name: values for name, values in own.items() if name != "model"}
+            tables["frames"] = {
+                name: np.concatenate([values, values]) for name, values in stays.items()
+            } | {"model": np.repeat(["nominal", "vec"], len(own["model"]))}
+        facts = {each.statistic: each.text for each in facts_of(tables) if each.item == "vec"}
+        limits.append(facts["highest_order_set_by"])
+    assert limits == ["configurations", "settings"]
 
 
 def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflectors):

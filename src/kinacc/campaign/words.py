@@ -26,6 +26,8 @@ REASONS = {
     "nothing_measured": "nothing measured yet",
     "first_visit": "{left} more points of the first visit have to be read before anything is said",
     "first_visit_by_travel": "{left} points of the first visit, made in order of travel, are left",
+    "predicted": "every reading ({read}) equals the predicted position to the last digit, which "
+    "none of an instrument does: were predictions recorded?",
     "suspects": "the suspects are not all measured again yet",
     "unmeasured": "{left} of {points} candidates are not measured",
     "missed": "{seen} of {points} candidates measured: {crowd} could have been missed",

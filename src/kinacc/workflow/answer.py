@@ -15,7 +15,7 @@ from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
 from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
-from kinacc.campaign import journal, of_calibration
+from kinacc.campaign import journal, of_calibration, slips
 from kinacc.campaign.of_calibration import Sought
 from kinacc.campaign.words import one_of
 from kinacc.deployment import folder as results
@@ -92,12 +92,13 @@ def told(
     ``campaign`` and ``exported`` are names for folders that the commands would make.
     """
     facts, arm = facts_of(tables), _arm(tables)
+    noise = [] if _is_synthetic(facts) else [_noise(tables)]
     commands = [] if bound.assessed is None else [bound.assessed.next_command]
     return Told(
         facts,
         _claims(folder, facts, tables),
         _other_errors(facts, tables, whole),
-        _bound(bound, folder, arm, campaign),
+        _bound(bound, folder, arm, noise, campaign),
         [*commands, *_uses(folder, arm, tables, exported)],
     )
 
@@ -156,7 +157,14 @@ def _arm(tables: Tables) -> Calibration:
     return results.calibration(tables, known)
 
 
-def _bound(bound: Sought, folder: Path, arm: Calibration, campaign: str) -> list[str]:
+def _noise(tables: Tables) -> str:
+    known = (tables[name] for name in ("measurements", "pose_errors", "frames"))
+    return slips.noise_by_repeats(*known)
+
+
+def _bound(
+    bound: Sought, folder: Path, arm: Calibration, noise: Sequence[str], campaign: str
+) -> list[str]:
     if bound.assessed is not None:
         return [*bound.assessed.in_words(), *bound.remarks]
     words = ["kinacc", "campaign", "start", campaign, "--calibration", str(folder)]
@@ -164,6 +172,7 @@ def _bound(bound: Sought, folder: Path, arm: Calibration, campaign: str) -> list
         *bound.remarks,
         "not assessed; a campaign bounds it (NOISE: standard deviation of one reading, mm):",
         *one_of(arm.default_point, [*arm.targets]),
+        *noise,
         f"{shlex.join(words)} --noise-mm NOISE --budget {_READINGS}",
     ]
 
