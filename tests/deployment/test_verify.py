@@ -98,8 +98,10 @@ def folder(tmp_path_factory):
         "same": (np.hstack([q_rad, xyz, quaternion]), turned, "quaternion"),
         "moved": (np.hstack([q_rad, xyz @ ELSEWHERE.rotation.T + 2000.0]), [], "none"),
     }
+    files["other_target"] = files["moved"]
     for name, (rows, more, kind) in files.items():
-        header = ",".join([*joint_names, "x_mm", "y_mm", "z_mm", *more])
+        named = "ball_" if name == "other_target" else ""
+        header = ",".join([*joint_names, *(f"{named}{axis}_mm" for axis in "xyz"), *more])
         np.savetxt(base / f"{name}.csv", rows, "%.17g", ",", header=header, comments="")
         (base / f"{name}.yaml").write_text(
             f"datasets: {{{name}: {{robot: mh180}}}}\nmeasurements: {{source: file, folds: 5, file:"
@@ -144,3 +146,12 @@ def test_another_robot_is_refused(folder, tmp_path):
     done = call("verify", found, own, "--base-and-tool", "fixed")
     assert done.exit_code == 2
     assert "another robot than" in done.output
+
+
+def test_another_target_than_the_calibrations_can_be_fitted_anew_and_not_be_kept(folder):
+    base, found = folder
+    kept = call("verify", found, base / "other_target.yaml", "--base-and-tool", "fixed")
+    assert kept.exit_code == 2
+    assert "no frame 'ball'" in kept.output
+    anew = call("verify", found, base / "other_target.yaml", "--base-and-tool", "estimated")
+    assert anew.exit_code == 0, anew.output

@@ -55,13 +55,11 @@ def verify(folder, files, base_and_tool, dataset, out) -> None:
     from kinacc.deployment import shared_readings
     from kinacc.deployment.applicability import is_measured_there
     from kinacc.deployment.verify import with_frames_fitted, with_kept_frames
-    from kinacc.kinematics import robot as robots
     from kinacc.progress import reporting
     from kinacc.workflow.stages import measurements
 
     name, config = _section(files, dataset)
-    tables, arm = results.read_tables(folder), choice.robot_of(folder, None, ())
-    results.require_same_robot(arm, robots.load(config["robot"]), name)
+    tables, arm = results.read_tables(folder), choice.robot_of(folder, config["robot"], ())
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         columns = measurements.run({}, config)["measurements"]
@@ -73,7 +71,8 @@ def verify(folder, files, base_and_tool, dataset, out) -> None:
             trials = with_frames_fitted(tables, arm, seen, weight)
         selected = results.selected_model(tables)
         known = results.calibration(tables, arm, selected)
-        there = is_measured_there(known, seen.at, seen.target_names[0])
+        point = next((each for each in seen.target_names if each in known.targets), None)
+        there = is_measured_there(known, seen.at, point)
     for each in dict.fromkeys(str(warning.message) for warning in said):
         click.echo(f"{name}: {each}", err=True)
     shared = 0

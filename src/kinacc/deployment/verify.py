@@ -45,7 +45,8 @@ def with_kept_frames(tables: Tables, robot: Robot, observations: Observations) -
     """
     sessions = observations.session_names
     bases = np.asarray(tables["frames"]["frame"]) == "base"
-    measured = {str(each) for each in np.asarray(tables["frames"].get("session", []))[bases]}
+    named = np.asarray(tables["frames"].get("session", np.full(len(bases), None)))
+    measured = {str(each) for each in named[bases]}
     if sessions == (None,) and len(measured) > 1:
         what = "do not say in which session they were read, and each has a base of its own"
         raise InputError(Problem("the readings", what, f"one of {', '.join(sorted(measured))}"))
