@@ -86,7 +86,7 @@ at the fifth that was left out, in turn; the arm is not touched. `kinacc verify`
 
 **Left out.** Within a series, fifths of the configurations dealt out at random. Neighbours of a
 pose stay in the fit: such errors are about poses among those measured. For VEC on the UR5's grid
-they are {grid_vec} / {grid_largest} mm ({grid_n} readings), as at the test poses.
+they are {grid_vec} / {grid_largest} mm ({grid_n} readings), much as at the test poses.
 
 **Largest.** It is that of the readings there are: of {n} it says little, and none is a bound on
 others ([campaigns](campaigns.md) make those). No row is left out; the three largest held-out
@@ -109,11 +109,11 @@ were set with these sets at hand, the UR5's grid among them
 
 ## Are the authors' figures the same quantity?
 
-No. In the thesis the UR5 was sent to corrected joints and measured again. Its {after} mm hold the
-scatter of that second run (the maker states a repeatability of 0.1 mm), and rest on base and tool
-that were calibrated beforehand. The figures here are what models leave of the readings of the
-first run, which is the one published, with base and tool fitted to the grid. An arm that is
-corrected by these models shows its scatter on top.
+No. By the data set's description the UR5 was measured again under each compensation. The thesis's
+{after} mm hold the scatter of that run (the maker states a repeatability of 0.1 mm), and rest on
+base and tool that were calibrated beforehand. The figures here are what models leave of the
+readings of the first run, which is the one published, with base and tool fitted to the grid. An
+arm that is corrected by these models shows its scatter on top.
 
 Nor is "before" the same. The published differences of the {n} poses have a mean of 2.565 mm (the
 thesis has {before}). With the best base and tool the nominal arm leaves {test_nominal}: most of
@@ -130,6 +130,7 @@ mirror image, with errors of the same size.
 ## What it does not say
 
 - Two arms of one maker, one of each type. The UR5 moved in 7 to 21 % of its joints' ranges.
+- From one series of the UR10 to the other the arm itself may have changed.
 - Nothing of orientations: the UR5's were not measured; `kinacc fitted` and `kinacc verify` give
   those of the UR10.
 - Not here: series A and C of the UR10, which are large, and a FANUC R-2000iC, whose data state no
@@ -138,8 +139,8 @@ mirror image, with errors of the same size.
 
 ## Again
 
-`make public-robots` works in `public-robots/` (some minutes on two cores; what is up to date is
-not made again). It writes [public-robots.csv](public-robots.csv), which has every error above with
+`make public-robots` works in `public-robots/`: four minutes of one core, half a minute where all is
+up to date. It writes [public-robots.csv](public-robots.csv), which has every error above with
 99 % and rms, and from it this page. The commands, with the files of
 [examples/data](../examples/data/README.md) under these names and, for the UR5, target plus
 difference as `x_mm`, `y_mm`, `z_mm`:
