@@ -250,7 +250,7 @@ def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
 def test_what_repeats_tell_of_the_noise_stands_beside_the_question_for_it(folder, measured):
     page = " ".join(shown(measured).split())
     asked, told, command = (
-        page.index(each) for each in ("(NOISE:", "from ten visits to a pose", "--noise-mm NOISE")
+        page.index(each) for each in ("(NOISE:", "of ten visits to a pose", "--noise-mm NOISE")
     )
     assert asked < told < command
     assert "ten visits" not in shown(folder)  # nobody can go to a pose of a synthetic arm

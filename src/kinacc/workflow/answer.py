@@ -164,7 +164,7 @@ def _noise(facts: Sequence[Fact], tables: Tables) -> str:
         return asked
     known = (tables[name] for name in ("measurements", "pose_errors", "frames"))
     least = slips.scatter_in_brief(*known)
-    return f"{asked}, at least this: {least}" if least else f"{asked}, from ten visits to a pose"
+    return f"{asked}, at least this: {least}" if least else "NOISE: std of ten visits to a pose, mm"
 
 
 def _bound(bound: Sought, folder: Path, arm: Calibration, noise: str, campaign: str) -> list[str]:
