@@ -36,7 +36,7 @@ def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str
         *paragraph("check", _checked(facts, most, more)),
         *paragraph("excluded", _excluded(facts, most, more)),
         *_errors(facts, whole),
-        *paragraph("selected", _selected(facts)),
+        *paragraph("selected", selected(facts)),
         *paragraph("bending", _bending(of(facts, "bending"))),
         *paragraph("valid where", _range(facts)),
         *paragraph("undetermined", _undetermined(facts, most, more)),
@@ -167,7 +167,7 @@ def _order(known: Mapping[str, Fact]) -> str:
     return f"{told}, the highest {known['configurations'].value:.0f} configurations carry"
 
 
-def _selected(facts: Sequence[Fact]) -> list[str]:
+def selected(facts: Sequence[Fact]) -> list[str]:
     """Why the selected model is selected, and a warning where the nominal one is nearer."""
     models, held_out = of(facts, "selection"), of(facts, "held_out_error")
     best = next(model for model, known in models.items() if known["selected"].value)
