@@ -1,5 +1,7 @@
 """The section on parameters: differences with bars, and errors of joints no DH table can say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bokeh.models import VArea
@@ -17,6 +19,8 @@ from made_up_results import (
     vec_model,
 )
 
+from kinacc.kinematics import vec
+from kinacc.kinematics.dh import PARAMETERS, DHModel, forward
 from kinacc.kinematics.vec import ERRORS
 from kinacc.report import parameters
 
@@ -91,6 +95,42 @@ def test_the_linear_part_of_a_sliding_joint_is_its_neighbours_turn():
     assert [each[-3:] for each in labels] == ["deg", "deg", "deg", " mm"]
 
 
+def between(slides: bool, joint: int, twist: np.ndarray) -> dict[str, float]:
+    """Coefficients of the error of a joint, from 0, that is a small ``twist`` (6,) behind it."""
+    at = np.linspace(-1.0, 1.0, 60)
+    arm = robot(slides)
+    held = DHModel(*(getattr(arm.dh, name)[joint : joint + 1] for name in PARAMETERS))
+    if slides:
+        held = replace(held, prismatic=np.ones(1, bool))
+    passed = forward(held, arm.q_max_rad[joint] * at[:, None])
+    turn = passed.rotation @ twist[3:]
+    shift = passed.rotation @ twist[:3] + np.cross(passed.position_mm, turn)
+    curves = np.polynomial.chebyshev.chebfit(at, np.concatenate([shift, turn], axis=1), 12)
+    return {
+        f"j{joint + 1}__{error}__{n}": curves[n, i]
+        for i, error in enumerate(ERRORS)
+        for n in range(13)
+    }
+
+
+@pytest.mark.parametrize(("slides", "joint"), [(False, 1), (True, 3)])
+def test_what_is_left_out_changes_no_pose_where_the_neighbour_takes_it_over(slides, joint):
+    twist = np.array([0.02, -0.03, 0.01, 1e-5, 2e-5, -3e-5])  # mm and rad
+    moved = between(slides, joint, twist)
+    if not slides:  # the joint behind takes it back; behind the last one the tool does
+        moved |= {f"j{joint + 2}__{e}__0": -c for e, c in zip(ERRORS, twist, strict=True)}
+    model = vec_model(12, **moved)
+    arm = robot(slides)
+    if not slides:
+        q = arm.q_max_rad * np.random.default_rng(1).uniform(-1, 1, (20, 4))
+        same = vec.forward(vec.VECModel.from_columns(model, arm.dh.prismatic), q)
+        assert same.position_mm == pytest.approx(forward(arm.dh, q).position_mm, abs=1e-4)
+    found = section(slides=slides, vec_model=model)
+    for kind in ("delta", "eps"):
+        for axis in "xyz":
+            assert curve(found, f"j{joint + 1}_{kind}_{axis}", kind) == pytest.approx(0, abs=1e-5)
+
+
 def test_the_band_is_of_what_is_shown():
     variance = np.zeros(len(NAMES))
     variance[NAMES.index("j1.eps_z.0")] = 1.0  # a constant: no pose tells whose it is
@@ -105,7 +145,7 @@ def test_the_band_is_of_what_is_shown():
     assert np.ptp(value) == pytest.approx(4.0)
     at_an_end = table(found, "The largest of every error").rows[0][-1]
     assert [float(each) for each in at_an_end.split(" ± ")] == pytest.approx(
-        [value[0], high[0] - value[0] - 0.5 * value[0]], abs=1e-3
+        [value[0], 0.5 * (high[0] - value[0])], abs=1e-3
     )
 
 
