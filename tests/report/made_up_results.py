@@ -138,15 +138,15 @@ def selection(gain: float = 0.05, error: float = 0.01, selected: str = "vec") ->
     }
 
 
-def pose_errors(estimate: str = "cross_validated", **mean_mm: float) -> dict:
-    """``pose_errors`` of two rows, each model off by its ``mean_mm`` along x."""
+def pose_errors(estimate: str = "cross_validated", rows: int = 2, **mean_mm: float) -> dict:
+    """``pose_errors`` of some rows, each model off by its ``mean_mm`` along x."""
     sizes = {"nominal": 1.0, "dh": 0.4, "vec": 0.3} | mean_mm
-    count = 2 * len(sizes)
+    count = rows * len(sizes)
     return {
-        "comparison": np.repeat([f"{model}_vs_measured" for model in sizes], 2).astype(object),
+        "comparison": np.repeat([f"{model}_vs_measured" for model in sizes], rows).astype(object),
         "estimate": np.full(count, estimate, dtype=object),
-        "row": np.tile([0, 1], len(sizes)),
-        "ex_mm": np.repeat(list(sizes.values()), 2),
+        "row": np.tile(np.arange(rows), len(sizes)),
+        "ex_mm": np.repeat(list(sizes.values()), rows),
         **{f"e{axis}_mm": np.zeros(count) for axis in "yz"},
         **{f"r{axis}_mrad": np.full(count, np.nan) for axis in "xyz"},
     }

@@ -9,6 +9,7 @@ from made_up_results import (
     everything,
     measurements,
     picture,
+    pose_errors,
     robot,
     selection,
     table,
@@ -85,7 +86,20 @@ def test_repeats_show_the_noise_with_its_degrees_of_freedom():
     told = measured(section(measurements=readings))["noise from repeats"]
     # Each of three pairs leaves 2 (0.01 mm)^2 to one degree of freedom.
     assert "x 0.014, y 0, z 0 mm" in told
-    assert "3 poses and targets with 6 readings (3 degrees of freedom)" in told
+    assert "3 poses (each target by itself) with 6 readings (3 degrees of freedom)" in told
+
+
+def test_configurations_the_arm_came_back_to_show_noise_and_repeatability():
+    there = np.array([[0.0] * 4, [0.5] * 4, [0.0] * 4, [2e-5] * 4])
+    errors = pose_errors(rows=4)
+    mine = errors["comparison"] == "vec_vs_measured"
+    errors["ex_mm"][mine] = [0.31, 9.0, 0.29, 0.30]
+    found = section(measurements=measurements(there), pose_errors=errors)
+    told = measured(found)["noise from revisits"]
+    # 2 (0.01 mm)^2 on two degrees of freedom along x, nothing along y and z.
+    assert told.startswith("standard deviation 0.0058 mm per axis")
+    assert "1 configuration the arm came back to, with 3 readings (2 degrees of freedom)" in told
+    assert "noise from revisits" not in measured(section())
 
 
 def test_nothing_measured_twice_shows_no_noise_and_a_file_may_state_some():
@@ -145,5 +159,5 @@ def test_a_joint_beyond_its_limits_is_drawn_beyond_its_frame():
 
 
 def test_one_row_is_enough_for_a_section():
-    found = section(measurements=measurements([[0.0] * 4]))
+    found = section(measurements=measurements([[0.0] * 4]), pose_errors=pose_errors(rows=1))
     assert found.population.startswith("1 reading of 1 target at 1 pose of a measured arm")

@@ -10,10 +10,11 @@ from bokeh.transform import log_cmap
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import model_name
+from kinacc.artifacts.error_models import MEASURED, Comparison, model_name
 from kinacc.calibration import summary
 from kinacc.calibration.summary_words import counted
 from kinacc.checks import cells, noise
+from kinacc.checks.facts import revisited
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report import pictures
@@ -33,7 +34,7 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
     return Section(
         "data",
         "Data check",
-        f"{_population(measurements)}, as measured: no model is in these figures",
+        _population(measurements),
         "What was measured, how much of the travel of every joint it covers, and what the check "
         "of the file found before anything was fitted.",
         "Good: nothing suspicious, readings repeated at some poses, every joint over most of its "
@@ -45,7 +46,7 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
         (
             *_findings(found),
             *_excluded(tables),
-            _measured(measurements, robot),
+            _measured(tables, robot),
             _coverage(measurements, robot),
             _ranges(measurements, robot),
             *_left_out(found),
@@ -107,25 +108,27 @@ def _excluded(tables: Mapping[str, Columns]) -> list[Block]:
     return [Table(caption, heads, rows, frozenset({1}), folded=len(rows) > _MOST_SHOWN)]
 
 
-def _measured(measurements: Columns, robot: Robot) -> Table:
+def _measured(tables: Mapping[str, Columns], robot: Robot) -> Table:
     """What there is, in pairs of a name and words."""
+    measurements = tables["measurements"]
     count = len(measurements["pose"])
     fitted = int(np.sum(np.asarray(measurements["subset"]) == SUBSETS[0]))
     rest = f"{fitted} of {count}; {count - fitted} held out (measurements.validation_fold)"
-    rows = [
+    every = cells.of_columns(measurements, robot.dh.joints, RowNames.of_columns(measurements))
+    sessions = len(every.session_names) > 1
+    rows = (
         ("robot", f"{robot.name}: {robot.source}" if robot.source else robot.name),
         ("readings", str(count)),
         ("poses", str(len(np.unique(measurements["pose"])))),
         ("targets", _named(measurements["target"])),
+        ("sessions", _named(measurements["session"]) if sessions else ""),
         ("orientation", _turned(measurements)),
         ("fitted by the delivered models", "all" if fitted == count else rest),
-        ("noise from repeats", _repeats(measurements, robot)),
-    ]
-    if len(set(_texts(measurements["session"]))) > 1:
-        rows.insert(4, ("sessions", _named(measurements["session"])))
-    if stated := _stated(measurements):
-        rows.append(("noise as the file states it", stated))
-    return Table("What was measured", ("property", "value"), tuple(rows))
+        ("noise from repeats", _repeats(every)),
+        ("noise from revisits", _revisits(tables, every)),
+        ("noise as the file states it", _stated(measurements)),
+    )
+    return Table("What was measured", ("property", "value"), tuple(row for row in rows if row[1]))
 
 
 def _named(column: np.ndarray) -> str:
@@ -146,20 +149,48 @@ def _turned(measurements: Columns) -> str:
     return "not measured: how the tool is turned is judged nowhere on this page"
 
 
-def _repeats(measurements: Columns, robot: Robot) -> str:
+def _repeats(every: cells.Cells) -> str:
     """Noise that readings of one pose and target show, in words."""
-    names = RowNames.of_columns(measurements)
-    every = cells.of_columns(measurements, robot.dh.joints, names)
     found = noise.repeats(every, cells.merged(every)[1])
     if not found.freedom:
-        return "no target was read twice at a pose: the file does not show its noise"
+        return "unknown: no target was read twice at a pose"
     axes = ", ".join(f"{axis} {each:.2g}" for axis, each in zip("xyz", found.std_mm, strict=True))
-    degrees = counted(found.freedom, "degree")
+    groups = "one pose" if found.groups == 1 else f"{found.groups} poses (each target by itself)"
     return (
-        f"standard deviation {axes} mm, pooled over {counted(found.groups, 'pose and target')} "
-        f"with {found.readings} readings ({degrees} of freedom); it holds the instrument, and what "
-        "arm and set-up move meanwhile"
-    ).replace("pose and targets", "poses and targets")
+        f"standard deviation {axes} mm, pooled over {groups} with {found.readings} readings "
+        f"({_degrees(found.freedom)}); it holds the instrument, and what arm and set-up move "
+        "meanwhile"
+    )
+
+
+def _revisits(tables: Mapping[str, Columns], every: cells.Cells) -> str:
+    """Noise at configurations the arm came back to, in words; empty where it never did.
+
+    The selected model takes out what little the joints differ; poses of one configuration are held
+    out together, so that the same fit speaks of all of them.
+    """
+    table = tables["pose_errors"]
+    model = summary.selected(tables["model_selection"])
+    mine = np.asarray(table["comparison"]) == Comparison(MEASURED, model).name
+    held_out = mine & (np.asarray(table["estimate"]) == "cross_validated")
+    rows = np.flatnonzero(held_out if held_out.any() else mine)
+    left = np.full((len(every), 3), np.nan)
+    left[np.asarray(table["row"])[rows]] = np.stack(
+        [np.asarray(table[f"e{axis}_mm"], dtype=float)[rows] for axis in "xyz"], axis=1
+    )
+    found = revisited(every, left, np.isfinite(left[:, 0]))
+    if not found.freedom:
+        return ""
+    return (
+        f"standard deviation {noise.per_axis_mm(found.std_mm):.2g} mm per axis, pooled over "
+        f"{counted(found.configurations, 'configuration')} the arm came back to, with "
+        f"{found.readings} readings ({_degrees(found.freedom)}); it holds the arm's repeatability "
+        "besides"
+    )
+
+
+def _degrees(freedom: int) -> str:
+    return f"{freedom} {'degree' if freedom == 1 else 'degrees'} of freedom"
 
 
 def _stated(measurements: Columns) -> str:

@@ -38,7 +38,7 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
     return Section(
         "identifiability",
         "What the poses leave open",
-        f"{counted(len(told['parameter']), 'parameter')} of the DH fit, base and tool with them: "
+        f"{counted(len(told['parameter']), 'parameter')} of the DH fit{_frames(told)}: "
         f"{_counts(told)}",
         "Which parameters the measured poses determine, which they cannot tell apart, and which "
         "are only known together.",
@@ -55,6 +55,10 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
             _every(told),
         ),
     )
+
+
+def _frames(told: Columns) -> str:
+    return "" if of_arm([str(each) for each in told["parameter"]]).all() else ", base and tool too"
 
 
 def _counts(told: Columns) -> str:

@@ -163,12 +163,16 @@ def _differences(found: Sequence[Parameter], unit: str) -> Picture:
             legend_label=status,
         )
     plot.xaxis.major_label_orientation = "vertical"
-    plot.legend.orientation = "horizontal"
+    plot.legend.update(orientation="horizontal", spacing=14)
     plot.add_layout(plot.legend[0], "above")
     caption = (
-        f"Difference of the {what} of the DH model, with {_WIDE:g} standard deviations either way. "
-        "Undetermined ones have no bar: they stay near nominal by convention, not by measurement."
+        f"Difference of the {what} of the DH model, with {_WIDE:g} standard deviations either way."
     )
+    if any(each.status == UNDETERMINED for each in mine):
+        caption += (
+            " Undetermined ones have no bar: where they stand is a convention, the least change of "
+            "all that fit, and no measurement."
+        )
     far = max(mine, key=lambda each: abs(each.difference))
     words = f"{caption} The largest: {parameter_name(far.name)}, {far.difference:+.3f} {unit}."
     details = {
@@ -297,7 +301,7 @@ class _Curves:
             line.glyph.name = f"{name}-line"
         plot.xaxis[0].name = f"{kind}-axis"
         plot.legend.click_policy = "hide"
-        plot.legend.orientation = "horizontal"
+        plot.legend.update(orientation="horizontal", spacing=14)
         plot.add_layout(plot.legend[0], "above")
         options = tuple(
             Option(f"{n + 1}", tuple(self._sets(kind, mine, n, banded)))
