@@ -75,6 +75,10 @@ def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
     assert [each > 0 for each in columns["chosen"]] == [False, True, False]
     assert "Lowest at order 4, chosen: 2" in shown.described
     assert set_nothing_that_is_not_there(shown)
+    tried = table(found, "Orders tried")
+    assert tried.rows[1] == ("2", "0.3", "0.4", "0.7", "0.3100", "0.00600", "0.00700")
+    assert tried.rows[2][-1] == "–"
+    assert tried.marked == {1: "← chosen"}
     chosen = table(found, "Orders chosen")
     assert [row[:2] for row in chosen.rows] == [("all, delivered", "2"), ("without fold 0", "4")]
 

@@ -22,6 +22,12 @@ _FIGURES = {  # of an order: what it is called, and its digits
     "excess_mm2": ("squared error beyond the best, mm²", 5),
 }
 
+_PRIOR = {
+    "prior, mm": "prior_std_mm",
+    "prior, mrad": "prior_std_mrad",
+    "decay": "prior_decay",
+}
+
 
 def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
     """The section of a page on ``model_selection`` and ``vec_orders``."""
@@ -101,7 +107,8 @@ def _orders(table: Columns | None) -> list[Block]:
         told = f"The order of the VEC model, {order}, is stated and no other was tried"
         return [Text(f"{told} (calibration.vec.order: auto tries several).")]
     final = np.flatnonzero(known & np.isnan(np.asarray(table["fold"], dtype=float)))
-    return [*([_over_order(table, final)] if len(final) else []), _chosen(table)]
+    tried = [_over_order(table, final), _tried(table, final)] if len(final) else []
+    return [*tried, _chosen(table)]
 
 
 def _over_order(table: Columns, rows: np.ndarray) -> Picture:
@@ -163,9 +170,9 @@ def _over_order(table: Columns, rows: np.ndarray) -> Picture:
         for name, (label, _) in _FIGURES.items()
     )
     caption = (
-        "Each order with its best prior. Chosen (ring) is the lowest order whose squared error "
-        "exceeds the best by no more than one standard error, which the bars of the second view "
-        "show."
+        "Errors of poses left out of a fit while the order was chosen (far ones count less), each "
+        "order with its best prior. Chosen (ring) is the lowest order whose squared error exceeds "
+        "the best by no more than one standard error, which the bars of the second view show."
     )
     best = int(columns["order"][np.nanargmin(columns[first])])
     picked = ", ".join(f"{each:.0f}" for each in columns["order"][chosen]) or "none"
@@ -173,6 +180,29 @@ def _over_order(table: Columns, rows: np.ndarray) -> Picture:
     control = Control("Shown", options)
     details = {"order": "order {}", "held_out_rms_mm": "held-out rms {} mm"}
     return Picture("orders", plot, words, caption, (control,), details=details)
+
+
+def _tried(table: Columns, rows: np.ndarray) -> Table:
+    """What the picture shows."""
+    rows = rows[np.argsort(np.asarray(table["order"])[rows], kind="stable")]
+    figures = [(name, digits) for name, (_, digits) in _FIGURES.items()]
+    figures.append(("excess_std_error_mm2", 5))
+    cells = tuple(
+        (
+            f"{int(table['order'][i])}",
+            *_prior(table, i),
+            *(_number(table[name][i], digits) for name, digits in figures),
+        )
+        for i in rows
+    )
+    chosen = {n: "← chosen" for n, i in enumerate(rows) if table["chosen"][i] == 1}
+    labels = (*(label for label, _ in _FIGURES.values()), "standard error of it")
+    heads = ("order", *_PRIOR, *labels)
+    return Table("Orders tried", heads, cells, frozenset(range(len(heads))), chosen, folded=True)
+
+
+def _prior(table: Columns, row: int) -> tuple[str, ...]:
+    return tuple(f"{float(table[name][row]):g}" for name in _PRIOR.values())
 
 
 def _chosen(table: Columns) -> Table:
@@ -184,12 +214,10 @@ def _chosen(table: Columns) -> Table:
             (
                 f"without fold {fold[i]:.0f}" if np.isfinite(fold[i]) else "all, delivered",
                 f"{int(table['order'][i])}",
-                f"{table['prior_std_mm'][i]:g}",
-                f"{table['prior_std_mrad'][i]:g}",
-                f"{table['prior_decay'][i]:g}",
+                *_prior(table, i),
                 _number(table["held_out_rms_mm"][i], 4),
             )
         )
-    heads = ("poses seen", "order", "prior, mm", "prior, mrad", "decay", "held-out rms, mm")
+    heads = ("poses seen", "order", *_PRIOR, "held-out rms, mm")
     caption = "Orders chosen: held-out errors contain the cost of choosing"
     return Table(caption, heads, tuple(rows), frozenset(range(1, 6)), folded=len(rows) > 1)
