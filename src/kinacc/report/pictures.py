@@ -42,6 +42,11 @@ def source(name: str, columns: Mapping[str, np.ndarray]) -> ColumnDataSource:
     return ColumnDataSource(plain, name=name)
 
 
+def field(name: str) -> dict[str, str]:
+    """What an option of a control sets where a glyph takes its values from a column."""
+    return {"field": name}  # with a "type" beside it, as Python sends it, the browser draws nothing
+
+
 def figure(
     x_label: str,
     y_label: str,

@@ -220,7 +220,7 @@ def _over_joint(found: Errors, data: ColumnDataSource, robot: Robot) -> Picture:
             f"{n + 1}",
             (
                 *(
-                    (f"over-joint-{m}-glyph", "x", {"type": "field", "field": f"q{n + 1}"})
+                    (f"over-joint-{m}-glyph", "x", pictures.field(f"q{n + 1}"))
                     for m in _shown(found)
                 ),
                 ("over-joint-axis", "axis_label", _joint(robot, n)),
@@ -264,8 +264,8 @@ def _in_space(found: Errors, data: ColumnDataSource) -> Picture:
         Option(
             f"{across} and {up}",
             (
-                ("in-space-glyph", "x", {"type": "field", "field": across}),
-                ("in-space-glyph", "y", {"type": "field", "field": up}),
+                ("in-space-glyph", "x", pictures.field(across)),
+                ("in-space-glyph", "y", pictures.field(up)),
                 ("in-space-across", "axis_label", f"{across}, mm"),
                 ("in-space-up", "axis_label", f"{up}, mm"),
             ),
