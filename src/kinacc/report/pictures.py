@@ -10,7 +10,8 @@ from pathlib import Path
 import bokeh
 import numpy as np
 from bokeh.document import Document
-from bokeh.models import ColumnDataSource, GlyphRenderer, HoverTool, Plot
+from bokeh.models import ColumnDataSource, HoverTool, Plot
+from bokeh.models.renderers import GlyphRenderer
 from bokeh.plotting import figure as bokeh_figure
 
 # Okabe and Ito's colours, of which those too light on one of the two backgrounds are left out.
