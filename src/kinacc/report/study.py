@@ -71,7 +71,7 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
         f"that it takes as known ({held_to.what}); {span} simulations at each of {len(levels)} "
         "noise levels. The readings are simulated: nothing of this was measured in a campaign",
         "The accuracy that the paper's methods would state from noisy readings of these points, "
-        f"beside the largest error there is, {held_to.largest_mm:.3f} mm.",
+        f"beside the largest error among them, {held_to.largest_mm:.3f} mm.",
         "Good: a narrow band about the line at the noise of your instrument. Bad: a band below "
         "the line, for it calls the model better than it is, or one that rises with the noise, "
         "for it states the noise and not the robot.",
