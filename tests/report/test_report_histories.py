@@ -54,8 +54,8 @@ def test_an_example_that_only_comes_near_to_its_rule_says_so():
 
 def test_points_read_again_are_listed_with_whether_they_are_beyond_the_bound():
     rejected, kept = tables_of(section_of())[1:]
-    assert rejected.rows == (("1", "2", "3", "0.600", "0.500", "beyond"),)
-    assert [row[5] for row in kept.rows] == ["not beyond: noise alone"] * 2
+    assert rejected.rows == (("1", "2", "3", "0.600", "0.500", "yes"),)
+    assert [row[5] for row in kept.rows] == ["no: noise alone"] * 2
 
 
 def test_a_button_shows_the_last_reading_of_its_point_in_its_own_example():

@@ -233,10 +233,13 @@ def _again(histories: Columns, each: _Example, first_row: int) -> Table:
                 str(repeat[last[p]]),
                 f"{histories['averaged_mm'][row]:.3f}",
                 f"{true:.3f}",
-                "beyond" if true > each.eta_mm else "not beyond: noise alone",
+                "yes" if true > each.eta_mm else "no: noise alone",
             )
         )
-    heads = ("point", "first at iteration", "readings", "average, mm", "error of the point, mm", "bound")
+    heads = (
+        *("point", "first at iteration", "readings", "average, mm", "error of the point, mm"),
+        "beyond the bound",
+    )
     return Table(
         f"{each.called[0].upper()}{each.called[1:]}: points measured again",
         heads,
