@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kinacc.kinematics import robot
-from kinacc.report import accuracy_map
+from kinacc.report import accuracy_map, map_cells
 from kinacc.report.page import FirstScreen, Page, Picture, Table, Text, html
 
 ARM = robot.load("mh180")
@@ -156,7 +156,7 @@ def test_a_map_made_before_joints_were_kept_is_shown_without_them():
 
 def test_of_more_cells_than_can_be_drawn_the_largest_are_kept():
     table = made_up(radii=7, heights=5)
-    drawn = accuracy_map.cells(table, most=30)
+    drawn = map_cells.cells(table, most=30)
     assert drawn.merged
     assert len(drawn.farthest) <= 30
     position = table["position_max_mm"]
@@ -168,7 +168,7 @@ def test_of_more_cells_than_can_be_drawn_the_largest_are_kept():
 
 
 def test_a_button_of_a_merged_cell_points_at_the_cell_it_is_in(monkeypatch):
-    monkeypatch.setattr(accuracy_map.cells, "__defaults__", (4,))
+    monkeypatch.setattr(map_cells.cells, "__defaults__", (4,))
     section = section_of(made_up())
     picture, listed = block(section, Picture), block(section, Table)
     assert "drawn as one" in picture.caption

@@ -136,9 +136,7 @@ def _level(
     plot: BokehFigure, data: ColumnDataSource, shown: GroupFilter, y: str, **look: object
 ) -> None:
     """A value of every iteration as a short line of its own."""
-    part = plot.segment(
-        "from", y, "to", y, source=data, view=CDSView(filter=shown), **look
-    )  # fmt: skip
+    part = plot.segment("from", y, "to", y, source=data, view=CDSView(filter=shown), **look)
     part.nonselection_glyph = None
 
 
