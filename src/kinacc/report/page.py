@@ -23,7 +23,8 @@ class Table:
 
     ``numeric`` says which columns hold numbers, ``marked`` which row is the one meant, in words
     behind it; ``folded`` tables are opened by the reader. ``picks`` are rows of the data of the
-    picture ``picked_in``, one for each row of the table: a button there selects it.
+    picture ``picked_in``, one for each row of the table: a button there selects it. ``choices``
+    are made first, for each row pairs: label of a control of that picture, label of its option.
     """
 
     caption: str
@@ -34,6 +35,7 @@ class Table:
     folded: bool = False
     picked_in: str = ""
     picks: tuple[int, ...] = ()
+    choices: tuple[tuple[tuple[str, str], ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ class Picture:
     """A picture to explore.
 
     ``key`` is its name on the page and that of its data, ``described`` is read to who cannot see
-    it. ``details`` maps a column of its data to what is said of a point that is selected.
+    it. ``details`` maps a column of its data to what is said of a point that is selected, unless
+    there is no value; ``names`` says by column what its numbers stand for, counted from 0.
     """
 
     key: str
@@ -74,6 +77,7 @@ class Picture:
     caption: str = ""
     controls: tuple[Control, ...] = ()
     details: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     invitation: str = "Select a point to see what it is."
 
 
@@ -147,7 +151,12 @@ def html(page: Page, marks: Mapping[str, object], read: Mapping[str, str]) -> st
     pictures = list(_pictures(page.sections))
     data, drawn = documents([each.plot for each in pictures])
     places = {
-        each.key: {"document": document, "root": root, "details": dict(each.details)}
+        each.key: {
+            "document": document,
+            "root": root,
+            "details": dict(each.details),
+            "names": dict(each.names),
+        }
         for each, (document, root) in zip(pictures, drawn, strict=True)
     }
     return _template().render(
@@ -159,7 +168,7 @@ def html(page: Page, marks: Mapping[str, object], read: Mapping[str, str]) -> st
         library=library() if pictures else "",
         pictures=_embedded({"documents": data, "places": places}),
         kind=lambda block: type(block).__name__,
-        sets=lambda option: json.dumps(option.sets),
+        plain=json.dumps,
     )
 
 
