@@ -127,12 +127,12 @@ def how_often(confidence: float) -> str:
 def _noise_assumed(said: Statement, state: State) -> str:
     """What the noise has to be: no more than stated, or as stated where a bound is that small."""
     used = state.plan.instruments
-    noise = ", ".join(instrument.noise(each) for each in used)
-    if len(used) > 1:
-        noise = f"stated ({', '.join(f'{each.name}: {instrument.noise(each)}' for each in used)})"
     largest = max(float(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in used)
     clear = said.upper_mm > _CLEAR_OF_NOISE * math.sqrt(largest)
-    return f"the noise is {'at most' if clear else 'exactly'} {noise}"
+    if len(used) == 1:
+        return f"the noise is {'at most' if clear else 'exactly'} {instrument.noise(used[0])}"
+    each = "; ".join(f"{one.name}: {instrument.noise(one)}" for one in used)
+    return f"the noise is {'at most ' if clear else ''}as stated ({each})"
 
 
 def statement(said: Statement, state: State) -> str:

@@ -182,12 +182,14 @@ def _answers(state: State, said: Sequence[Statement], lead: Statement) -> tuple[
 
 def _statements(state: State, said: Sequence[Statement]) -> Table:
     tolerance = state.plan.limits.tolerance_mm
+    doubtful = _against(state, said)
     heads = ("of", "at most", "estimate", "at least", "each bound is right in")
     rows = []
     for each in said:
         share = f"{each.share:.1%} of the region"
         about = share if each.target == REGION else words.TARGETS[each.target]
-        right = words.how_often(each.confidence) if np.isfinite(each.confidence) else "-"
+        sure = np.isfinite(each.confidence) and not doubtful
+        right = words.how_often(each.confidence) if sure else "-"
         sizes = (mm(size) for size in (each.upper_mm, each.value_mm, each.lower_mm))
         verdict = () if tolerance is None else (decide(each, tolerance).verdict,)
         rows.append((about, *sizes, right, *verdict))
