@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from bokeh.models import ColumnDataSource, HoverTool
+from bokeh.models import CDSView, ColumnDataSource, HoverTool, IndexFilter
 
 from kinacc.artifacts.columns import Columns
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION
@@ -28,20 +28,18 @@ _RARE = 1.94  # root of chi-square over its 3 degrees of freedom: 1 in 100 is ab
 def course(state: State, tables: Mapping[str, Columns], key: str) -> tuple[Block, ...]:
     """The bounds over the readings, and the moments as a table."""
     bounds = tables["campaign_bounds"]
-    plot = pictures.figure(
-        "readings used",
-        "largest error, mm",
-    )
-    marks = []
-    for about, rows in _statements(bounds):
-        kept = rows[np.isfinite(np.stack([bounds[n] for n, _ in _BOUNDS])[:, rows]).any(axis=0)]
-        if not kept.size:
-            continue
-        data = _moments(bounds, kept, about, f"{key}-{len(marks)}")
-        marks.append(_curves(plot, data, bounds["target"][kept[0]]))
-    if not marks:
+    plot = pictures.figure("readings used", "largest error, mm")
+    sizes = np.stack([np.asarray(bounds[name], dtype=float) for name, _ in _BOUNDS])
+    told = np.isfinite(sizes).any(axis=0)
+    of_each = {about: rows[told[rows]] for about, rows in _statements(bounds) if told[rows].any()}
+    if not of_each:
         said = "Nothing can be said of the largest error yet, so there is no course to draw."
         return (Text(said), _as_table(bounds))
+    data = _moments(bounds, of_each, key)
+    marks, first = [], 0
+    for about, rows in of_each.items():
+        part = slice(first, first := first + len(rows))
+        marks.append(_curves(plot, data, part, bounds["target"][rows[0]], about))
     hover = [
         ("", "@about, after @readings readings at @points_measured points"),
         *((said, f"@{name}{{0.000}} mm") for name, said in _BOUNDS),
@@ -82,19 +80,22 @@ def _statements(bounds: Columns) -> Iterator[tuple[str, np.ndarray]]:
         yield about, np.flatnonzero((target == each) & (share == part))
 
 
-def _moments(bounds: Columns, rows: np.ndarray, about: str, name: str) -> ColumnDataSource:
-    count = len(rows)
+def _moments(bounds: Columns, of_each: Mapping[str, np.ndarray], name: str) -> ColumnDataSource:
+    """What could be said at which moment, the statements one after another."""
+    rows = np.concatenate([*of_each.values()])
     columns = {each: np.asarray(bounds[each])[rows] for each in ("readings", "points_measured")}
     columns |= {each: np.asarray(bounds[each], dtype=float)[rows] for each, _ in _BOUNDS}
-    columns["about"] = np.array([about] * count, dtype=object)
-    columns["right"] = np.array(
-        [
+    upper, value = columns["upper_mm"], columns["value_mm"]
+    columns["mark_mm"] = np.where(np.isfinite(upper), upper, value)
+    texts = {
+        "about": [about for about, mine in of_each.items() for _ in mine],
+        "right": [
             words.how_often(each) if np.isfinite(each) else "no campaign that is known"
             for each in np.asarray(bounds["confidence"], dtype=float)[rows]
         ],
-        dtype=object,
-    )
-    columns["rests"] = np.array([_rests(bounds, row) for row in rows], dtype=object)
+        "rests": [_rests(bounds, int(row)) for row in rows],
+    }
+    columns |= {each: np.array(values, dtype=object) for each, values in texts.items()}
     return pictures.source(name, columns)
 
 
@@ -106,30 +107,29 @@ def _rests(bounds: Columns, row: int) -> str:
     return f"if {assumption}" if assumption else "no assumption but the noise"
 
 
-def _curves(plot, data: ColumnDataSource, target: str):
-    """Draw the bounds of a target; the marks of its moments."""
+def _curves(plot, data: ColumnDataSource, part: slice, target: str, label: str):
+    """Draw the bounds of a target, ``part`` of the data; the marks of its moments."""
     colour, dashes, marker = _LOOKS[target]
-    label = str(data.data["about"][0])
-    ends = {name: np.asarray(data.data[name]) for name in ("readings", "lower_mm", "upper_mm")}
-    both = np.isfinite(ends["lower_mm"]) & np.isfinite(ends["upper_mm"])
-    between = pictures.source("", {name: values[both] for name, values in ends.items()})
+    names = ("readings", *(name for name, _ in _BOUNDS))
+    mine = {name: np.asarray(data.data[name])[part] for name in names}
+    both = np.isfinite(mine["lower_mm"]) & np.isfinite(mine["upper_mm"])
+    between = pictures.source("", {name: values[both] for name, values in mine.items()})
     plot.varea(
         "readings", "lower_mm", "upper_mm", source=between, color=colour, alpha=0.12,
         legend_label=label,
     )  # fmt: skip
+    course_of = pictures.source("", mine)
     for name, _ in _BOUNDS:
         estimate = name == "value_mm"
-        look = {
-            "line_color": colour,
-            "line_width": 1.0 if estimate else 2.0,
-            "line_alpha": 0.7 if estimate else 1.0,
-        }
-        dash = "dotdash" if estimate else dashes
-        plot.line("readings", name, source=data, line_dash=dash, legend_label=label, **look)
+        plot.line(
+            "readings", name, source=course_of, legend_label=label, line_color=colour,
+            line_dash="dotdash" if estimate else dashes, line_width=1.0 if estimate else 2.0,
+            line_alpha=0.7 if estimate else 1.0,
+        )  # fmt: skip
     return plot.scatter(
-        "readings", "upper_mm", source=data, size=5, marker=marker, color=colour,
-        legend_label=label, nonselection_alpha=0.4, selection_line_color=VERMILION,
-        selection_fill_color=VERMILION,
+        "readings", "mark_mm", source=data, size=5, marker=marker, color=colour,
+        view=CDSView(filter=IndexFilter([*range(part.start, part.stop)])), legend_label=label,
+        nonselection_alpha=0.4, selection_line_color=VERMILION, selection_fill_color=VERMILION,
     )  # fmt: skip
 
 
