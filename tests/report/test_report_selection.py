@@ -14,6 +14,7 @@ from made_up_results import (
     words,
 )
 
+from kinacc.calibration import summary
 from kinacc.report import selection as page_section
 
 TRIED = (
@@ -26,7 +27,13 @@ TRIED = (
 
 
 def section(**tables):
-    return page_section.section(everything() | tables, robot())
+    return of(everything() | tables)
+
+
+def of(found):
+    plain = {name: table for name, table in found.items() if name != "vec_orders"}
+    facts = [*summary.of_selection(plain, robot()), *summary.of_errors(found["pose_errors"])]
+    return page_section.section(found, facts)
 
 
 def test_the_selected_model_is_marked_and_its_gain_stands_in_standard_errors():
@@ -92,5 +99,5 @@ def test_choices_for_folds_alone_stand_in_the_table():
 def test_results_without_a_table_of_orders_leave_it_out():
     tables = everything()
     del tables["vec_orders"]
-    found = page_section.section(tables, robot())
+    found = of(tables)
     assert "stated" not in words(found)

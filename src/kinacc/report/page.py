@@ -10,10 +10,13 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from kinacc import __version__
+
 if TYPE_CHECKING:
     from bokeh.models import Plot
 
 TEMPLATES = "templates"
+_MADE_BY = {"kinacc_version": __version__}
 _DIGITS = 16  # of a digest, as shown
 
 
@@ -134,17 +137,20 @@ class FirstScreen:
 
 @dataclass(frozen=True)
 class Page:
-    """A whole page: the answer, then the evidence."""
+    """A whole page: the answer, then the evidence; ``marks`` say what it is about."""
 
     first: FirstScreen
     sections: tuple[Section, ...]
+    marks: Mapping[str, str] = field(default_factory=dict)
 
 
-def html(page: Page, marks: Mapping[str, object], read: Mapping[str, str]) -> str:
+def html(
+    page: Page, marks: Mapping[str, object] | None = None, read: Mapping[str, str] | None = None
+) -> str:
     """The page as one file: the same bytes for the same page.
 
     ``marks`` are its provenance and ``read`` the digests of the files that were read for it, by
-    what they are; both stand at its end.
+    what they are; both stand at its end, as far as they are known.
     """
     from kinacc.report.pictures import documents, library
 
@@ -161,8 +167,8 @@ def html(page: Page, marks: Mapping[str, object], read: Mapping[str, str]) -> st
     }
     return _template().render(
         page=page,
-        marks={name: str(value) for name, value in marks.items()},
-        read={name: digest[:_DIGITS] for name, digest in read.items()},
+        marks={k: str(v) for k, v in {**_MADE_BY, **page.marks, **(marks or {})}.items()},
+        read={name: digest[:_DIGITS] for name, digest in (read or {}).items()},
         style=_text("page.css"),
         script=_text("page.js"),
         library=library() if pictures else "",

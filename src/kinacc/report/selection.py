@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import PLAINEST, model_name
-from kinacc.calibration import summary, summary_words
+from kinacc.calibration import summary_words
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
+from kinacc.calibration.summary import Fact
 from kinacc.calibration.summary_words import counted
-from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.page import Block, Control, Option, Picture, Section, Table, Text
 from kinacc.report.pictures import BLUE, VERMILION
@@ -29,8 +29,8 @@ _PRIOR = {
 }
 
 
-def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
-    """The section of a page on ``model_selection`` and ``vec_orders``."""
+def section(tables: Mapping[str, Columns], facts: Sequence[Fact]) -> Section:
+    """The section of a page on ``model_selection`` and ``vec_orders``; ``facts`` of ``summary``."""
     choice = tables["model_selection"]
     count = np.nanmax(np.asarray(choice["configurations"], dtype=float), initial=0.0)
     held_out = f"position errors at {counted(count, 'configuration')}, each held out of its fit"
@@ -43,20 +43,19 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
         f"squared error more than {STANDARD_ERRORS:g} standard errors, and rms and mean of folds "
         "fall too.",
         "Good: the selected model gains many standard errors, and the order lies where the curve "
-        "is flat. Bad: no model is nearer to held-out poses than the nominal; the highest order that "
-        "was tried is the best, and a higher one may do more.",
+        "is flat. Bad: no model is nearer to held-out poses than the nominal; the highest order "
+        "that was tried is the best, and a higher one may do more.",
         "Keep the selected model unless your controller takes DH parameters only (kinacc export "
         "--model dh). With order: auto the order is chosen anew by held-out errors.",
         (
-            *(Text(f"{each[:1].upper()}{each[1:]}.") for each in _why(tables, robot)),
+            *(Text(f"{each[:1].upper()}{each[1:]}.") for each in _why(facts)),
             _models(tables),
             *_orders(tables.get("vec_orders")),
         ),
     )
 
 
-def _why(tables: Mapping[str, Columns], robot: Robot) -> list[str]:
-    facts = [*summary.of_selection(tables, robot), *summary.of_errors(tables["pose_errors"])]
+def _why(facts: Sequence[Fact]) -> list[str]:
     return [each.replace("\u00a0", " ") for each in summary_words.selected(facts)]
 
 
