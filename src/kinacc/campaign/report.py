@@ -211,8 +211,7 @@ def _facts(opened: Opened, state: State) -> list[str]:
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
     lines += map(in_markdown, words.not_counted(state))
-    found = consistency.scatter(state)
-    return lines if found is None else [*lines, consistency.in_words(found)]
+    return [*lines, *consistency.remarks(state)]
 
 
 def read_above(state: State, points: Columns) -> list[str]:

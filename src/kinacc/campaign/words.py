@@ -115,7 +115,7 @@ def statement(said: Statement, state: State) -> str:
     text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
     text += f", if {reason(said.assumption)}" if said.assumption else ""
-    return f"{text}{_doubt(said)}."
+    return f"{text}{_doubt(said, state)}."
 
 
 def standing(state: State) -> list[str]:
@@ -130,9 +130,7 @@ def standing(state: State) -> list[str]:
         f"{points} points; {len(state.in_hand)} in hand, not asked for yet"
     ]
     lines += not_counted(state)
-    found = consistency.scatter(state)
-    if found is not None:
-        lines.append(consistency.in_words(found))
+    lines += consistency.remarks(state)
     if state.asked is not None:
         lines.append(f"measure next: point {state.plan.points.label[state.asked]}")
     elif len(state.told) >= budget:
@@ -168,7 +166,7 @@ def _about(said: Statement, state: State) -> str:
     return f"the largest error of {said.share:.1%} of the region"
 
 
-def _doubt(said: Statement) -> str:
+def _doubt(said: Statement, state: State) -> str:
     """What the figures of a statement say against it.
 
     Bounds are the narrowest of several looks, the estimate is of all readings: where it lies above
@@ -180,6 +178,8 @@ def _doubt(said: Statement) -> str:
         found = "The estimate lies above the upper bound, which cannot be relied on"
     else:
         return ""
+    if consistency.too_near(state):
+        return f". {found}: the noise is stated too large, or these are no readings"
     return (
         f". {found}: the noise is stated too small, or this is one of the few campaigns the "
         "confidence allows to be wrong"
