@@ -43,8 +43,8 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
         f"squared error more than {STANDARD_ERRORS:g} standard errors, and rms and mean of folds "
         "fall too.",
         "Good: the selected model gains many standard errors, and the order lies where the curve "
-        "is flat. Bad: no model is nearer to held-out poses than the nominal; the highest order that "
-        "was tried is the best, and a higher one may do more.",
+        "is flat. Bad: no model is nearer to held-out poses than the nominal; the highest order "
+        "that was tried is the best, and a higher one may do more.",
         "Keep the selected model unless your controller takes DH parameters only (kinacc export "
         "--model dh). With order: auto the order is chosen anew by held-out errors.",
         (
