@@ -29,7 +29,8 @@ made on request by `kinacc tournament` or `snakemake tournament`.
 
 `kinacc campaign report` leaves the tables named `campaign_*` in the campaign's own folder.
 
-`kinacc check-results results/` holds a folder to all of this.
+`kinacc check-results results/` holds a folder to all of this; `kinacc show` prints any of it
+([looking at results](workflow.md#looking-at-results)).
 
 Written from the contract by `python tools/document_artifacts.py`.
 """

@@ -20,6 +20,7 @@ PICTURES = {
     "png": b"\x89PNG\r\n\x1a\n" + b"\x00" * 8 + b"IEND\xaeB`\x82",
     "pdf": b"%PDF-1.4\n%%EOF\n",
 }
+PAGE = b"<!DOCTYPE html>\n<html></html>\n"
 
 
 class SmallResults:
@@ -35,6 +36,8 @@ class SmallResults:
                     path = self.folder / "figures" / f"{name}.{kind}"
                     path.parent.mkdir(parents=True, exist_ok=True)
                     path.write_bytes(content)
+            elif stage.leaves == "page":
+                (self.folder / f"{name}.html").write_bytes(PAGE)
             elif not stage.on_request and all(each in self.tables for each in stage.outputs):
                 self.save(name)
 
@@ -70,7 +73,7 @@ class SmallResults:
     def change(self, stage_name: str, artefact: str, **columns) -> None:
         """Change columns of one table and make everything that follows from it again."""
         self.tables[artefact] = self.tables[artefact] | columns
-        names = [name for name, stage in STAGES.items() if not stage.is_figure]
+        names = [name for name, stage in STAGES.items() if stage.leaves == "tables"]
         for name in names[names.index(stage_name) :]:
             if STAGES[name].on_request or STAGES[name].measured:
                 continue
@@ -289,6 +292,7 @@ def _map() -> dict:
             "solutions": [18, 0],
             "wanted": [18, 18],
             "extrapolating": [0, 0],
+            **{f"q{joint}": [0.1 * joint, None] for joint in range(1, 7)},
         }
     }
 

@@ -198,6 +198,48 @@ def test_poses_that_were_read_once_say_nothing_of_the_noise():
     assert not slips.of_little_noise(instruments(["t=0.03"], "base"), *readings_of(120, 1, 0.06))
 
 
+def test_repeats_are_offered_as_noise_along_the_axes_of_the_instrument():
+    measured, errors = readings_of(50, 6, np.array([0.05, 0.1, 0.2]), sessions=2)
+    half = np.sqrt(0.5)
+    # Bases a quarter turn about z and x away from the instrument's axes.
+    turned = {"qw": [half, half], "qx": [0.0, half], "qy": [0.0, 0.0], "qz": [half, 0.0]}
+    frames = {"model": ["dh"] * 2, "frame": ["base"] * 2, "session": ["0", "1"], **turned}
+    frames |= {f"{axis}_mm": [0.0, 0.0] for axis in "xyz"}
+    for names, quarter in (("xy", 0), ("yz", 1)):
+        own = measured["session"].astype(int) == quarter
+        one, other = (f"e{axis}_mm" for axis in names)
+        kept = errors[one].copy()
+        errors[one] = np.where(own, errors[other], kept)
+        errors[other] = np.where(own, -kept, errors[other])
+    told = slips.noise_by_repeats(measured, errors, frames)
+    count, groups, std_mm = re.match(
+        r"(\d+) readings at (\d+) .* scatter by (\S+) mm", told
+    ).groups()
+    assert (count, groups) == ("600", "50")
+    found = [float(each) for each in std_mm.split(",")]
+    assert found == pytest.approx([0.05, 0.1, 0.2], rel=0.1)
+    assert "no new set-up of instrument or target" in told
+
+
+@pytest.mark.parametrize("readings", [readings_of(120, 1, 0.06), readings_of(9, 2, 0.06)])
+def test_where_hardly_any_joints_were_read_again_it_is_said_how_to_find_the_noise(readings):
+    quarter = {"qw": [1.0], "qx": [0.0], "qy": [0.0], "qz": [0.0]}
+    frames = {"model": ["dh"], "frame": ["base"], "session": ["0"], **quarter}
+    frames |= {f"{axis}_mm": [0.0] for axis in "xyz"}
+    told = slips.noise_by_repeats(*readings, frames)
+    assert "scatter by" not in told
+    assert "read a pose ten times" in told
+
+
+def test_a_campaign_without_noise_is_told_what_its_calibration_knows_of_it(start, tmp_path):
+    for done in (start(), call("plan-campaign"), call("plan-campaign", "--errors", tmp_path)):
+        assert done.exit_code == 2
+        assert "noise: is not given; allowed: --noise-mm" in done.output
+        assert "read a pose ten times" in done.output
+    assert "too few repeats" in start().output
+    assert not (tmp_path / "check").exists()
+
+
 def test_a_campaign_is_no_results_folder_and_the_command_for_it_is_named(visited):
     done = call("fitted", visited[0])
     assert done.exit_code == 2

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import call
 
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.simulate import conduct
@@ -186,3 +187,33 @@ def test_an_estimate_above_its_upper_bound_is_told(make_plan):
 def test_a_plan_comes_back_to_the_last_bit(make_plan):
     plan = make_plan(texts=("a=0.1,0.2,0.3", "b=0.01"), frame="instrument")
     assert to_json(from_json(to_json(plan), "here")) == to_json(plan)
+
+
+def entry_at(plan, positions_mm):
+    """A journal's entry of the same readings again and again, more than are asked for."""
+    name = plan.instruments[0].name
+    return folder.readings_entry(
+        [Reading(point, at, name) for _ in range(4) for point, at in enumerate(positions_mm)]
+    )
+
+
+@pytest.mark.parametrize("name", ["search_and_confirm", "single_shot"])
+def test_predictions_recorded_as_readings_bound_nothing(make_plan, name, tmp_path):
+    plan = make_plan(name, points=12, budget=14)
+    path = tmp_path / "check"
+    folder.start(path, plan)
+    with folder.writing(path) as opened:
+        opened.write(entry_at(plan, plan.points.modelled_mm))
+    for command in ("status", "report"):
+        done = call("campaign", command, path)
+        assert done.exit_code == 0, done.output
+        assert "equals the predicted position to the last digit" in done.output
+        assert " at most " not in done.output
+
+
+def test_a_reading_a_trifle_off_its_prediction_is_a_reading(make_plan):
+    plan = make_plan(points=12, budget=14)
+    seen_mm = plan.points.modelled_mm.copy()
+    seen_mm[3, 0] += 1e-9
+    said = restore(plan, [entry_at(plan, seen_mm)]).statements()
+    assert not any(each.withheld for each in said)

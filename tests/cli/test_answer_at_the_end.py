@@ -1,5 +1,6 @@
 """What a run ends with, as an engineer reads it: half a page, and the same facts in a table."""
 
+import html
 import json
 import re
 import shlex
@@ -144,8 +145,9 @@ def test_nominal_says_whether_base_and_tool_were_fitted(folder, measured):
 
 
 def test_the_page_is_half_a_page(folder, measured, monkeypatch):
-    # The second is of poor data: what is wrong with them takes some lines more.
-    for each, most in ((folder, 26), (measured, 29)):
+    # The second is of poor data: what is wrong with them takes some lines more, and one says how to
+    # find the noise of an arm that can be measured.
+    for each, most in ((folder, 26), (measured, 30)):
         there = Path(each).absolute()
         monkeypatch.chdir(there.parents[1])  # a long path takes lines of its own
         lines = shown(there.relative_to(there.parents[1])).splitlines()
@@ -244,6 +246,15 @@ def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
     (command,) = re.findall(r"kinacc (campaign start .* --noise-mm NOISE .*)$", page, re.M)
     done = call(*command.replace("NOISE", "0.05").split())
     assert done.exit_code == 0, done.output
+
+
+def test_what_repeats_tell_of_the_noise_stands_beside_the_question_for_it(folder, measured):
+    page = " ".join(shown(measured).split())
+    asked, told, command = (
+        page.index(each) for each in ("(NOISE:", "of ten visits to a pose", "--noise-mm NOISE")
+    )
+    assert asked < told < command
+    assert "ten visits" not in shown(folder)  # nobody can go to a pose of a synthetic arm
 
 
 def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
@@ -428,6 +439,29 @@ def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(
     assert len(line) <= 100
 
 
+def test_a_stated_base_and_tool_leave_all_readings_to_the_model(reflectors):
+    from kinacc.workflow.answer import facts_of, read
+
+    tables = read(reflectors)
+    pose, frames = tables["measurements"]["pose"], tables["frames"]
+    kept = np.isin(pose, np.unique(pose)[:36])
+    tables["measurements"] |= {"fold": np.where(kept, tables["measurements"]["fold"], np.nan)}
+    # 324 numbers: as many as a model of order 8 has, which base and targets would take 15 of.
+    tried, fold = np.array([1.0, 2.0, 6.0]), np.zeros(3)
+    tables |= {"vec_orders": {"fold": fold, "order": tried, "chosen": tried == 6}}
+    limits = []
+    for stated in (False, True):
+        if stated:
+            own = {name: values[frames["model"] == "vec"] for name, values in frames.items()}
+            stays = {name: values for name, values in own.items() if name != "model"}
+            tables["frames"] = {
+                name: np.concatenate([values, values]) for name, values in stays.items()
+            } | {"model": np.repeat(["nominal", "vec"], len(own["model"]))}
+        facts = {each.statistic: each.text for each in facts_of(tables) if each.item == "vec"}
+        limits.append(facts["highest_order_set_by"])
+    assert limits == ["configurations", "settings"]
+
+
 def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflectors):
     from kinacc.calibration.blind_words import WEAK
     from kinacc.calibration.summary_words import half_page
@@ -447,3 +481,38 @@ def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflect
     for joint in range(1, 6):  # the sixth turns the flange about its own axis
         tables["measurements"][f"q{joint}"] = np.full_like(tables["measurements"]["q1"], 0.3)
     assert "the flange points one way in all poses (within" in page()
+
+
+def test_the_page_says_what_the_half_page_says_in_the_same_bytes_each_time(measured, tmp_path):
+    made = [call("report", measured, "--out", tmp_path / f"{n}.html") for n in (1, 2)]
+    assert [each.exit_code for each in made] == [0, 0], made[0].output
+    content = [(tmp_path / f"{n}.html").read_bytes() for n in (1, 2)]
+    assert content[0] == content[1]
+    assert len(content[0]) < 3e6
+    text, half = html.unescape(content[0].decode()), shown(measured)
+    figures = [f"{each:.2f}" for each in figures_of(half, "DH")]
+    assert re.search("DH</th>" + "".join(rf'<td class="number">{f}</td>' for f in figures), text)
+    assert "DATA: nothing suspicious" not in text
+    assert "http:" not in re.sub(r"<script>.*?</script>", "", text, flags=re.S)
+
+
+def test_a_page_of_a_folder_without_a_calibration_names_every_table_missing(tmp_path):
+    done = call("report", tmp_path)
+    assert done.exit_code == 2
+    assert "pose_errors.parquet" in done.output
+    assert "residuals.parquet" in done.output
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_page_about_other_tables_is_found_by_the_check(measured, tmp_path):
+    folder = tmp_path / "results" / "own"
+    shutil.copytree(measured, folder)
+    assert call("report", folder).exit_code == 0
+    about = [line for line in call("check-results", folder).output.splitlines() if "html" in line]
+    assert about == []
+    table = store.read(folder / "worst_rows.parquet")
+    table["error_mm"] = table["error_mm"] + 1e-3
+    marks = store.read_metadata(folder / "worst_rows.parquet")
+    store.write(folder / "worst_rows.parquet", "worst_rows", table, marks)
+    said = call("check-results", folder).output
+    assert "report.html: was made from another worst_rows" in said

@@ -37,8 +37,15 @@ def joints(name: str, count: int, seed: int = 2, part: float = 0.36) -> np.ndarr
 
 def measured(name: str, count: int = 80, noise_mm: float = 0.03, seed: int = 3) -> Observations:
     """Poses of the real arm seen by an instrument, joints of the robot's DH table."""
-    arm, rng = robot.load(name), np.random.default_rng(seed)
-    q_rad = joints(name, count, part=0.4) @ arm.joint_map.T
+    q_rad = joints(name, count, part=0.4) @ robot.load(name).joint_map.T
+    return measured_at(name, q_rad, noise_mm, seed)
+
+
+def measured_at(
+    name: str, q_rad: np.ndarray, noise_mm: float = 0.03, seed: int = 3
+) -> Observations:
+    """The real arm seen by an instrument at joints (count, k) of the robot's DH table."""
+    rng, count = np.random.default_rng(seed), len(q_rad)
     seen = compose(BASE, compose(dh.forward(truth(name), q_rad), TOOL))
     turn = exp_so3(rng.normal(0.0, noise_mm / WEIGHT, (count, 3)))
     noise = rng.normal(0.0, noise_mm, (count, 3))
@@ -114,6 +121,7 @@ __all__ = [
     "frames",
     "joints",
     "measured",
+    "measured_at",
     "results",
     "results_of",
     "truth",

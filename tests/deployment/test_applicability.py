@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import shared_data
 from command_line import call
-from small_arms import calibrated, joints, measured
+from small_arms import calibrated, joints, measured, measured_at, results_of
 
 from kinacc.artifacts import store
 from kinacc.deployment import folder
 from kinacc.deployment.applicability import is_measured_there, share_of_box
+from kinacc.deployment.folder import calibration
+from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 SERIES = "ur10_tmac/series_D.csv"
@@ -68,6 +70,19 @@ def test_the_half_page_says_how_little_of_the_box_of_joints_was_measured(part_of
     share = np.asarray(known["value"])[np.asarray(known["topic"]) == "like_measured"]
     assert len(share) == 1
     assert 0.0 <= share[0] < 0.01
+
+
+@pytest.mark.parametrize("model", ["dh", "vec"])
+def test_a_gap_between_two_clusters_of_poses_is_not_where_it_was_measured(model):
+    rng, middle = np.random.default_rng(5), np.deg2rad([-50.0, -90.0, 30.0, -60.0, -60.0, 10.0])
+    sides = np.where(rng.random(200) < 0.5, -0.85, 0.85)[:, None]
+    seen = measured_at("ur10", middle + sides + rng.uniform(-0.35, 0.35, (200, 6)))
+    found = calibration(results_of("ur10", seen), robot.load("ur10"), model, "ur10")
+    found = replace(found, fitted=JointState(seen.q_rad))
+    between = middle + rng.uniform(-0.3, 0.3, (100, 6))
+    assert not found.outside_range(between).any()
+    assert not is_measured_there(found, JointState(between)).any()
+    assert is_measured_there(found, JointState(seen.q_rad)).mean() > 0.9
 
 
 def test_a_box_that_was_measured_everywhere_is_where_it_was_measured():

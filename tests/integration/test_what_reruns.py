@@ -7,7 +7,9 @@ import pytest
 from kinacc.workflow.catalogue import STAGES
 
 FIGURES = {stage.name for stage in STAGES.values() if stage.is_figure and not stage.on_request}
-AFTER_POINTS = {"study_chunk", "study", "histories", "claims"} | (FIGURES - {"fig1", "fig3"})
+AFTER_POINTS = {"study_chunk", "study", "histories", "claims", "report"} | (
+    FIGURES - {"fig1", "fig3"}
+)
 AFTER_DH = {"residuals", "summary", "accuracy_map", "fig3", "assessment_points"} | AFTER_POINTS
 ALL = {"measurements", "vec", "dh", "fig1"} | AFTER_DH
 NOT_OWN = {"accuracy_map", "fig3", "claims"}  # a measured arm has neither a map here nor claims
@@ -36,14 +38,14 @@ def test_a_comment_in_the_configuration(project):
 @pytest.mark.parametrize(
     ("change", "reruns"),
     [
-        ("map: {grid_mm: 200}", {"mh180": {"accuracy_map", "fig3", "claims"}}),
+        ("map: {grid_mm: 200}", {"mh180": {"accuracy_map", "fig3", "claims", "report"}}),
         (
             "study: {noise_mm: [0.1, 0.2]}",
-            both({"study_chunk", "study", "fig4", "claims"}),
+            both({"study_chunk", "study", "fig4", "claims", "report"}),
         ),
         (
             "histories: {noise_mm: 0.2}",
-            both({"histories", "fig5", "fig6", "claims"}),
+            both({"histories", "fig5", "fig6", "claims", "report"}),
         ),
         (
             "datasets: {mh180: {calibration: {vec: {order: 3}}}}",
@@ -78,10 +80,11 @@ def test_one_value_of_the_configuration(project, change, reruns):
         ),
         ("figures/fig4", {"mh180": {"fig4"}, "own": {"fig4"}}),
         ("figures/save", both(FIGURES)),
-        ("study/claims/numbers", both({"claims"})),
+        ("study/claims/numbers", {"mh180": {"claims", "report"}}),
+        ("report/residuals", both({"report"})),
         (
             "study/histories",
-            both({"histories", "fig5", "fig6", "claims"}),
+            both({"histories", "fig5", "fig6", "claims", "report"}),
         ),
         ("kinematics/compliance", {}),  # no data set here asks for that model
         ("calibration/compliance_fit", {}),
@@ -153,7 +156,7 @@ def test_the_schema_of_the_configuration_is_read_by_no_stage(project):
 
 def test_a_deleted_artefact_alone_is_remade(project):
     (project.folder / "results" / "mh180" / "claims.parquet").unlink()
-    assert project.to_do() == {"mh180": {"claims"}}
+    assert project.to_do() == {"mh180": {"claims", "report"}}
 
 
 def test_one_artefact_asked_for_by_name(project):

@@ -34,7 +34,7 @@ for stage in STAGES.values():
                         path,
                         caption="../report/made.rst",
                         category=folder,
-                        subcategory="figures" if stage.is_figure else "tables",
+                        subcategory=stage.leaves,
                         labels={"file": os.path.basename(path), "step": stage.message},
                     )
                 )

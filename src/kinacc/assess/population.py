@@ -39,8 +39,11 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
 
     sizes_mm: (n,) sizes of mean readings; noise_mm: (n,) their standard deviations per axis;
     unmeasured: number of points without a reading, taken as drawn from the same population.
+    Sizes go with the largest reading: where every reading is 0, so is every size.
     """
     top = float(sizes_mm.max())
+    if top == 0.0:
+        return LargestSize(np.zeros(1), np.ones(1), np.ones(1))
     scale = top * np.exp(np.arange(np.log(_SMALLEST), np.log(_LARGEST), _STEP))
     size, width = _grid(top)
     bumps = _chi_density(size, scale / np.sqrt(_FREEDOM)) * width

@@ -71,6 +71,15 @@ def highest_order(components: int, joints: int, frames: int) -> int:
     return (components - frames) // (6 * joints) - 1
 
 
+def distinct(held_out: Observations) -> Observations:
+    """One reading of every configuration and target.
+
+    Another one of the same tells nothing new of the arm.
+    """
+    same = np.stack([configurations(held_out.pose, held_out.q_rad), held_out.target], axis=1)
+    return held_out.select(np.unique(same, axis=0, return_index=True)[1])
+
+
 @dataclass(frozen=True)
 class Trial:
     """How the best prior of one order did.

@@ -11,11 +11,12 @@ import numpy as np
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSETS
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
-from kinacc.calibration import blind_words
-from kinacc.calibration.selection import ORDERS, highest_order
+from kinacc.calibration import blind_words, frames
+from kinacc.calibration.observations import from_columns
+from kinacc.calibration.selection import ORDERS, distinct, highest_order
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
-from kinacc.measurements.folds import configurations_of
+from kinacc.measurements.folds import configurations
 from kinacc.measurements.row_names import RowNames
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
@@ -58,8 +59,8 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
             for number, text in enumerate(left_out(tables.get("data_check")), 1)
         ),
         *_findings(tables.get("data_check")),
-        *_errors(tables["pose_errors"]),
-        *_selection(tables),
+        *of_errors(tables["pose_errors"]),
+        *of_selection(tables, robot),
         *(
             Fact("bending", f"joint {each['joint']}", name, float(each[name]), unit)
             for each in bending(tables.get("compliance_model"))
@@ -69,7 +70,7 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
         *_excluded(tables.get("excluded_rows"), selected(tables["model_selection"])),
         *_range(tables["measurements"], robot),
         *_like_measured(like_measured),
-        *_pointing(tables["measurements"], robot),
+        *of_pointing(tables["measurements"], robot),
         *(
             Fact("undetermined", str(number), "statement", text=text)
             for number, text in enumerate(blind_words.listed(tables["dh_identified"]), 1)
@@ -132,12 +133,16 @@ def _data(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
 
 
 def _frames(table: Mapping) -> Iterator[Fact]:
-    """Whether base and tool were fitted: then every model has its own."""
+    """Whether base and tool were fitted."""
+    yield Fact("robot", "base and tool", "fitted", float(_frames_fitted(table)), "1")
+
+
+def _frames_fitted(table: Mapping) -> bool:
+    """Whether every model has a base and tool of its own: then they were fitted."""
     places = np.stack([table[name] for name in ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz")], axis=1)
     own = np.asarray(table["model"]) == NOMINAL
     first = np.asarray(table["model"]) == np.asarray(table["model"])[~own][0]
-    fitted = not np.array_equal(places[own], places[first])
-    yield Fact("robot", "base and tool", "fitted", float(fitted), "1")
+    return not np.array_equal(places[own], places[first])
 
 
 def _findings(table: Mapping | None) -> Iterator[Fact]:
@@ -157,7 +162,7 @@ def _findings(table: Mapping | None) -> Iterator[Fact]:
     yield Fact("check", "data_check", "findings", float(len(order)), "1")
 
 
-def _errors(table: Mapping) -> Iterator[Fact]:
+def of_errors(table: Mapping) -> Iterator[Fact]:
     """Statistics of every comparison; held out at rows that every model was tried on."""
     comparison, estimate = (np.asarray(table[name]) for name in ("comparison", "estimate"))
     sizes = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
@@ -198,7 +203,7 @@ def _statistics(size: np.ndarray) -> tuple[float, ...]:
     return float(len(size)), float(size.mean()), float(quantile), float(size.max())
 
 
-def _selection(tables: Mapping) -> Iterator[Fact]:
+def of_selection(tables: Mapping, robot: Robot) -> Iterator[Fact]:
     choice = tables["model_selection"]
     for i, name in enumerate(map(str, choice["model"])):
         yield Fact("selection", name, "selected", float(choice["selected"][i]), "1")
@@ -209,11 +214,12 @@ def _selection(tables: Mapping) -> Iterator[Fact]:
         order = tables.get(f"{name}_model", {}).get("order")
         if order is not None:
             yield Fact("selection", name, "order", float(np.max(order)), "1")
-            yield from _orders(name, tables.get(f"{name}_orders"), tables["measurements"])
+            yield from _orders(name, tables, robot)
 
 
-def _orders(name: str, table: Mapping | None, measurements: Mapping) -> Iterator[Fact]:
+def _orders(name: str, tables: Mapping[str, Columns], robot: Robot) -> Iterator[Fact]:
     """The orders that held-out errors were found with, and the highest of several tried."""
+    table = tables.get(f"{name}_orders")
     if table is None:
         return
     order, chosen = (np.asarray(table[each], dtype=float) for each in ("order", "chosen"))
@@ -223,26 +229,21 @@ def _orders(name: str, table: Mapping | None, measurements: Mapping) -> Iterator
         yield Fact("selection", name, "high_order_held_out", float(order[folds].max()), "1")
     if len(np.unique(order)) > 1:
         yield Fact("selection", name, "highest_order_tried", float(order.max()), "1")
-        count, most = _carried(measurements)
+        count, most = _carried(tables["measurements"], robot, _frames_fitted(tables["frames"]))
         higher = next((each for each in ORDERS if each > order.max()), most)
         yield Fact("selection", name, "configurations", float(count), "1")
         by = SETTINGS if higher <= most else CONFIGURATIONS
         yield Fact("selection", name, "highest_order_set_by", text=by)
 
 
-def _carried(measurements: Mapping) -> tuple[int, int]:
+def _carried(measurements: Mapping, robot: Robot, frames_fitted: bool) -> tuple[int, int]:
     """Number of configurations that folds hold out, and the highest order they carry."""
-    rows = np.flatnonzero(np.isfinite(np.asarray(measurements["fold"], dtype=float)))
-    seen = {name: np.asarray(values)[rows] for name, values in measurements.items()}
-    turned = np.isfinite(np.asarray(seen["qw"], dtype=float))
-    configuration, target = configurations_of(seen), seen["target"].astype(str)
-    pairs = np.stack([configuration.astype(str), target], axis=1)
-    once = np.unique(pairs, axis=0, return_index=True)[1]
-    components = 3 * len(once) + 3 * int(turned[once].sum())
-    size = 6 if turned.any() else 3
-    frames = 6 * len(set(seen["session"].astype(str))) + size * len(set(target))
-    joints = sum(name[:1] == "q" and name[1:].isdigit() for name in seen)
-    return len(np.unique(configuration)), highest_order(components, joints, frames)
+    every = from_columns(measurements, robot)
+    anywhere = frames.known(sessions=len(every.session_names), targets=len(every.target_names))
+    estimated = frames.coordinates(every, anywhere, frames_fitted, frames_fitted).size
+    seen = every.select(every.fold >= 0)
+    most = highest_order(distinct(seen).components, every.joints, estimated)
+    return len(np.unique(configurations(seen.pose, seen.q_rad))), most
 
 
 def _excluded(table: Mapping | None, model: str) -> Iterator[Fact]:
@@ -283,7 +284,7 @@ def _like_measured(share: float) -> Iterator[Fact]:
         yield Fact("like_measured", "ranges of all joints", "share", share, "1")
 
 
-def _pointing(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
+def of_pointing(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
     """How far the flange turns away from one direction, where that is next to nothing."""
     axis = dh.forward(robot.dh, robot.dh_joints(_reported(measurements, robot))).rotation[..., 2]
     middle = axis.mean(axis=0)

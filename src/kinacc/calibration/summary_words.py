@@ -21,6 +21,7 @@ _FIGURES = ("mean", "quantile_99", "largest")
 _COLUMNS = {"mean": 8, f"{LARGE_SHARE:.0%} empirical": 14, "largest": 8}  # widths
 _CALLED = 53  # of a model's name before them
 _COMPLIANCE, _LEVER = "compliance_rad_per_nm", "lever_coefficient_rad_per_mm"
+_BEFORE_ERRORS = ("data", "check", "excluded")
 _SETTLED = '"others may": measure such (kinacc plan-poses) or state it (calibration.frames)'
 _NUMBERS = {2.0: "two"}
 
@@ -30,17 +31,23 @@ def half_page(facts: Sequence[Fact], more: str, whole: bool = False) -> list[str
 
     ``more``: the command that tells all of it; ``whole``: tell all of it.
     """
+    told = {name: paragraph(name, texts) for name, texts in texts_of(facts, more, whole).items()}
+    before = [line for name in _BEFORE_ERRORS for line in told.pop(name)]
+    return [*before, *_errors(facts, whole), *(line for each in told.values() for line in each)]
+
+
+def texts_of(facts: Sequence[Fact], more: str, whole: bool = False) -> dict[str, list[str]]:
+    """What is said under each name, in order, beside the errors; see :func:`half_page`."""
     most = None if whole else _MOST
-    return [
-        *paragraph("data", [*_data(facts), *_left_out(facts, most, more)]),
-        *paragraph("check", _checked(facts, most, more)),
-        *paragraph("excluded", _excluded(facts, most, more)),
-        *_errors(facts, whole),
-        *paragraph("selected", _selected(facts)),
-        *paragraph("bending", _bending(of(facts, "bending"))),
-        *paragraph("valid where", _range(facts)),
-        *paragraph("undetermined", _undetermined(facts, most, more)),
-    ]
+    return {
+        "data": [*_data(facts), *_left_out(facts, most, more)],
+        "check": _checked(facts, most, more),
+        "excluded": _excluded(facts, most, more),
+        "selected": selected(facts),
+        "bending": _bending(of(facts, "bending")),
+        "valid where": _range(facts),
+        "undetermined": _undetermined(facts, most, more),
+    }
 
 
 def paragraph(name: str, texts: Iterable[str]) -> list[str]:
@@ -123,18 +130,22 @@ def _table(
     head = f"{name} ({where}; {counted(rows, 'row')})"
     lines = [f"{head:57}" + "".join(f"{name:>{width}}" for name, width in _COLUMNS.items())]
     for model, figures in errors.items():
-        called = model_name(model)
-        if model == NOMINAL:
-            fitted = of(facts, "robot")["base and tool"]["fitted"].value
-            called = "nominal, with base and tool fitted" if fitted else "nominal"
-        elif "order" in chosen[model]:
-            called += _order(chosen[model])
+        called = model_called(facts, model)
         mark = "  <- selected" if model in chosen and chosen[model]["selected"].value else ""
         sizes = zip(_FIGURES, _COLUMNS.values(), strict=True)
         shown = "".join(f"{figures[each].value:{width}.3f}" for each, width in sizes)
         spare = min(0, _CALLED - len(called))  # a long name takes of the blanks behind it
         lines.append(f"{'':4}{called:{_CALLED}}{shown[-spare:]}{mark}".rstrip())
     return lines
+
+
+def model_called(facts: Sequence[Fact], model: str) -> str:
+    """A model with what belongs to its name: its order, or what of the nominal one is fitted."""
+    if model == NOMINAL:
+        fitted = of(facts, "robot")["base and tool"]["fitted"].value
+        return "nominal, with base and tool fitted" if fitted else "nominal"
+    known = of(facts, "selection")[model]
+    return model_name(model) + (_order(known) if "order" in known else "")
 
 
 def _orientation(facts: Sequence[Fact], whole: bool) -> list[str]:
@@ -167,7 +178,7 @@ def _order(known: Mapping[str, Fact]) -> str:
     return f"{told}, the highest {known['configurations'].value:.0f} configurations carry"
 
 
-def _selected(facts: Sequence[Fact]) -> list[str]:
+def selected(facts: Sequence[Fact]) -> list[str]:
     """Why the selected model is selected, and a warning where the nominal one is nearer."""
     models, held_out = of(facts, "selection"), of(facts, "held_out_error")
     best = next(model for model, known in models.items() if known["selected"].value)

@@ -20,7 +20,6 @@ from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
-from kinacc.measurements.folds import configurations
 
 _AUTO = "auto"
 
@@ -116,11 +115,9 @@ class VECEstimator(Estimator):
         weight = self.common.rotation_weight_mm_per_rad
         at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
         size = at.coordinates.size
-        # Another reading of the same configuration tells nothing new of the arm. That a choice
-        # trains on three blocks of five is no limit: the prior holds what these do not show.
-        seen = every.select(every.fold >= 0)
-        same = np.stack([configurations(seen.pose, seen.q_rad), seen.target], axis=1)
-        count = seen.select(np.unique(same, axis=0, return_index=True)[1]).components
+        # That a choice trains on three blocks of five is no limit: the prior holds what these do
+        # not show.
+        count = selection.distinct(every.select(every.fold >= 0)).components
         grid = self.grid.within(count, self.common.nominal.joints, size)
         return selection.choices(
             self._wanted(every),

@@ -137,3 +137,23 @@ def _damaged(path: Path, number: int, what: str) -> InputError:
 def _not_written(path: Path, error: OSError) -> InputError:
     fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
     return InputError(Problem(str(path), f"cannot be written: {error.strerror}", fix=fix))
+
+
+def of_results(results: Path) -> list[Path]:
+    """Folders of campaigns on the calibration in a results folder, by the name they have of it.
+
+    They are sought beside it, beside all results, and in the folder one stands in; each is named
+    as a person there would.
+    """
+    within = results.absolute().parent
+    near = {within.resolve(): results.parent, within.parent.resolve(): results.parent / ".."}
+    places = [*(near | {Path.cwd(): Path()}).values()]
+    plans = [plan for place in places for plan in sorted(place.glob(f"*/{PLAN}"))]
+    return [plan.parent for plan in plans if _is_about(plan, results.resolve().name)]
+
+
+def _is_about(plan: Path, calibration: str) -> bool:
+    try:
+        return bool(json.loads(plan.read_bytes())["about"]["calibration"] == calibration)
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return False  # no campaign, or one that cannot say whose it is

@@ -48,7 +48,7 @@ _ALIKE: dict[str, frozenset[str]] = {
     | {"9c378ac63b7a94d6", "ba028a354b6609f4", "f922bfe981ed1abf"},
     "region_share": _BEFORE_ROOMS | {"f78096dfad5397d1", "26e6f3ceebbbcf39", "02b91a8e49c3da8c"},
     "search_and_confirm": _BEFORE_ROOMS
-    | {"47fbae570ce61729", "0e1ed1ef42570ea4", "7d799bcacdd9b633"},
+    | {"47fbae570ce61729", "0e1ed1ef42570ea4", "7d799bcacdd9b633", "e6b1d5ee9f4f4ddb"},
     "sequential": _BEFORE_ROOMS | {"94960c384a0a8485", "803268b7890760fe", "c98c882b0f01018a"},
     "single_shot": _BEFORE_ROOMS | {"79f6c4e7bcbed712", "9bc00b590c848797", "99bc95063c5154d9"},
     "two_stage": _BEFORE_ROOMS | {"aa386e4d4cbe4d9c", "63218d533e28078f", "42c20fc02fe70a7a"},

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import model_name
 from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
-from kinacc.campaign import folder, instrument, words
+from kinacc.campaign import consistency, folder, instrument, words
 from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.campaign.state import State
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError
+from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 _ORDER = (CANDIDATES, *(each for each in reversed(TARGETS) if each != CANDIDATES))
@@ -45,6 +46,7 @@ class Assessed:
         about, points = plan.about, len(plan.points) - len(state.left_out)
         return [
             words.statement(self.said, state) if self.said else "Nothing can be said yet.",
+            *consistency.contradicted(state),
             *words.begun_against(plan),
             f"campaign {self.place}: {about['point']} by the {model_name(about['model'])} model, "
             f"{points} candidates ({about['candidates']}), "
@@ -64,6 +66,7 @@ class Assessed:
             "candidates": len(plan.points) - len(self.state.left_out),
             "readings": self.state.taken,
             "noise": {each.name: instrument.noise(each) for each in plan.instruments},
+            "noise_contradicted": consistency.contradicted(self.state),
             "begun_against": list(plan.overruled),
         }
 
@@ -76,19 +79,20 @@ class Sought:
     remarks: tuple[str, ...] = ()
 
 
-def sought(calibration: Path, places: Iterable[Path]) -> Sought:
-    """The campaign of the results folder ``calibration`` in ``places``, the one read last.
+def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Sought:
+    """The campaign of the calibration ``name`` among the folders ``places``, the one read last.
 
-    Campaigns keep where their model saw the candidates, so that one begun before the arm was
-    calibrated anew is told from one that speaks of the models now there.
+    ``tables`` are those of its results folder, ``places`` what :func:`journal.of_results` finds.
+    Campaigns keep where their model saw the
+    candidates, so that one begun before the arm was calibrated anew is told from one that speaks
+    of the models now there.
     """
     remarks = []
-    name = calibration.resolve().name
-    found = sorted(set(_named(places, name)), key=_last_reading, reverse=True)
+    found = sorted(set(places), key=_last_reading, reverse=True)
     for number, place in enumerate(found, 1):
         try:
             opened = folder.open_(place)
-            if not _is_of(opened.plan, calibration):
+            if not _is_of(opened.plan, tables):
                 remarks.append(f"campaign {place} was begun with another calibration of {name}")
                 continue
             state = opened.state()
@@ -102,34 +106,22 @@ def sought(calibration: Path, places: Iterable[Path]) -> Sought:
     return Sought(None, tuple(remarks))
 
 
-def _named(places: Iterable[Path], name: str) -> Iterator[Path]:
-    """Folders in ``places`` with a campaign of a calibration of that name."""
-    for place in places:
-        for plan in sorted(place.glob(f"*/{PLAN}")):
-            try:
-                about = json.loads(plan.read_bytes())["about"]
-                if about["calibration"] == name:
-                    yield plan.parent
-            except (OSError, ValueError, LookupError, TypeError, RecursionError):
-                continue  # no campaign, or one that cannot say whose it is
-
-
 def _last_reading(place: Path) -> float:
     """Time of the last reading; of the plan where there is none."""
     journal = place / JOURNAL
     return (journal if journal.is_file() else place / PLAN).stat().st_mtime
 
 
-def _is_of(plan, calibration: Path) -> bool:
-    """Whether the model the campaign judges is the one that the results folder holds now."""
-    robot = results.recorded_robot(calibration)
-    if robot is None or len(robot.q_min_rad) != plan.points.joints.shape[1]:
-        return False
+def _is_of(plan, tables: Mapping[str, Columns]) -> bool:
+    """Whether the model the campaign judges is the one that the tables hold now."""
     try:
-        tables = results.read_tables(calibration)
-        arm = results.calibration(tables, robot, plan.about["model"], plan.about["calibration"])
-        at = JointState(robot.dh_joints(plan.points.joints), plan.points.directions)
-        seen = arm.pose(at, "base", plan.about["point"]).position_mm
+        arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+        if len(arm.q_min_rad) != plan.points.joints.shape[1]:
+            return False
+        about = plan.about
+        calibration = results.calibration(tables, arm, about["model"], about["calibration"])
+        at = JointState(arm.dh_joints(plan.points.joints), plan.points.directions)
+        seen = calibration.pose(at, "base", about["point"]).position_mm
     except InputError:
         return False  # the model or the target is not there any more
     return bool(np.abs(seen - plan.points.modelled_mm).max() < _SAME_MM)

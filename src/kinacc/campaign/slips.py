@@ -1,4 +1,7 @@
-"""Values that are allowed and look like slips: they are asked about before they are taken."""
+"""Values that are allowed and look like slips: they are asked about before they are taken.
+
+And what is known of the noise before it is stated: it is offered, and never taken by itself.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
 from kinacc.checks.noise import Revisits, per_axis_mm, revisits
 from kinacc.errors import Problem
+from kinacc.kinematics.tables import frame
 from kinacc.measurements import folds
 
 _NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads to nothing
@@ -26,6 +30,8 @@ _LITTLE_NOISE = 0.8  # of the scatter that was measured
 _USUAL_READINGS = 10  # that say what size is usual
 _UNUSUAL = 6.0  # times the median size
 _FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
+MEASURE_IT = "read a pose ten times, leaving it between, and take the scatter"
+_TOO_FEW = f"too few repeats: {MEASURE_IT}"
 
 
 def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> list[Problem]:
@@ -52,10 +58,46 @@ def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> li
 
 def of_repeats(instruments: Sequence[Instrument], calibration: Path) -> list[Problem]:
     """The same as :func:`of_little_noise` of a results folder; nothing where it has no readings."""
-    readings = [calibration / f"{name}.parquet" for name in ("measurements", "pose_errors")]
-    if not all(path.is_file() for path in readings):
-        return []
-    return of_little_noise(instruments, *map(store.read, readings))
+    known = _read(calibration, ("measurements", "pose_errors"))
+    return of_little_noise(instruments, *known) if known else []
+
+
+def noise_known(calibration: Path) -> str:
+    """The same as :func:`noise_by_repeats` of a results folder."""
+    known = _read(calibration, ("measurements", "pose_errors", "frames"))
+    return noise_by_repeats(*known) if known else _TOO_FEW
+
+
+def noise_by_repeats(measured: Columns, errors: Columns, frames: Columns) -> str:
+    """What readings at equal joints tell of the noise, and what they do not; else how to find it.
+
+    ``measured``, ``errors`` and ``frames``: ``measurements``, ``pose_errors`` and ``frames`` of the
+    calibration.
+    """
+    brief = scatter_in_brief(measured, errors, frames)
+    if not brief:
+        return _TOO_FEW
+    return (
+        f"{brief} along x,y,z of the instrument: the noise is that or more, as they may have been "
+        "read back to back, without coming back to the pose, and hold no new set-up of instrument "
+        "or target"
+    )
+
+
+def scatter_in_brief(measured: Columns, errors: Columns, frames: Columns) -> str:
+    """By how much readings at equal joints scatter; empty where there are too few to tell."""
+    again = scatter(measured, errors, frames)
+    if again.freedom < _USUAL_READINGS or not (again.std_mm > 0.0).all():
+        return ""
+    std_mm = ",".join(f"{each:.2g}" for each in again.std_mm)
+    where = f"{again.readings} readings at {again.configurations} configurations"
+    return f"{where} scatter by {std_mm} mm"
+
+
+def _read(calibration: Path, names: Sequence[str]) -> list[Columns]:
+    """Tables of a results folder, none where one is not there."""
+    paths = [calibration / f"{name}.parquet" for name in names]
+    return [store.read(path) for path in paths] if all(p.is_file() for p in paths) else []
 
 
 def of_little_noise(
@@ -84,16 +126,22 @@ def of_little_noise(
     return problems
 
 
-def scatter(measured: Columns, errors: Columns) -> Revisits:
+def scatter(measured: Columns, errors: Columns, frames: Columns | None = None) -> Revisits:
     """Scatter of what the plainest model leaves of readings at one configuration.
 
-    Held-out errors where there are: readings of a configuration are held out together.
+    Held-out errors where there are: readings of a configuration are held out together. Per axis of
+    the robot's base, with ``frames`` per axis of the instrument.
     """
     own = np.asarray(errors["comparison"]) == Comparison(MEASURED, PLAINEST).name
     held_out = own & (np.asarray(errors["estimate"]) == ESTIMATES[1])
     used = held_out if held_out.any() else own
     row = np.asarray(errors["row"])[used].astype(int)
     left_mm = np.stack([np.asarray(errors[f"e{axis}_mm"])[used] for axis in "xyz"], axis=1)
+    if frames is not None:
+        sessions = np.asarray(measured["session"])[row]
+        for each in {*sessions}:
+            base = frame(frames, PLAINEST, "base", each)
+            left_mm[sessions == each] @= base.rotation.T
     session, target = (
         np.unique(np.asarray(measured[name]).astype(str), return_inverse=True)[1].ravel()
         for name in ("session", "target")

@@ -87,9 +87,13 @@ def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
     """The statements of a campaign, without those that its visit does not support yet.
 
     Part of a visit made in order of travel is no random sample: until it is complete, nothing is
-    said of points that were not measured.
+    said of points that were not measured. Readings that all equal the prediction to the last digit
+    are none: whatever the errors, noise keeps them apart.
     """
     said = campaign.statements()
+    if campaign.ledger.taken and not campaign.ledger.sizes_mm().any():
+        reason = Reason("predicted", {"read": campaign.ledger.taken})
+        return tuple(Statement(each.target, share=each.share, withheld=reason) for each in said)
     left = campaign.first - len(campaign.ledger.visited)
     if left <= 0 or not plan.by_travel:
         return said

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from kinacc.workflow.plan import Plan
 
 # Made by a study, perhaps of an earlier calibration.
-STUDIED = ("accuracy_map", "assessment_points", "claims")
+STUDIED = (
+    *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
+    "claims",
+)
 WORDS = {"ignore_unknown_options": True}
 CORES = click.option(
     "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
@@ -44,6 +47,7 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc calibrate tracker.yaml -- --dry-run
     """
     from kinacc.cli.fitted import summary
+    from kinacc.cli.report import written
     from kinacc.workflow.answer import answer, read
 
     configs, plan = carried_out("calibration", words, cores, default=None)
@@ -56,6 +60,7 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
         return
     more = shlex.join(["kinacc", "study", *configs])
     for folder in folders.values():
+        written(folder, without=STUDIED)
         tables = {name: table for name, table in read(folder).items() if name not in STUDIED}
         click.echo("\n".join(["", *answer(folder, tables, following=[more])]))
 

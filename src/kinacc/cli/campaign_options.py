@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from pathlib import Path
 
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
 from kinacc.assess.statement import CONFIDENCE
-from kinacc.campaign import instrument, plan
+from kinacc.campaign import instrument, plan, slips
 from kinacc.errors import InputError, Problem
 
 _LARGEST_MM = 1e6
@@ -20,14 +21,19 @@ def instruments(
     covariance_mm2: str | None,
     named: Sequence[str] | None = None,
     frame: str = "base",
+    calibrations: Sequence[Path] = (),
 ) -> tuple[instrument.Instrument, ...]:
-    """Instruments of ``--noise-mm``, ``--covariance-mm2`` and ``--instrument``, if there is one."""
+    """Instruments of ``--noise-mm``, ``--covariance-mm2`` and ``--instrument``, if there is one.
+
+    Raises InputError where there is none, with what results folders ``calibrations`` tell of it.
+    """
     unnamed = [f"instrument={each}" for each in (covariance_mm2, noise_mm) if each is not None]
     texts = [*unnamed, *(named or ())]
     if not texts:
         allowed = "--noise-mm or --covariance-mm2"
         allowed += "" if named is None else ", or --instrument NAME=.."
-        raise InputError(Problem("noise", "is not given", allowed))
+        known = dict.fromkeys(map(slips.noise_known, calibrations)) or [slips.MEASURE_IT]
+        raise InputError(Problem("noise", "is not given", allowed, "; ".join(known)))
     return instrument.instruments(texts, frame)
 
 

@@ -56,7 +56,9 @@ def question(given: Mapping) -> Simulation:
         what = "names a target of a results folder, and --errors names no such folder"
         problems.append(Problem("--point", what, fix="leave it out, or give --errors FOLDER"))
     with gathered(problems):
-        instruments = campaign_options.instruments(given["noise_mm"], given["covariance_mm2"])
+        instruments = campaign_options.instruments(
+            given["noise_mm"], given["covariance_mm2"], calibrations=folders
+        )
         if not given["sure"]:
             problems += slips.of_noise(instruments)
             problems += [each for path in folders for each in slips.of_repeats(instruments, path)]

@@ -32,7 +32,9 @@ def start(given: Mapping, out: Output) -> None:
     noise = (given[each] for each in ("noise_mm", "covariance_mm2", "instrument", "frame"))
     method = (given[each] for each in ("assessor", "budget", "confidence", "settings"))
     with gathered(problems):
-        instruments = campaign_options.instruments(*noise)
+        instruments = campaign_options.instruments(
+            *noise, calibrations=[Path(given["calibration"])]
+        )
     with gathered(problems):
         assessor = campaign_options.assessor(*method)
     lengths = ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm")

@@ -68,7 +68,7 @@ def summary(folder: Path | str) -> dict:
     from kinacc.workflow.answer import campaign_of, facts_of
 
     tables = read(folder)
-    facts, bound = facts_of(tables), campaign_of(folder).assessed
+    facts, bound = facts_of(tables), campaign_of(folder, tables).assessed
     excluded, names = tables.get("excluded_rows"), RowNames.of_columns(tables["measurements"])
     choice, told = tables["model_selection"], tables["dh_identified"]
     best = selected(choice)

@@ -51,11 +51,16 @@ _MEANT = {
     "remove": "strike",
     "reproduce": "study",
     "results": "fitted",
-    "show": "fitted",
+    "cat": "show",
+    "head": "show",
+    "list": "show",
+    "ls": "show",
+    "print": "show",
+    "table": "show",
+    "view": "show",
     "summary": "fitted",
     "undo": "strike",
     "validate": "check-data",
-    "verify": "check-results",
 }
 # Spellings of options that are gone with the next version, by command.
 _FORMERLY = {
@@ -211,15 +216,18 @@ SECTIONS = {
     },
     "The study": {
         "study": "everything beside: maps, the assessors under noise, claims",
+        "show": "any table of results in the terminal, or as CSV",
         "run": "run one stage of the workflow by hand",
         "check-results": "hold a results folder to its contract",
         "draw-robots": "search synthetic arms like the paper's",
     },
     "A calibrated arm": {
         "fitted": "what the fits are worth, and what the poses leave open",
+        "report": "one page of it all, to read, mail and keep",
         "predict": "joints to the pose of the tool, with uncertainty",
         "compensate": "poses to the joints that put the tool there",
         "export": "write the model for other programs",
+        "verify": "how far it is off at readings it was not fitted to",
         "compare": "what differs between two calibrations",
     },
     "Its largest error": {

@@ -85,7 +85,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     """
     from kinacc.artifacts.atomic import replacing
     from kinacc.cli.first_poses import first_poses, poses_without_robot
-    from kinacc.cli.init_questions import asked, looked
+    from kinacc.cli.init_questions import asked, looked, poses_to_ask_about
     from kinacc.cli.init_remarks import remarks_on, rounded
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
@@ -96,6 +96,8 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     folder = Path(options["folder"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
     _refuse(paths, name, out.force)
+    seen = poses_to_ask_about(guess) if ask else []
+    _show(seen, out)
     if ask:
         guess = asked(guess, options["robot"])
     robot, chosen = _robot(guess, options["robot"], ask)
@@ -110,7 +112,8 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
         shown = first_poses(reading, arm.dh.prismatic)
     else:
         shown = poses_without_robot(guess)
-    _show(shown, out)
+    if shown != seen:  # answers, or the readings, say otherwise than the names did
+        _show(shown, out)
     texts = {} if text is None else {paths[1]: text}
     texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
     with replacing(list(texts)) as parts:
@@ -121,10 +124,10 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
 
 
 def _show(shown: list[dict], out: Output) -> None:
-    """Print the first poses, before anything is written."""
+    """Print the first poses, if any, before anything is written."""
     from kinacc.cli.first_poses import in_words
 
-    if not out.as_json:
+    if shown and not out.as_json:
         click.echo("\n".join(in_words(shown)))
 
 
@@ -387,9 +390,6 @@ def _tell(
     ]
     if guess.found.commanded:
         lines.append(f"joints as commanded: {_listed(guess.found.commanded)}")
-    named = {kind: name.column for kind, name in guess.found.single.items()}
-    if named:
-        lines.append("; ".join(f"{kind}: {column}" for kind, column in named.items()))
     targets = [f"{name} ({_point(each)})" for name, each in guess.found.targets.items()]
     lines.append(f"targets, in {section['length_unit']}: {', '.join(targets)}")
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]

@@ -10,7 +10,7 @@ from typing import NoReturn
 import click
 
 from kinacc.cli.file_options import ANSWERS
-from kinacc.cli.first_poses import in_words, poses_without_robot
+from kinacc.cli.first_poses import poses_without_robot
 from kinacc.errors import InputError, Problem
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.intake.choices import Choice, Undecided
@@ -119,14 +119,18 @@ _QUESTIONS = {
 }
 
 
+def poses_to_ask_about(guess: Guess) -> list[dict[str, object]]:
+    """The first poses as assumed, to look at before anything is asked; none where nothing is."""
+    with suppress(InputError):  # joints that slide are not to be read without their robot
+        return poses_without_robot(guess) if guess.assumed else []
+    return []
+
+
 def asked(guess: Guess, robot: str | None) -> Guess:
-    """The guess after a person was asked about what it assumes, with the first poses in view.
+    """The guess after a person was asked about what it assumes.
 
     ``robot``: the one given, which needs no question. Raises InputError where nobody answers.
     """
-    if guess.assumed:
-        with suppress(InputError):  # joints that slide are not to be read without their robot
-            click.echo("\n".join(in_words(poses_without_robot(guess))))
     try:
         return _by_person(guess)
     except click.Abort:

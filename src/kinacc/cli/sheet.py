@@ -18,6 +18,7 @@ from kinacc.cli.output import plain
 from kinacc.config.names import in_csv
 
 _SHOWN_ROWS = 24
+_PLAIN_UNITS = ("mm", "mrad", "rad", "deg", "kg")
 _NOTHING = 5e-5  # less is no digit of the four shown after the point
 
 
@@ -34,15 +35,25 @@ class Field:
     meaning: str = ""
     on_screen: bool = True
 
+    @property
+    def heading(self) -> str:
+        """The name, with the unit where it does not say it: q1 [rad]."""
+        told = self.unit not in _PLAIN_UNITS or self.name.endswith(f"_{self.unit}")
+        return self.name if told else f"{self.name} [{self.unit}]"
+
 
 @dataclass(frozen=True)
 class Sheet:
-    """Named columns of equal length and a few facts about all of them."""
+    """Named columns of equal length and a few facts about all of them.
+
+    ``with_units``: CSV has headings instead of names, so that no unit has to be known.
+    """
 
     title: str
     facts: Mapping[str, object]
     fields: Sequence[Field]
     shown_rows: int = _SHOWN_ROWS
+    with_units: bool = False
 
     def __len__(self) -> int:
         return len(self.fields[0].values) if self.fields else 0
@@ -58,7 +69,8 @@ class Sheet:
         """Column names, then one line per row; empty cells for none."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow([field.name for field in self.fields])
+        names = [field.heading if self.with_units else field.name for field in self.fields]
+        writer.writerow([in_csv(name) for name in names])
         for i in range(len(self)):
             writer.writerow([_cell(field.values[i]) for field in self.fields])
         return out.getvalue()

@@ -5,6 +5,14 @@ the box they span was never measured. The covariance of the fit tells. Seen on U
 data, DH and VEC models fitted without a part of the poses: the rms of the rest is 0.9 to 1.2 times
 the usual held-out one inside (1.7 for the 24 poses of the FANUC), 1.0 to 7.7 times outside.
 Distances to measured poses alone call FANUC poses inside that are off by 4.7 times that.
+
+Gaps between clusters of poses need no measure of their own. On a made-up UR10 measured in two
+clusters no pose between them counts as measured. Measured at both ends of joint 2 alone, the rms in
+the gap is 1.2 to 1.3 times the usual one of a DH model, which takes it for measured; of VEC models,
+which take none of it so (with order 2 three quarters of a narrow gap), it is 1.5 to 7 times. By the
+distance to the nearest measured pose 65 to 83 % of those gaps are as near as others. Of held-out
+UR10 and UR5 poses the 1 to 2 % that it calls far are off by 0.9 to 1.2 times as much as the rest,
+those that the covariance does by 1.0 to 1.6 times.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ def _quantity(places: list[tuple[str, float, float]]) -> Control:
     options = []
     for place, (label, unit) in enumerate((("position", "mm"), ("orientation", "mrad"))):
         sets: list[tuple[str, str, object]] = [
-            (f"moved-{key}", "x", {"type": "field", "field": f"{key}_{unit}"}) for key in LOOKS
+            (f"moved-{key}", "x", pictures.field(f"{key}_{unit}")) for key in LOOKS
         ]
         sets += [(name, "location", chance[place]) for name, *chance in places]
         sets.append(("moved-axis", "axis_label", f"change of {label}, {unit}"))
@@ -222,7 +222,7 @@ def _over_joint(case: Case, data: ColumnDataSource) -> Picture:
     caption = "How far each pose moved, over the angle of one joint. A click in the legend hides."
     return Picture(
         "over-joint", plot, caption, caption, (pictures.choice("Joint", axes, named, "over-axis"),),
-        _details(case), "Select a pose to see what it is.",
+        _details(case), invitation="Select a pose to see what it is.",
     )  # fmt: skip
 
 
@@ -235,7 +235,7 @@ def _in_space(case: Case, data: ColumnDataSource) -> Picture:
     )
     return Picture(
         "space", plot, f"Shifts in space. {caption}", caption, (control,), _details(case),
-        "Select a pose to see what it is.",
+        invitation="Select a pose to see what it is.",
     )  # fmt: skip
 
 

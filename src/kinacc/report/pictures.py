@@ -11,6 +11,7 @@ import bokeh
 import numpy as np
 from bokeh.document import Document
 from bokeh.models import ColumnDataSource, HoverTool, Plot
+from bokeh.models.renderers import GlyphRenderer
 from bokeh.plotting import figure as bokeh_figure
 from bokeh.transform import linear_cmap
 
@@ -46,6 +47,11 @@ def source(name: str, columns: Mapping[str, np.ndarray]) -> ColumnDataSource:
     return ColumnDataSource(plain, name=name)
 
 
+def field(name: str) -> dict[str, str]:
+    """What an option of a control sets where a glyph takes its values from a column."""
+    return {"field": name}  # with a "type" beside it, as Python sends it, the browser draws nothing
+
+
 def figure(
     x_label: str,
     y_label: str,
@@ -76,6 +82,19 @@ def figure(
     return plot
 
 
+def hover(plot: bokeh_figure, said: Sequence[tuple[str, str]], *parts: GlyphRenderer) -> None:
+    """What hovering over these ``parts`` of a picture says, where others say something else."""
+    plot.add_tools(HoverTool(tooltips=list(said), renderers=list(parts), visible=False))
+
+
+def legend_above(plot: bokeh_figure, columns: int = 2) -> None:
+    """Put the legend where it covers nothing, in few columns; a click in it hides what it names."""
+    (legend,) = plot.legend
+    legend.update(click_policy="hide", orientation="horizontal", ncols=columns, nrows="auto")
+    legend.label_text_font_size = "12px"
+    plot.add_layout(legend, "above")
+
+
 def from_zero(plot: bokeh_figure) -> None:
     """Let the axis of values begin at zero, so that sizes can be compared by eye."""
     plot.y_range.update(start=0.0)
@@ -98,7 +117,7 @@ def choice(
                 said,
                 (
                     *(
-                        (name, each, {"type": "field", "field": column})
+                        (name, each, field(column))
                         for name, properties in glyphs.items()
                         for each in properties
                     ),
@@ -145,7 +164,7 @@ def in_space(
                 f"{across} and {up}",
                 (
                     *(
-                        (f"{name}-glyph", side, {"type": "field", "field": column})
+                        (f"{name}-glyph", side, field(column))
                         for side, column in (("x", across), ("y", up))
                     ),
                     *(
@@ -184,6 +203,7 @@ def documents(
         for plot in group:
             document.add_root(plot)
         text = json.dumps(document.to_json(deferred=False))
+        document.clear()  # a plot may be written again: it belongs to one document at a time
         names = {name: f"k{number}-{i}" for i, name in enumerate(dict.fromkeys(_ID.findall(text)))}
         text = _ID.sub(lambda match, names=names: f'"{names[match[1]]}"', text)
         found[f"d{number}"] = json.loads(text)

@@ -200,9 +200,9 @@ def _over_file(found: Errors, data: ColumnDataSource) -> Picture:
     )
     _points(plot, found, data, "order", "over-file")
     large = float(np.quantile(found.sizes[found.selected], summary.LARGE_SHARE))
-    plot.hspan(y=large, line_color=BLUE, line_dash="dotted")
+    plot.hspan(y=large, line_color=BLUE)
     caption = (
-        f"Dotted: {summary.LARGE_SHARE:.0%} of the rows lie below it ({large:.3f} mm) with the "
+        f"Line: {summary.LARGE_SHARE:.0%} of the rows lie below it ({large:.3f} mm) with the "
         "selected model. A step or a slope along the file is time at work: a base that moved, an "
         "arm that warmed up."
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,7 @@ from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
 from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
-from kinacc.campaign import of_calibration
-from kinacc.campaign.journal import PLAN
+from kinacc.campaign import journal, of_calibration, slips
 from kinacc.campaign.of_calibration import Sought
 from kinacc.campaign.words import one_of
 from kinacc.deployment import folder as results
@@ -26,7 +26,6 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 from kinacc.study.summary import claims_counted, claims_that_differ, differences
 from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES
-from kinacc.workflow.plan import Plan
 
 IF_THERE = (
     *(f"{kind}_model" for kind in ERROR_MODELS),
@@ -41,7 +40,7 @@ Tables = Mapping[str, Columns]
 def read(folder: Path | str, needed: Collection[str] = summary.TABLES) -> dict[str, Columns]:
     """The tables an answer is made from. Raises InputError naming all ``needed`` ones missing."""
     folder = Path(folder)
-    if (folder / PLAN).is_file():
+    if (folder / journal.PLAN).is_file():
         status = shlex.join(["kinacc", "campaign", "status", str(folder)])
         fix = f"ask {status}, or name its results folder"
         raise InputError(Problem(str(folder), "is a campaign, and no results folder", fix=fix))
@@ -65,12 +64,43 @@ def facts_of(tables: Tables) -> list[Fact]:
     return summary.facts(tables, arm, float(share[0]) if len(share) else np.nan)
 
 
-def campaign_of(folder: Path | str) -> Sought:
-    """The campaign of a results folder, sought beside it, beside all results, and here."""
-    folder = Path(folder)
-    within = folder.absolute().parent
-    near = {within.resolve(): folder.parent, within.parent.resolve(): folder.parent / ".."}
-    return of_calibration.sought(folder, [*(near | {Path.cwd(): Path()}).values()])
+def campaign_of(folder: Path | str, tables: Tables) -> Sought:
+    """The campaign of a results folder with these tables; see :func:`journal.of_results`."""
+    name = Path(folder).resolve().name
+    return of_calibration.sought(name, tables, journal.of_results(Path(folder)))
+
+
+class Told(NamedTuple):
+    """What there is to tell of a results folder, as texts under names.
+
+    ``claims`` are about the paper, empty where its claims are not held to these results; ``other``
+    errors are of populations beside held-out and training poses; ``following`` are commands.
+    """
+
+    facts: list[Fact]
+    claims: dict[str, list[str]]
+    other: list[str]
+    largest: list[str]
+    following: list[str]
+
+
+def told(
+    folder: Path, tables: Tables, bound: Sought, whole: bool, campaign: str, exported: str
+) -> Told:
+    """What is to be told of the tables of a results folder and its campaign.
+
+    ``campaign`` and ``exported`` are names for folders that the commands would make.
+    """
+    facts, arm = facts_of(tables), _arm(tables)
+    noise = _noise(facts, tables)
+    commands = [] if bound.assessed is None else [bound.assessed.next_command]
+    return Told(
+        facts,
+        _claims(folder, facts, tables),
+        _other_errors(facts, tables, whole),
+        _bound(bound, folder, arm, noise, campaign),
+        [*commands, *_uses(folder, arm, tables, exported)],
+    )
 
 
 def answer(
@@ -81,34 +111,21 @@ def answer(
     ``whole`` leaves nothing out; ``following`` are commands to name beside the next ones.
     """
     folder = Path(folder)
-    facts = facts_of(tables)
+    name, bound = folder.resolve().name, campaign_of(folder, tables)
+    found = told(folder, tables, bound, whole, _free("check", folder), _free("exported", folder))
     more = shlex.join(["kinacc", "fitted", str(folder), "--all"])
-    lines = [f"{folder.resolve().name}: what its calibration is worth"]
-    lines += half_page(facts, more, whole)
-    lines += paragraph("other errors", _other_errors(facts, tables, whole))
-    bound, arm = campaign_of(folder), _arm(folder, tables)
-    lines += paragraph("largest error", _bound(bound, folder, arm))
-    commands = [] if bound.assessed is None else [bound.assessed.next_command]
-    lines += paragraph("next", [*commands, *following, *_uses(folder, arm, tables)])
-    return [*_claims(folder, facts, tables), *lines]
-
-
-def last_words(plan: Plan, made: Collection[str]) -> list[str]:
-    """What a run says at its end, which was about the files ``made``, up to date ones included.
-
-    Of data sets whose summary was not asked for, only what the check of the data found.
-    """
-    lines: list[str] = []
-    for dataset in plan.datasets:
-        if plan.outputs("summary", dataset)["summary"] in made:
-            folder = Path(plan.results) / dataset
-            tables = read(folder)
-            if plan.outputs("claims", dataset)["claims"] not in made:
-                tables.pop("claims", None)
-            lines += ["", *answer(folder, tables)]
-        else:
-            lines += plan.remarks(dataset)
-    return lines
+    own = 0 if bound.assessed is None else 1  # a campaign's next command goes first
+    commands = [*found.following[:own], *following, *found.following[own:]]
+    claims = [line for each in found.claims.items() for line in paragraph(*each)]
+    return [
+        *([f"{name}: the paper reproduced", *claims, ""] if claims else []),
+        f"{name}: what its calibration is worth",
+        *half_page(found.facts, more, whole),
+        *paragraph("other errors", found.other),
+        *paragraph("largest error", found.largest),
+        *paragraph("next", commands),
+        *paragraph("page", [str(page)] if (page := folder / "report.html").is_file() else []),
+    ]
 
 
 def _other_errors(facts: Sequence[Fact], tables: Tables, whole: bool) -> list[str]:
@@ -134,25 +151,35 @@ def _is_synthetic(facts: Sequence[Fact]) -> bool:
     return of(facts, "data")["measurements"]["source"].text == "synthetic"
 
 
-def _arm(folder: Path, tables: Tables) -> Calibration:
+def _arm(tables: Tables) -> Calibration:
     """The calibration that the commands of campaigns and poses would use."""
     known = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    return results.calibration(results.read_tables(folder), known)
+    return results.calibration(tables, known)
 
 
-def _bound(bound: Sought, folder: Path, arm: Calibration) -> list[str]:
+def _noise(facts: Sequence[Fact], tables: Tables) -> str:
+    """What a campaign has to be told of the noise, and what the readings tell of it."""
+    asked = "NOISE: standard deviation of one reading, mm"
+    if _is_synthetic(facts):
+        return asked
+    known = (tables[name] for name in ("measurements", "pose_errors", "frames"))
+    least = slips.scatter_in_brief(*known)
+    return f"{asked}, at least this: {least}" if least else "NOISE: std of ten visits to a pose, mm"
+
+
+def _bound(bound: Sought, folder: Path, arm: Calibration, noise: str, campaign: str) -> list[str]:
     if bound.assessed is not None:
         return [*bound.assessed.in_words(), *bound.remarks]
-    words = ["kinacc", "campaign", "start", _free("check", folder), "--calibration", str(folder)]
+    words = ["kinacc", "campaign", "start", campaign, "--calibration", str(folder)]
     return [
         *bound.remarks,
-        "not assessed; a campaign bounds it (NOISE: standard deviation of one reading, mm):",
+        f"not assessed; a campaign bounds it ({noise}):",
         *one_of(arm.default_point, [*arm.targets]),
         f"{shlex.join(words)} --noise-mm NOISE --budget {_READINGS}",
     ]
 
 
-def _uses(folder: Path, arm: Calibration, tables: Tables) -> list[str]:
+def _uses(folder: Path, arm: Calibration, tables: Tables, exported: str) -> list[str]:
     """Commands that use the calibration: files for controllers, and joints for a pose."""
     names = [f"q{joint + 1}" for joint in range(len(arm.robot.q_min_rad))]
     near = _easy(arm, np.stack([tables["measurements"][name] for name in names], axis=1))
@@ -161,7 +188,7 @@ def _uses(folder: Path, arm: Calibration, tables: Tables) -> list[str]:
     numbers += [f"{each:.4f}" for each in quaternion_from_rotation(pose.rotation[0])]
     shown = np.where(arm.robot.dh.prismatic, near, np.rad2deg(near)).round() + 0.0  # no minus zero
     chosen = [] if arm.choice == PLAINEST else ["--model", arm.choice]
-    export = ["kinacc", "export", str(folder), *chosen, "--out", _free("exported", folder)]
+    export = ["kinacc", "export", str(folder), *chosen, "--out", exported]
     use = ["kinacc", "compensate", str(folder), "--pose", ",".join(numbers)]
     use += ["--near-deg", ",".join(f"{each:.0f}" for each in shown)]
     return [shlex.join(export), shlex.join(use)]
@@ -181,19 +208,16 @@ def _free(name: str, folder: Path) -> str:
     return name if not Path(name).exists() else f"{name}_{folder.resolve().name}"
 
 
-def _claims(folder: Path, facts: Sequence[Fact], tables: Tables) -> list[str]:
+def _claims(folder: Path, facts: Sequence[Fact], tables: Tables) -> dict[str, list[str]]:
     """What became of the paper's claims, where they are held to these results."""
     if "claims" not in tables or not _is_synthetic(facts):
-        return []
+        return {}
     claims, figures = (
         tables["claims"],
         [stage.name for stage in STAGES.values() if stage.is_figure and not stage.on_request],
     )
-    pictures = f"{folder}/{FIGURE_FOLDER}: {figures[0]} to {figures[-1]}"
-    return [
-        f"{folder.resolve().name}: the paper reproduced",
-        *paragraph("claims", [claims_counted(claims), f"{folder}/claims.parquet has each of them"]),
-        *paragraph("differ", [", ".join(claims_that_differ(claims))]),
-        *paragraph("figures", [pictures]),
-        "",
-    ]
+    return {
+        "claims": [claims_counted(claims), f"{folder}/claims.parquet has each of them"],
+        "differ": [", ".join(claims_that_differ(claims))],
+        "figures": [f"{folder}/{FIGURE_FOLDER}: {figures[0]} to {figures[-1]}"],
+    }

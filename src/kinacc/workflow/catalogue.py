@@ -14,6 +14,7 @@ from typing import Any
 from kinacc.artifacts.error_models import ALWAYS, FITTED
 
 FIGURE_FOLDER = "figures"
+TABLES, FIGURE, PAGE = "tables", "figure", "page"  # what a stage leaves
 TOURNAMENT = "tournament"  # folder of the joint stages, a name no data set can have
 
 
@@ -37,7 +38,7 @@ class Stage:
     ``inputs`` of every data set (``measured_inputs`` where it is measured) and of joint stages;
     ``fits`` is the kind of error model a stage fits;
     ``shared`` ones take long enough to be kept for other folders (Snakemake's cache);
-    ``is_figure`` ones draw instead of making tables, see :func:`_figure`.
+    ``leaves`` says what its files are: tables, a figure (see :func:`_figure`), a page.
     """
 
     name: str
@@ -57,7 +58,12 @@ class Stage:
     measured_inputs: tuple[str, ...] = ()
     shared: bool = False
     fits: str = ""
-    is_figure: bool = False
+    leaves: str = TABLES
+
+    @property
+    def is_figure(self) -> bool:
+        """Whether it draws a figure, once for every format."""
+        return self.leaves == FIGURE
 
     @property
     def module(self) -> str:
@@ -108,7 +114,7 @@ def _figure(
         files=files,
         uses=uses,
         on_request=on_request,
-        is_figure=True,
+        leaves=FIGURE,
     )
 
 
@@ -121,6 +127,7 @@ _FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _D
 _FITTED_AND_MAPPED = ("seed", "robot", "measurements", "calibration", "evaluation", "map")
 _WHOLE_STUDY = (*_FITTED_AND_MAPPED, "study", "histories", "robustness")
 _MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
+_FITS_OF_ALL = tuple(f"{kind}_{what}" for kind in FITTED for what in ("fit", "covariance"))
 _FURTHER = tuple(f"{kind}_model" for kind in FITTED if kind not in ALWAYS)
 _MODEL = "kinacc.artifacts.error_models:MODELS[{models}]"
 _ESTIMATOR = "kinacc.artifacts.error_models:ESTIMATORS"
@@ -265,7 +272,7 @@ STAGES: dict[str, Stage] = {
             uses=(_ROBOT, _MODEL),
             optional=(
                 *("data_check", "excluded_rows", "vec_orders", *_FURTHER),
-                *(f"{kind}_{what}" for kind in FITTED for what in ("fit", "covariance")),
+                *_FITS_OF_ALL,
             ),
         ),
         Stage(
@@ -383,6 +390,23 @@ STAGES: dict[str, Stage] = {
             ("claims",),
             ("robot",),
             optional=("accuracy_map", "robustness"),
+        ),
+        Stage(
+            "report",
+            "writing the page that says what it is all worth",
+            (
+                *("measurements", "robot", *_MODELS, "dh_identified", "pose_errors"),
+                *("model_selection", "residuals", "worst_rows", "summary"),
+            ),
+            ("report",),
+            ("dataset",),
+            uses=(*(f"report/templates/page.{kind}" for kind in ("html", "css", "js")), _MODEL),
+            optional=(
+                *("data_check", "excluded_rows", "vec_orders", *_FURTHER, *_FITS_OF_ALL),
+                *("accuracy_map", "assessment_points", "study", "study_summary", "readings"),
+                *("histories", "claims"),
+            ),
+            leaves=PAGE,
         ),
         _over_arms(
             "robustness_chunk",

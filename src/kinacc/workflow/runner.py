@@ -82,6 +82,13 @@ def perform(job: Job, progress: object = None) -> None:
     result = stage.run(tables, settings, **more)
     if isinstance(result, Mapping):
         _write_tables(job, result)
+    elif "html" in job.outputs:
+        from kinacc.artifacts.atomic import write_whole
+        from kinacc.report.page import html
+
+        read = {name: _content(name, paths) for name, paths in job.inputs.items()}
+        content = html(result, stage_provenance(job), read)
+        write_whole(job.outputs["html"], content.encode())
     else:
         from kinacc.figures.save import write
 

@@ -18,12 +18,12 @@ from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES, maker_of
+from kinacc.workflow.catalogue import FIGURE_FOLDER, PAGE, STAGES, TABLES, maker_of
 from kinacc.workflow.plan import RESULTS, Plan
 from kinacc.workflow.verification.conformity import check_file
 from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts
 from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_command
-from kinacc.workflow.verification.pictures import check_picture
+from kinacc.workflow.verification.pictures import check_page, check_picture
 from kinacc.workflow.verification.rules import contradictions
 
 FORMATS = schema.key("figures.formats").choices
@@ -204,7 +204,8 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
     found += _missing(folder, left_out)
     for name, picture in _pictures(folder, plan, left_out):
         checked += [str(picture)] if picture.exists() else []
-        found += [(problem, (Doubt(name),)) for problem in check_picture(picture)]
+        look = check_page if STAGES[name].leaves == PAGE else check_picture
+        found += [(problem, (Doubt(name),)) for problem in look(picture)]
     for problem, names in contradictions(tables):
         doubts = tuple(Doubt(maker_of(name).name) for name in names)
         found.append((_placed(folder, problem), doubts))
@@ -219,6 +220,19 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         frozenset(doubt for _, doubts in found for doubt in doubts),
         marks,
     )
+
+
+def not_there(folder: Path) -> tuple[str, ...]:
+    """Tables that a data set would have beside those in its folder, for all that these say."""
+    tables, marks = {}, {}
+    for name in ARTEFACTS:
+        path = folder / f"{name}.parquet"
+        with suppress(InputError):
+            if path.is_file():
+                marks[name] = store.read_metadata(path)
+                tables |= {name: store.read(path)} if name in ("measurements", "frames") else {}
+    left_out = _left_out(folder, marks, tables, None)
+    return tuple(Path(problem.where).stem for problem, _ in _missing(folder, left_out))
 
 
 def check_tournament(folder: Path) -> DatasetReport:
@@ -345,7 +359,8 @@ def _missing(folder: Path, left_out: Collection[str]) -> list[Found]:
             (Doubt(stage.name),),
         )
         for stage in STAGES.values()
-        if not (stage.on_request or stage.scattered or stage.is_figure or stage.name in left_out)
+        if stage.leaves == TABLES
+        if not (stage.on_request or stage.scattered or stage.name in left_out)
         for name in stage.outputs
         if not (folder / f"{name}.parquet").exists()
     ]
@@ -356,7 +371,11 @@ def _pictures(
 ) -> Iterator[tuple[str, Path]]:
     formats = FORMATS if plan is None else plan.formats
     for name, stage in STAGES.items():
-        if stage.is_figure and not stage.on_request and name not in left_out:
+        if stage.on_request or name in left_out:
+            continue
+        if stage.leaves == PAGE:
+            yield name, folder / f"{name}.html"
+        elif stage.is_figure:
             for kind in formats:
                 yield name, folder / FIGURE_FOLDER / f"{name}.{kind}"
 

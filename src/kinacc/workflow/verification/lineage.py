@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
 from kinacc import __version__
 from kinacc.artifacts import provenance
+from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.artifacts.store import read_metadata
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import STAGES, Stage, maker_of
+from kinacc.workflow.catalogue import STAGES, TABLES, Stage, maker_of
 from kinacc.workflow.plan import Plan
 from kinacc.workflow.runner import Job, stage_provenance
 from kinacc.workflow.verification.mending import Doubt, Marks
@@ -67,9 +69,22 @@ def check_lineage(
     return found, notes
 
 
+def outdated(folder: Path, artefacts: Collection[str]) -> set[str]:
+    """Which of the artefacts, as far as they are there, were made from others than are there."""
+    marks = {
+        path.stem: read_metadata(path)
+        for path in sorted(folder.glob("*.parquet"))
+        if path.stem in ARTEFACTS
+    }
+    doubted = {doubt.stage for _, doubts in check_lineage(folder, marks)[0] for doubt in doubts}
+    return {name for name in artefacts if name in marks and maker_of(name).name in doubted}
+
+
 def made_without(folder: Path, artefact: str, marks: Marks) -> bool:
     """Whether every stage that may use an artefact was run without it."""
-    users = [stage for stage in STAGES.values() if artefact in stage.optional]
+    users = [
+        stage for stage in STAGES.values() if artefact in stage.optional and stage.leaves == TABLES
+    ]
     return bool(users) and all(
         stage.outputs[0] in marks
         and any(

@@ -1,0 +1,42 @@
+"""Write the page that says what a data set's results are worth."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+
+from kinacc.campaign import of_calibration
+from kinacc.kinematics import robot
+from kinacc.report import dataset
+from kinacc.report.first_screen import Answers
+from kinacc.report.page import Page
+from kinacc.workflow.answer import told
+
+
+def run(inputs: Mapping, settings: Mapping) -> Page:
+    """The page on the tables that are there, and on the campaign of their calibration.
+
+    ``settings``: ``dataset``; ``folder`` where the results are not in their usual place, and
+    ``outdated`` tables that are left out because they were made from others.
+    """
+    name = settings["dataset"]
+    files = {role: each for role, each in inputs.items() if isinstance(each, Path)}
+    tables = {role: each for role, each in inputs.items() if role not in files}
+    campaigns = [each.parent for role, each in files.items() if role.startswith("campaign_")]
+    bound = of_calibration.sought(name, tables, campaigns)
+    folder = Path(settings.get("folder", f"results/{name}"))
+    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    found = told(folder, tables, bound, False, f"check_{name}", f"exported_{name}")
+    assessed = bound.assessed
+    answers = Answers(
+        claims=found.claims,
+        other=found.other,
+        largest=found.largest,
+        statement=assessed.in_words()[0] if assessed else "",
+        tolerance_mm=assessed.state.plan.limits.tolerance_mm if assessed else None,
+        following=found.following,
+        outdated=settings.get("outdated", ()),
+        more=shlex.join(["kinacc", "fitted", str(folder), "--all"]),
+    )
+    return dataset.page(name, tables, arm, found.facts, answers)
