@@ -111,10 +111,18 @@
   }, {rootMargin: "600px"});
   document.querySelectorAll(".plot").forEach((each) => near.observe(each));
 
+  // A glyph and those that take its place while something is selected.
+  function looks(name, model) {
+    const drawn = open(name).roots().flatMap((plot) => plot.renderers);
+    const own = drawn.filter((each) => each.glyph === model);
+    const others = own.flatMap((each) => [each.selection_glyph, each.nonselection_glyph]);
+    return [model, ...others.filter((each) => each && each !== model && each.properties)];
+  }
+
   function set(select) {
     const {document: name} = places[select.dataset.picture];
     for (const [model, property, value] of JSON.parse(select.value)) {
-      open(name).get_model_by_name(model)[property] = value;
+      for (const each of looks(name, open(name).get_model_by_name(model))) each[property] = value;
     }
   }
 
