@@ -51,6 +51,7 @@ SLOW = (
     "cli/test_check_data.py",
     "cli/test_init.py",
     "cli/test_init_readings.py",
+    "cli/test_init_robots.py",
     "cli/test_next_commands.py",
     "cli/test_rows_as_the_user_calls_them.py",
     "cli/test_the_same_readings_compared.py",
