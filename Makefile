@@ -12,12 +12,16 @@
 .PHONY: reproduce robustness public-robots lint check test lock clean distclean
 CORES = 2
 PY = .venv/bin/python
+# Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
+PYTEST = $(PY) -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 PIP = $(PY) -m pip install -qq --disable-pip-version-check
 
 # More BLAS threads change the last bits of a sum, and two jobs already fill two cores.
 export OPENBLAS_NUM_THREADS = 1
 export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
+# Bytecode that is kept spares every start a second, and the tests the rewriting of their assertions.
+unexport PYTHONDONTWRITEBYTECODE
 
 key = $(shell { cat $(1); pwd; } | cksum | tr -d ' ')
 PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
@@ -42,12 +46,12 @@ lint: $(KINACC) $(TOOLS)
 	$(PY) -m mypy
 
 check: lint
-	$(PY) -m pytest -n $(CORES) -m "not slow"
+	$(PYTEST) -m "not slow"
 
 test: lint
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
-	$(PY) -m pytest -n $(CORES)
+	$(PYTEST)
 
 # A .venv that another folder or an unsupported Python left here is made anew.
 $(PACKAGES):
