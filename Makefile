@@ -2,13 +2,14 @@
 # make robustness  the claims again on further draws of the arm; their shares go into claims.parquet
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
+# make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make lock        renew requirements/*.txt (needs uv)
 # make clean       remove results/; make distclean removes .venv as well
 #
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness lint check test lock clean distclean
+.PHONY: reproduce robustness lint check test docs docs-links lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 PIP = $(PY) -m pip install -qq --disable-pip-version-check
@@ -44,6 +45,14 @@ test: lint
 	$(PY) -m snakemake --lint
 	$(PY) -m pytest -n $(CORES)
 
+SITE = $(PY) -m sphinx -q -W --keep-going -c docs
+docs: $(KINACC) $(TOOLS)
+	@$(SITE) . docs/_build
+	@echo "docs/_build/index.html"
+
+docs-links: $(KINACC) $(TOOLS)
+	$(SITE) -b linkcheck . docs/_build/links
+
 # A .venv that another folder or an unsupported Python left here is made anew.
 $(PACKAGES):
 	@if ! { sh requirements/find-python $(PY) && grep -qF "$$(pwd)/.venv" .venv/bin/activate; } >/dev/null 2>&1; then \
@@ -75,7 +84,7 @@ lock:
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
 
 clean:
-	rm -rf results .snakemake
+	rm -rf results .snakemake docs/_build
 
 distclean: clean
 	rm -rf .venv
