@@ -24,10 +24,13 @@ autodoc_typehints_format = "short"
 html_theme = "furo"
 html_title = "kinacc"
 html_copy_source = False
-html_extra_path = ["site"]
+html_extra_path = ["site/index.html"]
+html_static_path = ["site/wide.css"]
+html_css_files = ["wide.css"]
+html_theme_options = {"light_css_variables": {"code-font-size": "75%"}}
 
 _CONTENTS = ("docs/index", "docs/assessors")
-_LISTED = re.compile(r"^- \[[^]]*\]\(([\w./-]+)\.md\)", re.MULTILINE)
+_LISTED = re.compile(r"^- \[([^]]*)\]\(([\w./-]+)\.md\)", re.MULTILINE)
 _NAME = re.compile(r"^- `(kinacc\.[\w.]+)`.*\n", re.MULTILINE)
 
 
@@ -39,7 +42,8 @@ def _made_of_the_page(app: object, page: str, source: list[str]) -> None:
 
 
 def _with_contents(section: str) -> str:
-    title, pages = section.removeprefix("## ").splitlines()[0], _LISTED.findall(section)
+    title = section.removeprefix("## ").splitlines()[0]
+    pages = [f"{name} <{page}>" for name, page in _LISTED.findall(section)]
     if not pages:
         return section
     return "\n".join([section, "```{toctree}", ":hidden:", f":caption: {title}", *pages, "```\n"])
