@@ -3,13 +3,14 @@
 # make public-robots  every measured arm in examples/data calibrated blind, and the page about it
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
+# make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make lock        renew requirements/*.txt (needs uv)
 # make clean       remove results/ and public-robots/; make distclean removes .venv as well
 #
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test docs docs-links lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -53,6 +54,14 @@ test: lint
 	$(PY) -m snakemake --lint
 	$(PYTEST)
 
+SITE = $(PY) -m sphinx -q -W --keep-going -c docs
+docs: $(KINACC) $(TOOLS)
+	@$(SITE) . docs/_build
+	@echo "docs/_build/index.html"
+
+docs-links: $(KINACC) $(TOOLS)
+	$(SITE) -b linkcheck . docs/_build/links
+
 # A .venv that another folder or an unsupported Python left here is made anew.
 $(PACKAGES):
 	@if ! { sh requirements/find-python $(PY) && grep -qF "$$(pwd)/.venv" .venv/bin/activate; } >/dev/null 2>&1; then \
@@ -84,7 +93,7 @@ lock:
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
 
 clean:
-	rm -rf results public-robots .snakemake
+	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
 	rm -rf .venv
