@@ -1,9 +1,10 @@
-// Draws the pictures when they come near the window, in the colours of the page; sets what a
-// control says; tells what is selected.
+// Draws the pictures, first those near the window, in the colours of the page; sets what a control
+// says; tells what is selected; puts the pictures on paper as images.
 (() => {
   "use strict";
   const {documents, places} = JSON.parse(document.getElementById("pictures").textContent);
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const touched = window.matchMedia("(pointer: coarse)").matches;
   let printing = false;
   const opened = {};   // documents by name
   const drawn = {};    // promises by document
@@ -21,6 +22,7 @@
         if (part.type.endsWith("Axis")) {
           text(part, "axis_label"); text(part, "major_label");
           part.axis_label_text_font_style = "normal";
+          part.axis_label_text_font_size = part.major_label_text_font_size = "13px";
           part.axis_line_color = part.major_tick_line_color = muted;
           part.minor_tick_line_color = null;
         }
@@ -30,12 +32,14 @@
         }
         if (part.type === "ColorBar") {
           text(part, "title"); text(part, "major_label"); part.background_fill_color = null;
+          part.title_text_font_style = "normal";
         }
         if (part.type === "Title") part.text_color = ink;
         if (part.type === "Label" || part.type === "LabelSet") part.text_color = ink;
       }
     }
     if (plot.title) plot.title.text_color = ink;
+    if (touched) plot.toolbar.active_drag = null;  // a finger moves the page, not the picture
   }
 
   function open(name) {
@@ -63,7 +67,8 @@
     const row = source.selected.indices[0];
     if (!place || row === undefined) return;
     const names = Object.entries(places[key].details).filter(([name]) => source.data[name]);
-    const said = names.map(([name, words]) => words.replace("{}", shown(source.data[name][row])));
+    const said = names.map(([name, words]) => 
+      words.replace("{}", () => shown(source.data[name][row])));  // as it is: $ would mean more
     const more = source.selected.indices.length - 1;
     place.textContent = said.join("; ") + (more > 0 ? `; and ${more} more at the same place` : "");
   }
@@ -80,6 +85,8 @@
       });
       await Bokeh.embed.add_document_standalone(open(name), elements[0], elements, false);
       for (const each of keys) {
+        // No key does anything in a picture, and what it tells stands in words and tables.
+        Bokeh.index.get(root(each)).canvas_view.events_el.tabIndex = -1;
         const source = data(root(each));
         source.selected.properties.indices.change.connect(() => tell(each, source));
       }
@@ -90,9 +97,31 @@
   const everything = () => Promise.all(Object.keys(places).map(draw));
   const repaint = () => Object.keys(drawn).forEach((name) => open(name).roots().forEach(paint));
 
+  // A browser prints what is there when this returns: no picture can be laid out or painted anew.
+  function toPaper() {
+    printing = true;
+    repaint();
+    for (const key of Object.keys(places)) {
+      const view = drawn[places[key].document] && Bokeh.index.get(root(key));
+      if (!view) continue;
+      view.paint();  // the legend was made anew by its colours, and its marks are drawn here
+      const image = document.createElement("img");
+      image.className = "paper";
+      image.alt = "";  // the picture beside it is described
+      image.src = view.export("png", true).canvas.toDataURL();
+      document.getElementById(`plot-${key}`).after(image);
+    }
+  }
+
+  function fromPaper() {
+    printing = false;
+    document.querySelectorAll("img.paper").forEach((each) => each.remove());
+    repaint();
+  }
+
   dark.addEventListener("change", repaint);
-  window.addEventListener("beforeprint", () => { printing = true; everything(); repaint(); });
-  window.addEventListener("afterprint", () => { printing = false; repaint(); });
+  window.addEventListener("beforeprint", toPaper);
+  window.addEventListener("afterprint", fromPaper);
 
   const near = new IntersectionObserver((entries) => {
     for (const entry of entries) {
@@ -104,12 +133,27 @@
   }, {rootMargin: "600px"});
   document.querySelectorAll(".plot").forEach((each) => near.observe(each));
 
+  // The others while the reader reads, one document at a time, so that all are there to be printed.
+  const later = window.requestIdleCallback ?? ((todo) => setTimeout(todo, 200));
+  function drawRest() {
+    const key = Object.keys(places).find((each) => !drawn[places[each].document]);
+    if (key) draw(key).then(() => later(drawRest));
+  }
+  window.addEventListener("load", () => later(drawRest));
+
+  // {"type": "field", "field": "q1"} in a document is {"field": "q1"} in a model that was made of it.
+  function inside(value) {
+    if (value === null || typeof value !== "object" || !("type" in value)) return value;
+    const {type, ...rest} = value;
+    return rest;
+  }
+
   document.addEventListener("change", (event) => {
     const select = event.target.closest("select[data-picture]");
     if (!select) return;
     const {document: name} = places[select.dataset.picture];
     for (const [model, property, value] of JSON.parse(select.value)) {
-      open(name).get_model_by_name(model)[property] = value;
+      open(name).get_model_by_name(model)[property] = inside(value);
     }
   });
   document.addEventListener("click", (event) => {
