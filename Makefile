@@ -1,14 +1,15 @@
 # make reproduce   the paper's study, from a bare checkout to results/
 # make robustness  the claims again on further draws of the arm; their shares go into claims.parquet
+# make public-robots  every measured arm in examples/data calibrated blind, and the page about it
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
 # make lock        renew requirements/*.txt (needs uv)
-# make clean       remove results/; make distclean removes .venv as well
+# make clean       remove results/ and public-robots/; make distclean removes .venv as well
 #
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness lint check test lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 PIP = $(PY) -m pip install -qq --disable-pip-version-check
@@ -29,6 +30,10 @@ reproduce: $(KINACC)
 
 robustness: $(KINACC)
 	@$(PY) -m snakemake --cores $(CORES) robustness
+
+public-robots: $(KINACC)
+	@$(PY) tools/public_robots.py $(CORES)
+	@$(PY) tools/document_public_robots.py
 
 lint: $(KINACC) $(TOOLS)
 	$(PY) -m ruff check .
@@ -75,7 +80,7 @@ lock:
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
 
 clean:
-	rm -rf results .snakemake
+	rm -rf results public-robots .snakemake
 
 distclean: clean
 	rm -rf .venv

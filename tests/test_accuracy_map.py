@@ -140,6 +140,8 @@ def test_unreachable_cells_are_marked_and_the_others_not_touched():
     assert np.isnan(found.orientation_max_mrad[2])
     assert found.worst_branch[2] is None
     assert found.orientation_worst_branch[2] is None
+    assert np.isnan(found.worst_q_rad[2]).all()
+    assert np.isfinite(found.worst_q_rad[:2]).all()
     alone = region.Cells(*(axis[:1] for axis in cells))
     first = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), alone, WANTED)
     assert first.position_max_mm[0] == found.position_max_mm[0]

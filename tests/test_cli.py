@@ -146,7 +146,6 @@ def test_checking_a_folder_that_is_not_there_fails(tmp_path):
     [
         (["inverse", "results/a"], "compensate"),
         (["fit"], "calibrate"),
-        (["verify"], "check-results"),
         (["chek-data"], "check-data"),
         (["campaign", "undo", "check"], "strike"),
         (["campaign", "recrod"], "record"),

@@ -292,6 +292,7 @@ def _map() -> dict:
             "solutions": [18, 0],
             "wanted": [18, 18],
             "extrapolating": [0, 0],
+            **{f"q{joint}": [0.1 * joint, None] for joint in range(1, 7)},
         }
     }
 

@@ -270,6 +270,8 @@ RULES = [
     ("residuals", "residuals", "unit", 0, "mrad", "unit in row 0"),
     ("accuracy_map", "accuracy_map", "worst_branch", 1, "front", "worst_branch null in row 1"),
     ("accuracy_map", "accuracy_map", "position_max_mm", 1, 0.0, "position_max_mm null in row 1"),
+    ("accuracy_map", "accuracy_map", "q2", 1, 0.5, "q2 null in row 1"),
+    ("accuracy_map", "accuracy_map", "q3", 0, 30.0, "q3 beyond two turns in row 0"),
     ("accuracy_map", "accuracy_map", "solutions", 0, 19, "more combinations than tried in row 0"),
     ("assessment_points", "assessment_points", "true_error_mm", 1, 0.5, "true_error_mm in row 1"),
     ("assessment_points", "assessment_points", "point", 2, 5, "point out of sequence"),

@@ -24,7 +24,7 @@ PROMISED = {
     "frames": "model frame x_mm y_mm z_mm qw qx qy qz",
     "residuals": "comparison subset fold quantity unit n mean max rms gamma99",
     "accuracy_map": "slice_deg radius_mm height_mm position_max_mm orientation_max_mrad "
-    "worst_branch solutions wanted",
+    "worst_branch solutions wanted q1 q6",
     "assessment_points": "point q1 q6 s1 s6 ex_mm ey_mm ez_mm true_error_mm",
     "study": "noise_mm repetition assessor assessed_mm measurements points_visited "
     "lower_mm upper_mm",

@@ -1,5 +1,6 @@
 """What a run ends with, as an engineer reads it: half a page, and the same facts in a table."""
 
+import html
 import json
 import re
 import shlex
@@ -249,10 +250,10 @@ def test_without_a_campaign_the_largest_error_is_not_assessed(folder):
 def test_what_repeats_tell_of_the_noise_stands_beside_the_question_for_it(folder, measured):
     page = " ".join(shown(measured).split())
     asked, told, command = (
-        page.index(each) for each in ("(NOISE:", "go to one pose ten times", "--noise-mm NOISE")
+        page.index(each) for each in ("(NOISE:", "of ten visits to a pose", "--noise-mm NOISE")
     )
     assert asked < told < command
-    assert "go to one pose" not in shown(folder)  # nobody can go to a pose of a synthetic arm
+    assert "ten visits" not in shown(folder)  # nobody can go to a pose of a synthetic arm
 
 
 def test_every_command_of_the_page_runs_as_printed_once_the_noise_is_filled_in(
@@ -479,3 +480,38 @@ def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflect
     for joint in range(1, 6):  # the sixth turns the flange about its own axis
         tables["measurements"][f"q{joint}"] = np.full_like(tables["measurements"]["q1"], 0.3)
     assert "the flange points one way in all poses (within" in page()
+
+
+def test_the_page_says_what_the_half_page_says_in_the_same_bytes_each_time(measured, tmp_path):
+    made = [call("report", measured, "--out", tmp_path / f"{n}.html") for n in (1, 2)]
+    assert [each.exit_code for each in made] == [0, 0], made[0].output
+    content = [(tmp_path / f"{n}.html").read_bytes() for n in (1, 2)]
+    assert content[0] == content[1]
+    assert len(content[0]) < 3e6
+    text, half = html.unescape(content[0].decode()), shown(measured)
+    figures = [f"{each:.2f}" for each in figures_of(half, "DH")]
+    assert re.search("DH</th>" + "".join(rf'<td class="number">{f}</td>' for f in figures), text)
+    assert "DATA: nothing suspicious" not in text
+    assert "http:" not in re.sub(r"<script>.*?</script>", "", text, flags=re.S)
+
+
+def test_a_page_of_a_folder_without_a_calibration_names_every_table_missing(tmp_path):
+    done = call("report", tmp_path)
+    assert done.exit_code == 2
+    assert "pose_errors.parquet" in done.output
+    assert "residuals.parquet" in done.output
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_page_about_other_tables_is_found_by_the_check(measured, tmp_path):
+    folder = tmp_path / "results" / "own"
+    shutil.copytree(measured, folder)
+    assert call("report", folder).exit_code == 0
+    about = [line for line in call("check-results", folder).output.splitlines() if "html" in line]
+    assert about == []
+    table = store.read(folder / "worst_rows.parquet")
+    table["error_mm"] = table["error_mm"] + 1e-3
+    marks = store.read_metadata(folder / "worst_rows.parquet")
+    store.write(folder / "worst_rows.parquet", "worst_rows", table, marks)
+    said = call("check-results", folder).output
+    assert "report.html: was made from another worst_rows" in said

@@ -12,7 +12,7 @@ from command_line import call, small_study
 
 from kinacc.kinematics import robot
 
-HELP = ("predict", "compensate", "export", "compare", "plan-poses", "fitted")
+HELP = ("predict", "compensate", "export", "verify", "compare", "plan-poses", "fitted")
 
 
 @pytest.fixture(scope="module")

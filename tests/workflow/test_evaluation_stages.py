@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from kinacc.artifacts.store import to_table
 from kinacc.geometry import quaternion_from_rotation, rotation_z
 from kinacc.kinematics import dh, robot, vec
 from kinacc.kinematics.inverse import limits
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import ERRORS
 from kinacc.workflow import evaluation
 from kinacc.workflow.stages import accuracy_map, assessment_points, measurements
@@ -133,6 +135,29 @@ def test_the_map_fits_its_contract_and_keeps_the_slices_as_configured():
     table = to_table("accuracy_map", columns, PROVENANCE)
     assert table.num_rows == 3 * 5 * 3
     assert np.unique(columns["slice_deg"]).tolist() == [0.0, 15.0, 30.0]
+
+
+def test_the_worst_pose_of_a_cell_can_be_driven_to_and_shows_the_error_that_is_stated():
+    columns = accuracy_map.run(inputs(), settings())["accuracy_map"]
+    q, model = joints(columns), vec_of(False)
+    assert np.isfinite(q).all()
+    seen = dh.forward(ARM.dh, q).position_mm
+    error_mm = np.linalg.norm(model.pose(JointState(q)).position_mm - seen, axis=1)
+    assert np.allclose(error_mm, columns["position_max_mm"], rtol=0.0, atol=1e-9)
+    assert np.allclose(np.hypot(seen[:, 0], seen[:, 1]), columns["radius_mm"], atol=1e-5)
+    assert np.allclose(seen[:, 2], columns["height_mm"], atol=1e-5)
+
+
+def test_the_joints_of_a_cell_are_those_the_controller_reports(tmp_path):
+    own = tmp_path / "turned.yaml"
+    shipped = files("kinacc.kinematics") / "robots" / "mh180.yaml"
+    text = shipped.read_text("utf-8").replace("[-60, 76]", "[-76, 60]")
+    turned = np.diag([1, -1, 1, 1, 1, 1]).tolist()
+    own.write_text(f"{text}joint_map: {turned}\n", encoding="utf-8")
+    reported = accuracy_map.run(inputs(), {**settings(), "robot": str(own)})["accuracy_map"]
+    plain = accuracy_map.run(inputs(), settings())["accuracy_map"]
+    assert np.array_equal(reported["q2"], -plain["q2"])
+    assert np.array_equal(reported["q3"], plain["q3"])
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kinacc.artifacts.allowed import (
     ASSESSOR_PATTERN,
     COVARIANCES,
@@ -16,6 +18,7 @@ from kinacc.artifacts.columns import (
     ERROR_MM,
     ERROR_MRAD,
     JOINTS,
+    SLIDES,
     Artefact,
     error_vector,
     length,
@@ -93,6 +96,12 @@ ACCURACY_MAP = Artefact(
         whole("solutions", "orientation x branch combinations reached, 0 if unreachable"),
         whole("wanted", "orientation x branch combinations tried", 1),
         whole("extrapolating", "combinations left out: reached, but outside the VEC's range"),
+        replace(
+            JOINTS[0],
+            nullable=True,
+            meaning="reported position of each joint at the largest position error, "
+            f"{SLIDES}, null if unreachable",
+        ),
     ),
     ("slice_deg", "radius_mm", "height_mm"),
 )

@@ -81,7 +81,7 @@ def sentence(directions: np.ndarray, names: Sequence[str], frames: Frames) -> st
     said = (np.abs(directions) >= LEAST).any(axis=0)
     involved = np.flatnonzero(of_arm(names) & said).tolist()
     involved.sort(key=lambda i: -np.abs(directions[:, i]).max())
-    called = [_called(names[i]) for i in sorted(involved)]
+    called = [parameter_name(names[i]) for i in sorted(involved)]
     moved = _motions(directions[0], names, frames) if len(directions) == 1 else []
     if not involved:
         if len(moved) > 1:
@@ -89,7 +89,7 @@ def sentence(directions: np.ndarray, names: Sequence[str], frames: Frames) -> st
         return f"{' and '.join(moved)} changes no measured pose"
     listed = _listed(called)
     if len(called) > _MOST_NAMES:
-        most = _listed([_called(names[i]) for i in involved[:_MOST_NAMES]])
+        most = _listed([parameter_name(names[i]) for i in involved[:_MOST_NAMES]])
         listed = f"a mixture of {len(called)} parameters, most of all {most},"
     if moved:
         together = " together" if 1 < len(called) <= _MOST_NAMES else ""
@@ -103,7 +103,7 @@ def sentence(directions: np.ndarray, names: Sequence[str], frames: Frames) -> st
 
 def _combination(directions: np.ndarray, names: list[str]) -> str:
     """The combinations of some parameters of the arm that poses do show."""
-    called = [_called(name) for name in names]
+    called = [parameter_name(name) for name in names]
     shown = np.linalg.svd(directions)[2][len(directions) :]
     if len(shown) > 1:
         amounts = ", ".join(
@@ -209,9 +209,18 @@ def _common_twist(motions: list[np.ndarray], position_mm: np.ndarray) -> np.ndar
     return twist if np.abs(left).max() < LEAST else None
 
 
-def _called(name: str) -> str:
-    joint, _, parameter = name.partition(".")
-    return f"{_CALLED[parameter]} of joint {joint[1:]}"
+def parameter_name(name: str) -> str:
+    """A parameter as sentences call it; of base and targets as ``calibration.frames`` writes it."""
+    where, _, parameter = name.rpartition(".")
+    if parameter in _CALLED:
+        return f"{_CALLED[parameter]} of joint {where[1:]}"
+    return f"{where} {parameter.partition('_')[0]}"
+
+
+def short_name(name: str) -> str:
+    """``parameter_name`` where there is little room: j2 theta."""
+    where, _, parameter = name.rpartition(".")
+    return f"{where} {_CALLED.get(parameter, parameter.partition('_')[0])}"
 
 
 def _listed(names: Sequence[str]) -> str:

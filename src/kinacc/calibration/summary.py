@@ -59,8 +59,8 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
             for number, text in enumerate(left_out(tables.get("data_check")), 1)
         ),
         *_findings(tables.get("data_check")),
-        *_errors(tables["pose_errors"]),
-        *_selection(tables, robot),
+        *of_errors(tables["pose_errors"]),
+        *of_selection(tables, robot),
         *(
             Fact("bending", f"joint {each['joint']}", name, float(each[name]), unit)
             for each in bending(tables.get("compliance_model"))
@@ -70,7 +70,7 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
         *_excluded(tables.get("excluded_rows"), selected(tables["model_selection"])),
         *_range(tables["measurements"], robot),
         *_like_measured(like_measured),
-        *_pointing(tables["measurements"], robot),
+        *of_pointing(tables["measurements"], robot),
         *(
             Fact("undetermined", str(number), "statement", text=text)
             for number, text in enumerate(blind_words.listed(tables["dh_identified"]), 1)
@@ -162,7 +162,7 @@ def _findings(table: Mapping | None) -> Iterator[Fact]:
     yield Fact("check", "data_check", "findings", float(len(order)), "1")
 
 
-def _errors(table: Mapping) -> Iterator[Fact]:
+def of_errors(table: Mapping) -> Iterator[Fact]:
     """Statistics of every comparison; held out at rows that every model was tried on."""
     comparison, estimate = (np.asarray(table[name]) for name in ("comparison", "estimate"))
     sizes = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
@@ -203,7 +203,7 @@ def _statistics(size: np.ndarray) -> tuple[float, ...]:
     return float(len(size)), float(size.mean()), float(quantile), float(size.max())
 
 
-def _selection(tables: Mapping, robot: Robot) -> Iterator[Fact]:
+def of_selection(tables: Mapping, robot: Robot) -> Iterator[Fact]:
     choice = tables["model_selection"]
     for i, name in enumerate(map(str, choice["model"])):
         yield Fact("selection", name, "selected", float(choice["selected"][i]), "1")
@@ -284,7 +284,7 @@ def _like_measured(share: float) -> Iterator[Fact]:
         yield Fact("like_measured", "ranges of all joints", "share", share, "1")
 
 
-def _pointing(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
+def of_pointing(measurements: Mapping, robot: Robot) -> Iterator[Fact]:
     """How far the flange turns away from one direction, where that is next to nothing."""
     axis = dh.forward(robot.dh, robot.dh_joints(_reported(measurements, robot))).rotation[..., 2]
     middle = axis.mean(axis=0)

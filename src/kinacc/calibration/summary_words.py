@@ -43,7 +43,7 @@ def texts_of(facts: Sequence[Fact], more: str, whole: bool = False) -> dict[str,
         "data": [*_data(facts), *_left_out(facts, most, more)],
         "check": _checked(facts, most, more),
         "excluded": _excluded(facts, most, more),
-        "selected": _selected(facts),
+        "selected": selected(facts),
         "bending": _bending(of(facts, "bending")),
         "valid where": _range(facts),
         "undetermined": _undetermined(facts, most, more),
@@ -178,7 +178,7 @@ def _order(known: Mapping[str, Fact]) -> str:
     return f"{told}, the highest {known['configurations'].value:.0f} configurations carry"
 
 
-def _selected(facts: Sequence[Fact]) -> list[str]:
+def selected(facts: Sequence[Fact]) -> list[str]:
     """Why the selected model is selected, and a warning where the nominal one is nearer."""
     models, held_out = of(facts, "selection"), of(facts, "held_out_error")
     best = next(model for model, known in models.items() if known["selected"].value)

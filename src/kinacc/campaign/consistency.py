@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,14 +40,8 @@ def scatter(state: State) -> Scatter | None:
     The first reading of a point is left out, because a point is read again for being large there.
     None without a point that was read at least three times.
     """
-    groups: dict[int, list[Told]] = {}
-    for each in (*state.told, *state.in_hand):
-        groups.setdefault(each.reading.point, []).append(each)
     square, freedom = 0.0, 0
-    for group in groups.values():
-        if len(group) < 3:
-            continue
-        later = sorted(group, key=lambda each: each.number)[1:]
+    for later in _repeated(state):
         square += _square(state, later)
         freedom += 3 * (len(later) - 1)
     if not freedom:
@@ -56,12 +51,43 @@ def scatter(state: State) -> Scatter | None:
     return Scatter(math.sqrt(square / freedom), freedom, float(chdtrc(freedom, square)))
 
 
+def deviations(state: State) -> dict[int, float]:
+    """Of the readings that ``scatter`` counts, by number: distance from the mean of their point.
+
+    In units of what the noise stated brings: the root mean square is 1 where it is as stated.
+    """
+    found = {}
+    for later in _repeated(state):
+        weights, mean = _mean(state, later)
+        of_mean = np.linalg.inv(sum(weights))
+        for each, weight in zip(later, weights, strict=True):
+            apart = each.error_mm - mean
+            own = np.linalg.inv(weight) - of_mean
+            found[each.number] = math.sqrt(float(apart @ np.linalg.solve(own, apart)) / 3.0)
+    return found
+
+
+def _repeated(state: State) -> Iterator[list[Told]]:
+    """Readings of every point that was read at least three times, without its first."""
+    groups: dict[int, list[Told]] = {}
+    for each in (*state.told, *state.in_hand):
+        groups.setdefault(each.reading.point, []).append(each)
+    for group in groups.values():
+        if len(group) >= 3:
+            yield sorted(group, key=lambda each: each.number)[1:]
+
+
+def _mean(state: State, readings: list[Told]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Weights (3, 3) of readings of one point, and their weighted mean (3,)."""
+    weights = [np.linalg.inv(covariance_mm2(state.plan, each.reading)) for each in readings]
+    sums = sum(w @ each.error_mm for w, each in zip(weights, readings, strict=True))
+    return weights, np.linalg.solve(sum(weights), sums)
+
+
 def _square(state: State, readings: list[Told]) -> float:
     """Chi-square of readings of one point about their weighted mean."""
-    weights = [np.linalg.inv(covariance_mm2(state.plan, each.reading)) for each in readings]
+    weights, mean = _mean(state, readings)
     values = [each.error_mm for each in readings]
-    sums = sum(w @ x for w, x in zip(weights, values, strict=True))
-    mean = np.linalg.solve(sum(weights), sums)
     return float(sum((x - mean) @ w @ (x - mean) for w, x in zip(weights, values, strict=True)))
 
 

@@ -79,6 +79,23 @@ def answers_alike(recorded: str | None, assessor: AdaptiveAssessor) -> bool:
     return recorded == now or {recorded, now} <= _ALIKE.get(assessor.name, frozenset())
 
 
+def doubts(opened: Opened) -> list[str]:
+    """What to know of a campaign as it was read: other code, a last line that was cut off.
+
+    Other code may choose other points than were measured, and say other bounds of equal readings.
+    """
+    lines = []
+    if not answers_alike(opened.plan.about.get("assessor_code"), opened.plan.assessor):
+        begun = opened.plan.about.get("kinacc_version", "an earlier state")
+        lines.append(f"begun with other code of the assessors, of kinacc {begun}")
+    if opened.journal.cut_off:
+        lines.append(
+            "the last entry was cut off while it was written and never confirmed; it is left out: "
+            "look whether the last reading has to be recorded again"
+        )
+    return lines
+
+
 def marks_of(opened: Opened) -> dict[str, object]:
     """Provenance: the plan counts as the configuration, the journal as the input."""
     assessor = type(opened.plan.assessor).__module__

@@ -154,12 +154,12 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     if plan.limits.tolerance_mm is not None:
         lines += ["## Conformity", "", *_conformity(state), ""]
     lines += [f"![sizes of the errors, and the bounds as they grew]({picture})", ""]
-    lines += ["## What was measured", "", *(f"- {each}" for each in _facts(opened, state)), ""]
+    lines += ["## What was measured", "", *(f"- {each}" for each in facts(opened, state)), ""]
     points = found["campaign_points"]
-    shown = _shown(points)
+    shown = largest_read(points)
     lines += ["## Largest errors", "", *_largest(points, shown), ""]
-    lines += _beyond_limits(points, shown)
-    lines += ["## What the bounds rest on", "", *(f"- {each}" for each in _grounds(state)), ""]
+    lines += beyond_limits(points, shown)
+    lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
     lines += [f"Campaign {opened.digest}, readings {opened.journal.last}."]
     return "\n".join(lines) + "\n"
 
@@ -185,17 +185,18 @@ def _conformity(state: State) -> list[str]:
     return lines
 
 
-def _facts(opened: Opened, state: State) -> list[str]:
+def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markdown) -> list[str]:
+    """What was measured, with what and when, a line each; ``written``: as names are shown."""
     plan = state.plan
     visited = len({each.reading.point for each in state.told})
-    source = in_markdown(plan.about["candidates"])
+    source = written(plan.about["candidates"])
     joints = f"{len(plan.points) - len(state.left_out)} candidates ({source})"
     lines = [
         f"{len(state.told)} readings of {plan.assessor.measurements} at {visited} of {joints}, "
         f"order drawn with seed {plan.seed}",
-        f"point measured: {in_markdown(plan.about['point'])}",
+        f"point measured: {written(plan.about['point'])}",
         *(
-            f"instrument {in_markdown(each.name)}: {noise(each)}, {each.frame} frame"
+            f"instrument {written(each.name)}: {noise(each)}, {each.frame} frame"
             for each in plan.instruments
         ),
         f"assessor {plan.assessor.name}: {(type(plan.assessor).__doc__ or '').splitlines()[0]}",
@@ -210,7 +211,7 @@ def _facts(opened: Opened, state: State) -> list[str]:
         lines.append(
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
-    lines += map(in_markdown, words.not_counted(state))
+    lines += map(written, words.not_counted(state))
     found = consistency.scatter(state)
     return lines if found is None else [*lines, consistency.in_words(found)]
 
@@ -252,7 +253,7 @@ def _as_shown(values: np.ndarray) -> np.ndarray:
     return np.round(np.asarray(values, dtype=float), _DECIMALS)
 
 
-def _shown(points: Columns) -> np.ndarray:
+def largest_read(points: Columns) -> np.ndarray:
     """Rows of the largest errors read, largest first."""
     size = np.asarray(points["error_mm"], dtype=float)
     order = np.argsort(-np.where(np.isnan(size), -1.0, size), kind="stable")[:_LARGEST]
@@ -268,13 +269,15 @@ def _largest(points: Columns, shown: np.ndarray) -> list[str]:
     return lines
 
 
-def _beyond_limits(points: Columns, shown: np.ndarray) -> list[str]:
+def beyond_limits(
+    points: Columns, shown: np.ndarray, written: Callable[[str], str] = in_markdown
+) -> list[str]:
     """What is to be said where rows that are shown read more than their limit, or limits cross."""
     size, lower, upper = (_as_shown(points[f"{name}_mm"])[shown] for name in _SIZES)
     once = np.asarray(points["readings"], dtype=float)[shown] == 1.0
 
     def named(rows: np.ndarray) -> str:
-        return ", ".join(in_markdown(points["point"][row]) for row in shown[rows])
+        return ", ".join(written(points["point"][row]) for row in shown[rows])
 
     lines = []
     if (above := size > upper).any():
@@ -298,7 +301,8 @@ def _beyond_limits(points: Columns, shown: np.ndarray) -> list[str]:
     return lines
 
 
-def _grounds(state: State) -> list[str]:
+def grounds(state: State) -> list[str]:
+    """What the bounds rest on, a line each."""
     lines = [
         "readings are normal about the true position, with the covariance stated: it holds the "
         "instrument, its target, and how well the arm repeats a pose",

@@ -76,16 +76,24 @@ def noise_by_repeats(measured: Columns, errors: Columns, frames: Columns) -> str
     ``measured``, ``errors`` and ``frames``: ``measurements``, ``pose_errors`` and ``frames`` of the
     calibration.
     """
+    brief = scatter_in_brief(measured, errors, frames)
+    if not brief:
+        return _TOO_FEW
+    return (
+        f"{brief} along x,y,z of the instrument: the noise is that or more, as they may have been "
+        "read back to back, without coming back to the pose, and hold no new set-up of instrument "
+        "or target"
+    )
+
+
+def scatter_in_brief(measured: Columns, errors: Columns, frames: Columns) -> str:
+    """By how much readings at equal joints scatter; empty where there are too few to tell."""
     again = scatter(measured, errors, frames)
     if again.freedom < _USUAL_READINGS or not (again.std_mm > 0.0).all():
-        return _TOO_FEW
+        return ""
     std_mm = ",".join(f"{each:.2g}" for each in again.std_mm)
-    return (
-        f"{again.readings} readings at {again.configurations} configurations scatter by {std_mm} "
-        "mm along x,y,z of the instrument: the noise is that or more, as they may have been read "
-        "back to back, without coming back to the pose, and hold no new set-up of instrument or "
-        "target"
-    )
+    where = f"{again.readings} readings at {again.configurations} configurations"
+    return f"{where} scatter by {std_mm} mm"
 
 
 def _read(calibration: Path, names: Sequence[str]) -> list[Columns]:

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Reason, Statement
-from kinacc.campaign import consistency
+from kinacc.campaign import consistency, instrument
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import State
 
+_CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds stay right where the noise is less
 TARGETS = {MEASURED: "measured points", CANDIDATES: "all candidates", REGION: "share of the region"}
 
 REASONS = {
@@ -81,18 +82,59 @@ def begun_against(plan: Plan) -> list[str]:
 
 
 def statements(state: State) -> list[str]:
-    """What may be said, a sentence each.
+    """What may be said, a sentence each."""
+    return [statement(each, state) for each in distinct(state)]
 
-    Where all candidates are measured and the same holds of them, that is one sentence.
-    """
-    said = state.statements()
+
+def distinct(state: State) -> list[Statement]:
+    """The statements to tell: where all candidates are measured and the same holds of them, one."""
+    said = {each.target: each for each in state.statements()}
     points = len(state.plan.points) - len(state.left_out)
-    texts = {each.target: statement(each, state) for each in said}
+    texts = {target: statement(each, state) for target, each in said.items()}
     measured, whole = texts.get(MEASURED, ""), texts.get(CANDIDATES, "")
     same = measured.partition(" is ")[2] == whole.partition(" is ")[2]
     if whole and same and _visited(state) == points:
-        del texts[MEASURED]
-    return list(texts.values())
+        del said[MEASURED]
+    return list(said.values())
+
+
+def pledge(said: Statement, state: State) -> str:
+    """The upper bound as a promise: how often such a bound is right, of what, on which conditions.
+
+    Where none is stated, why.
+    """
+    if math.isnan(said.upper_mm):
+        return statement(said, state)
+    points = len(state.plan.points) - len(state.left_out)
+    limit = f"is off by more than {said.upper_mm:.3f} mm"
+    of_all = {
+        MEASURED: f"none of the {_visited(state)} measured points {limit}",
+        CANDIDATES: f"none of these {points} candidates {limit}",
+        REGION: f"no more than {1.0 - said.share:.1%} of the region {limit}",
+    }
+    needed = [reason(said.assumption) or "", _noise_assumed(said, state), "nothing moved"]
+    conditions = [each for each in needed if each]
+    return (
+        f"By a procedure whose bound is right in {how_often(said.confidence)}, "
+        f"{of_all[said.target]}, if {', '.join(conditions[:-1])} and {conditions[-1]}."
+    )
+
+
+def how_often(confidence: float) -> str:
+    """The confidence of a bound as a count: 95 of 100 campaigns."""
+    of = 100 if math.isclose(100.0 * confidence, round(100.0 * confidence)) else 1000
+    return f"{of * confidence:g} of {of} campaigns"
+
+
+def _noise_assumed(said: Statement, state: State) -> str:
+    """What the noise has to be: no more than stated, or as stated where a bound is that small."""
+    used = state.plan.instruments
+    largest = max(float(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in used)
+    clear = said.upper_mm > _CLEAR_OF_NOISE * math.sqrt(largest)
+    if len(used) == 1:
+        return f"the noise is {'at most' if clear else 'exactly'} {instrument.noise(used[0])}"
+    each = "; ".join(f"{one.name}: {instrument.noise(one)}" for one in used)
+    return f"the noise is {'at most ' if clear else ''}as stated ({each})"
 
 
 def statement(said: Statement, state: State) -> str:
@@ -115,7 +157,8 @@ def statement(said: Statement, state: State) -> str:
     text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
     text += f", if {reason(said.assumption)}" if said.assumption else ""
-    return f"{text}{_doubt(said)}."
+    against = doubt(said).replace("The bounds contradict", "They contradict")
+    return f"{text}. {against}." if against else f"{text}."
 
 
 def standing(state: State) -> list[str]:
@@ -168,20 +211,20 @@ def _about(said: Statement, state: State) -> str:
     return f"the largest error of {said.share:.1%} of the region"
 
 
-def _doubt(said: Statement) -> str:
+def doubt(said: Statement) -> str:
     """What the figures of a statement say against it.
 
     Bounds are the narrowest of several looks, the estimate is of all readings: where it lies above
-    the upper bound, that bound is nearly always wrong.
+    the upper bound, that bound is nearly always wrong. Empty where nothing speaks against it.
     """
     if said.upper_mm < said.lower_mm:
-        found = "They contradict each other"
+        found = "The bounds contradict each other"
     elif said.value_mm > said.upper_mm:
         found = "The estimate lies above the upper bound, which cannot be relied on"
     else:
         return ""
     return (
-        f". {found}: the noise is stated too small, or this is one of the few campaigns the "
+        f"{found}: the noise is stated too small, or this is one of the few campaigns the "
         "confidence allows to be wrong"
     )
 

@@ -75,17 +75,22 @@ def facts_of(
 
 
 def _revisits(fitted: Fitted) -> Revisits:
-    """Scatter at configurations that several poses came back to, turns of a joint apart."""
+    return revisited(fitted.seen.cells, fitted.left.position_mm, ~fitted.bad)
+
+
+def revisited(cells: Cells, left_mm: np.ndarray, used: np.ndarray) -> Revisits:
+    """Scatter at configurations that several poses came back to, turns of a joint apart.
+
+    ``left_mm`` (n, 3) is what a model leaves of the cells; only those ``used`` (n,) count.
+    """
     from kinacc.measurements.folds import configurations
 
-    cells = fitted.seen.cells
     poses = np.unique(cells.pose).size
     same = configurations(cells.pose, cells.q, _SAME_RAD) if poses > 1 else cells.pose
     first = np.unique(np.column_stack([same, cells.pose]), axis=0)[:, 0]
-    came_back = np.isin(same, np.flatnonzero(np.bincount(first) > 1)) & ~fitted.bad
-    left = fitted.left.position_mm[came_back]
+    came_back = np.isin(same, np.flatnonzero(np.bincount(first) > 1)) & used
     session, target = cells.session[came_back], cells.target[came_back]
-    return revisits(session, target, left, same[came_back])
+    return revisits(session, target, left_mm[came_back], same[came_back])
 
 
 def _coverage(every: Cells, robot: Robot) -> list[dict[str, object]]:

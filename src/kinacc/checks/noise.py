@@ -20,13 +20,14 @@ def per_axis_mm(std_mm: np.ndarray) -> float:
 class Repeats:
     """Scatter of readings taken at one configuration.
 
-    ``std_mm`` (3,) pooled per axis of the instrument, ``groups`` configurations and targets with
-    more than one reading, ``readings`` in them; ``deviation_mm`` (n, 3) of every reading from the
-    median of the others there, NaN where it is alone; ``common`` correlation of the deviations
-    of different targets, NaN for one target.
+    ``std_mm`` (3,) pooled per axis of the instrument, of ``freedom`` degrees each; ``groups``
+    configurations and targets with more than one reading, ``readings`` in them; ``deviation_mm``
+    (n, 3) of every reading from the median of the others there, NaN where it is alone; ``common``
+    correlation of the deviations of different targets, NaN for one target.
     """
 
     std_mm: np.ndarray
+    freedom: int
     groups: int
     readings: int
     deviation_mm: np.ndarray
@@ -54,7 +55,8 @@ def repeats(cells: Cells, cell: np.ndarray) -> Repeats:
         freedom += int(good.sum()) - 1
     groups = int(np.sum(counts > 1))
     std = np.sqrt(squares / freedom) if freedom > 0 else np.full(3, np.nan)
-    return Repeats(std, groups, int(counts[counts > 1].sum()), deviation, _common(cells, centred))
+    readings = int(counts[counts > 1].sum())
+    return Repeats(std, freedom, groups, readings, deviation, _common(cells, centred))
 
 
 def _common(cells: Cells, centred: np.ndarray) -> float:

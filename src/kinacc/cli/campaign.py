@@ -213,16 +213,17 @@ def status(out, **given) -> None:
 @option("--out", "to", type=click.Path(file_okay=False), help="Folder. [report in the campaign's]")
 @option("--table", "formats", multiple=True, type=click.Choice(["csv", "xlsx"]),
         help="The tables in this form as well; may be repeated.")  # fmt: skip
-@answers("Print what it says as JSON.", force="Replace files that are there.")
+@answers("Print what it says as JSON.", page="Write a page to read in a browser: an .html file.",
+         force="Replace files that are there.")  # fmt: skip
 def report(folder, to, formats, out) -> None:
     """Write what was measured and what may be said of it: tables, picture, text.
 
     Leaves campaign_points, campaign_readings and campaign_bounds (.parquet), campaign (.svg, .png)
-    and report.md.
+    and report.md; with --page also one HTML file with pictures to explore, to mail and to keep.
 
     \b
     Example:
-      kinacc campaign report check
+      kinacc campaign report check --page check.html
       kinacc campaign report check --out papers/check --table xlsx
     """
     from kinacc.cli import campaigns

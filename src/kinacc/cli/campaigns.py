@@ -159,7 +159,7 @@ def status(
 
 
 def write_report(path: str, to: str | None, formats: Sequence[str], out: Output) -> None:
-    """Write tables, picture and text of a campaign."""
+    """Write tables, picture, text and, where one is asked for, the page of a campaign."""
     from kinacc.artifacts.atomic import write_whole
     from kinacc.artifacts.store import TableToWrite, write_all
     from kinacc.campaign import report
@@ -197,24 +197,19 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     write(figure, pictures)
     write_whole(text, report.markdown(opened, state, tables, "campaign.svg").encode())
     written = [each.name for each in made_here]
+    if out.page is not None:
+        from kinacc.report.campaign import campaign_page
+
+        out.write_page(campaign_page(opened, state, tables))
     facts = answers.as_facts(state, state.plan.limits.tolerance_mm)
     lines = [*words.statements(state), *words.begun_against(state.plan)]
     lines += report.read_above(state, tables["campaign_points"])
     lines.append(f"{into}: {', '.join(written)}")
-    out.say({**facts, "folder": str(into), "files": written}, "\n".join(lines))
+    lines += [out.page] if out.page is not None else []
+    out.say({**facts, "folder": str(into), "files": written, "page": out.page}, "\n".join(lines))
 
 
 def say_doubts(opened: folders.Opened) -> None:
-    """Tell of a last line that was not written to its end, and of other code, on the error stream.
-
-    Other code may choose other points than were measured, and say other bounds of equal readings.
-    """
-    if not marks.answers_alike(opened.plan.about.get("assessor_code"), opened.plan.assessor):
-        begun = opened.plan.about.get("kinacc_version", "an earlier state")
-        click.echo(f"begun with other code of the assessors, of kinacc {begun}", err=True)
-    if opened.journal.cut_off:
-        click.echo(
-            "the last entry was cut off while it was written and never confirmed; it is left out: "
-            "look whether the last reading has to be recorded again",
-            err=True,
-        )
+    """Tell on the error stream what speaks against the folder as it was read."""
+    for line in marks.doubts(opened):
+        click.echo(line, err=True)

@@ -17,7 +17,8 @@ from kinacc.cli.output import answers
 @option("--model", type=choice.MODEL, default="dh", help="Model compared.")
 @choice.ROBOT
 @choice.NAMING
-@answers(table=True, picture="Draw to a .svg, .png or .pdf file.")
+@answers(table=True, picture="Draw to a .svg, .png or .pdf file.",
+         page="Write a page to read in a browser: an .html file.")  # fmt: skip
 def compare(first, second, joints, count, model, robot, config, out) -> None:
     """Compare two calibrations of one arm: what moved, and by how many standard deviations.
 
@@ -28,12 +29,13 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
 
     \b
     Example:
-      kinacc compare results/ur10_b results/ur10_d --picture moved.svg
+      kinacc compare results/ur10_b results/ur10_d --page moved.html --picture moved.svg
       kinacc compare before.yaml after.yaml --json
     """
     from kinacc.cli import comparison_report
     from kinacc.config import schema
     from kinacc.deployment.compare import compare as compared
+    from kinacc.deployment.compare_words import in_words, short_names
     from kinacc.progress import reporting
 
     with reporting("compare", bar=True):
@@ -47,5 +49,9 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
     if out.picture is not None:
         from kinacc.figures.comparison import draw
 
-        out.draw(draw(found, *comparison_report.short_names(calibrations)))
-    out.deliver(answer, comparison_report.in_words(found, calibrations))
+        out.draw(draw(found, *short_names(calibrations)))
+    if out.page is not None:
+        from kinacc.report.comparison import comparison_page
+
+        out.write_page(comparison_page(found, calibrations, q_rad))
+    out.deliver(answer, in_words(found, calibrations))

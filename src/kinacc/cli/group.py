@@ -61,7 +61,6 @@ _MEANT = {
     "summary": "fitted",
     "undo": "strike",
     "validate": "check-data",
-    "verify": "check-results",
 }
 # Spellings of options that are gone with the next version, by command.
 _FORMERLY = {
@@ -228,6 +227,7 @@ SECTIONS = {
         "predict": "joints to the pose of the tool, with uncertainty",
         "compensate": "poses to the joints that put the tool there",
         "export": "write the model for other programs",
+        "verify": "how far it is off at readings it was not fitted to",
         "compare": "what differs between two calibrations",
     },
     "Its largest error": {

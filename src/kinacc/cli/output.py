@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from kinacc.cli.sheet import Sheet
+    from kinacc.report.page import Page
 
 TABLES = (".csv", ".json", ".parquet", ".xlsx")
 PICTURES = (".svg", ".png", ".pdf")
+PAGES = (".html",)
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class Output:
     as_json: bool = False
     table: str | None = None
     picture: str | None = None
+    page: str | None = None
     force: bool = False
 
     def say(self, facts: object, words: str) -> None:
@@ -58,24 +61,34 @@ class Output:
         path = Path(self.picture or "")
         write(figure, {path.suffix[1:]: path})
 
+    def write_page(self, page: Page) -> None:
+        """Write the page a person reads in a browser."""
+        from kinacc.artifacts.atomic import write_whole
+        from kinacc.report.page import html
+
+        write_whole(Path(self.page or ""), html(page).encode())
+
 
 def answers(
     as_json: str = "Print the answer as JSON.",
     table: bool = False,
     picture: str = "",
+    page: str = "",
     force: str = "",
 ) -> Callable[[Callable], Callable]:
     """Options of a command's answer, handed over as ``out``; its files can be written then.
 
-    ``as_json``, ``picture`` and ``force`` are helps of options, ``table`` is for --out.
+    ``as_json``, ``picture``, ``page`` and ``force`` are helps of options, ``table`` is for --out.
     """
     options = [click.option("--json", "as_json", is_flag=True, help=as_json)]
     if table:
         words = "Write to a .csv, .xlsx, .json or .parquet file."
         options.insert(0, click.option("--out", "-o", "table", type=click.Path(), help=words))
+    if page:
+        options.insert(0, click.option("--page", type=click.Path(), help=page))
     if picture:
         options.insert(0, click.option("--picture", type=click.Path(), help=picture))
-    if table or picture or force:
+    if table or picture or page or force:
         words = force or "Replace a file that is there."
         options.append(click.option("--force", is_flag=True, help=words))
 
@@ -85,6 +98,7 @@ def answers(
             out = Output(**{name: given.pop(name) for name in _NAMES if name in given})
             require_writable([out.table], out.force, TABLES)
             require_writable([out.picture], out.force, PICTURES)
+            require_writable([out.page], out.force, PAGES)
             command(out=out, **given)
 
         for option in reversed(options):

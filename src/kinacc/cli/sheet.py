@@ -151,13 +151,6 @@ class Sheet:
         return sink.getvalue().to_pybytes()
 
 
-def number(value: float) -> str:
-    """Three digits for a sentence, whole thousands in full; 0 for what no digit is shown of."""
-    if abs(value) < _NOTHING:
-        return "0"
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
-
-
 def _cell(value: object) -> str:
     value = plain(value)
     if value is None:

@@ -10,10 +10,13 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from kinacc import __version__
+
 if TYPE_CHECKING:
     from bokeh.models import Plot
 
 TEMPLATES = "templates"
+_MADE_BY = {"kinacc_version": __version__}
 _DIGITS = 16  # of a digest, as shown
 
 
@@ -23,7 +26,8 @@ class Table:
 
     ``numeric`` says which columns hold numbers, ``marked`` which row is the one meant, in words
     behind it; ``folded`` tables are opened by the reader. ``picks`` are rows of the data of the
-    picture ``picked_in``, one for each row of the table: a button there selects it.
+    picture ``picked_in``, one for each row of the table: a button there selects it. ``choices``
+    are made first, for each row pairs: label of a control of that picture, label of its option.
     """
 
     caption: str
@@ -34,6 +38,7 @@ class Table:
     folded: bool = False
     picked_in: str = ""
     picks: tuple[int, ...] = ()
+    choices: tuple[tuple[tuple[str, str], ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,8 @@ class Picture:
     """A picture to explore.
 
     ``key`` is its name on the page and that of its data, ``described`` is read to who cannot see
-    it. ``details`` maps a column of its data to what is said of a point that is selected.
+    it. ``details`` maps a column of its data to what is said of a point that is selected, unless
+    there is no value; ``names`` says by column what its numbers stand for, counted from 0.
     """
 
     key: str
@@ -74,6 +80,7 @@ class Picture:
     caption: str = ""
     controls: tuple[Control, ...] = ()
     details: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     invitation: str = "Select a point to see what it is."
 
 
@@ -130,36 +137,44 @@ class FirstScreen:
 
 @dataclass(frozen=True)
 class Page:
-    """A whole page: the answer, then the evidence."""
+    """A whole page: the answer, then the evidence; ``marks`` say what it is about."""
 
     first: FirstScreen
     sections: tuple[Section, ...]
+    marks: Mapping[str, str] = field(default_factory=dict)
 
 
-def html(page: Page, marks: Mapping[str, object], read: Mapping[str, str]) -> str:
+def html(
+    page: Page, marks: Mapping[str, object] | None = None, read: Mapping[str, str] | None = None
+) -> str:
     """The page as one file: the same bytes for the same page.
 
     ``marks`` are its provenance and ``read`` the digests of the files that were read for it, by
-    what they are; both stand at its end.
+    what they are; both stand at its end, as far as they are known.
     """
     from kinacc.report.pictures import documents, library
 
     pictures = list(_pictures(page.sections))
     data, drawn = documents([each.plot for each in pictures])
     places = {
-        each.key: {"document": document, "root": root, "details": dict(each.details)}
+        each.key: {
+            "document": document,
+            "root": root,
+            "details": dict(each.details),
+            "names": dict(each.names),
+        }
         for each, (document, root) in zip(pictures, drawn, strict=True)
     }
     return _template().render(
         page=page,
-        marks={name: str(value) for name, value in marks.items()},
-        read={name: digest[:_DIGITS] for name, digest in read.items()},
+        marks={k: str(v) for k, v in {**_MADE_BY, **page.marks, **(marks or {})}.items()},
+        read={name: digest[:_DIGITS] for name, digest in (read or {}).items()},
         style=_text("page.css"),
         script=_text("page.js"),
         library=library() if pictures else "",
         pictures=_embedded({"documents": data, "places": places}),
         kind=lambda block: type(block).__name__,
-        sets=lambda option: json.dumps(option.sets),
+        plain=json.dumps,
     )
 
 

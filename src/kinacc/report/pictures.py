@@ -11,13 +11,18 @@ import bokeh
 import numpy as np
 from bokeh.document import Document
 from bokeh.models import ColumnDataSource, HoverTool, Plot
+from bokeh.models.renderers import GlyphRenderer
 from bokeh.plotting import figure as bokeh_figure
+from bokeh.transform import linear_cmap
+
+from kinacc.report.page import Control, Option
 
 # Okabe and Ito's colours, of which those too light on one of the two backgrounds are left out.
 BLUE, ORANGE, GREEN, VERMILION, PURPLE, GREY = (
     "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#8a8a8a",
 )  # fmt: skip
 COLOURMAP = "Viridis256"
+_PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
 _HEIGHT_PX = 300
 _ID = re.compile(r'"(p\d+)"')
 
@@ -40,6 +45,11 @@ def source(name: str, columns: Mapping[str, np.ndarray]) -> ColumnDataSource:
         for key, values in small.items()
     }
     return ColumnDataSource(plain, name=name)
+
+
+def field(name: str) -> dict[str, str]:
+    """What an option of a control sets where a glyph takes its values from a column."""
+    return {"field": name}  # with a "type" beside it, as Python sends it, the browser draws nothing
 
 
 def figure(
@@ -72,9 +82,100 @@ def figure(
     return plot
 
 
+def hover(plot: bokeh_figure, said: Sequence[tuple[str, str]], *parts: GlyphRenderer) -> None:
+    """What hovering over these ``parts`` of a picture says, where others say something else."""
+    plot.add_tools(HoverTool(tooltips=list(said), renderers=list(parts), visible=False))
+
+
+def legend_above(plot: bokeh_figure, columns: int = 2) -> None:
+    """Put the legend where it covers nothing, in few columns; a click in it hides what it names."""
+    (legend,) = plot.legend
+    legend.update(click_policy="hide", orientation="horizontal", ncols=columns, nrows="auto")
+    legend.label_text_font_size = "12px"
+    plot.add_layout(legend, "above")
+
+
 def from_zero(plot: bokeh_figure) -> None:
     """Let the axis of values begin at zero, so that sizes can be compared by eye."""
     plot.y_range.update(start=0.0)
+
+
+def choice(
+    label: str,
+    choices: Sequence[tuple[str, str, str]],
+    glyphs: Mapping[str, Sequence[str]],
+    axis: str,
+) -> Control:
+    """A control of which column is drawn: ``choices`` are label, column, words of the axis.
+
+    ``glyphs``: by name of a glyph the properties that are given the column; ``axis``: its name.
+    """
+    return Control(
+        label,
+        tuple(
+            Option(
+                said,
+                (
+                    *(
+                        (name, each, field(column))
+                        for name, properties in glyphs.items()
+                        for each in properties
+                    ),
+                    (axis, "axis_label", words),
+                ),
+            )
+            for said, column, words in choices
+        ),
+    )
+
+
+def in_space(
+    name: str,
+    data: ColumnDataSource,
+    colour: str,
+    top: float,
+    title: str,
+    hover: Sequence[tuple[str, str]],
+) -> tuple[bokeh_figure, Control]:
+    """Points at ``x``, ``y``, ``z`` of the data, mm, seen along an axis; the colour is a column's.
+
+    All above ``top`` have the last colour; ``title`` is that of the colours.
+    """
+    plot = figure("x, mm", "y, mm", hover=hover, height_px=380, match_aspect=True)
+    drawn = plot.scatter(
+        "x",
+        "y",
+        source=data,
+        size=6,
+        color=linear_cmap(colour, COLOURMAP, 0.0, top),
+        line_color=None,
+        fill_alpha=0.9,
+        nonselection_alpha=0.3,
+        selection_line_color=VERMILION,
+    )
+    drawn.glyph.name = f"{name}-glyph"
+    plot.xaxis[0].name, plot.yaxis[0].name = f"{name}-across", f"{name}-up"
+    plot.add_layout(drawn.construct_color_bar(title=title, width=10), "right")
+    axes = {"x": f"{name}-across", "y": f"{name}-up"}
+    return plot, Control(
+        "Axes",
+        tuple(
+            Option(
+                f"{across} and {up}",
+                (
+                    *(
+                        (f"{name}-glyph", side, field(column))
+                        for side, column in (("x", across), ("y", up))
+                    ),
+                    *(
+                        (axes[side], "axis_label", f"{column}, mm")
+                        for side, column in (("x", across), ("y", up))
+                    ),
+                ),
+            )
+            for across, up in _PLANES
+        ),
+    )
 
 
 def documents(
@@ -102,6 +203,7 @@ def documents(
         for plot in group:
             document.add_root(plot)
         text = json.dumps(document.to_json(deferred=False))
+        document.clear()  # a plot may be written again: it belongs to one document at a time
         names = {name: f"k{number}-{i}" for i, name in enumerate(dict.fromkeys(_ID.findall(text)))}
         text = _ID.sub(lambda match, names=names: f'"{names[match[1]]}"', text)
         found[f"d{number}"] = json.loads(text)

@@ -14,14 +14,13 @@ from kinacc.calibration import summary
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report import pictures
-from kinacc.report.page import Control, Option, Picture, Section, Table
+from kinacc.report.page import Picture, Section, Table
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE
 
 _MOST_POINTS = 12_000  # drawn one by one; of more rows every n-th is, and all of the largest
 _WORST = 10
 _BINS = 40
 _COLOURS = {NOMINAL: GREY, "dh": ORANGE, "compliance": PURPLE, "vec": BLUE}
-_PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
 
 
 @dataclass(frozen=True)
@@ -215,22 +214,14 @@ def _over_joint(found: Errors, data: ColumnDataSource, robot: Robot) -> Picture:
     plot = pictures.figure(_joint(robot, 0), "position error, mm", hover=_hover(found))
     _points(plot, found, data, "q1", "over-joint")
     plot.xaxis[0].name = "over-joint-axis"
-    options = tuple(
-        Option(
-            f"{n + 1}",
-            (
-                *(
-                    (f"over-joint-{m}-glyph", "x", {"type": "field", "field": f"q{n + 1}"})
-                    for m in _shown(found)
-                ),
-                ("over-joint-axis", "axis_label", _joint(robot, n)),
-            ),
-        )
-        for n in range(robot.dh.joints)
+    control = pictures.choice(
+        "Joint",
+        [(f"{n + 1}", f"q{n + 1}", _joint(robot, n)) for n in range(robot.dh.joints)],
+        {f"over-joint-{m}-glyph": ("x",) for m in _shown(found)},
+        "over-joint-axis",
     )
     caption = "The same rows over the angle of one joint: a wave that is left is that joint's."
     words = "Position error of every row over the angle of the joint that is chosen."
-    control = Control("Joint", options)
     return Picture("over-joint", plot, words, caption, (control,), details=_details(found, data))
 
 
@@ -239,44 +230,14 @@ def _joint(robot: Robot, joint: int) -> str:
 
 
 def _in_space(found: Errors, data: ColumnDataSource) -> Picture:
-    from bokeh.transform import linear_cmap
-
-    mine = f"{found.selected}_mm"
     top = float(np.quantile(found.sizes[found.selected], summary.LARGE_SHARE))
-    plot = pictures.figure("x, mm", "y, mm", hover=_hover(found), height_px=380, match_aspect=True)
-    colour = linear_cmap(mine, pictures.COLOURMAP, 0.0, top)
-    drawn = plot.scatter(
-        "x",
-        "y",
-        source=data,
-        size=6,
-        color=colour,
-        line_color=None,
-        fill_alpha=0.9,
-        nonselection_alpha=0.3,
-        selection_line_color=pictures.VERMILION,
-    )
-    drawn.glyph.name = "in-space-glyph"
-    plot.xaxis[0].name, plot.yaxis[0].name = "in-space-across", "in-space-up"
-    bar = drawn.construct_color_bar(title="error, mm", width=10)
-    plot.add_layout(bar, "right")
-    options = tuple(
-        Option(
-            f"{across} and {up}",
-            (
-                ("in-space-glyph", "x", {"type": "field", "field": across}),
-                ("in-space-glyph", "y", {"type": "field", "field": up}),
-                ("in-space-across", "axis_label", f"{across}, mm"),
-                ("in-space-up", "axis_label", f"{up}, mm"),
-            ),
-        )
-        for across, up in _PLANES
+    plot, control = pictures.in_space(
+        "in-space", data, f"{found.selected}_mm", top, "error, mm", _hover(found)
     )
     caption = (
         "Where the target was measured, in the instrument's frame; the colour is the error with "
         f"the selected model, all above {top:.2f} mm in the last colour."
     )
-    control = Control("Axes", options)
     return Picture(
         "in-space", plot, f"Errors in space. {caption}", caption, (control,),
         details=_details(found, data),

@@ -72,7 +72,7 @@ class PosesWanted(NamedTuple):
 
 
 class AccuracyMap(NamedTuple):
-    """One row per cell, all (n,); see ``accuracy_map``."""
+    """One row per cell, (n,) but for ``worst_q_rad`` (n, k); see ``accuracy_map``."""
 
     position_max_mm: np.ndarray
     orientation_max_mrad: np.ndarray
@@ -81,6 +81,7 @@ class AccuracyMap(NamedTuple):
     solutions: np.ndarray
     wanted: np.ndarray
     extrapolating: np.ndarray
+    worst_q_rad: np.ndarray
 
 
 def errors_at(models: Models, q_rad: np.ndarray) -> np.ndarray:
@@ -115,8 +116,9 @@ def accuracy_map(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted
 
     ``solutions`` counts the combinations reached within the joint limits and within the range of
     the reference, of ``wanted``; only those enter the maxima, since beyond its range it says
-    nothing. ``extrapolating`` counts the combinations left out for that reason alone. Cells without
-    a solution have NaN maxima and None branches, which read ``X+ Y- Z0, front-up-flip``.
+    nothing. ``extrapolating`` counts the combinations left out for that reason alone.
+    ``worst_q_rad`` are the DH joints of the largest position error. Cells without a solution have
+    NaN maxima and joints, and None branches, which read ``X+ Y- Z0, front-up-flip``.
     """
     count = len(cells.radius_mm)
     parts = [
@@ -146,14 +148,15 @@ def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> A
     orientation[found] = np.linalg.norm(error[:, 3:], axis=1) * 1e3
     shape = (count, turns * len(branches))
     solutions = found.reshape(shape).sum(axis=1)
-    position_max, worst = _largest(position.reshape(shape), orientations, branches)
-    orientation_max, orientation_worst = _largest(
-        orientation.reshape(shape), orientations, branches
-    )
+    position, orientation = position.reshape(shape), orientation.reshape(shape)
+    position_max, worst = _largest(position, orientations, branches)
+    orientation_max, orientation_worst = _largest(orientation, orientations, branches)
     outside = (solved.status == Status.OUTSIDE_RANGE).reshape(shape).sum(axis=1)
     tried = np.full(count, shape[1])
+    q_rad = solved.q_rad.reshape(*shape, -1)[np.arange(count), position.argmax(axis=1)]
+    q_rad[solutions == 0] = np.nan
     return AccuracyMap(
-        position_max, orientation_max, worst, orientation_worst, solutions, tried, outside
+        position_max, orientation_max, worst, orientation_worst, solutions, tried, outside, q_rad
     )
 
 

@@ -29,7 +29,7 @@ def differences(
             lines.append(told + modelled)
     error, count = float(np.max(points["true_error_mm"])), len(points["point"])
     told = f"operating-point error: at most {error:.3f} mm at the {count} points of the study"
-    if _are_measured(points, measurements):
+    if are_measured(points, measurements):
         told += f": measured poses, so it is a held-out error of DH, of mean readings{each}"
         return [*lines, told]
     return [*lines, f"{told}, DH to VEC{modelled}"]
@@ -45,7 +45,7 @@ def _of_tool(targets: Sequence[str]) -> str:
     return f"{told} (evaluation.tool_mm chooses another)"
 
 
-def _are_measured(points: Mapping, measurements: Mapping) -> bool:
+def are_measured(points: Mapping, measurements: Mapping) -> bool:
     """Whether every operating point is at joints that were measured."""
     names = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
     measured = set(zip(*(np.asarray(measurements[name]).tolist() for name in names), strict=True))

@@ -92,7 +92,7 @@ def told(
     ``campaign`` and ``exported`` are names for folders that the commands would make.
     """
     facts, arm = facts_of(tables), _arm(tables)
-    noise = [] if _is_synthetic(facts) else [_noise(tables)]
+    noise = _noise(facts, tables)
     commands = [] if bound.assessed is None else [bound.assessed.next_command]
     return Told(
         facts,
@@ -157,22 +157,24 @@ def _arm(tables: Tables) -> Calibration:
     return results.calibration(tables, known)
 
 
-def _noise(tables: Tables) -> str:
+def _noise(facts: Sequence[Fact], tables: Tables) -> str:
+    """What a campaign has to be told of the noise, and what the readings tell of it."""
+    asked = "NOISE: standard deviation of one reading, mm"
+    if _is_synthetic(facts):
+        return asked
     known = (tables[name] for name in ("measurements", "pose_errors", "frames"))
-    return slips.noise_by_repeats(*known)
+    least = slips.scatter_in_brief(*known)
+    return f"{asked}, at least this: {least}" if least else "NOISE: std of ten visits to a pose, mm"
 
 
-def _bound(
-    bound: Sought, folder: Path, arm: Calibration, noise: Sequence[str], campaign: str
-) -> list[str]:
+def _bound(bound: Sought, folder: Path, arm: Calibration, noise: str, campaign: str) -> list[str]:
     if bound.assessed is not None:
         return [*bound.assessed.in_words(), *bound.remarks]
     words = ["kinacc", "campaign", "start", campaign, "--calibration", str(folder)]
     return [
         *bound.remarks,
-        "not assessed; a campaign bounds it (NOISE: standard deviation of one reading, mm):",
+        f"not assessed; a campaign bounds it ({noise}):",
         *one_of(arm.default_point, [*arm.targets]),
-        *noise,
         f"{shlex.join(words)} --noise-mm NOISE --budget {_READINGS}",
     ]
 

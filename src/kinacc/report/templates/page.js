@@ -66,9 +66,15 @@
     const place = document.getElementById(`details-${key}`);
     const row = source.selected.indices[0];
     if (!place || row === undefined) return;
-    const names = Object.entries(places[key].details).filter(([name]) => source.data[name]);
-    const said = names.map(([name, words]) => 
-      words.replace("{}", () => shown(source.data[name][row])));  // as it is: $ would mean more
+    const {details, names} = places[key];
+    const said = Object.entries(details).filter(([column]) => source.data[column]).map(
+      ([column, words]) => {
+        const value = source.data[column][row];
+        return [names[column] ? names[column][value] : value, words];
+      },
+    ).filter(([value]) => value != null && !Number.isNaN(value)).map(
+      ([value, words]) => words.replace("{}", () => shown(value)),
+    );
     const more = source.selected.indices.length - 1;
     place.textContent = said.join("; ") + (more > 0 ? `; and ${more} more at the same place` : "");
   }
@@ -148,18 +154,30 @@
     return rest;
   }
 
-  document.addEventListener("change", (event) => {
-    const select = event.target.closest("select[data-picture]");
-    if (!select) return;
+  function set(select) {
     const {document: name} = places[select.dataset.picture];
     for (const [model, property, value] of JSON.parse(select.value)) {
       open(name).get_model_by_name(model)[property] = inside(value);
     }
+  }
+
+  function choose(key, control, option) {
+    const select = [...document.querySelectorAll("select[data-picture]")].find(
+      ({dataset}) => dataset.picture === key && dataset.control === control);
+    select.selectedIndex = [...select.options].findIndex((each) => each.text === option);
+    set(select);
+  }
+
+  document.addEventListener("change", (event) => {
+    const select = event.target.closest("select[data-picture]");
+    if (select) set(select);
   });
   document.addEventListener("click", (event) => {
     const button = event.target.closest("button[data-pick]");
     if (!button) return;
     const key = button.dataset.picture;
+    JSON.parse(button.dataset.choices ?? "[]").forEach(([control, option]) =>
+      choose(key, control, option));
     document.getElementById(`plot-${key}`).scrollIntoView({block: "center"});
     draw(key).then(() => {
       data(root(key)).selected.indices = [Number(button.dataset.pick)];

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.config.records import of_section
 from kinacc.kinematics import region, robot
+from kinacc.kinematics.inverse import limits
 from kinacc.study.accuracy_map import accuracy_map
 from kinacc.workflow import evaluation as shared
 
@@ -29,7 +30,8 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
     cells = region.grid(wanted.cylinder, np.deg2rad(layout.slices_deg), layout.grid_mm)
     arm = robot.load(settings["robot"])
     models = shared.models(inputs, equipment, arm)
-    result = accuracy_map(arm, models, cells, wanted)
+    result = accuracy_map(arm, models, cells, wanted)._asdict()
+    joints = limits.reported_joints(arm, result.pop("worst_q_rad"))
     # The slice as configured: degrees that went through radians and back are not the same number.
     per_slice = len(cells.radius_mm) // len(layout.slices_deg)
     columns = {
@@ -37,4 +39,5 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
         "radius_mm": cells.radius_mm,
         "height_mm": cells.height_mm,
     }
-    return {"accuracy_map": {**columns, **result._asdict()}}
+    columns |= result | {f"q{n + 1}": joints[:, n] for n in range(joints.shape[1])}
+    return {"accuracy_map": columns}

@@ -23,6 +23,9 @@ def _accuracy_map(tables: Tables) -> Iterator[Problem]:
     for name in ("worst_branch", "orientation_worst_branch"):
         wrong = np.array([value is None for value in table[name]]) != none
         yield from mark("accuracy_map", wrong, f"{name} null", "null exactly where solutions is 0")
+    for name in (each for each in table if each[0] == "q" and each[1:].isdigit()):
+        wrong = np.isnan(table[name]) != none
+        yield from mark("accuracy_map", wrong, f"{name} null", "null exactly where solutions is 0")
     wrong = table["solutions"] + table["extrapolating"] > table["wanted"]
     yield from mark("accuracy_map", wrong, "more combinations than tried", "at most wanted")
 

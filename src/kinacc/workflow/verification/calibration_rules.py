@@ -215,6 +215,7 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     *(((f"{kind}_model", "measurements"), _every_joint(f"{kind}_model")) for kind in FITTED),
     (("measurements", "robot"), _turns("measurements", ())),
     (("assessment_points", "robot"), _turns("assessment_points", ())),
+    (("accuracy_map", "robot"), _turns("accuracy_map", ())),
     (("vec_model", "robot"), _turns("vec_model", ("q_min_rad", "q_max_rad"))),
     (("joint_bias", "robot"), _turns("joint_bias", ("from_rad", "to_rad"))),
     (("pose_errors", "measurements"), _pose_errors),

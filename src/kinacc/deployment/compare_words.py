@@ -1,0 +1,108 @@
+"""What moved between two calibrations, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from kinacc.calibration.uncertainty import unit_of
+from kinacc.deployment.compare import Difference, Parameters, Shift
+from kinacc.deployment.record import Calibration
+from kinacc.deployment.shared_readings import SharedReadings
+
+_UNLIKELY = 0.001
+_NOTHING = 5e-5  # less is no digit of the four shown after the point
+
+
+def short_names(calibrations: Sequence[Calibration]) -> tuple[str, str]:
+    """Last parts of the places the calibrations come from, where these differ."""
+    first, second = (Path(calibration.name).name for calibration in calibrations)
+    return (first, second) if first != second else (calibrations[0].name, calibrations[1].name)
+
+
+def in_words(found: Difference, calibrations: Sequence[Calibration]) -> str:
+    """What moved, in sentences."""
+    lines = of_readings(found.shared, calibrations)
+    if not found.same_robot:
+        first, second = (calibration.robot.name for calibration in calibrations)
+        lines.append(
+            f"these are different robots ({first} and {second}): before any calibration they are "
+            f"{number(found.robots_apart_mm)} mm rms apart, after the best base and tool; what "
+            "follows is no change of one arm"
+        )
+    elif np.isfinite(found.probability):
+        verdict = "the arm has changed" if has_changed(found) else "no change is proven"
+        lines.append(
+            f"{found.directions} directions both determine: squared distance "
+            f"{found.statistic:.1f}, probability of more by chance {found.probability:.2g}: "
+            f"{verdict}, if the residuals are independent noise"
+        )
+    words = "flange poses differ" if found.shared.all_of_both else "flange poses moved"
+    lines.append(moved(words, found.as_they_stand))
+    lines.append(moved("after the best base and tool", found.apart_from_frames))
+    return "\n".join(lines)
+
+
+def has_changed(found: Difference) -> bool:
+    """Whether the parameters differ by more than chance allows, where that can be told."""
+    return bool(np.isfinite(found.probability)) and found.probability < _UNLIKELY
+
+
+def of_readings(shared: SharedReadings, calibrations: Sequence[Calibration]) -> list[str]:
+    """What readings in both calibrations mean for a verdict."""
+    if not shared.count:
+        return []
+    if shared.all_of_both:
+        return [
+            f"both are fitted to the same {shared.count} readings: nothing can have moved between "
+            "them; what differs comes from the settings of the fits"
+        ]
+    first, second = short_names(calibrations)
+    return [
+        f"{shared.count} readings are in both, of {shared.first} in {first} and {shared.second} in "
+        f"{second}: they show no change, and are counted once"
+    ]
+
+
+def moved(words: str, shift: Shift) -> str:
+    """How far poses moved, beside what chance brings."""
+    by_chance = ""
+    if np.isfinite(shift.chance_mm):
+        chance = number(shift.chance_mm), number(1e3 * shift.chance_rad)
+        by_chance = f" (by chance {chance[0]} mm, {chance[1]} mrad)"
+    return (
+        f"{words}: {number(shift.rms_mm)} mm rms, at most {number(shift.position_mm.max())} mm, "
+        f"{number(1e3 * shift.rms_rad)} mrad rms{by_chance}"
+    )
+
+
+def shown_in(each: Parameters) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Names (P,) of parameters without their unit, the unit shown, and its scale: mm, mrad."""
+    units = [unit_of(name) for name in each.names]
+    names = [
+        name.rpartition("_")[0] if unit in ("rad", "mm") else name
+        for name, unit in zip(each.names, units, strict=True)
+    ]
+    scale = np.where(np.array(units) == "rad", 1e3, 1.0)
+    shown = [{"rad": "mrad"}.get(unit, unit) for unit in units]
+    return np.array(names, dtype=object), np.array(shown, dtype=object), scale
+
+
+def remarks(each: Parameters) -> np.ndarray:
+    """Which calibration leaves each parameter (P,) open; empty where none does."""
+    words = {
+        "": "",
+        "first": "undetermined in the first",
+        "second": "undetermined in the second",
+        "both": "undetermined in both",
+    }
+    return np.array([words[where] for where in each.undetermined_in], dtype=object)
+
+
+def number(value: float) -> str:
+    """Three digits for a sentence, whole thousands in full; 0 for what no digit is shown of."""
+    if abs(value) < _NOTHING:
+        return "0"
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"

@@ -1,0 +1,366 @@
+"""Where two models differ most over the evaluation space: a map to explore, cell by cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from bokeh.models import (
+    CDSView,
+    ColumnDataSource,
+    Filter,
+    GroupFilter,
+    IntersectionFilter,
+    LinearColorMapper,
+)
+from bokeh.models.renderers import GlyphRenderer
+from bokeh.plotting import figure as BokehFigure
+
+from kinacc.artifacts.columns import Columns
+from kinacc.kinematics.robot import Robot
+from kinacc.report import pictures
+from kinacc.report.map_cells import Cells, cells, largest_of
+from kinacc.report.page import Control, Option, Picture, Section, Table, Text
+from kinacc.report.pictures import GREY, VERMILION
+
+_KEY = "map"
+_LARGEST = 10
+_UNREACHED = "#b9b9bd"
+
+
+class _Quantity(NamedTuple):
+    """A column of the picture's data, what a control calls it, and its unit."""
+
+    column: str
+    label: str
+    unit: str
+
+
+_POSITION = _Quantity("position", "position", "mm")
+_ORIENTATION = _Quantity("orientation", "orientation", "mrad")
+_REACHED = _Quantity("reached", "share of poses reached", "%")
+_QUANTITIES = (_POSITION, _ORIENTATION, _REACHED)
+
+
+def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
+    """The section of a page on the cells of ``accuracy_map``."""
+    table = tables["accuracy_map"]
+    drawn = cells(table)
+    return Section(
+        _KEY,
+        "Accuracy map: where the models differ",
+        f"{_space(table)}; VEC minus DH in up to {int(table['wanted'].max())} poses a cell. Both "
+        "are models: nothing here is measured, and nothing is an error of the robot itself",
+        "By how much the tool of the VEC model is elsewhere than that of the DH model at the same "
+        "joints: in every cell the largest of all turns of the flange and all postures tried. It "
+        "is the error of a controller that uses the DH model, as far as the VEC model is right.",
+        "Good: small beside your tolerance, and even. Bad: bright cells where the robot works. "
+        "The map is no bound on the robot's error: only a campaign gives one.",
+        "Work where the difference is small, or let kinacc compensate correct the poses by the "
+        "VEC model. Where a bright cell matters, drive to the joints that it shows and measure.",
+        (_picture(table, drawn, robot), *_largest(table, drawn, robot)),
+    )
+
+
+def _space(table: Columns) -> str:
+    """The cells in words: how many, in which slices, over which radii and heights."""
+    slices = np.unique(table["slice_deg"])
+    shown = [f"{each:g}" for each in slices]
+    angles = ", ".join(shown) if len(shown) < 7 else f"{shown[0]} to {shown[-1]}"
+    spans = (
+        f"{name} {np.min(values):.0f} to {np.max(values):.0f} mm"
+        for name, values in (("radius", table["radius_mm"]), ("height", table["height_mm"]))
+    )
+    return (
+        f"{len(table['radius_mm'])} cells of the evaluation space, at {angles} deg, "
+        + ", ".join(spans)
+    )
+
+
+def _degrees(angle: float) -> str:
+    return f"{angle:g}\u00a0deg"
+
+
+def _joints(table: Columns) -> list[str]:
+    """Columns of the joints, none in tables that were made before there were any."""
+    return [name for name in table if name[:1] == "q" and name[1:].isdigit()]
+
+
+def _data(table: Columns, drawn: Cells, robot: Robot) -> tuple[ColumnDataSource, dict[str, Any]]:
+    """What all parts of the picture share, and what numbers in it stand for."""
+    poses = _poses(table)
+    slices = np.unique(drawn.slice_deg)
+    columns = {
+        "slice": np.searchsorted(slices, drawn.slice_deg).astype(np.int8),
+        "radius": drawn.radius_mm,
+        "height": drawn.height_mm,
+        "position": np.asarray(table["position_max_mm"])[drawn.farthest],
+        "orientation": np.asarray(table["orientation_max_mrad"])[drawn.most_turned],
+        "reached": 100.0 * drawn.reached,
+        "some": (drawn.reached > 0).astype(np.int8),
+        "partly": ((drawn.reached > 0) & (drawn.reached < 1)).astype(np.int8),
+    }
+    if drawn.merged:
+        columns |= {"wide": drawn.wide_mm, "high": drawn.high_mm}
+    for quantity in (_POSITION, _ORIENTATION):
+        columns[f"top_{quantity.column}"] = _tops(columns["slice"], columns[quantity.column])
+    names = {"slice": tuple(map(_degrees, slices))}
+    for name, rows, of in (
+        ("pose", drawn.farthest, "worst_branch"),
+        ("turned", drawn.most_turned, "orientation_worst_branch"),
+    ):
+        columns[name] = np.array([poses.get(each, -1) for each in table[of][rows]], dtype=np.int16)
+        names[name] = tuple(poses)
+    for joint, name in enumerate(_joints(table)):
+        values = np.asarray(table[name])[drawn.farthest]
+        columns[name] = values if robot.dh.prismatic[joint] else np.rad2deg(values)
+    return pictures.source(_KEY, columns), names
+
+
+def _poses(table: Columns) -> dict[str, int]:
+    """Every turn and branch that is the worst of some cell, numbered."""
+    found = {*table["worst_branch"], *table["orientation_worst_branch"]} - {None}
+    return {name: number for number, name in enumerate(sorted(map(str, found)))}
+
+
+def _tops(of_slice: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """1 at the largest value of every slice, 0 elsewhere."""
+    top = np.zeros(len(values), dtype=np.int8)
+    top[largest_of(values, of_slice)] = 1
+    return np.where(np.isnan(values), 0, top).astype(np.int8)
+
+
+def _picture(table: Columns, drawn: Cells, robot: Robot) -> Picture:
+    data, names = _data(table, drawn, robot)
+    plot = pictures.figure("radius, mm", "height, mm", height_px=400)
+    plot.grid.visible = False
+    for along in (plot.x_range, plot.y_range):
+        along.update(range_padding=0.02)
+    shown = GroupFilter("slice", 0, name=f"{_KEY}-slice")
+    _unreached(plot, data, drawn, shown)
+    parts = {each: _coloured(plot, data, drawn, shown, each) for each in _QUANTITIES}
+    _some_reached(plot, data, shown)
+    for quantity in (_POSITION, _ORIENTATION):
+        parts[quantity] += _rings(plot, data, shown, quantity)
+    for quantity, models in parts.items():
+        for model in models:
+            model.visible = quantity == _POSITION
+    slices = tuple(
+        Option(name, ((f"{_KEY}-slice", "group", number),))
+        for number, name in enumerate(names["slice"])
+    )
+    quantities = tuple(
+        Option(
+            each.label,
+            tuple(
+                (model.name, "visible", quantity == each)
+                for quantity, models in parts.items()
+                for model in models
+            ),
+        )
+        for each in _QUANTITIES
+    )
+    caption = _caption(table, drawn)
+    largest = float(np.nanmax(table["position_max_mm"])) if drawn.reached.any() else np.nan
+    told = f"; the largest position difference is {largest:.3f} mm" if drawn.reached.any() else ""
+    return Picture(
+        _KEY,
+        plot,
+        f"Map of the largest difference in every cell of a slice{told}. {caption}",
+        caption,
+        (Control("Slice", slices), Control("Quantity", quantities)),
+        _details(data, robot),
+        names,
+        "Select a cell to see its values, and the pose and joints of its largest difference.",
+    )
+
+
+def _view(*filters: Filter) -> CDSView:
+    return CDSView(filter=IntersectionFilter(operands=list(filters)))
+
+
+def _cell(
+    plot: BokehFigure, data: ColumnDataSource, drawn: Cells, view: CDSView, **look: object
+) -> GlyphRenderer:
+    width: float | str = "wide" if drawn.merged else float(drawn.wide_mm[0])
+    height: float | str = "high" if drawn.merged else float(drawn.high_mm[0])
+    part = plot.rect(
+        "radius", "height", width=width, height=height, source=data, view=view, **look
+    )  # fmt: skip
+    part.selection_glyph = part.glyph.clone(line_color=VERMILION, line_width=3)
+    part.nonselection_glyph = None  # what is not selected looks as before
+    return part
+
+
+def _unreached(plot: BokehFigure, data: ColumnDataSource, drawn: Cells, shown: GroupFilter) -> None:
+    part = _cell(
+        plot, data, drawn, _view(shown, GroupFilter("some", 0)),
+        fill_color=_UNREACHED, line_color=None,
+        fill_alpha=0.5, hatch_pattern="/", hatch_color=GREY, hatch_scale=8.0,
+    )  # fmt: skip
+    told = [("", "@radius{0} mm out, @height{0} mm high: no pose reached")]
+    pictures.hover(plot, told, part)
+
+
+def _coloured(
+    plot: BokehFigure,
+    data: ColumnDataSource,
+    drawn: Cells,
+    shown: GroupFilter,
+    quantity: _Quantity,
+) -> list[Any]:
+    """The cells in the colours of a quantity, and their scale: one for all slices."""
+    values = np.asarray(data.data[quantity.column], dtype=float)
+    low, high = _span(values) if quantity != _REACHED else (0.0, 100.0)
+    colour = {
+        "field": quantity.column,
+        "transform": LinearColorMapper(palette=pictures.COLOURMAP, low=low, high=high),
+    }
+    part = _cell(
+        plot, data, drawn, _view(shown, GroupFilter("some", 1)),
+        fill_color=colour, line_color=colour, line_width=0.6,  # no gap between cells
+        name=f"{_KEY}-{quantity.column}",
+    )  # fmt: skip
+    told = [
+        ("", "@radius{0} mm out, @height{0} mm high"),
+        ("position, mm", "@position{0.000}"),
+        ("orientation, mrad", "@orientation{0.000}"),
+        ("poses reached, %", "@reached{0}"),
+    ]
+    pictures.hover(plot, told, part)
+    bar = part.construct_color_bar(
+        title=quantity.unit, width=10, name=f"{_KEY}-{quantity.column}-scale"
+    )
+    plot.add_layout(bar, "right")
+    return [part, bar]
+
+
+def _span(values: np.ndarray) -> tuple[float, float]:
+    """Ends of a scale of colours: apart, even where all values are the same or there is none."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return 0.0, 1.0
+    low, high = float(known.min()), float(known.max())
+    return (low, high) if high - low > 1e-3 * abs(high) else (0.9 * low, 1.1 * high + 1e-3)
+
+
+def _some_reached(plot: BokehFigure, data: ColumnDataSource, shown: GroupFilter) -> None:
+    if np.any(data.data["partly"]):
+        plot.scatter(
+            "radius", "height", source=data, view=_view(shown, GroupFilter("partly", 1)), size=3,
+            color="#ffffff", line_color=None, nonselection_fill_alpha=1.0,
+        )  # fmt: skip
+
+
+def _rings(
+    plot: BokehFigure, data: ColumnDataSource, shown: GroupFilter, quantity: _Quantity
+) -> list[GlyphRenderer]:
+    """A ring about the largest value of the slice, dark on light, to be seen on every colour."""
+    rings = []
+    for name, colour, width in (("light", "#ffffff", 5), ("dark", "#1d1d1f", 2)):
+        ring = plot.scatter(
+            "radius", "height", source=data, size=18, fill_color=None, line_color=colour,
+            line_width=width, view=_view(shown, GroupFilter(f"top_{quantity.column}", 1)),
+            name=f"{_KEY}-{quantity.column}-{name}-ring",
+        )  # fmt: skip
+        ring.nonselection_glyph = None
+        rings.append(ring)
+    return rings
+
+
+def _caption(table: Columns, drawn: Cells) -> str:
+    words = (
+        "Colours are on one scale over all slices; the ring is at the largest value of the slice. "
+    )
+    none = np.asarray(table["solutions"]) == 0
+    if none.any():
+        words += f"Hatched grey: no pose reached ({none.sum()} of {len(none)} cells"
+        beyond = none & (np.asarray(table["extrapolating"]) > 0)
+        if beyond.any():
+            words += f", in {beyond.sum()} of them only at joints beyond those measured"
+        words += "). "
+    elif (drawn.reached < 1).any():
+        words += "Some pose is reached in every cell. "
+    else:
+        words += "Every pose is reached in every cell. "
+    if ((drawn.reached > 0) & (drawn.reached < 1)).any():
+        words += "A white dot: some of its poses are not reached. "
+    if drawn.merged:
+        words += "Neighbouring cells are drawn as one, with the largest of their values. "
+    return words + "Radius and height are drawn at different scales."
+
+
+def _details(data: ColumnDataSource, robot: Robot) -> dict[str, str]:
+    joints = {
+        name: f"J{name[1:]} {{}} {'mm' if robot.dh.prismatic[int(name[1:]) - 1] else 'deg'}"
+        for name in data.data
+        if name[:1] == "q" and name[1:].isdigit()
+    }
+    return {
+        "slice": "slice {}",
+        "radius": "radius {} mm",
+        "height": "height {} mm",
+        "reached": "{} % of its poses reached",
+        "position": "largest position difference {} mm",
+        "pose": "in pose {}",
+        **joints,
+        "orientation": "largest orientation difference {} mrad",
+        "turned": "in pose {}",
+    }
+
+
+def _largest(table: Columns, drawn: Cells, robot: Robot) -> tuple[Table | Text, ...]:
+    """The cells of the largest position differences, to be shown in the picture."""
+    size = np.asarray(table["position_max_mm"], dtype=float)
+    order = np.argsort(np.where(np.isnan(size), np.inf, -size), kind="stable")
+    order = order[: min(_LARGEST, int(np.isfinite(size).sum()))]
+    if not len(order):
+        return (Text("No cell is reached in any pose: the space lies out of the robot's reach."),)
+    slides = any(robot.dh.prismatic)
+    heads = (
+        *("slice", "radius, mm", "height, mm", "position, mm", "orientation, mrad"),
+        *("pose", "joints, deg" + (" or mm" if slides else "")),
+    )
+    rows = tuple(
+        (
+            _degrees(table["slice_deg"][row]),
+            f"{table['radius_mm'][row]:.0f}",
+            f"{table['height_mm'][row]:.0f}",
+            f"{size[row]:.3f}",
+            f"{table['orientation_max_mrad'][row]:.3f}",
+            _in_one_piece(", ", str(table["worst_branch"][row]).split(", ")),
+            _in_one_piece(",\u00a0", _worst_joints(table, row, robot)),
+        )
+        for row in order
+    )
+    caption = (
+        f"The {len(order)} cells of the largest position difference, with pose and joints of it. "
+        "A pose is the turn of the flange about its axes X, Y, Z (+, 0 or -), then the posture"
+    )
+    return (
+        Table(
+            caption,
+            heads,
+            rows,
+            frozenset({1, 2, 3, 4}),
+            picked_in=_KEY,
+            picks=tuple(int(drawn.of_row[row]) for row in order),
+            choices=tuple((("Slice", row[0]), ("Quantity", _POSITION.label)) for row in rows),
+        ),
+    )
+
+
+def _worst_joints(table: Columns, row: int, robot: Robot) -> list[str]:
+    """Joints of the largest position difference of a cell, as a person types them."""
+    values = [float(table[name][row]) for name in _joints(table)]
+    return [
+        f"{value if slides else np.rad2deg(value):.1f}"
+        for value, slides in zip(values, robot.dh.prismatic, strict=False)
+    ]
+
+
+def _in_one_piece(between: str, words: Sequence[str]) -> str:
+    """Words with nothing in them that a line could be broken at."""
+    solid = (word.replace(" ", "\u00a0").replace("-", "\u2011") for word in words)
+    return between.join(solid)

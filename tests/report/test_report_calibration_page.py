@@ -1,0 +1,28 @@
+"""Sections that repeat what a user wrote: escaped, and the same bytes every time."""
+
+import numpy as np
+from made_up_results import as_page, check, covariance, everything, identified, robot
+
+from kinacc.report import data_check, identifiability
+
+EVIL = '</script><script>alert("1")</script>'
+
+
+def page() -> str:
+    tables = everything()
+    tables["measurements"]["target"][:] = EVIL
+    tables["data_check"] = check(
+        ("outliers", "warning", EVIL, f"lines of {EVIL}", EVIL, f"{EVIL} it's so", 1),
+        ("left_out", "note", EVIL, None, None, None, 0),
+    )
+    tables["dh_identified"] = identified(**{f"{EVIL}__x_mm": ("undetermined", np.nan, EVIL)})
+    names = [f"{EVIL}.x_mm", "j1.a_mm"]
+    tables["dh_covariance"] = covariance(names, [[1.0, 0.2], [0.2, 1.0]])
+    return as_page(*(each.section(tables, robot()) for each in (data_check, identifiability)))
+
+
+def test_names_in_a_users_file_are_text_on_the_page_and_it_is_the_same_every_time():
+    first = page()
+    assert "<script>alert" not in first
+    assert "&lt;script&gt;alert" in first
+    assert first == page()

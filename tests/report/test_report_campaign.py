@@ -1,0 +1,187 @@
+"""A campaign's page and section: what is promised, of whom, and when nothing is."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinacc.campaign import begin, folder, journal, report
+from kinacc.campaign.folder import Opened
+from kinacc.campaign.instrument import instruments
+from kinacc.campaign.plan import Limits, assessor_of
+from kinacc.campaign.reading import Reading
+from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.record import nominal
+from kinacc.kinematics import robot as robots
+from kinacc.report import page
+from kinacc.report.campaign import campaign_page, section
+from kinacc.report.page import Picture, Table
+
+TRUE_MM = 0.2
+
+
+def measured(
+    texts=("tracker=0.05",), points=12, budget=16, readings=99, noise_mm=0.05, tolerance_mm=None,
+    extra=(), names=None, mean_mm=TRUE_MM,
+):  # fmt: skip
+    """A campaign of an arm whose errors are known, with its state and tables."""
+    arm = nominal(robots.load("mh180"))
+    found = begin.points_of(
+        arm, spread(arm.robot, points), names or [f"p{i}" for i in range(points)]
+    )
+    limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
+    about = {"robot": "mh180", "calibration": "cell 3", "model": "dh", "point": "tool",
+             "candidates": "drawn", "kinacc_version": "0"}  # fmt: skip
+    plan = begin.plan_of(
+        arm, found, assessor_of("search_and_confirm", {"measurements": budget}),
+        instruments(texts, "base"), limits, 3, np.zeros(6), about,
+    )  # fmt: skip
+    rng, true = np.random.default_rng(4), np.random.default_rng(5).normal(0.0, mean_mm, (points, 3))
+    rows = plan.visiting(frozenset())
+    asking, entries = plan.assessor.begin(plan.candidates(rows)), []
+    while len(entries) < readings and (row := asking.next()) is not None:
+        seen = true[rows[row]] + rng.normal(0.0, noise_mm, 3)
+        used = plan.instruments[len(entries) % len(plan.instruments)]
+        asking.record(row, seen, used.covariance_mm2)
+        at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, used.name)
+        entries.append(folder.readings_entry([at]))
+    journal_ = journal.Journal((*entries, *extra), "cd", 0, 0)
+    campaign = Opened(Path("check"), plan, journal_, "ab")
+    state, tables = report.tables(campaign)
+    return SimpleNamespace(opened=campaign, state=state, tables=tables)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return measured(tolerance_mm=2.0)
+
+
+def first_of(campaign):
+    return campaign_page(campaign.opened, campaign.state, campaign.tables).first
+
+
+def note(first, name):
+    return " ".join(text.words for each, texts in first.notes if each == name for text in texts)
+
+
+def test_the_first_sentence_is_a_promise_with_its_odds_its_poses_and_its_conditions(whole):
+    upper = whole.state.statements()[0].upper_mm
+    first = first_of(whole)
+    assert first.answers[0] == (
+        "By a procedure whose bound is right in 95 of 100 campaigns, none of these 12 candidates "
+        f"is off by more than {upper:.3f} mm, if the noise is at most 0.05 mm per axis and nothing "
+        "moved."
+    )
+    assert first.badge == ("WITHIN 2 mm", False)
+    assert "model error" in note(first, "VALID")
+    assert "these 12 candidates (drawn)" in note(first, "VALID")
+
+
+def test_a_tolerance_below_the_lower_bound_is_a_warning():
+    first = first_of(measured(tolerance_mm=0.1))
+    assert first.badge == ("BEYOND 0.1 mm", True)
+    assert "reject" in first.answers[-1]
+
+
+def test_two_instruments_are_named_with_the_noise_of_each():
+    first = first_of(measured(("tracker=0.05", "camera=0.06")))
+    assert "as stated (tracker: 0.05 mm per axis; camera: 0.06 mm per axis)" in first.answers[0]
+
+
+def test_a_campaign_just_begun_promises_nothing_and_asks_for_the_next_point():
+    campaign = measured(readings=3)
+    first = first_of(campaign)
+    assert first.badge == ("NO BOUND YET", True)
+    assert "No upper bound" in first.answers[0]
+    assert not re.search(r"\d+ of \d+ campaigns|confidence", " ".join(first.answers))
+    label = campaign.state.plan.points.label[campaign.state.asked]
+    assert f"point {label}; 13 readings are left" in note(first, "NEXT")
+    assert "kinacc campaign next check" in note(first, "NEXT")
+
+
+def test_readings_that_scatter_more_than_stated_take_the_promise_back():
+    campaign = measured(points=8, budget=60, noise_mm=0.4)
+    first = first_of(campaign)
+    assert first.badge == ("BOUND IN DOUBT", True)
+    assert "cannot be relied on" in first.answers[0]
+    assert not any("By a procedure" in each for each in first.answers)
+    assert {row[4] for row in first.tables[0].rows} == {"-"}
+    assert "new campaign" in note(first, "NEXT")
+
+
+def test_a_bound_as_small_as_the_noise_is_not_promised_for_less_noise():
+    first = first_of(measured(("tracker=0.5",), noise_mm=0.3, mean_mm=0.01))
+    upper = float(re.search(r"more than ([\d.]+) mm", first.answers[0])[1])
+    assert upper < 1.5
+    assert "the noise is exactly 0.5 mm per axis" in first.answers[0]
+
+
+def blocks(parts, kind):
+    return [block for part in parts for block in part.blocks if isinstance(block, kind)]
+
+
+def named(picture):
+    """What a picture shares with its tables: the data whose rows can be selected."""
+    sources = [each.data_source for each in picture.plot.renderers]
+    return next(each.data for each in sources if each.name)
+
+
+def test_every_point_with_its_limits_is_in_picture_and_table(whole):
+    parts = campaign_page(whole.opened, whole.state, whole.tables).sections
+    drawn = {each.key: each for each in blocks(parts, Picture)}
+    data = named(drawn["points-sizes"])
+    assert sorted(data["called"]) == sorted(f"p{i}" for i in range(12))
+    assert sorted(data["place"]) == [*range(1, 13)]
+    largest = next(each for each in blocks(parts, Table) if "largest errors" in each.caption)
+    for row, pick in zip(largest.rows, largest.picks, strict=True):
+        assert data["called"][pick] == row[0]
+        assert f"{data['error_mm'][pick]:.3f}" == row[2]
+    assert float(largest.rows[0][2]) == pytest.approx(
+        np.nanmax(whole.tables["campaign_points"]["error_mm"]), abs=5e-4
+    )
+
+
+def test_what_was_struck_stands_there_with_its_reason_as_text_and_bytes_repeat():
+    reason = '<script>alert("x")</script>'
+    entries = (folder.strike_entry(2, reason),)
+    campaign = measured(readings=6, extra=entries, names=[f'<b>"{i}' for i in range(12)])
+    built = campaign_page(campaign.opened, campaign.state, campaign.tables)
+    struck = next(each for each in blocks(built.sections, Table) if "void" in each.caption)
+    assert [(row[0], row[3]) for row in struck.rows] == [("2", reason)]
+    text = page.html(built)
+    assert text == page.html(campaign_page(campaign.opened, campaign.state, campaign.tables))
+    assert "<script>alert" not in text
+    assert "&lt;script&gt;alert" in text
+    assert '<b>"' not in text
+
+
+def test_the_course_says_nothing_where_nothing_could_be_said(whole):
+    parts = campaign_page(whole.opened, whole.state, whole.tables).sections
+    course = next(each for each in blocks(parts, Table) if "course" in each.caption)
+    early = [row for row in course.rows if int(row[0]) < 5 and row[2] == "all candidates"]
+    assert {row[3] for row in early} == {"-"}
+    assert all(row[6].startswith("no upper bound: ") for row in early)
+    assert course.rows[-1][3] == f"{whole.state.statements()[-1].upper_mm:.3f}"
+
+
+def test_noise_as_stated_is_seen_as_one_and_fourfold_noise_as_four():
+    def rms(noise_mm):
+        campaign = measured(points=4, budget=120, noise_mm=noise_mm)
+        parts = campaign_page(campaign.opened, campaign.state, campaign.tables).sections
+        drawn = {each.key: each for each in blocks(parts, Picture)}
+        apart = named(drawn["noise-repeats"])["apart"]
+        return float(np.sqrt(np.mean(np.square(apart))))
+
+    assert rms(0.05) == pytest.approx(1.0, abs=0.15)
+    assert rms(0.2) == pytest.approx(4.0, abs=0.6)
+
+
+def test_as_a_section_it_is_kept_apart_from_held_out_errors(whole):
+    part = section(whole.state, whole.tables, "campaign-1")
+    assert "12 candidates" in part.population
+    assert "none of the held-out rows" in part.population
+    assert all(each.key.startswith("campaign-1-") for each in blocks((part,), Picture))

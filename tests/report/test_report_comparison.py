@@ -1,0 +1,140 @@
+"""Two calibrations on a page: what is called a change, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinacc.calibration.uncertainty import Uncertainty, scale_of
+from kinacc.config import schema
+from kinacc.deployment.compare import compare
+from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.record import Residual, nominal
+from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
+from kinacc.kinematics import dh
+from kinacc.kinematics import robot as robots
+from kinacc.report import page
+from kinacc.report.comparison import comparison_page
+from kinacc.report.page import Picture, Table
+
+STD = 0.02  # mm and mrad
+
+
+def arm(name="March", fitted=True, robot="ur10", **changes):
+    """A calibration of an arm whose DH parameters are known to ``STD``, with some changed."""
+    made = nominal(robots.load(robot), name)
+    names = made.model.parameter_names
+    vector = dh.to_vector(made.model).copy()
+    for parameter, by in changes.items():
+        vector[names.index(parameter.replace("_", ".", 1))] += by
+    made = replace(made, model=dh.with_vector(made.model, vector), choice="dh")
+    if not fitted:
+        return made
+    covariance = np.diag([(STD * scale_of(each)) ** 2 for each in names])
+    open_ = np.zeros((1, len(names)))
+    open_[0, names.index("j1.d_mm")] = 1.0
+    return replace(made, known=Uncertainty(names, covariance, open_))
+
+
+def paged(first, second, shared=NONE_SHARED, poses=40):
+    q_rad = spread(first.robot, poses)
+    weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+    return comparison_page(compare(first, second, q_rad, weight, shared), (first, second), q_rad)
+
+
+def note(built, name):
+    return " ".join(
+        text.words for each, texts in built.first.notes if each == name for text in texts
+    )
+
+
+@pytest.fixture(scope="module")
+def bent():
+    return paged(arm(), arm("November", j3_alpha_rad=1e-3, j2_a_mm=0.1))
+
+
+def test_an_arm_that_changed_is_said_to_with_the_joint_and_against_chance(bent):
+    assert bent.first.badge == ("CHANGED", True)
+    assert "From March to November, the modelled poses moved by" in bent.first.answers[0]
+    assert "by chance alone" in bent.first.answers[0]
+    assert "the arm itself" in bent.first.answers[1]
+    assert note(bent, "PARAMETERS").startswith(
+        "Changed the most: j3.alpha by +1 mrad (35.4 standard"
+    )
+    assert "measure the poses of the first again" in note(bent, "NEXT").lower()
+
+
+def test_an_arm_that_did_not_change_needs_nothing():
+    built = paged(arm(), arm("November", j2_a_mm=0.01))
+    assert built.first.badge == ("NO CHANGE PROVEN", False)
+    assert note(built, "NEXT").startswith("Nothing")
+
+
+def test_a_base_that_moved_is_not_taken_for_the_arm():
+    built = paged(arm(), arm("November", j1_theta_offset_rad=2e-3))
+    stands, stays = built.first.tables[0].rows
+    assert float(stands[1]) > 0.5
+    assert float(stays[1]) < 1e-6
+    assert "little of it is the arm itself" in built.first.answers[1]
+
+
+def test_a_change_at_poses_of_one_alone_that_the_model_may_lack_is_in_doubt():
+    left = Residual(0.9, 1e-3, "validation")
+    far = (np.full(6, 3.0), np.full(6, 3.1))
+    second = replace(arm("November", j3_alpha_rad=5e-4), residual=left, fitted_range_rad=far)
+    built = paged(replace(arm(), residual=left), second)
+    assert built.first.badge == ("CHANGE IN DOUBT", True)
+    assert "leaves 0.9 mm and 0.9 mm rms unexplained" in note(built, "CHECK")
+    assert "None of the 40 poses lie where both were measured" in note(built, "CHECK")
+    assert "before anything is changed at the robot" in note(built, "NEXT")
+
+
+def test_a_robot_that_was_never_fitted_gives_distances_and_no_verdict():
+    built = paged(arm(j2_a_mm=0.5), arm("ur10.yaml", fitted=False))
+    assert built.first.badge == ("CHANCE NOT KNOWN", False)
+    assert "There is no verdict on a change: how sure ur10.yaml is" in built.first.answers[-1]
+    assert not any(isinstance(each, Picture) for each in built.sections[-1].blocks)
+
+
+def test_the_same_readings_and_other_robots_are_no_change():
+    same = paged(arm(), arm("other settings", j2_a_mm=0.5), SharedReadings(80, 80, 80))
+    assert same.first.badge == ("SAME READINGS", False)
+    assert "nothing can have moved" in same.first.answers[0]
+    other = paged(arm(), arm("B", robot="mh180"))
+    assert other.first.badge == ("DIFFERENT ROBOTS", True)
+    assert "no change of one arm" in other.first.answers[0]
+    assert not any("chance" in each for each in other.first.answers)
+
+
+def test_what_the_poses_leave_open_is_not_counted(bent):
+    table = next(each for each in bent.sections[-1].blocks if isinstance(each, Table))
+    row = next(each for each in table.rows if each[0] == "j1.d")
+    assert row[6:] == ("-", "undetermined in both")
+    bars = next(each for each in bent.sections[-1].blocks if isinstance(each, Picture))
+    data = bars.plot.select({"name": "parameters"})[0].data
+    assert data["said"][[*data["called"]].index("j1.d")] == "no standard deviation"
+
+
+def test_the_poses_that_moved_the_most_are_those_of_the_picture(bent):
+    where = next(each for each in bent.sections if each.key == "where")
+    table = next(each for each in where.blocks if isinstance(each, Table))
+    picture = next(each for each in where.blocks if isinstance(each, Picture))
+    data = picture.plot.renderers[0].data_source.data
+    assert [data["number"][pick] for pick in table.picks] == [int(row[0]) for row in table.rows]
+    assert float(table.rows[0][2]) == pytest.approx(max(data["apart_mm"]), abs=5e-4)
+
+
+def test_names_a_user_gave_are_text_and_bytes_repeat():
+    made = [paged(arm('<script>"1'), arm("<b>two", j2_a_mm=0.5)) for _ in range(2)]
+    texts = [page.html(each) for each in made]
+    assert texts[0] == texts[1]
+    assert '<script>"1' not in texts[0]
+    assert "&lt;b&gt;two" in texts[0]
+
+
+def test_one_pose_is_enough_for_a_page():
+    built = paged(arm(), arm("November", j2_a_mm=0.5), poses=1)
+    assert "1 poses" in built.first.subtitle
+    assert page.html(built)

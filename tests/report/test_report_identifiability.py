@@ -1,0 +1,105 @@
+"""The section on what poses leave open names it, says what settles it, and shows close pairs."""
+
+import numpy as np
+import pytest
+from made_up_results import covariance, data, everything, identified, picture, robot, table, words
+
+from kinacc.calibration.blind_words import WEAK
+from kinacc.report import identifiability
+
+ALWAYS = "theta of joint 1 cannot be told from a turn of the base about the axis of joint 1"
+SOMETIMES = f"tool z changes no measured pose {WEAK}"
+FIT = {
+    "quantity": np.array(["rank", "rank_threshold", *["singular_value"] * 3], dtype=object),
+    "value": np.array([2.0, 0.01, 40.0, 10.0, 0.02]),
+}
+
+
+def section(**tables):
+    return identifiability.section(everything() | tables, robot())
+
+
+def test_all_determined_is_said_in_a_sentence():
+    found = section()
+    assert "determine every parameter" in words(found)
+    assert found.population.endswith("16 determined by the poses, 4 fixed")
+
+
+def test_what_other_poses_would_show_stands_first_with_what_settles_it():
+    told = identified(
+        j1__theta_offset_rad=("undetermined", np.nan, ALWAYS),
+        base__rz_rad=("undetermined", np.nan, ALWAYS),
+        tool__z_mm=("undetermined", np.nan, SOMETIMES),
+    )
+    found = section(dh_identified=told)
+    first, second = table(found, "What cannot be told apart").rows
+    assert first[0] == "tool z changes no measured pose"
+    assert "kinacc plan-poses" in first[1]
+    assert second == (ALWAYS, "no pose of such an arm does: no fault")
+    assert "3 undetermined" in found.population
+
+
+def test_a_flange_that_points_one_way_is_named_where_poses_show_too_little():
+    tables = everything()
+    joints = tables["measurements"]
+    for n in (2, 3, 4):
+        joints[f"q{n}"] = np.zeros(2)
+    joints["q1"] = np.array([0.0, 0.01])
+    tables["dh_identified"] = identified(tool__z_mm=("undetermined", np.nan, SOMETIMES))
+    assert "points one way" in words(identifiability.section(tables, robot()))
+
+
+def test_every_parameter_has_its_status_and_standard_deviation():
+    told = identified(
+        j2__a_mm=("prior", 0.5, "known beforehand to 0.5 mm"),
+        j3__alpha_rad=("identified", 0.0002, None),
+        tool__rx_rad=("undetermined", np.nan, "a sentence"),
+    )
+    rows = {row[0]: row[1:] for row in table(section(dh_identified=told), "Status of").rows}
+    assert rows["a of joint 2"] == ("prior", "0.5 mm", "known beforehand to 0.5 mm")
+    assert rows["alpha of joint 3"] == ("identified", "0.2 mrad", "–")
+    assert rows["tool rx"] == ("undetermined", "–", "a sentence")
+    assert rows["beta of joint 1"] == ("fixed", "–", "not fitted")
+
+
+def test_how_weakly_a_direction_may_be_seen_is_told_by_the_rank():
+    told = words(section(dh_fit=FIT))
+    assert "2 of 3 are fitted" in told
+    assert "0.25 times" in told
+    assert "0.0005 times" in told
+    assert "the limit is 0.01" in told
+
+
+def test_all_directions_fitted_leaves_none_to_compare_with():
+    fit = FIT | {"value": np.array([3.0, 0.01, 40.0, 10.0, 4.0])}
+    assert "not fitted" not in words(section(dh_fit=fit))
+
+
+def test_the_closest_pair_comes_first_and_its_button_selects_its_cell():
+    names = ["base.x_mm", "j1.a_mm", "j1.d_mm", "j2.a_mm"]
+    matrix = np.diag([1.0, 4.0, 0.0, 9.0])  # j1.d is undetermined: it has no correlation
+    matrix[0, 1] = matrix[1, 0] = 0.5
+    matrix[1, 3] = matrix[3, 1] = -0.97 * 6
+    found = section(dh_covariance=covariance(names, matrix))
+    closest = table(found, "The 3 pairs")
+    assert closest.rows[0] == ("a of joint 2", "a of joint 1", "-0.970")
+    assert closest.rows[1] == ("a of joint 1", "base x", "+0.250")
+    cells = data(picture(found, closest.picked_in))
+    at = closest.picks[0]
+    assert (cells["first"][at], cells["second"][at]) == closest.rows[0][:2]
+    assert cells["correlation"][at] == pytest.approx(-0.97)
+    assert cells["mark"][at] > 0.0
+    assert cells["mark"][closest.picks[1]] == 0.0
+    assert "1 are left out" in picture(found, "correlations").caption
+    assert "d of joint 1" not in cells["first"]
+
+
+def test_one_determined_parameter_has_nothing_to_be_compared_with():
+    found = section(dh_covariance=covariance(["j1.a_mm", "j2.a_mm"], np.diag([1.0, 0.0])))
+    assert not [block for block in found.blocks if getattr(block, "key", "")]
+
+
+def test_many_targets_leave_the_picture_to_the_arm():
+    names = [f"m{i}.{axis}_mm" for i in range(20) for axis in "xyz"] + ["j1.a_mm", "j2.a_mm"]
+    found = section(dh_covariance=covariance(names, np.eye(62)))
+    assert set(data(picture(found, "correlations"))["first"]) == {"a of joint 1", "a of joint 2"}

@@ -1,0 +1,117 @@
+"""The sections on the paper: its tables beside what is recomputed, and its claims by verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc.kinematics import robot
+from kinacc.report import paper
+from kinacc.report.page import FirstScreen, Page, Section, Table, Text, html
+from kinacc.study.claims import all_claims
+
+ARM = robot.load("mh180")
+
+
+def claims(**verdicts: str) -> dict[str, dict[str, np.ndarray]]:
+    """Every claim as its paper has it, and a tenth more here; ``verdicts`` by claim."""
+    every = all_claims()
+    text = {
+        "claim": [each.id for each in every],
+        "statement": [each.statement for each in every],
+        "statistic": [each.statistic for each in every],
+        "verdict": [verdicts.get(each.id, "agrees") for each in every],
+    }
+    number = {
+        "paper": [each.paper for each in every],
+        "reproduced": [each.paper + 0.1 for each in every],
+        "tolerance": [each.tolerance for each in every],
+        "share": [np.nan for _ in every],
+    }
+    columns = {name: np.array(values, dtype=object) for name, values in text.items()}
+    return {"claims": columns | {name: np.array(values) for name, values in number.items()}}
+
+
+def tables_of(section: Section) -> list[Table]:
+    return [each for each in section.blocks if isinstance(each, Table)]
+
+
+def test_every_number_of_the_papers_tables_stands_beside_the_one_here():
+    one, two, three = tables_of(paper.tables_section(claims(), ARM))
+    assert one.rows[0] == (*("position, mm", "0.705", "0.805", "1.635", "1.735", "1.731", "1.831"),)
+    assert three.rows[1][:3] == ("orientation, mrad", "1.336", "1.436")
+    assert len(two.rows) == 6
+    assert two.rows[3] == (
+        *("4", "-3.142", "-3.042", "-1226.154", "-1226.054", "0.029", "0.129", "-1.571", "-1.471"),
+    )
+    assert len(one.heads) == len(one.rows[0])
+    assert len(two.heads) == len(two.rows[0])
+
+
+def test_a_number_that_differs_is_named_at_its_row():
+    verdicts = {"table1_position_max": "differs", "table2_a_3": "differs"}
+    one, two, three = tables_of(paper.tables_section(claims(**verdicts), ARM))
+    assert one.marked == {0: "largest differs"}
+    assert two.marked == {2: "a differs"}
+    assert not three.marked
+
+
+def test_what_only_a_pair_of_joints_can_show_is_not_said_to_differ():
+    verdicts = {"table2_d_2": "not comparable", "table2_d_3": "not comparable"}
+    _, two, _ = tables_of(paper.tables_section(claims(**verdicts), ARM))
+    assert not two.marked
+    assert "the paper has -0.964 mm, here it is -0.864 mm" in two.caption
+
+
+def test_what_was_not_recomputed_is_a_dash():
+    tables = claims()
+    tables["claims"]["reproduced"][:] = np.nan
+    one, _, _ = tables_of(paper.tables_section(tables, ARM))
+    assert one.rows[0][2] == "-"
+
+
+def test_fitted_poses_are_said_to_flatter():
+    assert "flatters" in paper.tables_section(claims(), ARM).population
+
+
+def test_claims_that_differ_come_first_and_are_open():
+    verdicts = {"map_nonlinear": "differs", "table2_d_2": "not comparable"}
+    section = paper.claims_section(claims(**verdicts), ARM)
+    differ, uncompared, agree = tables_of(section)
+    assert [row[5] for row in differ.rows] == ["map_nonlinear"]
+    assert not differ.folded
+    assert (uncompared.folded, agree.folded) == (True, True)
+    assert len(differ.rows) + len(uncompared.rows) + len(agree.rows) == len(all_claims())
+    assert "70 agree, 1 differ, 1 cannot be compared" in section.shows
+
+
+def test_where_none_differs_it_is_said():
+    section = paper.claims_section(claims(), ARM)
+    assert [each.words for each in section.blocks if isinstance(each, Text)] == [
+        "Differs here: none.",
+        "Not comparable: nothing to judge it by here: none.",
+    ]
+
+
+def test_a_sentence_has_no_number_and_says_so_by_a_dash():
+    differ = tables_of(paper.claims_section(claims(map_nonlinear="differs"), ARM))[0]
+    assert differ.rows[0][1:4] == ("-", "-", "-")
+
+
+def test_shares_over_further_arms_are_shown_where_they_were_counted():
+    tables = claims(map_nonlinear="differs")
+    assert "holds on further arms" not in tables_of(paper.claims_section(tables, ARM))[0].heads
+    tables["claims"]["share"][:] = 0.75
+    differ = tables_of(paper.claims_section(tables, ARM))[0]
+    assert differ.heads[-1] == "holds on further arms"
+    assert differ.rows[0][-1] == "75%"
+
+
+@pytest.mark.parametrize("section", [paper.tables_section, paper.claims_section])
+def test_the_page_is_the_same_twice_and_takes_no_markup_from_a_claim(section):
+    tables = claims()
+    tables["claims"]["statement"][0] = "</td><script>alert('x')</script>"
+    first = FirstScreen("title", "", ("", False), (), (), ())
+    one, other = (html(Page(first, (section(tables, ARM),))) for _ in range(2))
+    assert one == other
+    assert "<script>alert" not in one

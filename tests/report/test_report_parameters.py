@@ -1,0 +1,190 @@
+"""The section on parameters: differences with bars, and errors of joints no DH table can say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bokeh.models import VArea
+from made_up_results import (
+    TRAVEL_RAD,
+    covariance,
+    data,
+    dh_model,
+    everything,
+    identified,
+    picture,
+    robot,
+    set_nothing_that_is_not_there,
+    table,
+    vec_model,
+)
+
+from kinacc.kinematics import vec
+from kinacc.kinematics.dh import PARAMETERS, DHModel, forward
+from kinacc.kinematics.vec import ERRORS
+from kinacc.report import parameters
+
+NAMES = [f"j{joint}.{error}.{n}" for joint in range(1, 5) for error in ERRORS for n in range(3)]
+
+
+def section(slides=False, **tables):
+    return parameters.section(everything() | tables, robot(slides))
+
+
+def test_differences_have_their_unit_and_bars_of_two_standard_deviations():
+    change = {"d_mm": [0, 0, 0, 1.5], "alpha_rad": [0, -0.0004, 0, 0]}
+    model = dh_model(change) | {"std_alpha_rad": np.full(4, 0.0001)}
+    found = section(dh_model=model)
+    lengths, angles = (data(picture(found, f"differences-{of}")) for of in ("lengths", "angles"))
+    d4, alpha2 = lengths["short"].index("j4 d"), angles["short"].index("j2 alpha")
+    assert [lengths[each][d4] for each in ("low", "difference", "high")] == pytest.approx(
+        [1.3, 1.5, 1.7]
+    )
+    assert [angles[each][alpha2] for each in ("low", "difference", "high")] == pytest.approx(
+        [-0.6, -0.4, -0.2]
+    )
+    rows = {row[0]: row[1:] for row in table(found, "DH parameters").rows}
+    assert rows["d of joint 4"][:4] == ("100.0000 mm", "101.5000 mm", "+1.5000 mm", "0.1000 mm")
+    assert rows["alpha of joint 2"][2:] == ("-0.4000 mrad", "0.1000 mrad", "identified")
+
+
+def test_an_undetermined_parameter_has_no_bar_and_a_marker_of_its_own():
+    told = identified(j1__d_mm=("undetermined", np.nan, "a sentence"))
+    model = dh_model() | {"std_d_mm": np.array([np.nan, 0.1, 0.1, 0.1])}
+    found = section(dh_model=model, dh_identified=told)
+    shown = data(picture(found, "differences-lengths"))
+    at = shown["short"].index("j1 d")
+    assert np.isnan(shown["low"][at])
+    assert shown["size_undetermined"][at] > 0.0
+    assert shown["size_identified"][at] == 0.0
+    rows = {row[0]: row[1:] for row in table(found, "DH parameters").rows}
+    assert rows["d of joint 1"][3:] == ("–", "undetermined")
+
+
+def test_an_angle_beta_that_no_joint_has_is_not_listed_and_a_fixed_length_is():
+    told = identified(
+        j2__d_mm=("fixed", np.nan, "not fitted"), j3__beta_rad=("identified", 1, None)
+    )
+    named = {row[0] for row in table(section(dh_identified=told), "DH parameters").rows}
+    assert "d of joint 2" in named
+    assert {each for each in named if each.startswith("beta")} == {"beta of joint 3"}
+
+
+def curve(found, name: str, kind: str = "eps") -> np.ndarray:
+    return np.asarray(data(picture(found, f"curves-{kind}"))[name], dtype=float)
+
+
+def test_what_a_dh_table_can_say_is_left_out_of_the_errors_of_joints():
+    at = np.linspace(-1.0, 1.0, 200)
+    wave = np.polynomial.chebyshev.chebfit(at, np.cos(TRAVEL_RAD * at + 0.3), 10)
+    same = {f"j2__{each}__{n}": c for each in ("eps_x", "eps_z") for n, c in enumerate(wave)}
+    found = section(vec_model=vec_model(10, j1__delta_z__0=3.0, **same))
+    assert curve(found, "j1_delta_z", "delta") == pytest.approx(0.0, abs=1e-5)
+    assert curve(found, "j2_eps_x") == pytest.approx(0.0, abs=1e-4)  # the neighbour's frame
+    assert np.ptp(curve(found, "j2_eps_z")) > 500.0  # about its own axis: an eccentric encoder
+
+
+def test_the_linear_part_of_a_sliding_joint_is_its_neighbours_turn():
+    lines = {f"j4__{each}__1": 0.2 for each in ("delta_x", "delta_z", "eps_x")}
+    found = section(slides=True, vec_model=vec_model(**lines))
+    assert curve(found, "j4_delta_x", "delta") == pytest.approx(0.0, abs=1e-6)
+    assert np.ptp(curve(found, "j4_delta_z", "delta")) == pytest.approx(0.4)
+    assert np.ptp(curve(found, "j4_eps_x")) == pytest.approx(400.0)
+    options = picture(found, "curves-eps").controls[0].options
+    labels = [value for each in options for name, _, value in each.sets if name == "eps-axis"]
+    assert [each[-3:] for each in labels] == ["deg", "deg", "deg", " mm"]
+
+
+def between(slides: bool, joint: int, twist: np.ndarray) -> dict[str, float]:
+    """Coefficients of the error of a joint, from 0, that is a small ``twist`` (6,) behind it."""
+    at = np.linspace(-1.0, 1.0, 60)
+    arm = robot(slides)
+    held = DHModel(*(getattr(arm.dh, name)[joint : joint + 1] for name in PARAMETERS))
+    if slides:
+        held = replace(held, prismatic=np.ones(1, bool))
+    passed = forward(held, arm.q_max_rad[joint] * at[:, None])
+    turn = passed.rotation @ twist[3:]
+    shift = passed.rotation @ twist[:3] + np.cross(passed.position_mm, turn)
+    curves = np.polynomial.chebyshev.chebfit(at, np.concatenate([shift, turn], axis=1), 12)
+    return {
+        f"j{joint + 1}__{error}__{n}": curves[n, i]
+        for i, error in enumerate(ERRORS)
+        for n in range(13)
+    }
+
+
+@pytest.mark.parametrize(("slides", "joint"), [(False, 1), (True, 3)])
+def test_what_is_left_out_changes_no_pose_where_the_neighbour_takes_it_over(slides, joint):
+    twist = np.array([0.02, -0.03, 0.01, 1e-5, 2e-5, -3e-5])  # mm and rad
+    moved = between(slides, joint, twist)
+    if not slides:  # the joint behind takes it back; behind the last one the tool does
+        moved |= {f"j{joint + 2}__{e}__0": -c for e, c in zip(ERRORS, twist, strict=True)}
+    model = vec_model(12, **moved)
+    arm = robot(slides)
+    if not slides:
+        q = arm.q_max_rad * np.random.default_rng(1).uniform(-1, 1, (20, 4))
+        same = vec.forward(vec.VECModel.from_columns(model, arm.dh.prismatic), q)
+        assert same.position_mm == pytest.approx(forward(arm.dh, q).position_mm, abs=1e-4)
+    found = section(slides=slides, vec_model=model)
+    for kind in ("delta", "eps"):
+        for axis in "xyz":
+            assert curve(found, f"j{joint + 1}_{kind}_{axis}", kind) == pytest.approx(0, abs=1e-5)
+
+
+def test_the_band_is_of_what_is_shown():
+    variance = np.zeros(len(NAMES))
+    variance[NAMES.index("j1.eps_z.0")] = 1.0  # a constant: no pose tells whose it is
+    variance[NAMES.index("j1.eps_z.2")] = 1e-6
+    known = covariance(NAMES, np.diag(variance))
+    model = vec_model(j1__eps_z__2=0.002)
+    found = section(vec_model=model, vec_covariance=known)
+    value, high = curve(found, "j1_eps_z"), curve(found, "j1_eps_z_high")
+    # A standard deviation of half the coefficient: two of them are the curve's own height.
+    assert high - value == pytest.approx(np.abs(value), abs=1e-5)
+    assert value.mean() == pytest.approx(0.0, abs=1e-6)
+    assert np.ptp(value) == pytest.approx(4.0)
+    at_an_end = table(found, "The largest of every error").rows[0][-1]
+    assert [float(each) for each in at_an_end.split(" ± ")] == pytest.approx(
+        [value[0], 0.5 * (high[0] - value[0])], abs=1e-3
+    )
+
+
+def test_results_without_a_covariance_show_curves_without_bands():
+    found = picture(section(), "curves-eps")
+    assert "not known" in found.caption
+    assert not found.plot.select({"type": VArea})
+
+
+def test_the_control_of_joints_sets_what_is_there():
+    bare = section()
+    banded = section(vec_covariance=covariance(NAMES, np.eye(len(NAMES))))
+    for found in (bare, banded):
+        for kind in ("delta", "eps"):
+            shown = picture(found, f"curves-{kind}")
+            assert [each.label for each in shown.controls[0].options] == ["1", "2", "3", "4"]
+            assert set_nothing_that_is_not_there(shown)
+
+
+def test_backlash_and_bending_stand_in_tables_where_they_were_fitted():
+    model = vec_model()
+    extra = {name: each[-1:] for name, each in model.items()}
+    extra |= {"joint": [3], "error": ["eps_z"], "direction": [-1], "order": [0]}
+    extra |= {"coefficient": [0.00025], "std": [0.0001]}
+    model = {name: np.append(each, extra[name]) for name, each in model.items()}
+    bends = dict.fromkeys(
+        ("lever_coefficient_rad_per_mm", "std_lever_coefficient_rad_per_mm"), np.full(2, np.nan)
+    )
+    bends |= {
+        "joint": np.array([2, 3]),
+        "compliance_rad_per_nm": np.array([2e-6, np.nan]),
+        "std_compliance_rad_per_nm": np.array([np.nan, np.nan]),
+    }
+    found = section(vec_model=model, compliance_model=bends)
+    assert table(found, "Offsets by the direction").rows == (
+        ("joint 3", "falling", "+0.2500", "0.1000"),
+    )
+    assert table(found, "Joints that bend").rows == (
+        ("joint 2", "2", "not determined", "urad per N m"),
+    )
+    plain = [getattr(block, "caption", "") for block in section().blocks]
+    assert not any(each.startswith(("Offsets", "Joints that bend")) for each in plain)

@@ -1,0 +1,103 @@
+"""The section on the model that is selected: why, by how much, and which order."""
+
+import numpy as np
+from made_up_results import (
+    data,
+    everything,
+    orders,
+    picture,
+    pose_errors,
+    robot,
+    selection,
+    set_nothing_that_is_not_there,
+    table,
+    words,
+)
+
+from kinacc.calibration import summary
+from kinacc.report import selection as page_section
+
+TRIED = (
+    (np.nan, 0, 0.50, 0.16, 0.02, 0),
+    (np.nan, 2, 0.31, 0.006, 0.007, 1),
+    (np.nan, 4, 0.30, 0.0, np.nan, 0),
+    (0, 0, 0.52, 0.18, 0.02, 0),
+    (0, 4, 0.29, 0.0, np.nan, 1),
+)
+
+
+def section(**tables):
+    return of(everything() | tables)
+
+
+def of(found):
+    plain = {name: table for name, table in found.items() if name != "vec_orders"}
+    facts = [*summary.of_selection(plain, robot()), *summary.of_errors(found["pose_errors"])]
+    return page_section.section(found, facts)
+
+
+def test_the_selected_model_is_marked_and_its_gain_stands_in_standard_errors():
+    found = section()
+    told = table(found, "Models at held-out poses")
+    assert told.rows == (
+        ("DH", "–", "0.400", "0.410", "–", "–", "–"),
+        ("VEC", "2", "0.300", "0.310", "+0.0500", "0.0100", "+5.0"),
+    )
+    assert told.marked == {1: "← selected"}
+    assert "VEC is selected: on held-out poses" in words(found)
+    assert found.population.startswith("position errors at 40 configurations")
+
+
+def test_a_gain_within_its_errors_leaves_dh_selected_and_says_so():
+    found = section(model_selection=selection(0.01, 0.02, "dh"))
+    assert table(found, "Models at held-out poses").marked == {0: "← selected"}
+    assert "no more than two standard errors" in words(found)
+
+
+def test_nothing_held_out_says_that_there_is_nothing_to_judge_by():
+    found = section(
+        model_selection=selection(np.nan, np.nan, "dh"), pose_errors=pose_errors("train")
+    )
+    assert found.population.startswith("no pose was held out")
+    assert "no pose was held out to judge VEC by" in words(found)
+    assert table(found, "Models at held-out poses").rows[1][2:] == ("–",) * 5
+
+
+def test_a_model_no_nearer_than_nominal_is_warned_about():
+    found = section(pose_errors=pose_errors(nominal=0.2))
+    assert "no nearer to held-out poses than the nominal model" in words(found)
+
+
+def test_a_stated_order_is_said_to_be_stated_and_has_no_picture():
+    found = section()
+    assert "2, is stated and no other was tried" in words(found)
+    assert not [block for block in found.blocks if getattr(block, "key", "")]
+
+
+def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
+    found = section(vec_orders=orders(*TRIED))
+    shown = picture(found, "orders")
+    columns = data(shown)
+    assert list(columns["order"]) == [0, 2, 4]  # of the choice that has seen all rows
+    assert [each > 0 for each in columns["chosen"]] == [False, True, False]
+    assert "Lowest at order 4, chosen: 2" in shown.described
+    assert set_nothing_that_is_not_there(shown)
+    tried = table(found, "Orders tried")
+    assert tried.rows[1] == ("2", "0.3", "0.4", "0.7", "0.3100", "0.00600", "0.00700")
+    assert tried.rows[2][-1] == "–"
+    assert tried.marked == {1: "← chosen"}
+    chosen = table(found, "Orders chosen")
+    assert [row[:2] for row in chosen.rows] == [("all, delivered", "2"), ("without fold 0", "4")]
+
+
+def test_choices_for_folds_alone_stand_in_the_table():
+    found = section(vec_orders=orders(*TRIED[3:]))
+    assert not [block for block in found.blocks if getattr(block, "key", "")]
+    assert table(found, "Orders chosen").rows[0][0] == "without fold 0"
+
+
+def test_results_without_a_table_of_orders_leave_it_out():
+    tables = everything()
+    del tables["vec_orders"]
+    found = of(tables)
+    assert "stated" not in words(found)
