@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from kinacc.campaign import folder
+from kinacc.campaign import consistency, folder, of_calibration, words
 from kinacc.campaign.consistency import in_words, scatter
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.reading import Reading
@@ -57,3 +59,37 @@ def test_readings_count_with_their_own_noise(make_plan):
     rough += [each.reading.as_entry() | {"instrument": "rough"} for each in state.told]
     found = scatter(restore(plan, [{"kind": "readings", "readings": rough}]))
     assert found.too_small
+
+
+def near(plan, error_mm, noise_mm, seed=0):
+    """A campaign of an arm with errors and noise of these standard deviations per axis, and the
+    largest of the errors."""
+    rng = np.random.default_rng(seed)
+    errors = rng.normal(0.0, error_mm, plan.points.modelled_mm.shape)
+    readings = [
+        Reading(point, at + rng.normal(0.0, noise_mm, 3), "tracker")
+        for _ in range(3)
+        for point, at in enumerate(plan.points.modelled_mm + errors)
+    ]
+    largest_mm = np.linalg.norm(errors, axis=1).max()
+    return restore(plan, [folder.readings_entry(readings)]), largest_mm
+
+
+@pytest.mark.parametrize("assessor", ["search_and_confirm", "single_shot"])
+def test_noise_stated_far_above_noise_and_errors_is_told_for_bounds_fall_short(make_plan, assessor):
+    plan = make_plan(assessor)
+    state, largest_mm = near(plan, 0.006, 0.005)  # 0.05 mm is stated
+    assert all(said.upper_mm < largest_mm for said in state.statements())
+    (told,) = consistency.remarks(state)
+    assert "The noise is stated too large" in told
+    assert "cannot be relied on" in told
+    assert told in words.standing(state)
+    assert "too small" not in " ".join(words.statements(state))
+    assert told in of_calibration.Assessed(Path("check"), state, state.statements()[0]).in_words()
+
+
+def test_readings_of_a_perfect_arm_with_the_noise_stated_are_not_called_too_near(make_plan):
+    plan = make_plan()
+    found = [consistency.too_near(near(plan, 0.0, 0.05, seed)[0]) for seed in range(60)]
+    assert found == [None] * 60
+    assert consistency.remarks(restore(plan, [])) == []

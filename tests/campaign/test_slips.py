@@ -208,16 +208,16 @@ def test_where_hardly_any_joints_were_read_again_it_is_said_how_to_find_the_nois
     frames = {"model": ["dh"], "frame": ["base"], "session": ["0"], **quarter}
     frames |= {f"{axis}_mm": [0.0] for axis in "xyz"}
     told = slips.noise_by_repeats(*readings, frames)
-    assert "scatter" not in told
-    assert "go to one pose ten times" in told
+    assert "scatter by" not in told
+    assert "read a pose ten times" in told
 
 
 def test_a_campaign_without_noise_is_told_what_its_calibration_knows_of_it(start, tmp_path):
     for done in (start(), call("plan-campaign"), call("plan-campaign", "--errors", tmp_path)):
         assert done.exit_code == 2
         assert "noise: is not given; allowed: --noise-mm" in done.output
-        assert "go to one pose ten times" in done.output
-    assert "too few readings at equal joints" in start().output
+        assert "read a pose ten times" in done.output
+    assert "too few repeats" in start().output
     assert not (tmp_path / "check").exists()
 
 

@@ -1,4 +1,4 @@
-"""Whether repeated readings scatter as the stated noise says: what every bound rests on."""
+"""Whether readings scatter as the stated noise says: what every bound rests on."""
 
 from __future__ import annotations
 
@@ -82,6 +82,53 @@ def _mean(state: State, readings: list[Told]) -> tuple[list[np.ndarray], np.ndar
     weights = [np.linalg.inv(covariance_mm2(state.plan, each.reading)) for each in readings]
     sums = sum(w @ each.error_mm for w, each in zip(weights, readings, strict=True))
     return weights, np.linalg.solve(sum(weights), sums)
+
+
+def nearness(state: State) -> Scatter | None:
+    """Size of all readings, with the covariances stated, as scatter about the predictions.
+
+    Errors make readings larger than noise alone would, never smaller: ``too_small`` contradicts
+    the noise stated, whatever the errors are. None without a reading.
+    """
+    readings = [*state.told, *state.in_hand]
+    if not readings:
+        return None
+    from scipy.special import chdtrc
+
+    square, freedom = 0.0, 3 * len(readings)
+    for each in readings:
+        size = np.linalg.solve(covariance_mm2(state.plan, each.reading), each.error_mm)
+        square += float(each.error_mm @ size)
+    return Scatter(math.sqrt(square / freedom), freedom, float(chdtrc(freedom, square)))
+
+
+def too_near(state: State) -> str | None:
+    """That readings are nearer to the predictions than their noise lets any be, as a sentence."""
+    found = nearness(state)
+    if found is None or not found.too_small:
+        return None
+    return (
+        f"readings are {found.ratio:.2f} times as far from the predictions as the noise stated "
+        f"alone would take them ({found.freedom} degrees of freedom): nearer than chance allows of "
+        "an arm without errors. The noise is stated too large, or these are no readings: the "
+        "bounds cannot be relied on"
+    )
+
+
+def remarks(state: State) -> list[str]:
+    """What the readings say of the noise stated, a sentence each."""
+    near, found = too_near(state), scatter(state)
+    if near is not None:
+        # Bounds are wider for noise stated too large where errors outweigh it, and only there.
+        return [near]
+    return [] if found is None else [in_words(found)]
+
+
+def contradicted(state: State) -> list[str]:
+    """Those of ``remarks`` by which the bounds cannot be relied on."""
+    found = scatter(state)
+    contradicts = too_near(state) is not None or (found is not None and found.too_large)
+    return remarks(state) if contradicts else []
 
 
 def _square(state: State, readings: list[Told]) -> float:

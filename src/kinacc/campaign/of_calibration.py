@@ -12,7 +12,7 @@ import numpy as np
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import model_name
 from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
-from kinacc.campaign import folder, instrument, words
+from kinacc.campaign import consistency, folder, instrument, words
 from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.campaign.state import State
 from kinacc.deployment import folder as results
@@ -46,6 +46,7 @@ class Assessed:
         about, points = plan.about, len(plan.points) - len(state.left_out)
         return [
             words.statement(self.said, state) if self.said else "Nothing can be said yet.",
+            *consistency.contradicted(state),
             *words.begun_against(plan),
             f"campaign {self.place}: {about['point']} by the {model_name(about['model'])} model, "
             f"{points} candidates ({about['candidates']}), "
@@ -65,6 +66,7 @@ class Assessed:
             "candidates": len(plan.points) - len(self.state.left_out),
             "readings": self.state.taken,
             "noise": {each.name: instrument.noise(each) for each in plan.instruments},
+            "noise_contradicted": consistency.contradicted(self.state),
             "begun_against": list(plan.overruled),
         }
 

@@ -212,8 +212,7 @@ def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markd
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
     lines += map(written, words.not_counted(state))
-    found = consistency.scatter(state)
-    return lines if found is None else [*lines, consistency.in_words(found)]
+    return [*lines, *consistency.remarks(state)]
 
 
 def read_above(state: State, points: Columns) -> list[str]:

@@ -30,10 +30,8 @@ _LITTLE_NOISE = 0.8  # of the scatter that was measured
 _USUAL_READINGS = 10  # that say what size is usual
 _UNUSUAL = 6.0  # times the median size
 _FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
-MEASURE_IT = (
-    "go to one pose ten times, from elsewhere each time, and take the standard deviation per axis"
-)
-_TOO_FEW = f"the calibration holds too few readings at equal joints to tell the noise: {MEASURE_IT}"
+MEASURE_IT = "read a pose ten times, leaving it between, and take the scatter"
+_TOO_FEW = f"too few repeats: {MEASURE_IT}"
 
 
 def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> list[Problem]:

@@ -157,7 +157,7 @@ def statement(said: Statement, state: State) -> str:
     text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
     text += f", if {reason(said.assumption)}" if said.assumption else ""
-    against = doubt(said).replace("The bounds contradict", "They contradict")
+    against = doubt(said, state).replace("The bounds contradict", "They contradict")
     return f"{text}. {against}." if against else f"{text}."
 
 
@@ -173,9 +173,7 @@ def standing(state: State) -> list[str]:
         f"{points} points; {len(state.in_hand)} in hand, not asked for yet"
     ]
     lines += not_counted(state)
-    found = consistency.scatter(state)
-    if found is not None:
-        lines.append(consistency.in_words(found))
+    lines += consistency.remarks(state)
     if state.asked is not None:
         lines.append(f"measure next: point {state.plan.points.label[state.asked]}")
     elif len(state.told) >= budget:
@@ -211,7 +209,7 @@ def _about(said: Statement, state: State) -> str:
     return f"the largest error of {said.share:.1%} of the region"
 
 
-def doubt(said: Statement) -> str:
+def doubt(said: Statement, state: State) -> str:
     """What the figures of a statement say against it.
 
     Bounds are the narrowest of several looks, the estimate is of all readings: where it lies above
@@ -223,6 +221,8 @@ def doubt(said: Statement) -> str:
         found = "The estimate lies above the upper bound, which cannot be relied on"
     else:
         return ""
+    if consistency.too_near(state):
+        return f"{found}: the noise is stated too large, or these are no readings"
     return (
         f"{found}: the noise is stated too small, or this is one of the few campaigns the "
         "confidence allows to be wrong"

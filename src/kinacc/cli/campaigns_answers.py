@@ -161,6 +161,7 @@ def as_facts(found: State, tolerance: float | None) -> dict[str, object]:
         "left_out": {label[point]: reason for point, reason in found.left_out.items()},
         "struck": {str(each.number): reason for each, reason in found.struck},
         "scatter": _scatter_facts(found),
+        "too_near": consistency.too_near(found),
         "next": None if found.asked is None else label[found.asked],
         "statements": [_statement_facts(said, found, tolerance) for said in found.statements()],
     }

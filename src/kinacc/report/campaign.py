@@ -143,9 +143,8 @@ def _leading(state: State, said: Sequence[Statement]) -> Statement:
 
 def _against(state: State, said: Sequence[Statement]) -> list[str]:
     """Why the bounds cannot be relied on, a sentence each."""
-    found = consistency.scatter(state)
-    lines = [_sentence(consistency.in_words(found))] if found and found.too_large else []
-    return lines + [_sentence(text) for each in said if (text := words.doubt(each))]
+    doubts = (words.doubt(each, state) for each in said)
+    return [_sentence(text) for text in (*consistency.contradicted(state), *doubts) if text]
 
 
 def _badge(state: State, said: Sequence[Statement], lead: Statement) -> tuple[str, bool]:
@@ -206,7 +205,6 @@ def _notes(
     lead: Statement,
 ) -> tuple[tuple[str, tuple[Text, ...]], ...]:
     about, plan = state.plan.about, state.plan
-    found = consistency.scatter(state)
     check = [
         *marks.doubts(opened),
         *words.begun_against(plan),
@@ -215,7 +213,7 @@ def _notes(
     if state.in_hand:
         check.append(f"{len(state.in_hand)} readings were not asked for yet and are not used")
     noise = "no point was read three times or more: nothing holds the noise stated to readings"
-    noise = consistency.in_words(found) if found else noise
+    noise = "; ".join(consistency.remarks(state)) or noise
     valid = [
         f"only for {_population(state)}; nothing is said of other poses",
         f"off by: measured minus modelled position of the {about['point']}, model error; the robot "
@@ -229,7 +227,7 @@ def _notes(
     unsaid += words.not_counted(state)
     notes = {
         "CHECK": _lines(check),
-        "NOISE": () if found and found.too_large else _lines([noise]),
+        "NOISE": () if consistency.contradicted(state) else _lines([noise]),
         "VALID": _lines(valid),
         "OPEN": _lines(unsaid),
         "NEXT": _next(opened, state, said, lead),

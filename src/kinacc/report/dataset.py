@@ -2,24 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.artifacts.columns import Columns
 from kinacc.calibration.summary import Fact
 from kinacc.kinematics.robot import Robot
-from kinacc.report import first_screen, residuals
+from kinacc.report import (
+    accuracy_map,
+    data_check,
+    first_screen,
+    histories,
+    identifiability,
+    paper,
+    parameters,
+    residuals,
+    selection,
+    study,
+)
 from kinacc.report.first_screen import Answers
-from kinacc.report.page import Page
+from kinacc.report.page import Page, Section
+
+# In the order of the page: what a section reads, and how it is made.
+_OF_THE_FIT: tuple[tuple[str, Callable[..., Section]], ...] = (
+    ("pose_errors", residuals.section),
+    ("accuracy_map", accuracy_map.section),
+    ("measurements", data_check.section),
+    ("dh_covariance", identifiability.section),
+    ("dh_model", parameters.section),
+)
+_OF_THE_STUDY: tuple[tuple[str, Callable[..., Section]], ...] = (
+    ("study_summary", study.section),
+    ("histories", histories.section),
+    ("claims", paper.tables_section),
+    ("claims", paper.claims_section),
+)
 
 
 def page(
-    name: str, tables: Mapping[str, Columns], robot: Robot, facts: Sequence[Fact], answers: Answers
+    name: str,
+    tables: Mapping[str, Columns],
+    robot: Robot,
+    facts: Sequence[Fact],
+    answers: Answers,
+    campaign: Section | None,
 ) -> Page:
-    """The page on the tables of a data set."""
+    """The page on the tables of a data set; each section where there is what it reads."""
+    remedies = _remedies(tables.get("data_check"))
     return Page(
-        first_screen.screen(name, robot.name, facts, _remedies(tables.get("data_check")), answers),
-        (residuals.section(tables, robot),),
+        first_screen.screen(name, robot.name, facts, remedies, answers),
+        (
+            *(make(tables, robot) for needed, make in _OF_THE_FIT if needed in tables),
+            selection.section(tables, facts),
+            *([campaign] if campaign else []),
+            *(make(tables, robot) for needed, make in _OF_THE_STUDY if needed in tables),
+        ),
     )
 
 

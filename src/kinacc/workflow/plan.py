@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from kinacc.artifacts.error_models import ERROR_MODELS, asked_for
+from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.campaign.journal import JOURNAL, PLAN, of_results
 from kinacc.errors import InputError, Problem, gathered, refuse
@@ -25,6 +25,7 @@ from kinacc.workflow.catalogue import (
     Stage,
     maker_of,
 )
+from kinacc.workflow.configured import in_use, words_read
 from kinacc.workflow.runner import Job
 
 RESULTS = "results"
@@ -45,7 +46,7 @@ def planned(
     from kinacc.config.schema import without_execution_keys
     from kinacc.workflow.contradictions import load
 
-    full = load(paths, _read_words(overrides or {}))
+    full = load(paths, words_read(overrides or {}))
     formats = {name: tuple(config["figures"]["formats"]) for name, config in full.items()}
     first = next(iter(formats.values()))
     tournament = next(iter(full.values()))["tournament"]
@@ -64,7 +65,7 @@ def planned(
     ]
     refuse(problems)
     return Plan(
-        {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
+        {name: in_use(without_execution_keys(config)) for name, config in full.items()},
         {
             name: {section: config[section]["chunks"] for section in ("study", "choices")}
             for name, config in full.items()
@@ -432,60 +433,6 @@ def _is_current(table: str, files: Sequence[str], settings: Mapping[str, object]
         return read_metadata(table).get("config_hash") == config_hash(settings)
     except InputError:
         return False
-
-
-def _read_words(values: object) -> object:
-    """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
-    import yaml
-
-    if isinstance(values, Mapping):
-        return {key: _read_words(value) for key, value in values.items()}
-    if isinstance(values, (list, tuple)):
-        return [_read_words(value) for value in values]
-    if not isinstance(values, str):
-        return values
-    from kinacc.config.load import COMMAND_LINE
-    from kinacc.config.reading import unreadable
-
-    problem = unreadable(values, COMMAND_LINE)
-    if problem:
-        raise InputError(problem)
-    return yaml.safe_load(values)
-
-
-# Keys of files that tables of results do not know of where they are at their defaults.
-_LEFT_OUT_AS_USUAL = (
-    *("exclude", "thousands", "encoding", "sheet", "layout", "directions", "no_reading", "sigma"),
-    *("names", "pulses_per_deg", "repeats_in_names"),
-)
-
-
-def _in_use(config: dict) -> dict:
-    """The configuration without what it does not use.
-
-    That is the other source of measurements, models nobody asks for, and keys of files that are as
-    usual and came later than tables of results.
-    """
-    unused = {"synthetic", "file"} - {config["measurements"]["source"]}
-    measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
-    if "file" in measurements:
-        from kinacc.config.schema import defaults
-
-        usual = defaults()["measurements"]["file"]
-        file = {
-            key: value
-            for key, value in measurements["file"].items()
-            if key not in _LEFT_OUT_AS_USUAL or value != usual[key]
-            if key != "joints" or value["path"]
-        }
-        measurements = {**measurements, "file": file}
-    calibration, asked = config["calibration"], asked_for(config["calibration"])
-    calibration = {
-        name: section
-        for name, section in calibration.items()
-        if name in asked or name not in ERROR_MODELS
-    }
-    return {**config, "measurements": measurements, "calibration": calibration}
 
 
 def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:

@@ -6,11 +6,12 @@ import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
-from kinacc.campaign import of_calibration
+from kinacc.campaign import folder, of_calibration, report, words
+from kinacc.campaign.of_calibration import Assessed
 from kinacc.kinematics import robot
-from kinacc.report import dataset
+from kinacc.report import campaign, dataset
 from kinacc.report.first_screen import Answers
-from kinacc.report.page import Page
+from kinacc.report.page import Page, Section
 from kinacc.workflow.answer import told
 
 
@@ -25,18 +26,29 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
     tables = {role: each for role, each in inputs.items() if role not in files}
     campaigns = [each.parent for role, each in files.items() if role.startswith("campaign_")]
     bound = of_calibration.sought(name, tables, campaigns)
-    folder = Path(settings.get("folder", f"results/{name}"))
+    place = Path(settings.get("folder", f"results/{name}"))
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    found = told(folder, tables, bound, False, f"check_{name}", f"exported_{name}")
+    found = told(place, tables, bound, False, f"check_{name}", f"exported_{name}")
     assessed = bound.assessed
     answers = Answers(
         claims=found.claims,
         other=found.other,
         largest=found.largest,
-        statement=assessed.in_words()[0] if assessed else "",
+        statement=_statement(assessed) if assessed else "",
         tolerance_mm=assessed.state.plan.limits.tolerance_mm if assessed else None,
         following=found.following,
         outdated=settings.get("outdated", ()),
-        more=shlex.join(["kinacc", "fitted", str(folder), "--all"]),
+        more=shlex.join(["kinacc", "fitted", str(place), "--all"]),
     )
-    return dataset.page(name, tables, arm, found.facts, answers)
+    section = _campaign(assessed) if assessed else None
+    return dataset.page(name, tables, arm, found.facts, answers, section)
+
+
+def _statement(assessed: Assessed) -> str:
+    said = assessed.said
+    return words.pledge(said, assessed.state) if said else assessed.in_words()[0]
+
+
+def _campaign(assessed: Assessed) -> Section:
+    state, tables = report.tables(folder.open_(assessed.place))
+    return campaign.section(state, tables)
