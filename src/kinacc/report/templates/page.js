@@ -4,6 +4,7 @@
   "use strict";
   const {documents, places} = JSON.parse(document.getElementById("pictures").textContent);
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const narrow = window.matchMedia("(max-width: 40rem)").matches;
   const touched = window.matchMedia("(pointer: coarse)").matches;
   let printing = false;
   const opened = {};   // documents by name
@@ -29,10 +30,12 @@
         if (part.type === "Legend") {
           text(part, "label"); part.background_fill_color = paper;
           part.background_fill_alpha = 0.8; part.border_line_color = null;
+          part.spacing = narrow ? 2 : 8;
+          if (narrow) { part.label_text_font_size = "11px"; part.padding = part.label_standoff = 2; }
         }
         if (part.type === "ColorBar") {
           text(part, "title"); text(part, "major_label"); part.background_fill_color = null;
-          part.title_text_font_style = "normal";
+          part.title_text_font_style = "normal"; part.major_label_text_font_size = "13px";
         }
         if (part.type === "Title") part.text_color = ink;
         if (part.type === "Label" || part.type === "LabelSet") part.text_color = ink;
