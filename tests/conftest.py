@@ -66,6 +66,7 @@ SLOW = (
     "figures/test_figures.py",
     "kinematics/inverse/test_any_arm.py",
     "measurements/test_what_files_hold.py",
+    "report/test_in_a_browser.py",
     "study/tournament/test_tournament.py",
     "synthetic/test_accepted.py",
     "test_accuracy_map.py",
@@ -113,11 +114,15 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Say how many tests were skipped because measured data is absent, and where it is expected."""
+    """Say how many tests were skipped because measured data or a browser is absent."""
     import shared_data
 
     reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())]
     absent = sum(shared_data.ABSENT in reason for reason in reasons)
     if absent:
         line = f"{absent} skipped: the measured data sets are expected in {shared_data.FOLDER}"
+        terminalreporter.write_line(line, yellow=True)
+    unseen = sum("Chromium absent" in reason for reason in reasons)
+    if unseen:
+        line = f"{unseen} skipped: pages are looked at in Debian's chromium and chromium-driver"
         terminalreporter.write_line(line, yellow=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -165,4 +166,5 @@ def _notes(
 
 
 def _text(words: str) -> Text:
+    words = re.sub("\u00a0{2,}", "; ", words)  # columns of a terminal
     return Text(words, code=words.startswith("kinacc ") and not words.startswith("kinacc check-r"))

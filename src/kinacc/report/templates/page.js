@@ -1,9 +1,11 @@
-// Draws the pictures when they come near the window, in the colours of the page; sets what a
-// control says; tells what is selected.
+// Draws the pictures, first those near the window, in the colours of the page; sets what a control
+// says; tells what is selected; puts the pictures on paper as images.
 (() => {
   "use strict";
   const {documents, places} = JSON.parse(document.getElementById("pictures").textContent);
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const narrow = window.matchMedia("(max-width: 40rem)").matches;
+  const touched = window.matchMedia("(pointer: coarse)").matches;
   let printing = false;
   const opened = {};   // documents by name
   const drawn = {};    // promises by document
@@ -21,21 +23,26 @@
         if (part.type.endsWith("Axis")) {
           text(part, "axis_label"); text(part, "major_label");
           part.axis_label_text_font_style = "normal";
+          part.axis_label_text_font_size = part.major_label_text_font_size = "13px";
           part.axis_line_color = part.major_tick_line_color = muted;
           part.minor_tick_line_color = null;
         }
         if (part.type === "Legend") {
           text(part, "label"); part.background_fill_color = paper;
           part.background_fill_alpha = 0.8; part.border_line_color = null;
+          part.spacing = narrow ? 2 : 8;
+          if (narrow) { part.label_text_font_size = "11px"; part.padding = part.label_standoff = 2; }
         }
         if (part.type === "ColorBar") {
           text(part, "title"); text(part, "major_label"); part.background_fill_color = null;
+          part.title_text_font_style = "normal"; part.major_label_text_font_size = "13px";
         }
         if (part.type === "Title") part.text_color = ink;
         if (part.type === "Label" || part.type === "LabelSet") part.text_color = ink;
       }
     }
     if (plot.title) plot.title.text_color = ink;
+    if (touched) plot.toolbar.active_drag = null;  // a finger moves the page, not the picture
   }
 
   function open(name) {
@@ -87,6 +94,8 @@
       });
       await Bokeh.embed.add_document_standalone(open(name), elements[0], elements, false);
       for (const each of keys) {
+        // No key does anything in a picture, and what it tells stands in words and tables.
+        Bokeh.index.get(root(each)).canvas_view.events_el.tabIndex = -1;
         const source = data(root(each));
         source.selected.properties.indices.change.connect(() => tell(each, source));
       }
@@ -97,9 +106,31 @@
   const everything = () => Promise.all(Object.keys(places).map(draw));
   const repaint = () => Object.keys(drawn).forEach((name) => open(name).roots().forEach(paint));
 
+  // A browser prints what is there when this returns: no picture can be laid out or painted anew.
+  function toPaper() {
+    printing = true;
+    repaint();
+    for (const key of Object.keys(places)) {
+      const view = drawn[places[key].document] && Bokeh.index.get(root(key));
+      if (!view) continue;
+      view.paint();  // the legend was made anew by its colours, and its marks are drawn here
+      const image = document.createElement("img");
+      image.className = "paper";
+      image.alt = "";  // the picture beside it is described
+      image.src = view.export("png", true).canvas.toDataURL();
+      document.getElementById(`plot-${key}`).after(image);
+    }
+  }
+
+  function fromPaper() {
+    printing = false;
+    document.querySelectorAll("img.paper").forEach((each) => each.remove());
+    repaint();
+  }
+
   dark.addEventListener("change", repaint);
-  window.addEventListener("beforeprint", () => { printing = true; everything(); repaint(); });
-  window.addEventListener("afterprint", () => { printing = false; repaint(); });
+  window.addEventListener("beforeprint", toPaper);
+  window.addEventListener("afterprint", fromPaper);
 
   const near = new IntersectionObserver((entries) => {
     for (const entry of entries) {
@@ -110,6 +141,14 @@
     }
   }, {rootMargin: "600px"});
   document.querySelectorAll(".plot").forEach((each) => near.observe(each));
+
+  // The others while the reader reads, one document at a time, so that all are there to be printed.
+  const later = window.requestIdleCallback ?? ((todo) => setTimeout(todo, 200));
+  function drawRest() {
+    const key = Object.keys(places).find((each) => !drawn[places[each].document]);
+    if (key) draw(key).then(() => later(drawRest));
+  }
+  window.addEventListener("load", () => later(drawRest));
 
   // A glyph and those that take its place while something is selected.
   function looks(name, model) {

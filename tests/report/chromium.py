@@ -1,0 +1,86 @@
+"""Pages opened in real Chromium, as a reader opens them; what went wrong there fails the test."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+ABSENT = "Chromium absent: "
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+PHONE, DESK = (390, 844), (1100, 900)
+_READY = (
+    "const done = arguments[0]; kinacc.everything().then(() => done(null), (e) => done(`${e}`))"
+)
+
+
+class Chromium:
+    """A browser without a window, with the few things a reader does in it."""
+
+    def __init__(self):
+        from selenium import webdriver
+
+        options = webdriver.ChromeOptions()
+        options.binary_location = _program(NAMES)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        # --no-sandbox: in a container there is no sandbox to be had, and the pages are our own.
+        for option in ("--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"):
+            options.add_argument(option)
+        service = webdriver.ChromeService(_program(("chromedriver",)))
+        self.driver = webdriver.Chrome(options=options, service=service)
+        self.driver.set_script_timeout(60)
+
+    @contextmanager
+    def opened(self, path: Path, size=DESK, dark=False, drawn=True) -> Iterator[Chromium]:
+        """A page just opened; fails at the end where it complained or asked for another file."""
+        self.show(size, dark)
+        for kind in ("browser", "performance"):
+            self.driver.get_log(kind)
+        self.driver.get(path.as_uri())
+        if drawn:
+            self.draw()
+        yield self
+        worse = [each for each in self.driver.get_log("browser") if each["level"] != "INFO"]
+        assert worse == [], worse
+        asked = self._asked_for()
+        assert asked == {path.as_uri()}, asked
+
+    def show(self, size: tuple[int, int] = DESK, dark: bool = False, media: str = "") -> None:
+        """The size of the window, the colours the reader prefers, and screen or paper."""
+        width, height = size
+        told = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == PHONE}
+        self.command("Emulation.setDeviceMetricsOverride", **told)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.command("Emulation.setEmulatedMedia", media=media, features=[scheme])
+
+    def draw(self) -> None:
+        """Wait until every picture is drawn."""
+        assert self.driver.execute_async_script(_READY) is None
+
+    def run(self, script: str, *values: object):
+        """What a script returns; a promise is waited for."""
+        return self.driver.execute_script(f"return (async () => {{{script}}})()", *values)
+
+    def command(self, name: str, **values: object) -> dict:
+        return self.driver.execute_cdp_cmd(name, values)
+
+    def _asked_for(self) -> set[str]:
+        events = [json.loads(each["message"]) for each in self.driver.get_log("performance")]
+        sent = [each["message"] for each in events]
+        asked = [each for each in sent if each["method"] == "Network.requestWillBeSent"]
+        urls = {each["params"]["request"]["url"] for each in asked}
+        return {url.partition("#")[0] for url in urls if url.split(":")[0] not in ("data", "blob")}
+
+
+def _program(names: tuple[str, ...]) -> str:
+    """Path of the first of the programs that is there; skips the test where none is, but in CI."""
+    found = next(filter(None, map(shutil.which, names)), None)
+    if found is None:
+        told = f"{ABSENT}no {' or '.join(names)} on the search path"
+        pytest.fail(told) if os.environ.get("CI") else pytest.skip(told)
+    return found
