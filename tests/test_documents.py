@@ -12,8 +12,12 @@ from pathlib import Path
 import click
 import document_commands
 import pytest
+import yaml
 
 from kinacc.cli.group import main
+from kinacc.config.load import load
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import as_yaml
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
@@ -145,6 +149,22 @@ def test_held_out_errors_have_one_name_on_every_page_that_tells_of_them():
     said = re.compile("cross.valid", re.IGNORECASE)
     assert [page.name for page in others if said.search(page.read_text())] == []
     assert len(said.findall(glossary.read_text())) == 1
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_settings_that_are_shown_are_settings(page, tmp_path):
+    for number, (kind, text) in enumerate(BLOCK.findall(page.read_text())):
+        shown = yaml.safe_load(text) if kind == "yaml" else {}
+        if not {"datasets", "calibration"} & set(shown):
+            continue
+        arms = {name: {"robot": "ur10"} for name in shown.get("datasets", {"arm": {}})}
+        base, given = tmp_path / f"{number}.base.yaml", tmp_path / f"{number}.yaml"
+        base.write_text(yaml.safe_dump({"datasets": arms}))
+        given.write_text(text)
+        for each in shown.get("datasets", {}).values():
+            if each.get("robot", "").endswith(".yaml"):
+                (tmp_path / each["robot"]).write_text(as_yaml(robots.load("ur10")))
+        load([base, given])
 
 
 def test_every_page_stands_in_the_contents_of_the_site():
