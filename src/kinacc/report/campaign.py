@@ -163,9 +163,8 @@ def answers(state: State) -> tuple[str, ...]:
     said, tolerance = words.distinct(state), state.plan.limits.tolerance_mm
     lead, lines = _leading(state, said), _against(state, said)
     if lines:
-        lines.append("The bounds of the campaign are what the readings give by the noise stated; they are no "
-                     "statement on the arm.")  # fmt: skip
-        return tuple(lines)
+        by_noise = "The bounds of the campaign are what the readings give by the noise stated"
+        return (*lines, f"{by_noise}; they are no statement on the arm.")
     lines.append(words.pledge(lead, state))
     if np.isfinite(lead.upper_mm):
         known = [f"estimated at {lead.value_mm:.3f} mm"] if np.isfinite(lead.value_mm) else []
