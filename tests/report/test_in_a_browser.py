@@ -87,31 +87,48 @@ def test_the_page_opens_in_seconds_and_draws_every_picture_by_itself(chromium, p
     assert timing < 5000  # a guard: about 300 on a quiet core
 
 
-def test_every_choice_of_every_control_changes_its_picture_as_it_says(page):
-    found = page.run("""
-        const faults = []; let count = 0;
-        const look = (key) => Bokeh.index.get(kinacc.root(key)).export("png").canvas.toDataURL();
-        const same = (has, says) => says !== null && typeof says === "object"
-          ? Object.keys(says).every((name) => name === "type" || same(has[name], says[name]))
-          : has === says;
-        for (const select of document.querySelectorAll("select[data-picture]")) {
-          const key = select.dataset.picture, picture = kinacc.root(key);
-          const choices = [...select.options].map((each) => each.value);
-          const looks = [];
-          for (const choice of [...choices.slice(1), choices[0]]) {
-            select.value = choice;
-            select.dispatchEvent(new Event("change", {bubbles: true}));
-            await new Promise((go) => setTimeout(go, 60));
-            for (const [name, property, value] of JSON.parse(choice)) {
-              const model = picture.document.get_model_by_name(name);
-              if (!same(model[property], value)) faults.push([key, name, property, value]);
-            }
-            looks.push(look(key)); count += 1;
-          }
-          if (new Set(looks).size !== looks.length) faults.push([key, "looks alike"]);
+CHOICES = """
+    const faults = []; let count = 0;
+    const look = (key) => Bokeh.index.get(kinacc.root(key)).export("png").canvas.toDataURL();
+    const same = (has, says) => says !== null && typeof says === "object"
+      ? Object.keys(says).every((name) => name === "type" || same(has[name], says[name]))
+      : has === says;
+    for (const select of document.querySelectorAll("select[data-picture]")) {
+      const key = select.dataset.picture, picture = kinacc.root(key);
+      const choices = [...select.options].map((each) => each.value);
+      const looks = [];
+      for (const choice of [...choices.slice(1), choices[0]]) {
+        select.value = choice;
+        select.dispatchEvent(new Event("change", {bubbles: true}));
+        await new Promise((go) => setTimeout(go, 60));
+        for (const [name, property, value] of JSON.parse(choice)) {
+          const model = picture.document.get_model_by_name(name);
+          if (!same(model[property], value)) faults.push([key, name, property, value]);
         }
-        return {faults, count};
-    """)
+        looks.push(look(key)); count += 1;
+      }
+      if (new Set(looks).size !== looks.length) faults.push([key, "looks alike"]);
+    }
+    return {faults, count};
+"""
+SHOWS = """
+    const faults = [], buttons = [...document.querySelectorAll("button[data-pick]")];
+    if (buttons.length === 0) faults.push("no buttons");
+    for (const button of buttons) {
+      const key = button.dataset.picture, told = document.getElementById(`details-${key}`);
+      told.textContent = "";
+      button.click();
+      await new Promise((go) => setTimeout(go, 30));
+      const picked = kinacc.data(kinacc.root(key)).selected.indices;
+      if (picked.join() !== button.dataset.pick) faults.push([key, picked.join()]);
+      if (told.textContent === "") faults.push([key, "tells nothing"]);
+    }
+    return faults;
+"""
+
+
+def test_every_choice_of_every_control_changes_its_picture_as_it_says(page):
+    found = page.run(CHOICES)
     assert found["faults"] == []
     assert found["count"] >= 9
 
@@ -140,20 +157,7 @@ def test_a_click_on_a_point_tells_what_it_is(page):
 
 
 def test_show_selects_the_row_of_a_table_in_the_picture_and_tells_it(page):
-    faults = page.run("""
-        const faults = [], buttons = [...document.querySelectorAll("button[data-pick]")];
-        if (buttons.length === 0) faults.push("no buttons");
-        for (const button of buttons) {
-          const key = button.dataset.picture, told = document.getElementById(`details-${key}`);
-          told.textContent = "";
-          button.click();
-          await new Promise((go) => setTimeout(go, 30));
-          const picked = kinacc.data(kinacc.root(key)).selected.indices;
-          if (picked.join() !== button.dataset.pick) faults.push([key, picked.join()]);
-          if (told.textContent === "") faults.push([key, "tells nothing"]);
-        }
-        return faults;
-    """)
+    faults = page.run(SHOWS)
     assert faults == []
 
 
@@ -322,6 +326,31 @@ def test_the_first_screen_says_what_it_said(text, folder):
     if os.environ.get("KINACC_NEW_TEXT"):
         FIRST_SCREEN.write_text(saved, encoding="utf-8")
     assert saved == FIRST_SCREEN.read_text(encoding="utf-8")
+
+
+def test_pages_of_campaigns_and_comparisons_do_what_they_say_as_well(chromium, tmp_path):
+    from test_report_campaign import measured
+    from test_report_comparison import arm, paged
+
+    from kinacc.report.campaign import campaign_page
+    from kinacc.report.page import html
+
+    found = measured(tolerance_mm=2.0)
+    pages = {
+        "campaign": campaign_page(found.opened, found.state, found.tables),
+        "comparison": paged(arm(), arm("November", j3_alpha_rad=1e-3)),
+    }
+    for name, made in pages.items():
+        written = tmp_path / f"{name}.html"
+        written.write_text(html(made), encoding="utf-8")
+        with chromium.opened(written) as page:
+            choices = page.run(CHOICES)
+            assert (name, choices["faults"]) == (name, [])
+            assert choices["count"] > 0
+            assert (name, page.run(SHOWS)) == (name, [])
+            for dark in (False, True):
+                page.show(dark=dark)
+                assert (name, page.run(CONTRAST)) == (name, [])
 
 
 def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp_path):
