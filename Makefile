@@ -3,21 +3,26 @@
 # make public-robots  every measured arm in examples/data calibrated blind, and the page about it
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
+# make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make lock        renew requirements/*.txt (needs uv)
 # make clean       remove results/ and public-robots/; make distclean removes .venv as well
 #
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test docs docs-links lock clean distclean
 CORES = 2
 PY = .venv/bin/python
+# Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
+PYTEST = $(PY) -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 PIP = $(PY) -m pip install -qq --disable-pip-version-check
 
 # More BLAS threads change the last bits of a sum, and two jobs already fill two cores.
 export OPENBLAS_NUM_THREADS = 1
 export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
+# Bytecode that is kept spares every start a second, and the tests the rewriting of their assertions.
+unexport PYTHONDONTWRITEBYTECODE
 
 key = $(shell { cat $(1); pwd; } | cksum | tr -d ' ')
 PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
@@ -42,12 +47,20 @@ lint: $(KINACC) $(TOOLS)
 	$(PY) -m mypy
 
 check: lint
-	$(PY) -m pytest -n $(CORES) -m "not slow"
+	$(PYTEST) -m "not slow"
 
 test: lint
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
-	$(PY) -m pytest -n $(CORES)
+	$(PYTEST)
+
+SITE = $(PY) -m sphinx -q -W --keep-going -c docs
+docs: $(KINACC) $(TOOLS)
+	@$(SITE) . docs/_build
+	@echo "docs/_build/index.html"
+
+docs-links: $(KINACC) $(TOOLS)
+	$(SITE) -b linkcheck . docs/_build/links
 
 # A .venv that another folder or an unsupported Python left here is made anew.
 $(PACKAGES):
@@ -80,7 +93,7 @@ lock:
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
 
 clean:
-	rm -rf results public-robots .snakemake
+	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
 	rm -rf .venv

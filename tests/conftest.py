@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,20 +13,30 @@ from hypothesis import settings
 TESTS = Path(__file__).resolve().parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "tools")]
 
-# Files and folders left out of `make check`; measured with `pytest --durations=0`.
+# Files and folders left out of `make check`; measured with `pytest --durations=0`. The first ones
+# take longest: `make test` hands them out first, so that no worker is left alone with one.
 SLOW = (
+    "integration/test_installed.py",
+    "integration/test_changed_artefacts.py",
+    "integration/test_shared_cache.py",
+    "integration/test_same_bytes.py",
+    "integration/test_real_arm.py",
     "integration",
     "integration_oracle",
-    "artifacts/test_check.py",
+    "measurements/test_files_as_they_come.py",
+    "checks/test_planted_faults.py",
     "assess/test_adaptive.py",
     "assess/test_exact_scan.py",
     "assess/test_more_assessors.py",
     "assess/test_oracle_invalidation.py",
     "assess/test_size_limits.py",
+    "artifacts/test_check.py",
+    "calibration/test_chosen_order.py",
     "calibration/test_convergence.py",
     "calibration/test_dh_fit.py",
     "calibration/test_oracle_fits.py",
     "calibration/test_reach.py",
+    "calibration/test_repeated_configurations.py",
     "calibration/test_selection.py",
     "calibration/test_vec_fit.py",
     "campaign/test_campaign_commands.py",
@@ -35,20 +46,25 @@ SLOW = (
     "campaign/test_planning.py",
     "campaign/test_report_above_its_bounds.py",
     "campaign/test_state.py",
-    "checks/test_planted_faults.py",
+    "checks/test_advice_on_misread_files.py",
+    "cli/test_answer_at_the_end.py",
     "cli/test_check_data.py",
     "cli/test_init.py",
     "cli/test_init_readings.py",
+    "cli/test_init_robots.py",
     "cli/test_next_commands.py",
+    "cli/test_rows_as_the_user_calls_them.py",
+    "cli/test_the_same_readings_compared.py",
     "deployment/planning/test_exchange.py",
+    "deployment/test_applicability.py",
     "deployment/test_compare.py",
     "deployment/test_compensate.py",
+    "deployment/test_poses_unlike_the_measured.py",
     "deployment/test_predict.py",
     "figures/test_figure_files.py",
     "figures/test_figure_stages.py",
     "figures/test_figures.py",
     "kinematics/inverse/test_any_arm.py",
-    "measurements/test_files_as_they_come.py",
     "measurements/test_what_files_hold.py",
     "report/test_in_a_browser.py",
     "study/tournament/test_tournament.py",
@@ -69,17 +85,32 @@ SLOW = (
     "workflow/test_stopping.py",
     "workflow/test_tournament_command.py",
 )
+_SLOW = tuple(TESTS / name for name in SLOW)
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
 
 
+@cache
+def place(path: Path) -> int:
+    """Index in ``SLOW`` of what holds a file; the length of ``SLOW`` where it is quick."""
+    held = (number for number, slow in enumerate(_SLOW) if path.is_relative_to(slow))
+    return next(held, len(SLOW))
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Do not even read slow files where their tests are left out."""
+    if config.option.markexpr == "not slow" and place(collection_path) < len(SLOW):
+        return True
+    return None
+
+
 def pytest_collection_modifyitems(items):
-    """Mark the tests of slow files, so that ``-m "not slow"`` leaves them out."""
-    slow = tuple(TESTS / name for name in SLOW)
+    """Mark the tests of slow files, so that ``-m "not slow"`` leaves them out; longest first."""
     for item in items:
-        if any(item.path.is_relative_to(path) for path in slow):
+        if place(item.path) < len(SLOW):
             item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: place(item.path))
 
 
 def pytest_terminal_summary(terminalreporter):

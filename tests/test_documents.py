@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 import shlex
 import tomllib
 from pathlib import Path
 
 import click
+import document_commands
 import pytest
+import yaml
 
 from kinacc.cli.group import main
+from kinacc.config.load import load
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import as_yaml
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
@@ -19,6 +25,7 @@ PLACE = re.compile(r"`((?:src|tests|tools|workflow|docs|examples|benchmarks)/[\w
 MODULE = re.compile(r"\bkinacc(?:\.[a-z_]\w*)+")
 LINK = re.compile(r"\]\(([^)#\s]+)")
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)  # no reader sees it
 SHOWN = re.compile(r"^(?:\$ )?kinacc ([a-z][^\n]*)", re.MULTILINE)
 
 
@@ -70,7 +77,9 @@ def test_the_map_of_the_house_names_every_room_in_its_order():
 def shown_commands(page: Path) -> list[list[str]]:
     """Words of the command lines in a page's blocks, continued lines joined."""
     found = BLOCK.findall(page.read_text())
-    blocks = "\n".join(text for kind, text in found if kind in ("", "sh")).replace("\\\n", " ")
+    blocks = "\n".join(text for kind, text in found if kind in ("console", "sh")).replace(
+        "\\\n", " "
+    )
     return [shlex.split(line, comments=True) for line in SHOWN.findall(blocks)]
 
 
@@ -89,12 +98,19 @@ def test_commands_are_there_and_take_what_is_shown(page):
 
 
 # Looked up, never read from top to bottom.
-REFERENCE = ("artifacts", "claims", "configuration", "reading-the-paper", "tournament")
+REFERENCE = (
+    "artifacts",
+    "command-line",
+    "claims",
+    "configuration",
+    "reading-the-paper",
+    "tournament",
+)
 
 
 def test_pages_written_by_hand_are_short_enough_to_be_read():
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
-    words = {page.name: len(page.read_text().split()) for page in pages}
+    words = {page.name: len(re.sub(COMMENT, "", page.read_text()).split()) for page in pages}
     own = {name: count for name, count in words.items() if name.split(".")[0] not in REFERENCE}
     assert len(own) > 20
     assert {name: count for name, count in own.items() if count >= 1500} == {}
@@ -133,3 +149,55 @@ def test_held_out_errors_have_one_name_on_every_page_that_tells_of_them():
     said = re.compile("cross.valid", re.IGNORECASE)
     assert [page.name for page in others if said.search(page.read_text())] == []
     assert len(said.findall(glossary.read_text())) == 1
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_settings_that_are_shown_are_settings(page, tmp_path):
+    for number, (kind, text) in enumerate(BLOCK.findall(page.read_text())):
+        shown = yaml.safe_load(text) if kind == "yaml" else {}
+        if not {"datasets", "calibration"} & set(shown):
+            continue
+        arms = {name: {"robot": "ur10"} for name in shown.get("datasets", {"arm": {}})}
+        base, given = tmp_path / f"{number}.base.yaml", tmp_path / f"{number}.yaml"
+        base.write_text(yaml.safe_dump({"datasets": arms}))
+        given.write_text(text)
+        for each in shown.get("datasets", {}).values():
+            if each.get("robot", "").endswith(".yaml"):
+                (tmp_path / each["robot"]).write_text(as_yaml(robots.load("ur10")))
+        load([base, given])
+
+
+def test_every_page_stands_in_the_contents_of_the_site():
+    listed = set()
+    for name in ("index", "assessors"):
+        text = (ROOT / "docs" / f"{name}.md").read_text()
+        found = re.findall(r"^- \[[^]]*\]\(([^)#]+\.md)\)", text, re.MULTILINE)
+        listed |= {(ROOT / "docs" / each).resolve() for each in found}
+    pages = {*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")} - {ROOT / "docs" / "index.md"}
+    assert {page.name for page in pages - listed if "_build" not in page.parts} == set()
+
+
+def test_the_list_of_commands_is_what_their_help_says():
+    written = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
+    assert written == document_commands.command_line_markdown(), (
+        "run python tools/document_commands.py"
+    )
+
+
+PUBLIC = re.findall(r"^- `(kinacc\.[\w.]+)`$", (ROOT / "docs/api.md").read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_what_a_script_imports_says_what_it_is_for_its_shapes_and_its_units(name):
+    module, _, attribute = name.rpartition(".")
+    found = getattr(importlib.import_module(module), attribute)
+    told = inspect.getdoc(found)
+    assert told
+    assert told.splitlines()[0][0].isupper() or told.startswith("``")
+    signature = str(inspect.signature(found))
+    if "np.ndarray" in signature and not getattr(found, "_is_protocol", False):
+        assert re.search(r"\(\w+(, [\w +]+)*,?\)", told), "the shape of an array is missing"
+        without = ("choose", "order", "distances")  # of any unit: what is given is given back
+        assert attribute in without or re.search(r"\b(mm|rad|mrad)\b|_mm|_rad", told + signature)
+    if inspect.isfunction(found) and "InputError" in inspect.getsource(found):
+        assert "InputError" in told

@@ -85,26 +85,39 @@ def test_nearest_point_of_the_ball_to_fifty_digits():
 
 def exact_nearest(reading, covariance, radius) -> np.ndarray:
     """The same point from the secular equation in 50 digits, by bisection and Newton."""
-    matrix, y = mpmath.matrix(covariance.tolist()), mpmath.matrix(reading.tolist())
-    identity, radius = mpmath.eye(3), mpmath.mpf(float(radius))
+    s, y = ([mpmath.mpf(v) for v in each.ravel().tolist()] for each in (covariance, reading))
+    radius = mpmath.mpf(float(radius))
 
-    def point(t):
-        return mpmath.lu_solve(identity + t * matrix, y)
+    def solved(t, right):
+        """(1 + t S)^-1 right by Cramer's rule, five times as fast as a general solver here."""
+        a, b, c, d, e, f = (t * s[i] for i in (0, 1, 2, 4, 5, 8))
+        a, d, f = a + 1, d + 1, f + 1
+        first = (d * f - e * e, c * e - b * f, b * e - c * d)
+        second = (first[1], a * f - c * c, b * c - a * e)
+        third = (first[2], second[2], a * d - b * b)
+        whole = a * first[0] + b * first[1] + c * first[2]
+        return [_dot(row, right) / whole for row in (first, second, third)]
+
+    def size(x):
+        return mpmath.sqrt(_dot(x, x))
 
     low, high = mpmath.mpf(0), mpmath.mpf(1)
-    while mpmath.norm(point(high)) > radius:
+    while size(solved(high, y)) > radius:
         low, high = high, high * 8
     for _ in range(25):
         middle = (low + high) / 2
-        low, high = (middle, high) if mpmath.norm(point(middle)) > radius else (low, middle)
+        low, high = (middle, high) if size(solved(middle, y)) > radius else (low, middle)
     t = low
     for _ in range(8):
-        x = point(t)
-        size = mpmath.norm(x)
-        rate = mpmath.lu_solve(identity + t * matrix, matrix * x)
-        slope = (x.T * rate)[0] / size
-        t += (size - radius) / slope * size / radius
-    return np.array([float(each) for each in point(t)])
+        x = solved(t, y)
+        length = size(x)
+        slope = _dot(x, solved(t, [_dot(s[i : i + 3], x) for i in (0, 3, 6)])) / length
+        t += (length - radius) / slope * length / radius
+    return np.array([float(each) for each in solved(t, y)])
+
+
+def _dot(one, other):
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def test_nearest_point_of_the_ball_agrees_with_a_general_solver_where_that_converges():

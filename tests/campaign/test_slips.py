@@ -146,6 +146,25 @@ def test_tables_of_a_campaign_open_in_a_spreadsheet(visited, tmp_path):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
+def test_a_page_of_a_campaign_stands_beside_its_report_and_is_not_overwritten(visited, tmp_path):
+    folder, rows = visited
+    assert call("campaign", "record", folder, written(tmp_path / "r.csv", rows)).exit_code == 0
+    page = tmp_path / "check.html"
+    done = call("campaign", "report", folder, "--page", page)
+    assert done.exit_code == 0, done.output
+    assert done.output.splitlines()[-1] == str(page)
+    text = page.read_text("utf-8")
+    assert text.startswith("<!DOCTYPE html>")
+    assert "By a procedure whose bound is right in 95 of 100 campaigns, none of these" in text
+    assert "://" not in text.partition("<script")[0]
+    assert (folder / "report" / "report.md").is_file()
+    for other in (page, tmp_path / "check.pdf"):
+        done = call("campaign", "report", folder, "--page", other)
+        assert done.exit_code == 2
+        assert "Nothing was written" in done.output
+    assert page.read_text("utf-8") == text
+
+
 def readings_of(poses, times, std_mm, sessions=1, seed=3):
     """``measurements`` and ``pose_errors`` of poses read several times, bases of sessions apart."""
     rng = np.random.default_rng(seed)

@@ -183,6 +183,16 @@ def test_compare_draws_and_says_what_moved(folder, tmp_path):
     assert picture.stat().st_size > 5000
 
 
+def test_compare_writes_a_page_that_opens_with_what_moved(folder, tmp_path):
+    page = tmp_path / "moved.html"
+    done = call("compare", "mh180", folder, "--robot", "mh180", "--page", page)
+    assert done.exit_code == 0, done.output
+    assert "the modelled poses differ by" in page.read_text("utf-8")
+    done = call("compare", "mh180", folder, "--robot", "mh180", "--page", page)
+    assert done.exit_code == 2
+    assert "--force" in done.output
+
+
 def test_compare_says_that_robots_differ_and_refuses_what_cannot_be_compared():
     other = call("compare", "irb120", "meca500")
     assert other.exit_code == 0, other.output

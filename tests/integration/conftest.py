@@ -44,6 +44,11 @@ class Project:
 
     folder: Path
 
+    def copied(self, folder: Path) -> Project:
+        """A copy of it to be changed."""
+        shutil.copytree(self.folder, folder, symlinks=True)
+        return Project(folder)
+
     def snakemake(
         self,
         *targets: str,
@@ -154,7 +159,7 @@ def write_poses(path: Path, poses: int = 60) -> None:
 
 
 @pytest.fixture(scope="session")
-def finished_once(tmp_path_factory) -> Path:
+def finished(tmp_path_factory) -> Project:
     """A project whose small study has been run; shared by all workers, never changed."""
     base = tmp_path_factory.getbasetemp()
     base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
@@ -167,7 +172,7 @@ def finished_once(tmp_path_factory) -> Path:
                 break
             time.sleep(0.5)
         assert done.exists(), "the small study could not be run; see the other worker"
-        return folder
+        return Project(folder)
     try:
         _copy(ROOT, folder)
         (folder / "small.yaml").write_text(SMALL)
@@ -177,12 +182,10 @@ def finished_once(tmp_path_factory) -> Path:
         done.touch()
     finally:
         (base / "over").touch()
-    return folder
+    return Project(folder)
 
 
 @pytest.fixture
-def project(finished_once: Path, tmp_path: Path) -> Project:
+def project(finished: Project, tmp_path: Path) -> Project:
     """A copy of the finished project to be changed."""
-    folder = tmp_path / "a project"
-    shutil.copytree(finished_once, folder, symlinks=True)
-    return Project(folder)
+    return finished.copied(tmp_path / "a project")

@@ -13,7 +13,8 @@ import pytest
 
 from kinacc.artifacts import store
 
-MODEL = "results/mh180/dh_model.parquet"
+MODEL = "results/mh180/dh_model.parquet"  # nearly all that follows is made from it
+TABLE = "results/own/histories.parquet"  # two figures are
 CHUNK = "results/mh180/study_chunk/1-of-2.parquet"
 
 
@@ -38,27 +39,31 @@ def with_first(column, value):
     return change
 
 
-def edited(project):
+def model_edited(project):
     rewrite(project, MODEL, with_first("d_mm", 3.0))
 
 
+def edited(project):
+    rewrite(project, TABLE, with_first("eta_mm", 3.0))
+
+
 def cut(project):
-    path = project.folder / MODEL
+    path = project.folder / TABLE
     path.write_bytes(path.read_bytes()[:900])
 
 
 def lost(project):
-    (project.folder / MODEL).unlink()
+    (project.folder / TABLE).unlink()
 
 
 def swapped(project):
-    shutil.copy(project.folder / "results/own/dh_model.parquet", project.folder / MODEL)
+    shutil.copy(project.folder / "results/mh180/histories.parquet", project.folder / TABLE)
 
 
 def of_an_old_backup(project):
     """The file of an earlier run, with the date it had."""
     edited(project)
-    os.utime(project.folder / MODEL, (1e9, 1e9))
+    os.utime(project.folder / TABLE, (1e9, 1e9))
 
 
 def chunk_cut(project):
@@ -85,12 +90,12 @@ def claims_without_units(project):
 
 def study_edited_beside_a_part_of_other_numbers(project):
     """A part is left from a run in one part; the study itself has been edited."""
-    (project.folder / "results/mh180/study_chunk/1-of-1.parquet").write_bytes(b"PAR1")
-    rewrite(project, "results/mh180/study.parquet", with_first("assessed_mm", 0.5))
+    (project.folder / "results/own/study_chunk/1-of-1.parquet").write_bytes(b"PAR1")
+    rewrite(project, "results/own/study.parquet", with_first("assessed_mm", 0.5))
 
 
 def many(project):
-    for harm in (edited, chunk_cut, figure_cut, points_edited, claims_without_units):
+    for harm in (model_edited, chunk_cut, figure_cut, points_edited, claims_without_units):
         harm(project)
     (project.folder / "results/mh180/figures/fig1.svg").unlink()
 

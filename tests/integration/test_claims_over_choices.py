@@ -12,11 +12,18 @@ choices: {names: [search, wrist], runs: 2, chunks: 3}
 """
 
 
-@pytest.fixture
-def asked(project):
+@pytest.fixture(scope="module")
+def asked_once(finished, tmp_path_factory):
+    """The small study with its choices asked for; never changed."""
+    project = finished.copied(tmp_path_factory.mktemp("choices") / "a project")
     project.configure(FEW)
     project.snakemake("choices")
     return project
+
+
+@pytest.fixture
+def asked(asked_once, tmp_path):
+    return asked_once.copied(tmp_path / "a project")
 
 
 def made(project) -> dict[str, bytes]:

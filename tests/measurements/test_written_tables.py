@@ -441,6 +441,7 @@ def test_decimal_commas_between_commas_are_refused_with_the_reason(tmp_path):
         reading(file(tmp_path, lines(cells(decimal=","), mark=",")))
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_rows_take_seconds(tmp_path):
     import time
 

@@ -74,7 +74,7 @@ def test_how_good_how_sure_and_what_next_without_a_campaign():
     assert "Tolerance: none set." in shown
     assert "confidence" not in shown
     told = shown.index("line 534: measure it again"), shown.index("kinacc export results/cell")
-    assert shown.index("kinacc campaign start c") < told[0] < told[1]
+    assert told[0] < shown.index("kinacc campaign start c") < told[1]
 
 
 def test_figures_of_all_models_stand_on_the_same_rows():

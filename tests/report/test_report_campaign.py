@@ -114,7 +114,7 @@ def test_readings_that_scatter_more_than_stated_take_the_promise_back():
 
 
 def test_a_bound_as_small_as_the_noise_is_not_promised_for_less_noise():
-    first = first_of(measured(("tracker=0.5",), noise_mm=0.35, mean_mm=0.01))
+    first = first_of(measured(("tracker=0.5",), points=4, budget=40, noise_mm=0.5))
     upper = float(re.search(r"more than ([\d.]+) mm", first.answers[0])[1])
     assert upper < 1.5
     assert "the noise is exactly 0.5 mm per axis" in first.answers[0]
@@ -157,6 +157,16 @@ def test_what_was_struck_stands_there_with_its_reason_as_text_and_bytes_repeat()
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
     assert '<b>"' not in text
+
+
+def test_a_point_left_out_is_told_with_its_reason_and_no_candidate_any_more():
+    unread = measured(readings=6).state.rows[-1]
+    campaign = measured(readings=6, extra=(folder.leave_out_entry(int(unread), "behind a <b>"),))
+    built = campaign_page(campaign.opened, campaign.state, campaign.tables)
+    left = next(each for each in blocks(built.sections, Table) if "left out" in each.caption)
+    assert left.rows == ((campaign.state.plan.points.label[unread], "behind a <b>"),)
+    assert "these 11 candidates" in note(built.first, "VALID")
+    assert "was left out: behind a <b>" in note(built.first, "OPEN")
 
 
 def test_the_course_says_nothing_where_nothing_could_be_said(whole):

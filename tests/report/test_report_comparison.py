@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.config import schema
+from kinacc.deployment.applicability import measured_by_all
 from kinacc.deployment.compare import compare
+from kinacc.deployment.compare_words import in_words
 from kinacc.deployment.planning.candidates import spread
 from kinacc.deployment.record import Residual, nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
@@ -41,7 +43,9 @@ def arm(name="March", fitted=True, robot="ur10", **changes):
 def paged(first, second, shared=NONE_SHARED, poses=40):
     q_rad = spread(first.robot, poses)
     weight = schema.key("calibration.rotation_weight_mm_per_rad").default
-    return comparison_page(compare(first, second, q_rad, weight, shared), (first, second), q_rad)
+    found = compare(first, second, q_rad, weight, shared)
+    measured = measured_by_all((first, second), q_rad)
+    return comparison_page(found, (first, second), q_rad, measured)
 
 
 def note(built, name):
@@ -89,6 +93,30 @@ def test_a_change_at_poses_of_one_alone_that_the_model_may_lack_is_in_doubt():
     assert "leaves 0.9 mm and 0.9 mm rms unexplained" in note(built, "CHECK")
     assert "None of the 40 poses lie where both were measured" in note(built, "CHECK")
     assert "before anything is changed at the robot" in note(built, "NEXT")
+
+
+class Curves(dh.DHModel):
+    """A model whose parameters say nothing by themselves, as those of VEC."""
+
+    comparable = None
+
+
+def test_models_without_parameters_are_not_compared_where_one_was_never_measured():
+    first, far = arm(), (np.full(6, 3.0), np.full(6, 3.1))
+    fields_ = {each.name: getattr(first.model, each.name) for each in fields(first.model)}
+    first = replace(first, model=Curves(**fields_), choice="vec")
+    second = replace(first, name="November", fitted_range_rad=far)
+    built = paged(first, second)
+    assert built.first.badge == ("NOT COMPARABLE HERE", True)
+    assert (
+        "none of the 40 poses lie where both were measured, and a VEC model"
+        in (built.first.answers[0])
+    )
+    assert built.first.tables == ()
+    q_rad = spread(first.robot, 10)
+    measured = measured_by_all((first, second), q_rad)
+    assert "cannot be compared" in in_words(compare(first, second, q_rad, 100.0), (first, second),
+                                            measured)  # fmt: skip
 
 
 def test_a_robot_that_was_never_fitted_gives_distances_and_no_verdict():

@@ -56,7 +56,7 @@ def _one_base(part: Seen, model: DHModel, draws: int, stretches, targets: int) -
     for rows in _draws(part, draws, stretches):
         for _ in range(_REFINEMENTS):
             arm = _closed_form(part, flange, model, rows, targets)
-            misfit = _misfit(arm, part)
+            misfit = _misfit(arm, part, flange)
             middle = float(np.quantile(misfit, _JUDGED))
             if middle >= least:
                 break
@@ -67,7 +67,7 @@ def _one_base(part: Seen, model: DHModel, draws: int, stretches, targets: int) -
 
 def _placed(arm: Arm, part: Seen, flange: Pose, usual_mm: float) -> Arm:
     """The arm with targets that were in none of the readings chosen put where theirs have them."""
-    misfit = _misfit(arm, part)
+    misfit = _misfit(arm, part, flange)
     there = (part.cells.position_mm - arm.base.position_mm[0]) @ arm.base.rotation[0]
     there = np.einsum("nji,nj->ni", flange.rotation, there - flange.position_mm)
     points, turns = arm.targets.position_mm.copy(), arm.targets.rotation.copy()
@@ -101,22 +101,23 @@ def _draws(part: Seen, draws: int, stretches: tuple[int, ...]):
         yield np.flatnonzero(np.isin(part.cells.pose, chosen))
 
 
-def _misfit(arm: Arm, part: Seen) -> np.ndarray:
+def _misfit(arm: Arm, part: Seen, flange: Pose) -> np.ndarray:
     zero = Seen(part.cells, part.q, np.zeros_like(part.base), part.target)
-    return np.linalg.norm(residuals(arm, zero).position_mm, axis=1)
+    return np.linalg.norm(residuals(arm, zero, flange).position_mm, axis=1)
 
 
 def _closed_form(part: Seen, flange: Pose, model: DHModel, rows, targets: int) -> Arm:
     """Base and targets of ``rows``: of several base rotations the one that fits best."""
     turn, place = flange.rotation[rows], flange.position_mm[rows]
     measured, target = part.cells.position_mm[rows], part.target[rows]
-    rotations = [_of_free_matrix(turn, place, measured, target, targets)]
+    by_target = _by_target(turn, target, targets)
+    rotations = [nearest_rotation(_free_matrix(by_target, place, measured)).T]
     rotations.append(rigid_motion(place, measured)[0])
     turned = part.cells.turned[rows]
     for each in np.unique(target[turned]):
         of = turned & (target == each)
         rotations.append(_hand_eye(part.cells.rotation[rows][of], turn[of]))
-    solved = [_translations(each, turn, place, measured, target, targets) for each in rotations]
+    solved = [_translations(each, by_target, place, measured) for each in rotations]
     chosen = int(np.argmin([median for _, _, median in solved]))
     base, points, _ = solved[chosen]
     rotation = rotations[chosen]
@@ -128,22 +129,16 @@ def _closed_form(part: Seen, flange: Pose, model: DHModel, rows, targets: int) -
     return Arm(model, Pose(rotation[None], base[None]), Pose(turns, points))
 
 
-def _of_free_matrix(turn, place, measured, target, targets: int) -> np.ndarray:
-    """Base rotation from C m - R t + c = p, linear in a free matrix C, points t and c."""
-    solution = free_matrix(turn, place, measured, target, targets)
-    return nearest_rotation(solution).T
-
-
-def free_matrix(turn, place, measured, target, targets: int) -> np.ndarray:
-    """C (3, 3) of C m - R t + c = p, m in the unit of its spread: its sign tells a mirror."""
+def _free_matrix(by_target: np.ndarray, place, measured) -> np.ndarray:
+    """C (3, 3) of C m - R t + c = p, linear in a free matrix C, points t and c."""
     count = len(measured)
     centred = measured - measured.mean(axis=0)
     spread = np.abs(centred).max() or 1.0
-    design = np.zeros((count, 3, 12 + 3 * targets))
+    design = np.zeros((count, 3, 12 + by_target.shape[2]))
     for axis in range(3):
         design[:, axis, 3 * axis : 3 * axis + 3] = centred / spread
         design[:, axis, 9 + axis] = 1.0
-    design[:, :, 12:] = -_by_target(turn, target, targets)
+    design[:, :, 12:] = -by_target
     solution = np.linalg.lstsq(design.reshape(3 * count, -1), place.ravel(), rcond=_RCOND)[0]
     return solution[:9].reshape(3, 3) / spread
 
@@ -162,17 +157,17 @@ def _hand_eye(measured: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return nearest_rotation(base if np.linalg.det(base) > 0 else -base)
 
 
-def _translations(rotation, turn, place, measured, target, targets: int):
+def _translations(rotation, by_target: np.ndarray, place, measured):
     """Base position, target points and the median misfit, linear once the base is turned."""
     count = len(measured)
-    design = np.einsum("ij,njk->nik", rotation, _by_target(turn, target, targets))
+    design = np.einsum("ij,njk->nik", rotation, by_target)
     goal = measured - place @ rotation.T
     centred = (design - design.mean(axis=0)).reshape(3 * count, -1)
     points = np.linalg.lstsq(centred, (goal - goal.mean(axis=0)).ravel(), rcond=_RCOND)[0]
     rest = goal - design @ points
     base = rest.mean(axis=0)
     median = float(np.median(np.linalg.norm(rest - base, axis=1)))
-    return base, points.reshape(targets, 3), median
+    return base, points.reshape(-1, 3), median
 
 
 def _rigid(part: Seen, arm: Arm) -> tuple[np.ndarray, np.ndarray]:

@@ -99,9 +99,9 @@ def sigma_of(vectors: np.ndarray) -> float:
     return max(float(np.quantile(length, _QUANTILE)) / _QUANTILE_3D, _LEAST_SIGMA)
 
 
-def residuals(arm: Arm, seen: Seen) -> Residuals:
-    """What ``arm`` leaves of the readings."""
-    flange = dh.forward(arm.model, seen.q)
+def residuals(arm: Arm, seen: Seen, flange: Pose | None = None) -> Residuals:
+    """What ``arm`` leaves of the readings; ``flange`` (n) where the model's poses are known."""
+    flange = dh.forward(arm.model, seen.q) if flange is None else flange
     base = Pose(arm.base.rotation[seen.base], arm.base.position_mm[seen.base])
     rotation = base.rotation @ flange.rotation
     point = flange.position_mm + _turned(flange.rotation, arm.targets.position_mm[seen.target])
@@ -109,8 +109,9 @@ def residuals(arm: Arm, seen: Seen) -> Residuals:
     turned = rotation @ arm.targets.rotation[seen.target]
     turn = np.full(position.shape, np.nan)
     there = seen.cells.turned
-    measured = seen.cells.rotation[there]
-    turn[there] = log_so3(turned[there] @ np.swapaxes(measured, 1, 2))
+    if there.any():
+        measured = seen.cells.rotation[there]
+        turn[there] = log_so3(turned[there] @ np.swapaxes(measured, 1, 2))
     return Residuals(position - seen.cells.position_mm, turn, Pose(turned, position), rotation)
 
 

@@ -34,6 +34,7 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
     """
     from kinacc.cli import comparison_report
     from kinacc.config import schema
+    from kinacc.deployment.applicability import measured_by_all
     from kinacc.deployment.compare import compare as compared
     from kinacc.deployment.compare_words import in_words, short_names
     from kinacc.progress import reporting
@@ -44,6 +45,7 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
         ]
         q_rad = comparison_report.joints(calibrations, (first, second), joints, count)
         weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+        measured = measured_by_all(calibrations, q_rad)
         found = compared(*calibrations, q_rad, weight, comparison_report.shared((first, second)))
     answer = comparison_report.answer(found, calibrations, len(q_rad))
     if out.picture is not None:
@@ -53,5 +55,5 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
     if out.page is not None:
         from kinacc.report.comparison import comparison_page
 
-        out.write_page(comparison_page(found, calibrations, q_rad))
-    out.deliver(answer, in_words(found, calibrations))
+        out.write_page(comparison_page(found, calibrations, q_rad, measured))
+    out.deliver(answer, in_words(found, calibrations, measured))

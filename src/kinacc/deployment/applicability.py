@@ -17,6 +17,8 @@ those that the covariance does by 1.0 to 1.6 times.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kinacc.deployment.predict import BLOCK, along_open, sensitivity
@@ -70,6 +72,14 @@ def is_measured_there(
         rows = np.flatnonzero(inside)
         inside[rows] = position_std_mm(calibration, at.select(rows), point) <= most_mm
     return inside
+
+
+def measured_by_all(calibrations: Sequence[Calibration], q_rad: np.ndarray) -> np.ndarray:
+    """True (n,) where every calibration was measured, over reported joints (n, k)."""
+    found = [
+        is_measured_there(each, JointState(each.robot.dh_joints(q_rad))) for each in calibrations
+    ]
+    return np.all(found, axis=0)
 
 
 def share_of_box(calibration: Calibration, low: np.ndarray, high: np.ndarray) -> float:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.error_models import model_name
 from kinacc.calibration.uncertainty import unit_of
 from kinacc.deployment.compare import Difference, Parameters, Shift
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import SharedReadings
 
 _UNLIKELY = 0.001
+_ENOUGH = 0.5  # of the poses
 _NOTHING = 5e-5  # less is no digit of the four shown after the point
 
 
@@ -22,9 +24,15 @@ def short_names(calibrations: Sequence[Calibration]) -> tuple[str, str]:
     return (first, second) if first != second else (calibrations[0].name, calibrations[1].name)
 
 
-def in_words(found: Difference, calibrations: Sequence[Calibration]) -> str:
-    """What moved, in sentences."""
+def in_words(found: Difference, calibrations: Sequence[Calibration], measured: np.ndarray) -> str:
+    """What moved, in sentences; ``measured`` (n,): the poses where both were measured."""
     lines = of_readings(found.shared, calibrations)
+    if says_nothing(calibrations, measured):
+        why = nowhere(calibrations, measured)
+        lines.append(
+            f"these calibrations cannot be compared at these poses: {why}; compare at joints that "
+            "both cover (--joints), or the DH models (--model dh)"
+        )
     if not found.same_robot:
         first, second = (calibration.robot.name for calibration in calibrations)
         lines.append(
@@ -43,6 +51,25 @@ def in_words(found: Difference, calibrations: Sequence[Calibration]) -> str:
     lines.append(moved(words, found.as_they_stand))
     lines.append(moved("after the best base and tool", found.apart_from_frames))
     return "\n".join(lines)
+
+
+def says_nothing(calibrations: Sequence[Calibration], measured: np.ndarray) -> bool:
+    """Whether most poses are where models without parameters of their own say nothing."""
+    parametric = all(each.model.comparable is not None for each in calibrations)
+    return not parametric and float(np.mean(measured)) < _ENOUGH
+
+
+def nowhere(calibrations: Sequence[Calibration], measured: np.ndarray) -> str:
+    """Why a comparison at such poses means nothing."""
+    model = model_name(calibrations[0].choice)
+    return f"{of_both(measured)}, and a {model} model says nothing elsewhere"
+
+
+def of_both(measured: np.ndarray) -> str:
+    """How many poses lie where both calibrations were measured."""
+    both = int(np.sum(measured))
+    said = f"only {both}" if both else "none"
+    return f"{said} of the {len(measured)} poses lie where both were measured"
 
 
 def has_changed(found: Difference) -> bool:

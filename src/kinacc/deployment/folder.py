@@ -32,7 +32,10 @@ _SAME = 1e-9
 
 
 def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
-    """The tables of a data set's results folder. Raises InputError naming all that are missing."""
+    """The tables of a data set's results folder: columns (rows,) by table and name.
+
+    Units stand in the names (_mm, _rad). Raises InputError naming all tables that are missing.
+    """
     from kinacc.artifacts import store
 
     folder = Path(folder)

@@ -32,24 +32,28 @@ def start(count: int) -> Columns:
 def rotate_z(frames: Columns, angle_rad: np.ndarray | float) -> Columns:
     """Turn every frame about its own z axis."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
-    return frames._replace(x=c * frames.x + s * frames.y, y=c * frames.y - s * frames.x)
+    x, y, z, p_mm = frames
+    return Columns(c * x + s * y, c * y - s * x, z, p_mm)
 
 
 def rotate_x(frames: Columns, angle_rad: np.ndarray | float) -> Columns:
     """Turn every frame about its own x axis."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
-    return frames._replace(y=c * frames.y + s * frames.z, z=c * frames.z - s * frames.y)
+    x, y, z, p_mm = frames
+    return Columns(x, c * y + s * z, c * z - s * y, p_mm)
 
 
 def rotate_y(frames: Columns, angle_rad: np.ndarray | float) -> Columns:
     """Turn every frame about its own y axis."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
-    return frames._replace(x=c * frames.x - s * frames.z, z=c * frames.z + s * frames.x)
+    x, y, z, p_mm = frames
+    return Columns(c * x - s * z, y, c * z + s * x, p_mm)
 
 
 def shift(frames: Columns, axis: np.ndarray, distance_mm: np.ndarray | float) -> Columns:
     """Move every origin along ``axis`` (one of the frames' own columns)."""
-    return frames._replace(p_mm=frames.p_mm + distance_mm * axis)
+    x, y, z, p_mm = frames
+    return Columns(x, y, z, p_mm + distance_mm * axis)
 
 
 def disturb(frames: Columns, errors: np.ndarray) -> Columns:
@@ -65,6 +69,12 @@ def disturb(frames: Columns, errors: np.ndarray) -> Columns:
         z + ey * x - ex * y,
         p_mm + dx * x + dy * y + dz * z,
     )
+
+
+def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Cross products (3, n) of columns (3, n), with the bits of ``np.cross`` in less time."""
+    (a, b, c), (u, v, w) = one, other
+    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
 
 
 def to_pose(frames: Columns) -> Pose:

@@ -160,7 +160,7 @@ def joint_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
         if model.prismatic[joint]:
             jacobian[:, :3, joint], jacobian[:, 3:, joint] = axis.T, 0.0
             continue
-        jacobian[:, :3, joint] = np.cross(axis, frames.p_mm - origin, axis=0).T
+        jacobian[:, :3, joint] = _chain.cross(axis, frames.p_mm - origin).T
         jacobian[:, 3:, joint] = axis.T
     return jacobian
 
@@ -184,7 +184,7 @@ def parameter_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
         turns.append((joint, 4, frames.y, frames.p_mm))
         frames = _chain.rotate_y(frames, model.beta_rad[joint])
     for joint, column, axis, origin in turns:
-        jacobian[:, :3, joint, column] = np.cross(axis, frames.p_mm - origin, axis=0).T
+        jacobian[:, :3, joint, column] = _chain.cross(axis, frames.p_mm - origin).T
         jacobian[:, 3:, joint, column] = axis.T
     return jacobian
 

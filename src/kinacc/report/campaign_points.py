@@ -80,7 +80,7 @@ def _sizes(state: State, data: ColumnDataSource, hover: list[tuple[str, str]], k
     again = np.asarray(data.data["count"]) > 1
     limits = plot.segment(
         "place", "lower_mm", "place", "upper_mm", source=data, line_color=GREY, line_alpha=0.7,
-        legend_label="limits",
+        selection_line_color=VERMILION, legend_label="limits",
     )  # fmt: skip
     limits.glyph.name = f"{key}-limits"
     named = {f"{key}-limits": ("x0", "x1")}

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinacc.artifacts.error_models import model_name
-from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.compare import Difference, Parameters
 from kinacc.deployment.compare_words import (
     has_changed,
+    nowhere,
     number,
+    of_both,
     of_readings,
+    says_nothing,
     short_names,
     shown_in,
 )
@@ -27,10 +29,16 @@ _MOST_NAMED = 3
 
 
 def comparison_page(
-    found: Difference, calibrations: Sequence[Calibration], q_rad: np.ndarray
+    found: Difference,
+    calibrations: Sequence[Calibration],
+    q_rad: np.ndarray,
+    measured: np.ndarray,
 ) -> Page:
-    """The page of a comparison at reported joints ``q_rad`` (n, k), rad and mm."""
-    case = _case(found, calibrations, q_rad)
+    """The page of a comparison at reported joints ``q_rad`` (n, k), rad and mm.
+
+    ``measured`` (n,): the poses where both were measured.
+    """
+    case = _case(found, calibrations, q_rad, measured)
     first, second = case.names
     of_all = [each.robot.name for each in calibrations]
     screen = FirstScreen(
@@ -49,18 +57,19 @@ def comparison_page(
     return Page(screen, tuple(parts), {**made, "poses": str(len(q_rad))})
 
 
-def _case(found: Difference, calibrations: Sequence[Calibration], q_rad: np.ndarray) -> Case:
+def _case(
+    found: Difference,
+    calibrations: Sequence[Calibration],
+    q_rad: np.ndarray,
+    measured: np.ndarray,
+) -> Case:
     one = calibrations[0]
-    places = [JointState(each.robot.dh_joints(q_rad)) for each in calibrations]
-    measured = np.all(
-        [is_measured_there(each, at) for each, at in zip(calibrations, places, strict=True)], axis=0
-    )
     shown = np.where(one.robot.dh.prismatic, q_rad, np.rad2deg(q_rad))
-    position = one.pose(places[0], "base", FLANGE).position_mm
+    position = one.pose(JointState(one.robot.dh_joints(q_rad)), "base", FLANGE).position_mm
     left = tuple(each.residual.position_mm for each in calibrations if each.residual is not None)
     return Case(
         found, short_names(calibrations), one.choice, shown, one.robot.dh.prismatic, position,
-        measured, left, all(each.model.comparable is not None for each in calibrations),
+        measured, left, says_nothing(calibrations, measured),
     )  # fmt: skip
 
 
@@ -96,7 +105,7 @@ def _answers(case: Case, calibrations: Sequence[Calibration]) -> tuple[str, ...]
             f"These are different robots ({robots}): what follows is no change of one arm."
         )
     elif case.extrapolates:
-        why = f"{_not_measured(case)}, and a {model_name(case.model)} model says nothing elsewhere"
+        why = nowhere(calibrations, case.measured)
         return *lines, f"These calibrations cannot be compared at these poses: {why}."
     plain, apart = found.as_they_stand, found.apart_from_frames
     fitted = [each.known is not None for each in calibrations]
@@ -133,13 +142,6 @@ def _answers(case: Case, calibrations: Sequence[Calibration]) -> tuple[str, ...]
     return tuple(lines)
 
 
-def _not_measured(case: Case) -> str:
-    count = len(case.measured)
-    both = int(case.measured.sum())
-    said = "none" if both == 0 else f"only {both}"
-    return f"{said} of the {count} poses lie where both were measured"
-
-
 def _table(case: Case) -> Table:
     rows = []
     for key, shift in case.shifts.items():
@@ -159,7 +161,7 @@ def _notes(
         left = " and ".join(f"{number(each)} mm" for each in case.left_mm)
         check.append(f"the {model_name(case.model)} model leaves {left} rms unexplained")
     if case.measured.mean() < _MOSTLY and not case.extrapolates:
-        check.append(f"{_not_measured(case)}; elsewhere one of them is extrapolated")
+        check.append(f"{of_both(case.measured)}; elsewhere one of them is extrapolated")
     each = case.found.parameters
     notes = {
         "CHECK": check,

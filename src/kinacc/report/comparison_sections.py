@@ -30,7 +30,8 @@ LOOKS = {
 class Case:
     """What the page is about: the names, the poses (n, 3) of the first, and where it may be read.
 
-    ``measured`` (n,): where both calibrations were measured.
+    ``measured`` (n,): where both calibrations were measured; ``extrapolates``: at so few poses that
+    models without parameters of their own say nothing.
     """
 
     found: Difference
@@ -41,17 +42,12 @@ class Case:
     position_mm: np.ndarray
     measured: np.ndarray
     left_mm: tuple[float, ...]
-    parametric: bool
+    extrapolates: bool
 
     @property
     def shifts(self) -> Mapping[str, Shift]:
         """How poses moved, by what is done with base and tool."""
         return {"plain": self.found.as_they_stand, "apart": self.found.apart_from_frames}
-
-    @property
-    def extrapolates(self) -> bool:
-        """Whether most poses are where a model without parameters of its own says nothing."""
-        return not self.parametric and float(self.measured.mean()) < 0.5
 
     @property
     def in_doubt(self) -> bool:

@@ -158,8 +158,14 @@ def _notes(
         names = ", ".join(answers.outdated)
         words = f"{names}: made from other tables than those here, so not shown"
         notes.append(("LEFT OUT", [words, "kinacc check-results says what to run"]))
-    notes.append(("LARGEST ERROR", answers.largest))
-    notes.append(("NEXT", [*remedies, *answers.following]))
+    largest = list(answers.largest)
+    if answers.statement:
+        notes.append(("LARGEST ERROR", largest))
+        largest = []
+    largest = [
+        re.sub("^not assessed", "the largest error is not assessed", each) for each in largest
+    ]
+    notes.append(("NEXT", [*remedies, *largest, *answers.following]))
     notes += [(word, told[key]) for key, word in _NOTES.items()]
     notes.append(("OTHER ERRORS", answers.other))
     return [(name, tuple(_text(each) for each in texts)) for name, texts in notes if texts]

@@ -186,19 +186,16 @@ def documents(
     Plots that share data stand in one document, so that data is embedded once and a point that is
     selected in one is selected in all. Names count from 1 whatever was drawn before.
     """
-    groups: list[list[Plot]] = []
+    groups: list[tuple[set[str], list[Plot]]] = []
     for plot in plots:
-        shared = {each.id for each in _sources(plot)}
-        near = [
-            group for group in groups if any(shared & {s.id for s in _sources(p)} for p in group)
-        ]
-        if near:
-            near[0].append(plot)
-        else:
-            groups.append([plot])
+        own = {each.data_source.id for each in plot.renderers if hasattr(each, "data_source")}
+        near = [group for group in groups if group[0] & own]
+        groups = [group for group in groups if group not in near]
+        together = [each for group in near for each in group[1]]
+        groups.append((own.union(*(group[0] for group in near)), [*together, plot]))
     found: dict[str, object] = {}
     place: dict[str, tuple[str, str]] = {}
-    for number, group in enumerate(groups, start=1):
+    for number, (_, group) in enumerate(groups, start=1):
         document = Document()
         for plot in group:
             document.add_root(plot)
@@ -209,7 +206,3 @@ def documents(
         found[f"d{number}"] = json.loads(text)
         place |= {plot.id: (f"d{number}", names[plot.id]) for plot in group}
     return found, [place[plot.id] for plot in plots]
-
-
-def _sources(plot: Plot) -> list[ColumnDataSource]:
-    return list(plot.select({"type": ColumnDataSource}))

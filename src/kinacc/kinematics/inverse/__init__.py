@@ -122,8 +122,9 @@ def solve(
     within ``newton.POSITION_TOLERANCE_MM`` and ``newton.ROTATION_TOLERANCE_RAD``; otherwise it is
     dropped. Turns are those of ``limits.take_turns``. Solutions outside the joint limits are
     OUTSIDE_LIMITS, those within them but outside ``fitted_range_rad`` (k,), (k,) OUTSIDE_RANGE.
-    ``branches`` are some of ``branches_of``; None for all. ``grid_rad`` are the values of DH joint
-    1 at which the freedom of a seven-axis arm is sampled (``numeric.grid_of`` when not given).
+    ``branches`` are some of ``branches_of``, others raise InputError; None for all. ``grid_rad``
+    are the values of DH joint 1 at which the freedom of a seven-axis arm is sampled
+    (``numeric.grid_of`` when not given).
 
     With a closed form, a branch that converged to the joints of an earlier one is a DUPLICATE and
     branches keep the name they started from; on a calibrated arm one may be missed within 5 mm of

@@ -150,17 +150,18 @@
   }
   window.addEventListener("load", () => later(drawRest));
 
-  // {"type": "field", "field": "q1"} in a document is {"field": "q1"} in a model that was made of it.
-  function inside(value) {
-    if (value === null || typeof value !== "object" || !("type" in value)) return value;
-    const {type, ...rest} = value;
-    return rest;
+  // A glyph and those that take its place while something is selected.
+  function looks(name, model) {
+    const drawn = open(name).roots().flatMap((plot) => plot.renderers);
+    const own = drawn.filter((each) => each.glyph === model);
+    const others = own.flatMap((each) => [each.selection_glyph, each.nonselection_glyph]);
+    return [model, ...others.filter((each) => each && each !== model && each.properties)];
   }
 
   function set(select) {
     const {document: name} = places[select.dataset.picture];
     for (const [model, property, value] of JSON.parse(select.value)) {
-      open(name).get_model_by_name(model)[property] = inside(value);
+      for (const each of looks(name, open(name).get_model_by_name(model))) each[property] = value;
     }
   }
 

@@ -39,7 +39,7 @@ of upper bounds that are not below the truth; *excess* how far they are above it
 assessor keeps its confidence if no cell is significantly below it (binomial, family-wise 1 % by
 Holm) and none of 200 statements or more is further than three points below; fewer cannot tell.
 
-What each assessor does: [assessors](assessors/). Which to use:
+What each assessor does: [assessors](assessors.md#the-assessors). Which to use:
 [choosing an assessor](choosing-an-assessor.md). Why the bounds hold: [theory](assessors.md).
 The recommended one is `{RECOMMENDED}`. Your own robot takes part when it is in the configuration:
 `kinacc tournament --config config.yaml --config my-robot.yaml`.

@@ -1,0 +1,60 @@
+"""The site of the pages, as Sphinx builds it: ``make docs``, from the folder of the repository.
+
+The pages stay plain Markdown. Two things are made of what they hold anyway: the contents of the
+site from the lists of links in index.md and assessors.md, and the entries of the reference of
+the API from the names in api.md.
+"""
+
+import inspect
+import re
+from importlib import import_module
+
+from kinacc import __version__ as release  # noqa: F401
+
+project = "kinacc"
+copyright = "the kinacc developers"
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
+root_doc = "docs/index"
+include_patterns = ["*.md", "docs/**.md", "benchmarks/*.md", "config/*.md", "examples/data/*.md"]
+exclude_patterns = ["docs/_build"]
+myst_heading_anchors = 4  # by the same names as on a code host
+nitpicky = True
+nitpick_ignore_regex = [("py:.*", ".*")]  # types are named, not linked
+autodoc_typehints_format = "short"
+html_theme = "furo"
+html_title = "kinacc"
+html_copy_source = False
+html_extra_path = ["site/index.html"]
+html_static_path = ["site/wide.css"]
+html_css_files = ["wide.css"]
+html_theme_options = {"light_css_variables": {"code-font-size": "75%"}}
+
+_CONTENTS = ("docs/index", "docs/assessors")
+_LISTED = re.compile(r"^- \[([^]]*)\]\(([\w./-]+)\.md\)", re.MULTILINE)
+_NAME = re.compile(r"^- `(kinacc\.[\w.]+)`.*\n", re.MULTILINE)
+
+
+def _made_of_the_page(app: object, page: str, source: list[str]) -> None:
+    if page in _CONTENTS:
+        source[0] = "".join(map(_with_contents, re.split(r"^(?=## )", source[0], flags=re.M)))
+    if page == "docs/api":
+        source[0] = _NAME.sub(_entry, source[0])
+
+
+def _with_contents(section: str) -> str:
+    title = section.removeprefix("## ").splitlines()[0]
+    pages = [f"{name} <{page}>" for name, page in _LISTED.findall(section)]
+    if not pages:
+        return section
+    return "\n".join([section, "```{toctree}", ":hidden:", f":caption: {title}", *pages, "```\n"])
+
+
+def _entry(match: re.Match) -> str:
+    module, _, name = match[1].rpartition(".")
+    found = inspect.isclass(getattr(import_module(module), name))
+    return f"```{{eval-rst}}\n.. auto{'class' if found else 'function'}:: {match[1]}\n```\n\n"
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("source-read", _made_of_the_page)

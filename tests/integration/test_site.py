@@ -1,0 +1,58 @@
+"""The site of the pages: built without a warning, and read without a network."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+# Attributes by which a browser loads something while it shows a page.
+LOADED = {"src", "srcset", "poster", "data"}
+
+
+class Requests(HTMLParser):
+    """Addresses that a browser asks for to show a page, in the order they stand there."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag, attributes):
+        for name, value in attributes:
+            if name in LOADED or (tag == "link" and name == "href"):
+                self.found.append(value or "")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    """The site as ``make docs`` builds it."""
+    folder = tmp_path_factory.mktemp("site")
+    build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-c", "docs"]
+    places = ["-d", str(folder / "read"), ".", str(folder / "site")]
+    done = subprocess.run([*build, *places], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / "site"
+
+
+def test_every_page_is_there_and_asks_for_nothing_outside(site):
+    pages = list(site.rglob("*.html"))
+    names = {page.relative_to(site).as_posix() for page in pages}
+    assert {"index.html", "README.html", "docs/index.html", "docs/questions.html"} <= names
+    for page in pages:
+        asked = Requests()
+        asked.feed(page.read_text(encoding="utf-8"))
+        assert [each for each in asked.found if re.match(r"(\w+:)?//", each)] == [], page
+    for sheet in site.rglob("*.css"):
+        loaded = re.findall(r"url\(([^)]*)\)|@import", sheet.read_text(encoding="utf-8"))
+        assert [each for each in loaded if re.match(r"[\"']?(https?:)?//", each)] == [], sheet
+
+
+def test_the_names_a_script_imports_stand_there_with_what_they_do(site):
+    text = (site / "docs" / "api.html").read_text(encoding="utf-8")
+    assert 'id="kinacc.deployment.predict.predict"' in text
+    assert "at reported joints (n, k), rad and mm" in text

@@ -1,0 +1,50 @@
+"""Write docs/command-line.md from the commands' own help: ``python tools/document_commands.py``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from kinacc.cli.group import main
+
+_HEAD = """\
+# Commands and their options
+
+What `kinacc COMMAND --help` says, of every command. [What options and exit codes
+mean](commands.md) that all commands share is on a page of its own; what a stage
+(`kinacc run STAGE --help`) leaves is on that of [artefacts](artifacts.md).
+
+Written from the commands by `python tools/document_commands.py`.
+"""
+
+
+def command_line_markdown() -> str:
+    """The text of docs/command-line.md: commands in the sections and the order of the help."""
+    parts = [_HEAD]
+    for title, names in main.sections.items():
+        parts.append(f"## {title}\n")
+        for name in names:
+            parts += [_entry(words, command) for words, command in _below(name)]
+    return "\n".join(parts)
+
+
+def _below(name: str) -> Iterator[tuple[str, click.Command]]:
+    command = main.commands[name]
+    yield name, command
+    if isinstance(command, click.Group) and name != "run":  # its commands are the stages
+        for below in command.commands:
+            yield f"{name} {below}", command.commands[below]
+
+
+def _entry(words: str, command: click.Command) -> str:
+    context = click.Context(
+        command, info_name=f"kinacc {words}", max_content_width=80, terminal_width=80
+    )
+    return f"### kinacc {words}\n\n```text\n{command.get_help(context)}\n```\n"
+
+
+if __name__ == "__main__":
+    path = Path(__file__).parents[1] / "docs" / "command-line.md"
+    path.write_text(command_line_markdown(), encoding="utf-8")
