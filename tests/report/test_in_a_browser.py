@@ -63,6 +63,13 @@ def page(chromium, path):
         yield page
 
 
+@pytest.fixture
+def text(chromium, path):
+    """The page as it is before its pictures are drawn."""
+    with chromium.opened(path, drawn=False) as page:
+        yield page
+
+
 def test_the_page_opens_in_seconds_and_draws_every_picture_by_itself(chromium, path):
     with chromium.opened(path, drawn=False) as page:
         timing = page.run("return performance.getEntriesByType('navigation')[0].duration")
@@ -80,31 +87,48 @@ def test_the_page_opens_in_seconds_and_draws_every_picture_by_itself(chromium, p
     assert timing < 5000  # a guard: about 300 on a quiet core
 
 
-def test_every_choice_of_every_control_changes_its_picture_as_it_says(page):
-    found = page.run("""
-        const faults = []; let count = 0;
-        const look = (key) => Bokeh.index.get(kinacc.root(key)).export("png").canvas.toDataURL();
-        const same = (has, says) => says !== null && typeof says === "object"
-          ? Object.keys(says).every((name) => name === "type" || same(has[name], says[name]))
-          : has === says;
-        for (const select of document.querySelectorAll("select[data-picture]")) {
-          const key = select.dataset.picture, picture = kinacc.root(key);
-          const choices = [...select.options].map((each) => each.value);
-          const looks = [];
-          for (const choice of [...choices.slice(1), choices[0]]) {
-            select.value = choice;
-            select.dispatchEvent(new Event("change", {bubbles: true}));
-            await new Promise((go) => setTimeout(go, 60));
-            for (const [name, property, value] of JSON.parse(choice)) {
-              const model = picture.document.get_model_by_name(name);
-              if (!same(model[property], value)) faults.push([key, name, property, value]);
-            }
-            looks.push(look(key)); count += 1;
-          }
-          if (new Set(looks).size !== looks.length) faults.push([key, "looks alike"]);
+CHOICES = """
+    const faults = []; let count = 0;
+    const look = (key) => Bokeh.index.get(kinacc.root(key)).export("png").canvas.toDataURL();
+    const same = (has, says) => says !== null && typeof says === "object"
+      ? Object.keys(says).every((name) => name === "type" || same(has[name], says[name]))
+      : has === says;
+    for (const select of document.querySelectorAll("select[data-picture]")) {
+      const key = select.dataset.picture, picture = kinacc.root(key);
+      const choices = [...select.options].map((each) => each.value);
+      const looks = [];
+      for (const choice of [...choices.slice(1), choices[0]]) {
+        select.value = choice;
+        select.dispatchEvent(new Event("change", {bubbles: true}));
+        await new Promise((go) => setTimeout(go, 60));
+        for (const [name, property, value] of JSON.parse(choice)) {
+          const model = picture.document.get_model_by_name(name);
+          if (!same(model[property], value)) faults.push([key, name, property, value]);
         }
-        return {faults, count};
-    """)
+        looks.push(look(key)); count += 1;
+      }
+      if (new Set(looks).size !== looks.length) faults.push([key, "looks alike"]);
+    }
+    return {faults, count};
+"""
+SHOWS = """
+    const faults = [], buttons = [...document.querySelectorAll("button[data-pick]")];
+    if (buttons.length === 0) faults.push("no buttons");
+    for (const button of buttons) {
+      const key = button.dataset.picture, told = document.getElementById(`details-${key}`);
+      told.textContent = "";
+      button.click();
+      await new Promise((go) => setTimeout(go, 30));
+      const picked = kinacc.data(kinacc.root(key)).selected.indices;
+      if (picked.join() !== button.dataset.pick) faults.push([key, picked.join()]);
+      if (told.textContent === "") faults.push([key, "tells nothing"]);
+    }
+    return faults;
+"""
+
+
+def test_every_choice_of_every_control_changes_its_picture_as_it_says(page):
+    found = page.run(CHOICES)
     assert found["faults"] == []
     assert found["count"] >= 9
 
@@ -133,20 +157,7 @@ def test_a_click_on_a_point_tells_what_it_is(page):
 
 
 def test_show_selects_the_row_of_a_table_in_the_picture_and_tells_it(page):
-    faults = page.run("""
-        const faults = [], buttons = [...document.querySelectorAll("button[data-pick]")];
-        if (buttons.length === 0) faults.push("no buttons");
-        for (const button of buttons) {
-          const key = button.dataset.picture, told = document.getElementById(`details-${key}`);
-          told.textContent = "";
-          button.click();
-          await new Promise((go) => setTimeout(go, 30));
-          const picked = kinacc.data(kinacc.root(key)).selected.indices;
-          if (picked.join() !== button.dataset.pick) faults.push([key, picked.join()]);
-          if (told.textContent === "") faults.push([key, "tells nothing"]);
-        }
-        return faults;
-    """)
+    faults = page.run(SHOWS)
     assert faults == []
 
 
@@ -167,11 +178,10 @@ def test_the_tab_key_reaches_everything_in_the_order_of_the_page_and_shows_where
         });
         return all.filter((each) => each.checkVisibility()).map((each) => each.dataset.order);
     """)
-    ActionChains(page.driver).send_keys(*[Keys.TAB] * len(wanted)).perform()
+    ActionChains(page.driver).send_keys(*[Keys.TAB] * (len(wanted) + 20)).perform()
     met = page.run("return window.met")
     met = [each for each in met if 'class="wide"' not in each[0]]  # a wide table can be scrolled
-    assert [order for order, _ in met] == wanted[: len(met)]
-    assert len(met) == len(wanted)
+    assert [order for order, _ in met][: len(wanted)] == wanted
     assert all(seen for _, seen in met)
 
 
@@ -208,10 +218,10 @@ CONTRAST = """
 """
 
 
-@pytest.mark.parametrize("dark", [False, True])
-def test_text_stands_out_from_its_ground(page, dark):
-    page.show(dark=dark)
-    assert page.run(CONTRAST) == []
+def test_text_stands_out_from_its_ground_in_light_and_in_dark(text):
+    for dark in (False, True):
+        text.show(dark=dark)
+        assert text.run(CONTRAST) == []
 
 
 def test_pictures_follow_when_the_reader_turns_to_dark_colours(page):
@@ -229,9 +239,9 @@ def test_pictures_follow_when_the_reader_turns_to_dark_colours(page):
     )
 
 
-def test_on_paper_the_answer_fills_page_one_and_nothing_is_there_to_be_clicked(page):
-    page.show(PAPER_PX, dark=True, media="print")
-    seen = page.run("""
+def test_on_paper_the_answer_fills_page_one_and_nothing_is_there_to_be_clicked(text):
+    text.show(PAPER_PX, dark=True, media="print")
+    seen = text.run("""
         const screen = "select, button, nav, .skip, .screen, .plot";
         const clicked = [...document.querySelectorAll(screen)];
         return {
@@ -283,9 +293,9 @@ def test_on_a_phone_nothing_stands_out_to_the_side(chromium, path):
     assert wide == [PHONE[0]]
 
 
-def test_everything_has_a_name_that_is_read_aloud_and_headings_follow_in_order(page):
-    page.run("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
-    nodes = page.command("Accessibility.getFullAXTree")["nodes"]
+def test_everything_has_a_name_that_is_read_aloud_and_headings_follow_in_order(text):
+    text.run("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+    nodes = text.command("Accessibility.getFullAXTree")["nodes"]
     named = [
         (node["role"]["value"], node.get("name", {}).get("value", ""))
         for node in nodes
@@ -295,27 +305,52 @@ def test_everything_has_a_name_that_is_read_aloud_and_headings_follow_in_order(p
     found = [each for each in named if each[0] in meant]
     assert {"combobox", "button", "image", "heading"} <= {role for role, _ in found}
     assert [role for role, name in found if not name.strip()] == []
-    headings = page.run(
+    headings = text.run(
         "return [...document.querySelectorAll('h1, h2, h3, h4')].map((e) => e.tagName)"
     )
     levels = [int(each[1]) for each in headings]
     assert levels[0] == 1
     assert levels.count(1) == 1
     assert all(after <= before + 1 for before, after in pairwise(levels))
-    assert page.run("return document.documentElement.lang") == "en"
+    assert text.run("return document.documentElement.lang") == "en"
 
 
-def test_the_first_screen_says_what_it_said(page, folder):
+def test_the_first_screen_says_what_it_said(text, folder):
     """KINACC_NEW_TEXT=1 in the environment writes first_screen.txt anew."""
-    said = page.run("""
+    said = text.run("""
         const parts = [...document.querySelectorAll("header, #answer")];
         return parts.map((each) => each.innerText).join("\\n")
     """)
     said = said.replace(str(folder), "results/small").replace("\u00a0", " ")
-    text = "".join(f"{line.rstrip()}\n" for line in said.splitlines() if line.strip())
+    saved = "".join(f"{line.rstrip()}\n" for line in said.splitlines() if line.strip())
     if os.environ.get("KINACC_NEW_TEXT"):
-        FIRST_SCREEN.write_text(text, encoding="utf-8")
-    assert text == FIRST_SCREEN.read_text(encoding="utf-8")
+        FIRST_SCREEN.write_text(saved, encoding="utf-8")
+    assert saved == FIRST_SCREEN.read_text(encoding="utf-8")
+
+
+def test_pages_of_campaigns_and_comparisons_do_what_they_say_as_well(chromium, tmp_path):
+    from test_report_campaign import measured
+    from test_report_comparison import arm, paged
+
+    from kinacc.report.campaign import campaign_page
+    from kinacc.report.page import html
+
+    found = measured(tolerance_mm=2.0)
+    pages = {
+        "campaign": campaign_page(found.opened, found.state, found.tables),
+        "comparison": paged(arm(), arm("November", j3_alpha_rad=1e-3)),
+    }
+    for name, made in pages.items():
+        written = tmp_path / f"{name}.html"
+        written.write_text(html(made), encoding="utf-8")
+        with chromium.opened(written) as page:
+            choices = page.run(CHOICES)
+            assert (name, choices["faults"]) == (name, [])
+            assert choices["count"] > 0
+            assert (name, page.run(SHOWS)) == (name, [])
+            for dark in (False, True):
+                page.show(dark=dark)
+                assert (name, page.run(CONTRAST)) == (name, [])
 
 
 def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp_path):

@@ -1,9 +1,18 @@
 """Sections that repeat what a user wrote: escaped, and the same bytes every time."""
 
 import numpy as np
-from made_up_results import as_page, check, covariance, everything, identified, robot
+from made_up_results import (
+    as_page,
+    check,
+    covariance,
+    everything,
+    identified,
+    measurements,
+    pose_errors,
+    robot,
+)
 
-from kinacc.report import data_check, identifiability
+from kinacc.report import data_check, identifiability, residuals
 
 EVIL = '</script><script>alert("1")</script>'
 
@@ -26,3 +35,13 @@ def test_names_in_a_users_file_are_text_on_the_page_and_it_is_the_same_every_tim
     assert "<script>alert" not in first
     assert "&lt;script&gt;alert" in first
     assert first == page()
+
+
+def test_a_page_on_thirty_thousand_rows_can_still_be_mailed():
+    rows = 30_000
+    joints = np.random.default_rng(0).uniform(-1.0, 1.0, (rows, 4))
+    tables = everything() | {
+        "measurements": measurements(joints),
+        "pose_errors": pose_errors(rows=rows),
+    }
+    assert len(as_page(residuals.section(tables, robot())).encode()) < 2_500_000
