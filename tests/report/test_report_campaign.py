@@ -74,17 +74,17 @@ def test_the_first_sentence_is_a_promise_with_its_odds_its_poses_and_its_conditi
     assert first.answers[0] == (
         "By a procedure whose bound is right in 95 of 100 campaigns, none of these 12 candidates "
         f"is off by more than {upper:.3f} mm, if the noise is at most 0.05 mm per axis and nothing "
-        "moved."
+        "moved (base, tool, instrument)."
     )
     assert first.badge == ("WITHIN 2 mm", False)
-    assert "model error" in note(first, "VALID")
+    assert "This is the error of the model" in first.answers[-1]
     assert "these 12 candidates (drawn)" in note(first, "VALID")
 
 
 def test_a_tolerance_below_the_lower_bound_is_a_warning():
     first = first_of(measured(tolerance_mm=0.1))
     assert first.badge == ("BEYOND 0.1 mm", True)
-    assert "reject" in first.answers[-1]
+    assert "reject" in first.answers[-2]
 
 
 def test_two_instruments_are_named_with_the_noise_of_each():

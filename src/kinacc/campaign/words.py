@@ -112,7 +112,8 @@ def pledge(said: Statement, state: State) -> str:
         CANDIDATES: f"none of these {points} candidates {limit}",
         REGION: f"no more than {1.0 - said.share:.1%} of the region {limit}",
     }
-    needed = [reason(said.assumption) or "", _noise_assumed(said, state), "nothing moved"]
+    moved = "nothing moved (base, tool, instrument)"
+    needed = [reason(said.assumption) or "", _noise_assumed(said, state), moved]
     conditions = [each for each in needed if each]
     return (
         f"By a procedure whose bound is right in {how_often(said.confidence)}, "

@@ -19,6 +19,10 @@ from kinacc.report.campaign_course import course, mm, scatter
 from kinacc.report.campaign_points import points, readings
 from kinacc.report.page import FirstScreen, Page, Section, Table, Text
 
+_MODEL_ERROR = (
+    "This is the error of the model at these poses: the robot itself improves only once the "
+    "calibration is loaded into its controller, or its programs are compensated."
+)
 _VERDICTS = {ACCEPT: "WITHIN", REJECT: "BEYOND"}
 
 
@@ -120,12 +124,12 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
     visited = len({each.reading.point for each in state.told})
     candidates = len(plan.points) - len(state.left_out)
     first = FirstScreen(
-        f"Largest error of {about['robot']}",
-        f"{model_name(about['model'])} model of {about['calibration']}, {about['point']}; "
+        f"Largest error of the {model_name(about['model'])} model of {about['robot']}",
+        f"calibration {about['calibration']}, {about['point']}; "
         f"{len(state.told)} of {plan.assessor.measurements} readings, at {visited} of {candidates} "
         "candidates",
         _badge(state, said, lead),
-        answers(state),
+        (*answers(state), _MODEL_ERROR),
         (_statements(state, said),),
         _notes(opened, state, tables, said, lead),
     )
@@ -169,7 +173,7 @@ def answers(state: State) -> tuple[str, ...]:
     if np.isfinite(lead.upper_mm):
         known = [f"estimated at {lead.value_mm:.3f} mm"] if np.isfinite(lead.value_mm) else []
         if np.isfinite(lead.lower_mm):
-            known.append(f"at least {lead.lower_mm:.3f} mm, which is right as often")
+            known.append(f"at least {lead.lower_mm:.3f} mm, a bound that is right as often")
         if known:
             lines.append(f"The largest error among them is {', and '.join(known)}.")
     if tolerance is not None:
@@ -216,8 +220,7 @@ def _notes(
     noise = "; ".join(consistency.remarks(state)) or noise
     valid = [
         f"only for {_population(state)}; nothing is said of other poses",
-        f"off by: measured minus modelled position of the {about['point']}, model error; the robot "
-        f"itself is that accurate only once the {model_name(about['model'])} model is loaded",
+        f"off by: distance from measured to modelled position of the {about['point']}",
     ]
     unsaid = [
         words.statement(each, state)
@@ -250,8 +253,14 @@ def _next(
     if state.asked is not None:
         left = state.plan.assessor.measurements - len(state.told)
         label = state.plan.points.label[state.asked]
+        why = f"measure point {label}; {left} readings are left"
+        if (
+            limits.tolerance_mm is not None
+            and decide(lead, limits.tolerance_mm).verdict in _VERDICTS
+        ):
+            why = f"the tolerance is decided: you may end here, or narrow the bounds: {why}"
         return (
-            *_lines([f"measure point {label}; {left} readings are left"]),
+            *_lines([why]),
             Text(f"kinacc campaign next {folder}", code=True),
         )
     if limits.tolerance_mm is None:

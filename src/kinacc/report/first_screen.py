@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from kinacc.artifacts.allowed import FINDING_LEVELS
-from kinacc.artifacts.error_models import model_name
+from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
 from kinacc.report.page import FirstScreen, Table, Text
 
-_FIGURES = {"mean": "mean", "quantile_99": f"{LARGE_SHARE:.0%}", "largest": "largest"}
+_FIGURES = {
+    "mean": "mean",
+    "quantile_99": f"{LARGE_SHARE:.0%} are below",
+    "largest": "largest seen",
+}
 _OF_THE_PAPER = {"claims": "CLAIMS", "differ": "DIFFER"}
-_NO_CAMPAIGN = ("Largest error: not assessed (no campaign).", "Tolerance: none set.")
+_NO_CAMPAIGN = "Largest error of any pose: not assessed (no campaign); the largest seen is"
+_FOR = {  # commands that follow, and what they are for
+    "export": "files of the model for controllers and simulators:",
+    "compensate": "joints that put the tool at a pose:",
+    "campaign": "to go on with the campaign:",
+}
 _NOTES = {
     "excluded": "EXCLUDED",
     "selected": "SELECTED",
@@ -82,27 +91,37 @@ def _badge(facts: Sequence[Fact], synthetic: bool) -> tuple[str, bool]:
 
 
 def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
+    """How good, of which poses that holds, and what is known of the largest error."""
     chosen = of(facts, "selection")
     best = next(model for model, known in chosen.items() if known["selected"].value)
     held_out, trained = of(facts, "held_out_error"), of(facts, "training_error")
-    figures = (held_out or trained)[best]
-    whom = "poses no fit has seen" if held_out else "the poses it was fitted to"
-    size = {key: figures[key].value for key in _FIGURES}
+    errors = held_out or trained
+    size = {key: errors[best][key].value for key in _FIGURES}
+    plain = errors[NOMINAL]["mean"].value
     digits = _decimals([size["mean"]])
-    rows = counted(figures["n"].value, "held-out row")
+    rows = counted(errors[best]["n"].value, "row")
+    whom = "measured poses that its fit had not seen" if held_out else "the poses it was fitted to"
+    fitted = of(facts, "robot")["base and tool"]["fitted"].value
+    placed = ", with the best base and tool," if fitted else ""
     lines = [
         f"The calibrated model ({model_name(best)}) misses {whom} by {size['mean']:.{digits}f} "
         f"mm on average, {LARGE_SHARE:.0%} of them by less than {size['quantile_99']:.{digits}f} "
         "mm.",
+        f"The arm as its maker describes it{placed} misses them by {plain:.{digits}f} mm on "
+        "average. These are errors of models: the robot itself improves only once the calibration "
+        "is loaded into its controller, or its programs are compensated.",
     ]
     if held_out:
         lines.append(
-            f"Observed on {rows}; it says nothing of poses elsewhere. This is the error of the "
-            "model: the robot improves only once the calibration is loaded or used to compensate."
+            f"Observed on {rows}, each left out of the fit in turn; it says nothing of poses "
+            "elsewhere."
         )
     else:
         lines.append("No pose was held out: errors at other poses are larger, and unknown.")
-    return lines + (list(answers.campaign) or list(_NO_CAMPAIGN))
+    if answers.campaign:
+        first, *others = answers.campaign
+        return [*lines, f"Largest error, by a campaign at poses of its own: {first}", *others]
+    return [*lines, f"{_NO_CAMPAIGN} {size['largest']:.{digits}f} mm.", "Tolerance: none set."]
 
 
 def _errors(facts: Sequence[Fact]) -> tuple[Table, ...]:
@@ -112,7 +131,7 @@ def _errors(facts: Sequence[Fact]) -> tuple[Table, ...]:
     turned = of(facts, "held_out_orientation_error") if held_out else {}
     chosen = of(facts, "selection")
     count = next(iter(errors.values()))["n"].value
-    where = "poses left out of the fit" if held_out else "poses that were fitted"
+    where = "poses left out of the fit in turn" if held_out else "poses that were fitted"
     heads = ["model", *(f"{words}, mm" for words in _FIGURES.values())]
     heads += [f"{words}, mrad" for words in _FIGURES.values()] if turned else []
     digits = _decimals([figures["mean"].value for figures in errors.values()])
@@ -147,22 +166,45 @@ def _notes(
     """Lines under names in capitals; commands stand as code."""
     told = texts_of(facts, answers.more)
     notes = [(_OF_THE_PAPER[key], answers.claims[key]) for key in _OF_THE_PAPER if answers.claims]
-    notes.append(("CHECK", told["check"]))
+    notes.append(("CHECK", [*map(_without_code, told["check"]), *_sized_by(told["check"])]))
     if answers.outdated:
         names = ", ".join(answers.outdated)
         words = f"{names}: made from other tables than those here, so not shown"
         notes.append(("LEFT OUT", [words, "kinacc check-results says what to run"]))
     largest = list(answers.largest)
     if answers.campaign:
-        notes.append(("LARGEST ERROR", largest))
+        notes.append(("CAMPAIGN", largest[1:]))  # what may be said stands above
         largest = []
     largest = [
         re.sub("^not assessed", "the largest error is not assessed", each) for each in largest
     ]
-    notes.append(("NEXT", [*remedies, *largest, *answers.following]))
+    first = [f"{'then' if i else 'first'}, {each}" for i, each in enumerate(remedies)]
+    notes.append(("NEXT", [*first, *largest, *_captioned(answers.following)]))
     notes += [(word, told[key]) for key, word in _NOTES.items()]
     notes.append(("OTHER ERRORS", answers.other))
     return [(name, tuple(_text(each) for each in texts)) for name, texts in notes if texts]
+
+
+def _without_code(finding: str) -> str:
+    """A finding whose name is written as words."""
+    name, colon, rest = finding.partition(":")
+    return f"{name.replace('_', ' ')}{colon}{rest}" if name.isidentifier() else finding
+
+
+def _sized_by(findings: Sequence[str]) -> list[str]:
+    """Whose errors the check speaks of, where it does: they are not those of the table."""
+    if not any(" mm" in each for each in findings):
+        return []
+    return ["sizes here are those of the check's own quick fit, not of the models above"]
+
+
+def _captioned(commands: Sequence[str]) -> Iterator[str]:
+    """Commands, each below what it is for."""
+    for each in commands:
+        words = each.split()
+        if len(words) > 1 and words[1] in _FOR:
+            yield _FOR[words[1]]
+        yield each
 
 
 def _text(words: str) -> Text:
