@@ -118,13 +118,19 @@
       image.className = "paper";
       image.alt = "";  // the picture beside it is described
       image.src = view.export("png", true).canvas.toDataURL();
-      document.getElementById(`plot-${key}`).after(image);
+      const place = document.getElementById(`plot-${key}`);
+      const chosen = document.createElement("p");
+      chosen.className = "paper";
+      chosen.textContent = [...place.closest("figure").querySelectorAll("select")].map(
+        (each) => `${each.labels[0].firstChild.data.trim()}: ${each.selectedOptions[0].text}`,
+      ).join("; ");
+      place.after(chosen, image);
     }
   }
 
   function fromPaper() {
     printing = false;
-    document.querySelectorAll("img.paper").forEach((each) => each.remove());
+    document.querySelectorAll(".paper").forEach((each) => each.remove());
     repaint();
   }
 
