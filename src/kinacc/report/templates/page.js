@@ -42,6 +42,12 @@
       }
     }
     if (plot.title) plot.title.text_color = ink;
+    for (const {selection_glyph: picked} of plot.renderers) {
+      if (picked?.type !== "Scatter") continue;
+      picked.line_color = ink;  // a ring that is seen among points of any colour
+      picked.line_width = 4;
+      picked.line_alpha = picked.fill_alpha = 1;
+    }
     if (touched) plot.toolbar.active_drag = null;  // a finger moves the page, not the picture
   }
 
