@@ -145,6 +145,7 @@ up to date. It writes [public-robots.csv](public-robots.csv), which has every er
 [examples/data](../examples/data/README.md) under these names and, for the UR5, target plus
 difference as `x_mm`, `y_mm`, `z_mm`:
 
+<!-- not run: make public-robots types them, which takes minutes -->
 ```sh
 {commands}
 ```

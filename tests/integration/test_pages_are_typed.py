@@ -213,7 +213,7 @@ def test_a_page_does_what_it_says(page, shell, calibrated, request, tmp_path):
     assumed = textwrap.dedent(ASSUMED.get(name, ""))
     if name == "docs/the-paper.md":  # of the small study that other tests need as well
         shutil.rmtree(clone / "results")
-        shutil.copytree(request.getfixturevalue("finished_once") / "results", clone / "results")
+        shutil.copytree(request.getfixturevalue("finished").folder / "results", clone / "results")
     code, printed, _ = shell(assumed, start, HOME=str(home))
     assert code == 0, printed
     assert typed(shell, page, start, home, clone)[0] == []

@@ -8,7 +8,7 @@ from kinacc.calibration.summary import Fact
 from kinacc.report import first_screen, page
 from kinacc.report.first_screen import Answers
 
-NOTHING = Answers({}, [], [], "", None, [], [], "kinacc fitted results/cell --all")
+NOTHING = Answers({}, [], [], (), [], [], "kinacc fitted results/cell --all")
 
 
 def errors(topic, **by_model):
@@ -61,7 +61,7 @@ def words(found, answers=NOTHING, remedies=(), name="cell"):
 def test_how_good_how_sure_and_what_next_without_a_campaign():
     shown = words(
         facts(),
-        Answers({}, [], ["a campaign bounds it:", "kinacc campaign start c"], "", None,
+        Answers({}, [], ["a campaign bounds it:", "kinacc campaign start c"], (),
                 ["kinacc export results/cell"], [], ""),
         ["line 534: measure it again"],
     )  # fmt: skip
@@ -87,10 +87,12 @@ def test_figures_of_all_models_stand_on_the_same_rows():
 
 def test_a_confidence_stands_there_only_from_a_campaign():
     statement = "The largest error of all 200 candidates is at most 0.964 mm with 95% confidence."
-    shown = words(facts(), Answers({}, [], [statement], statement, 1.0, [], [], ""))
-    assert statement in shown
+    said = (statement, "Tolerance 1 mm: accept.")
+    shown = words(facts(), Answers({}, [], ["campaign check"], said, [], [], ""))
+    assert shown.index("Observed on 1495 held-out rows") < shown.index(statement)
+    assert "Tolerance 1 mm: accept." in shown
     assert "not assessed" not in shown
-    assert "Tolerance: 1 mm." in shown
+    assert "none set" not in shown
 
 
 def test_no_pose_was_held_out():
@@ -135,7 +137,7 @@ def test_a_synthetic_arm_is_called_one():
 
 
 def test_tables_of_an_earlier_run_are_named_and_not_shown():
-    left_out = Answers({}, [], [], "", None, [], ["accuracy_map", "claims"], "")
+    left_out = Answers({}, [], [], (), [], ["accuracy_map", "claims"], "")
     assert "accuracy_map, claims: made from other tables than those here" in words(
         facts(), left_out
     )

@@ -125,7 +125,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
         f"{len(state.told)} of {plan.assessor.measurements} readings, at {visited} of {candidates} "
         "candidates",
         _badge(state, said, lead),
-        _answers(state, said, lead),
+        answers(state),
         (_statements(state, said),),
         _notes(opened, state, tables, said, lead),
     )
@@ -158,13 +158,13 @@ def _badge(state: State, said: Sequence[Statement], lead: Statement) -> tuple[st
     return ("tolerance: none set", False) if tolerance is None else ("UNDECIDED", True)
 
 
-def _answers(state: State, said: Sequence[Statement], lead: Statement) -> tuple[str, ...]:
-    tolerance = state.plan.limits.tolerance_mm
-    lines = _against(state, said)
+def answers(state: State) -> tuple[str, ...]:
+    """What may be said of the largest error, the most important sentence first."""
+    said, tolerance = words.distinct(state), state.plan.limits.tolerance_mm
+    lead, lines = _leading(state, said), _against(state, said)
     if lines:
-        lines.append("The bounds below are what the readings give by the noise stated; they are no "
-                     "statement on the arm.")  # fmt: skip
-        return tuple(lines)
+        by_noise = "The bounds of the campaign are what the readings give by the noise stated"
+        return (*lines, f"{by_noise}; they are no statement on the arm.")
     lines.append(words.pledge(lead, state))
     if np.isfinite(lead.upper_mm):
         known = [f"estimated at {lead.value_mm:.3f} mm"] if np.isfinite(lead.value_mm) else []

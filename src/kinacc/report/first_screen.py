@@ -15,6 +15,7 @@ from kinacc.report.page import FirstScreen, Table, Text
 
 _FIGURES = {"mean": "mean", "quantile_99": f"{LARGE_SHARE:.0%}", "largest": "largest"}
 _OF_THE_PAPER = {"claims": "CLAIMS", "differ": "DIFFER"}
+_NO_CAMPAIGN = ("Largest error: not assessed (no campaign).", "Tolerance: none set.")
 _NOTES = {
     "excluded": "EXCLUDED",
     "selected": "SELECTED",
@@ -29,15 +30,14 @@ class Answers:
     """What is to be told beside the facts: texts, and commands that follow.
 
     ``claims`` on the paper by name, ``other`` errors of other populations, ``largest`` what there
-    is to say of the largest error, ``statement`` the sentence of a campaign, empty without one;
+    is to say of the largest error, ``campaign`` the sentences of a campaign, none without one;
     ``outdated`` tables are not shown.
     """
 
     claims: Mapping[str, Sequence[str]]
     other: Sequence[str]
     largest: Sequence[str]
-    statement: str
-    tolerance_mm: float | None
+    campaign: Sequence[str]
     following: Sequence[str]
     outdated: Sequence[str]
     more: str
@@ -95,10 +95,6 @@ def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
         f"mm on average, {LARGE_SHARE:.0%} of them by less than {size['quantile_99']:.{digits}f} "
         "mm.",
     ]
-    if answers.statement:
-        lines.append(answers.statement)
-    else:
-        lines.append("Largest error: not assessed (no campaign).")
     if held_out:
         lines.append(
             f"Observed on {rows}; it says nothing of poses elsewhere. This is the error of the "
@@ -106,9 +102,7 @@ def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
         )
     else:
         lines.append("No pose was held out: errors at other poses are larger, and unknown.")
-    tolerance = answers.tolerance_mm
-    lines.append(f"Tolerance: {'none set' if tolerance is None else f'{tolerance:g} mm'}.")
-    return lines
+    return lines + (list(answers.campaign) or list(_NO_CAMPAIGN))
 
 
 def _errors(facts: Sequence[Fact]) -> tuple[Table, ...]:
@@ -159,7 +153,7 @@ def _notes(
         words = f"{names}: made from other tables than those here, so not shown"
         notes.append(("LEFT OUT", [words, "kinacc check-results says what to run"]))
     largest = list(answers.largest)
-    if answers.statement:
+    if answers.campaign:
         notes.append(("LARGEST ERROR", largest))
         largest = []
     largest = [

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
-from kinacc.campaign import folder, of_calibration, report, words
+from kinacc.campaign import folder, of_calibration, report
 from kinacc.campaign.of_calibration import Assessed
 from kinacc.kinematics import robot
 from kinacc.report import campaign, dataset
@@ -34,19 +34,13 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
         claims=found.claims,
         other=found.other,
         largest=found.largest,
-        statement=_statement(assessed) if assessed else "",
-        tolerance_mm=assessed.state.plan.limits.tolerance_mm if assessed else None,
+        campaign=campaign.answers(assessed.state) if assessed else (),
         following=found.following,
         outdated=settings.get("outdated", ()),
         more=shlex.join(["kinacc", "fitted", str(place), "--all"]),
     )
     section = _campaign(assessed) if assessed else None
     return dataset.page(name, tables, arm, found.facts, answers, section)
-
-
-def _statement(assessed: Assessed) -> str:
-    said = assessed.said
-    return words.pledge(said, assessed.state) if said else assessed.in_words()[0]
 
 
 def _campaign(assessed: Assessed) -> Section:
