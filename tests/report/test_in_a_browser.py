@@ -267,6 +267,7 @@ def test_printed_from_a_dark_screen_every_picture_is_there_in_light_colours(page
           window.printed = {
             pictures: painted.length,
             images: document.querySelectorAll("img.paper[src^='data:image/png']").length,
+            chosen: [...document.querySelectorAll("p.paper")].map((each) => each.textContent),
             inks: [...new Set(painted.map(ink))],
           };
         });
@@ -276,7 +277,8 @@ def test_printed_from_a_dark_screen_every_picture_is_there_in_light_colours(page
     printed = page.run("return window.printed")
     assert printed["images"] == printed["pictures"] > 0
     assert printed["inks"] == ["#1d1d1f"]
-    assert page.run("return document.querySelectorAll('img.paper').length") == 0
+    assert {"Joint: 1", "Axes: x and y"} <= set(printed["chosen"])
+    assert page.run("return document.querySelectorAll('.paper').length") == 0
     sizes = {tuple(map(float, each)) for each in re.findall(rb"/MediaBox \[0 0 (\S+) (\S+)\]", pdf)}
     assert {tuple(map(round, each)) for each in sizes} == {(595, 842)}
     assert pdf.count(b"/Subtype /Image") >= printed["pictures"]

@@ -42,6 +42,12 @@
       }
     }
     if (plot.title) plot.title.text_color = ink;
+    for (const {selection_glyph: picked} of plot.renderers) {
+      if (picked?.type !== "Scatter") continue;
+      picked.line_color = ink;  // a ring that is seen among points of any colour
+      picked.line_width = 4;
+      picked.line_alpha = picked.fill_alpha = 1;
+    }
     if (touched) plot.toolbar.active_drag = null;  // a finger moves the page, not the picture
   }
 
@@ -118,13 +124,19 @@
       image.className = "paper";
       image.alt = "";  // the picture beside it is described
       image.src = view.export("png", true).canvas.toDataURL();
-      document.getElementById(`plot-${key}`).after(image);
+      const place = document.getElementById(`plot-${key}`);
+      const chosen = document.createElement("p");
+      chosen.className = "paper";
+      chosen.textContent = [...place.closest("figure").querySelectorAll("select")].map(
+        (each) => `${each.labels[0].firstChild.data.trim()}: ${each.selectedOptions[0].text}`,
+      ).join("; ");
+      place.after(chosen, image);
     }
   }
 
   function fromPaper() {
     printing = false;
-    document.querySelectorAll("img.paper").forEach((each) => each.remove());
+    document.querySelectorAll(".paper").forEach((each) => each.remove());
     repaint();
   }
 
