@@ -43,14 +43,14 @@ def test_the_selected_model_is_marked_and_its_gain_stands_in_standard_errors():
         ("DH", "–", "0.400", "0.410", "–", "–", "–"),
         ("VEC", "2", "0.300", "0.310", "+0.0500", "0.0100", "+5.0"),
     )
-    assert told.marked == {1: "← selected"}
+    assert told.marked == {1: "selected"}
     assert "VEC is selected: on held-out poses" in words(found)
     assert found.population.startswith("position errors at 40 configurations")
 
 
 def test_a_gain_within_its_errors_leaves_dh_selected_and_says_so():
     found = section(model_selection=selection(0.01, 0.02, "dh"))
-    assert table(found, "Models at held-out poses").marked == {0: "← selected"}
+    assert table(found, "Models at held-out poses").marked == {0: "selected"}
     assert "no more than two standard errors" in words(found)
 
 

@@ -11,7 +11,7 @@ from kinacc.artifacts.allowed import FINDING_LEVELS
 from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
-from kinacc.report.page import FirstScreen, Table, Text
+from kinacc.report.page import FirstScreen, Table, Text, printed
 
 _FIGURES = {
     "mean": "mean",
@@ -208,5 +208,6 @@ def _captioned(commands: Sequence[str]) -> Iterator[str]:
 
 
 def _text(words: str) -> Text:
-    words = re.sub("\u00a0{2,}", "; ", words)  # columns of a terminal
-    return Text(words, code=words.startswith("kinacc ") and not words.startswith("kinacc check-r"))
+    return Text(
+        printed(words), code=words.startswith("kinacc ") and not words.startswith("kinacc check-r")
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -176,6 +177,15 @@ def html(
         kind=lambda block: type(block).__name__,
         plain=json.dumps,
     )
+
+
+def printed(words: str) -> str:
+    """Words for a terminal as a page has them: with signs, and columns as parts of a sentence."""
+    signs = {"+-": "±", "mm^2": "mm²"}
+    words = re.sub("\u00a0{2,}", "; ", words)
+    for plain, sign in signs.items():
+        words = words.replace(plain, sign)
+    return words.replace("\u00a0", " ")
 
 
 def _pictures(sections: Sequence[Section]) -> Iterator[Picture]:

@@ -13,7 +13,7 @@ from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import Fact
 from kinacc.calibration.summary_words import counted
 from kinacc.report import pictures
-from kinacc.report.page import Block, Control, Option, Picture, Section, Table, Text
+from kinacc.report.page import Block, Control, Option, Picture, Section, Table, Text, printed
 from kinacc.report.pictures import BLUE, VERMILION
 
 _NONE = "–"
@@ -56,7 +56,7 @@ def section(tables: Mapping[str, Columns], facts: Sequence[Fact]) -> Section:
 
 
 def _why(facts: Sequence[Fact]) -> list[str]:
-    return [each.replace("\u00a0", " ") for each in summary_words.selected(facts)]
+    return [printed(each) for each in summary_words.selected(facts)]
 
 
 def _models(tables: Mapping[str, Columns]) -> Table:
@@ -78,7 +78,7 @@ def _models(tables: Mapping[str, Columns]) -> Table:
             )
         )
         if choice["selected"][i]:
-            marked[i] = "← selected"
+            marked[i] = "selected"
     plain = model_name(PLAINEST)
     heads = (
         "model",
