@@ -62,7 +62,7 @@ def screen(
     about = {
         "poses": counted(data["poses"].value, "pose"),
         "readings": counted(data["readings"].value, "reading"),
-        "kind": "full pose" if full else "position",
+        "kind": "full pose" if full else "positions only",
         "of": "of a synthetic arm: no measurement" if synthetic else "measured",
     }
     if data["poses"].value == data["readings"].value:
@@ -166,6 +166,7 @@ def _notes(
     """Lines under names in capitals; commands stand as code."""
     told = texts_of(facts, answers.more)
     notes = [(_OF_THE_PAPER[key], answers.claims[key]) for key in _OF_THE_PAPER if answers.claims]
+    notes.append(("DATA", told["data"][1:]))  # how many of what stands under the title
     notes.append(("CHECK", [*map(_without_code, told["check"]), *_sized_by(told["check"])]))
     if answers.outdated:
         names = ", ".join(answers.outdated)
