@@ -125,6 +125,10 @@ def test_small_errors_keep_two_digits():
             "DATA: nothing suspicious",
         ),
         ([Fact("check", "outliers", "warning", 3.0, "1", "outliers: 3 rows")], "DATA: 1 problem"),
+        (
+            [Fact("check", "outliers", "stops", 3.0, "1", "outliers: 3 rows; accepted: a test")],
+            "DATA: 1 problem, accepted",
+        ),
     ],
 )
 def test_whether_the_data_are_in_doubt(more, badge):

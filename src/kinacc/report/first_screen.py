@@ -20,6 +20,7 @@ _FIGURES = {
 }
 _OF_THE_PAPER = {"claims": "CLAIMS", "differ": "DIFFER"}
 _NO_CAMPAIGN = "Largest error of any pose: not assessed (no campaign); the largest seen is"
+_ACCEPTED = "; accepted: "  # in front of the reason, where a finding was accepted
 _FOR = {  # commands that follow, and what they are for
     "export": "files of the model for controllers and simulators:",
     "compensate": "joints that put the tool at a pose:",
@@ -87,7 +88,10 @@ def _badge(facts: Sequence[Fact], synthetic: bool) -> tuple[str, bool]:
     doubts = [each for each in found if each.text and each.statistic != FINDING_LEVELS[-1]]
     if not doubts:
         return "DATA: nothing suspicious", False
-    return f"DATA: {counted(len(doubts), 'problem')}", True
+    left = [each for each in doubts if _ACCEPTED not in each.text]
+    if not left:
+        return f"DATA: {counted(len(doubts), 'problem')}, accepted", False
+    return f"DATA: {counted(len(left), 'problem')}", True
 
 
 def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
