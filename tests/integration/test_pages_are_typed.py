@@ -82,8 +82,9 @@ SHORTENED = (
     "docs/using-a-calibration.md",
 )
 IN_FULL = bool(os.environ.get("KINACC_PAGES_IN_FULL"))
-# Few poses of a series that a page calibrates only to show how, and the lines it speaks of.
-THINNED = {"series_B.csv": (*range(1, 1500, 21), 2, 3, 4, 533, 534, 856, 857)}
+# Few poses of a series that a page calibrates only to show how, among them a repeated reading. With
+# 103 order 12 is the highest for all of them, and can still be fitted where a fold is left out.
+THINNED = {"series_B.csv": (*range(1, 1500, 15), 2, 3, 533, 534)}
 # The paper's arm as it is, and the two series with models that are fitted in seconds.
 SHORT = "".join(
     f"  {name}: {{measurements: {{folds: 2}}, calibration: {{vec: {{order: 2}}}}}}\n"
@@ -122,7 +123,8 @@ def calibrated(shell, tmp_path_factory) -> Path:
     def calibrate(folder: Path) -> None:
         clone = cloned(folder / "clone")
         (clone / "short.yaml").write_text(f"datasets:\n{SHORT}")
-        words = "kinacc calibrate config.yaml examples/ur10.yaml short.yaml"
+        words = "kinacc calibrate config.yaml examples/ur10.yaml"
+        words += "" if IN_FULL else " short.yaml"
         code, printed, _ = shell(words, clone, HOME=str(folder))
         assert code == 0, printed
 
