@@ -93,3 +93,22 @@ def test_one_of_few_configurations_excuses_no_poor_order():
     search.add(1, (prior,), astray)
     search.add(2, (prior,), good)
     assert search.choice().chosen.order == 2
+
+
+def test_so_few_poses_that_a_fold_carries_less_than_all_of_them(tmp_path):
+    """40 positions carry order 2; the 32 that are left without a fold carry order 1."""
+    arm, draw = robot.load("irb120"), np.random.default_rng(0)
+    q = draw.uniform(-1.0, 1.0, (40, 6))
+    place = robot.forward(arm, q).position_mm + draw.normal(0.0, 0.05, (40, 3))
+    lines = [",".join([*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])]
+    lines += [",".join(f"{value:.9f}" for value in row) for row in np.hstack([q, place])]
+    (tmp_path / "few.csv").write_text("\n".join(lines) + "\n")
+    settings, rows = read("few.csv", "irb120", 4, "{kind: none}", tmp_path)
+    table = orders(settings, rows)
+    assert np.asarray(table["order"]).max() == 1
+    arm_of_file = robot.load(settings["robot"])
+    every, _ = calibration_settings.observed({"measurements": rows}, arm_of_file)
+    estimator = models.estimators(settings["calibration"], arm_of_file, every)["vec"]
+    for fold in np.unique(every.fold):
+        of_fold = estimator.chosen({"vec_orders": table}, int(fold))
+        assert of_fold.fit(every.select(every.fold != fold), {}).model is not None

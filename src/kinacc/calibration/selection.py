@@ -80,6 +80,13 @@ def distinct(held_out: Observations) -> Observations:
     return held_out.select(np.unique(same, axis=0, return_index=True)[1])
 
 
+def carried(held_out: Observations) -> int:
+    """Residual components that every fit of a chosen order has, those without a fold as well."""
+    folds = np.unique(held_out.fold)
+    without = [distinct(held_out.select(held_out.fold != fold)).components for fold in folds]
+    return min(each for each in (distinct(held_out).components, *without) if each > 0)
+
+
 @dataclass(frozen=True)
 class Trial:
     """How the best prior of one order did.

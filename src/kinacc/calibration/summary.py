@@ -13,7 +13,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.calibration import blind_words, frames
 from kinacc.calibration.observations import from_columns
-from kinacc.calibration.selection import ORDERS, distinct, highest_order
+from kinacc.calibration.selection import ORDERS, carried, highest_order
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations
@@ -242,7 +242,7 @@ def _carried(measurements: Mapping, robot: Robot, frames_fitted: bool) -> tuple[
     anywhere = frames.known(sessions=len(every.session_names), targets=len(every.target_names))
     estimated = frames.coordinates(every, anywhere, frames_fitted, frames_fitted).size
     seen = every.select(every.fold >= 0)
-    most = highest_order(distinct(seen).components, every.joints, estimated)
+    most = highest_order(carried(seen), every.joints, estimated)
     return len(np.unique(configurations(seen.pose, seen.q_rad))), most
 
 

@@ -115,9 +115,9 @@ class VECEstimator(Estimator):
         weight = self.common.rotation_weight_mm_per_rad
         at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
         size = at.coordinates.size
-        # That a choice trains on three blocks of five is no limit: the prior holds what these do
-        # not show.
-        count = selection.distinct(every.select(every.fold >= 0)).components
+        # That a trial trains on three blocks of five is no limit: the prior holds what these do
+        # not show. What is chosen is fitted without a fold, too.
+        count = selection.carried(every.select(every.fold >= 0))
         grid = self.grid.within(count, self.common.nominal.joints, size)
         return selection.choices(
             self._wanted(every),
