@@ -59,6 +59,10 @@ def test_a_comment_in_the_configuration(project):
             "datasets: {mh180: {measurements: {synthetic: {tracker_noise_mm: 0.03}}}}",
             {"mh180": ALL - {"fig1"}},
         ),
+        (  # the check of the data depends on it as well
+            "datasets: {own: {calibration: {dh: {loss: huber}}}}",
+            {"own": ({"data_check", "dh"} | AFTER_DH) - NOT_OWN},
+        ),
         (
             "datasets: {own: {evaluation: {points: 11}}}",
             {"own": (AFTER_POINTS | {"assessment_points"}) - NOT_OWN},

@@ -7,15 +7,21 @@ for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
     folder = TOURNAMENT if stage.joint else whose
 
-    # What has to be there and is not read is `ancient`: a stage is not made anew when that is.
+    # What has to be there and is not read is `ancient`: a stage is not made anew when that is,
+    # unless it has to be made anew itself.
     rule:
         name:
             stage.name
         input:
             ancient(
-                lambda w, name=stage.name, folder=folder: plan.gates(
-                    name, w.get("dataset", folder)
-                )
+                lambda w, name=stage.name, folder=folder: [
+                    gate
+                    for gate in plan.gates(name, w.get("dataset", folder))
+                    if gate not in plan.followed(name, w.get("dataset", folder), w.get("part"))
+                ]
+            ),
+            lambda w, name=stage.name, folder=folder: plan.followed(
+                name, w.get("dataset", folder), w.get("part")
             ),
             unpack(
                 lambda w, name=stage.name, folder=folder: plan.inputs(

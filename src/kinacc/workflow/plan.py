@@ -21,6 +21,7 @@ from kinacc.workflow.catalogue import (
     MAP_READINGS,
     PAGE,
     STAGES,
+    TABLES,
     TOURNAMENT,
     Stage,
     maker_of,
@@ -85,7 +86,8 @@ class Plan:
     stages are computed in, those of the study and those of the choices; ``formats`` are the
     picture formats; ``tournament`` is the configuration's section of that name, which is one for
     all data sets. ``files_absolute``: files from outside are named in full, as a module of another
-    workflow needs them, whose results may have a folder put before them.
+    workflow needs them, whose results may have a folder put before them. ``made`` keeps which
+    tables were up to date when that was asked first.
     """
 
     datasets: Mapping[str, Mapping[str, object]]
@@ -94,6 +96,7 @@ class Plan:
     results: str = RESULTS
     tournament: Mapping[str, object] = field(default_factory=dict)
     files_absolute: bool = False
+    made: dict[tuple, bool] = field(default_factory=dict, repr=False, compare=False)
 
     def contest(
         self,
@@ -201,9 +204,47 @@ class Plan:
         ]
 
     def gates(self, name: str, dataset: str) -> list[str]:
-        """Tables that have to be there before a stage runs, and that it does not read."""
-        made = {each for stage in self.stages(dataset).values() for each in stage.outputs}
-        return [self._table(each, dataset) for each in STAGES[name].after if each in made]
+        """Tables that have to be there before a stage runs, and that it does not read.
+
+        Those of the stages whose tables it reads are among them.
+        """
+        stages = {} if STAGES[name].joint else self.stages(dataset)
+        made = {each: stage for stage in stages.values() for each in stage.outputs}
+        found: dict[str, None] = {}
+        waiting, seen = [STAGES[name]], {name}
+        while waiting:
+            stage = waiting.pop()
+            found |= dict.fromkeys(each for each in stage.after if each in made)
+            read = {made[each].name for each in (*stage.inputs, *stage.optional) if each in made}
+            waiting += [STAGES[each] for each in sorted(read - seen)]
+            seen |= read
+        return [self._table(each, dataset) for each in found]
+
+    def followed(self, name: str, dataset: str, part: str | None = None) -> list[str]:
+        """Those of ``gates`` that a stage has to be made after: they and it are to be made anew.
+
+        Snakemake asks for no other reason below a job that runs, so that a stage whose settings
+        changed together with those of a gate would stay as it is if the gate were ``ancient``.
+        """
+        gates = self.gates(name, dataset)
+        if not gates or all(self._is_made(Path(each).stem, dataset) for each in gates):
+            return []
+        return [] if self._is_made(name, dataset, part) else gates
+
+    def _is_made(self, name: str, dataset: str, part: str | None = None) -> bool:
+        """Whether tables are there by these settings and code; of pictures nothing is known."""
+        if STAGES[name].leaves != TABLES:
+            return False
+        known = (name, dataset, part)
+        if known not in self.made:
+            wanted = {
+                "config_hash": config_hash(self.settings(name, dataset)),
+                "code_hash": self.code(name, dataset),
+                "seed": str(self.seed(dataset)),
+            }
+            paths = self.outputs(name, dataset, part).values()
+            self.made[known] = all(_marks(path).items() >= wanted.items() for path in paths)
+        return self.made[known]
 
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""
@@ -427,12 +468,17 @@ def _is_current(table: str, files: Sequence[str], settings: Mapping[str, object]
     changed = max(map(os.path.getmtime, files))
     if not os.path.exists(table) or changed >= os.path.getmtime(table):
         return False
+    return _marks(table).get("config_hash") == config_hash(settings)
+
+
+def _marks(table: str) -> dict[str, str]:
+    """What a table says it was made from; nothing where there is none that can be read."""
     from kinacc.artifacts.store import read_metadata
 
     try:
-        return read_metadata(table).get("config_hash") == config_hash(settings)
+        return read_metadata(table)
     except InputError:
-        return False
+        return {}
 
 
 def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:
