@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import socket
 import subprocess
@@ -18,12 +19,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 _CLIENT = """\
-#!{python} -I
 import json, os, socket, sys
 with socket.socket(socket.AF_UNIX) as server:
     server.connect({address!r})
     socket.send_fds(server, [b"."], [0, 1, 2])
-    said = json.dumps([sys.argv, os.getcwd(), dict(os.environ)])
+    said = json.dumps([["kinacc", *sys.argv[1:]], os.getcwd(), dict(os.environ)])
     server.sendall(said.encode() + b"\\n")
     sys.exit(int(server.recv(8) or 70))
 """
@@ -83,9 +83,11 @@ def installed(folder: Path) -> Path:
 def started(folder: Path, site: Path) -> tuple[Shell, subprocess.Popen[str]]:
     """A shell, and the process behind its ``kinacc``, which is ended by whoever asked for it."""
     address = str(folder / "kinacc.socket")
-    _executable(folder / "kinacc", _CLIENT.format(python=sys.executable, address=address))
-    for name, words in _WORDS.items():
-        _executable(folder / name, _STARTS.format(python=sys.executable, words=words))
+    client = folder / "client.py"
+    client.write_text(_CLIENT.format(address=address))
+    python = shlex.quote(sys.executable)  # a path with a space cannot stand behind #!
+    for name, words in {**_WORDS, "kinacc": f"-I {shlex.quote(str(client))}"}.items():
+        _executable(folder / name, _STARTS.format(python=python, words=words))
     server = subprocess.Popen(
         [sys.executable, __file__, address],
         env=os.environ | _ONE_THREAD | {"PYTHONPATH": str(site)},
