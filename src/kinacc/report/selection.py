@@ -46,7 +46,8 @@ def section(tables: Mapping[str, Columns], facts: Sequence[Fact]) -> Section:
         "is flat. Bad: no model is nearer to held-out poses than the nominal; the highest order "
         "that was tried is the best, and a higher one may do more.",
         "Keep the selected model unless your controller takes DH parameters only (kinacc export "
-        "--model dh). With order: auto the order is chosen anew by held-out errors.",
+        "--model dh). With order: auto the order is "
+        "chosen anew by held-out errors, up to calibration.vec.order_highest (40 at most).",
         (
             *(Text(f"{each[:1].upper()}{each[1:]}.") for each in _why(facts)),
             _models(tables),
