@@ -12,6 +12,9 @@ from small_arms import BASE, TOOL, WEIGHT, joints, results, truth
 
 from kinacc.artifacts import store
 from kinacc.calibration.observations import full_poses
+from kinacc.calibration.summary import of_errors
+from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
+from kinacc.deployment.predict import predict
 from kinacc.deployment.verify import with_frames_fitted, with_kept_frames
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3
@@ -155,3 +158,128 @@ def test_another_target_than_the_calibrations_can_be_fitted_anew_and_not_be_kept
     assert "no frame 'ball'" in kept.output
     anew = call("verify", found, base / "other_target.yaml", "--base-and-tool", "estimated")
     assert anew.exit_code == 0, anew.output
+
+
+@pytest.fixture(scope="module")
+def later(folder, tmp_path_factory):
+    """Readings near the poses of the arm, off by ``grown`` times its held-out errors."""
+    _, found = folder
+    measured, errors = (store.read(found / f"{n}.parquet") for n in ("measurements", "pose_errors"))
+    tables = read_tables(found)
+    choice = selected_model(tables)
+    held = errors["estimate"] == "cross_validated"
+    held &= errors["comparison"] == f"{choice}_vs_measured"
+    off = np.stack([errors[f"e{axis}_mm"][held] for axis in "xyz"], axis=1)
+
+    def write(grown: float, count: int, model: str = choice):
+        arm = calibration(tables, recorded_robot(found), model)
+        base = tmp_path_factory.mktemp("later")
+        rng = np.random.default_rng(5)
+        q_rad = np.stack([measured[f"q{i}"] for i in range(1, 7)], axis=1)
+        middle = q_rad.mean(axis=0)  # drawn towards it: measured there
+        q_rad = middle + 0.6 * (q_rad[rng.integers(len(q_rad), size=count)] - middle)
+        q_rad += rng.normal(0.0, 0.01, q_rad.shape)
+        seen = predict(arm, q_rad, frame="instrument").pose.position_mm
+        seen = seen + grown * off[rng.integers(len(off), size=count)]
+        header = ",".join([*(f"q{i}_rad" for i in range(1, 7)), *(f"{x}_mm" for x in "xyz")])
+        rows = np.hstack([q_rad, seen])
+        np.savetxt(base / "today.csv", rows, "%.17g", ",", header=header, comments="")
+        (base / "today.yaml").write_text(
+            "datasets: {today: {robot: mh180}}\nmeasurements: {source: file, folds: 5, file:"
+            " {path: today.csv, joint_unit: rad, orientation: {kind: none}}}\n"
+        )
+        return base / "today.yaml"
+
+    return write
+
+
+def asked(found, described, *more):
+    done = call("verify", found, described, "--base-and-tool", "fixed", *more)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def test_an_arm_that_did_not_change_is_as_good_as_at_its_held_out_poses(folder, later):
+    _, found = folder
+    file = later(1.0, 400)
+    told = asked(found, file)
+    assert "verdict: as good as at its held-out poses" in told
+    said = json.loads(asked(found, file, "--json"))
+    assert said["verdict"] == "as good"
+    assert said["held_out"]["readings"] == 80
+    assert said["here"]["readings"] == said["like_measured"] > 100
+    assert said["difference_low_mm"] < said["difference_mm"] < said["difference_high_mm"]
+
+
+def test_the_held_out_error_is_that_which_fitted_states(folder):
+    base, found = folder
+    said = json.loads(asked(found, base / "same.yaml", "--json"))
+    tables = {"pose_errors": store.read(found / "pose_errors.parquet")}
+    stated = {
+        fact.statistic: fact.value
+        for fact in of_errors(tables["pose_errors"])
+        if fact.topic == "held_out_error" and fact.item == said["selected"]
+    }
+    for name in ("mean", "quantile_99"):
+        assert said["held_out"][f"{name}_mm"] == pytest.approx(stated[name], rel=1e-12)
+    assert said["held_out"]["readings"] == stated["n"]
+
+
+def test_an_arm_that_changed_is_worse_and_the_next_command_tells_arm_from_set_up(folder, later):
+    _, found = folder
+    file = later(3.0, 100)
+    told = asked(found, file)
+    assert "verdict: worse by" in told
+    assert told.rstrip().splitlines()[-1].endswith("--base-and-tool estimated")
+    assert json.loads(asked(found, file, "--json"))["difference_low_mm"] > 0.0
+
+
+def test_of_few_readings_where_it_was_measured_nothing_is_told_but_what_to_measure(folder, later):
+    _, found = folder
+    told = asked(found, later(3.0, 12))
+    assert "verdict: cannot be told from these readings: too few readings" in told
+    assert "next: measure 20 new configurations or more" in told
+    below = told[told.index("VEC ") :].splitlines()
+    assert "lie where the calibration was measured" in below[1]  # right after the table
+
+
+def test_readings_of_one_configuration_are_not_many(folder, later):
+    _, found = folder
+    file = later(1.0, 12)
+    header, *rows = (file.parent / "today.csv").read_text().splitlines()
+    (file.parent / "today.csv").write_text("\n".join([header, *rows * 5]) + "\n")
+    said = json.loads(asked(found, file, "--json"))
+    assert said["here"]["readings"] == 5 * said["here"]["configurations"]
+    assert said["verdict"] == "cannot be told"
+
+
+def test_a_moved_instrument_and_fitted_readings_give_no_verdict_on_the_arm(folder):
+    base, found = folder
+    for name, reason in (("moved", "stands elsewhere"), ("same", "it was fitted to")):
+        said = json.loads(asked(found, base / f"{name}.yaml", "--json"))
+        assert said["verdict"] == "cannot be told"
+        assert reason in said["verdict_reason"]
+
+
+def test_a_calibrated_model_that_is_worse_than_nominal_is_named(folder, later):
+    _, found = folder
+    file = later(1.0, 60, "nominal")  # as if the arm had been mastered as its maker has it
+    (worst, *_) = json.loads(asked(found, file, "--json"))["worse_than_nominal"]
+    assert worst["mean_mm"] > worst["nominal_mean_mm"]
+    assert f"{worst['model']} is worse than the nominal arm at" in asked(found, file)
+
+
+def test_a_file_of_readings_is_answered_with_the_command_that_describes_it(folder):
+    base, found = folder
+    done = call("verify", found, base / "same.csv", "--base-and-tool", "fixed")
+    assert done.exit_code == 2
+    assert "holds readings" in done.output
+    assert f"kinacc init {base / 'same.csv'} writes it" in done.output
+
+
+def test_who_does_not_say_whether_something_was_moved_is_told_how_to_choose(folder):
+    base, found = folder
+    done = call("verify", found, base / "same.yaml")
+    assert done.exit_code == 2
+    assert "give fixed where instrument and tool stand as they did" in done.output
+    assert "estimated where either stands anew" in done.output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ _MOST_VALUES = 20_000
 _DEEPEST = 12
 _LONGEST_TEXT = 10_000
 _LONGEST_NUMBER = 100
+_READINGS = (".csv", ".tsv", ".xlsx", ".xls")
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CONSTRUCTOR = yaml.constructor.SafeConstructor()
@@ -78,6 +80,8 @@ def read(path: Path | str) -> tuple[Document, list[Problem]]:
         # No more is read than is needed to see that it is too much: the file may be a device.
         with open(path, "rb") as stream:
             content = stream.read(_MOST_BYTES + 1)
+        if Path(path).suffix.lower() in _READINGS:
+            return Document(name, {}), [_readings(name)]
         text = content.decode("utf-8-sig") if len(content) <= _MOST_BYTES else ""
     except FileNotFoundError:
         fix = "give the path of a configuration file, e.g. config.yaml"
@@ -94,6 +98,12 @@ def read(path: Path | str) -> tuple[Document, list[Problem]]:
         allowed = f"a YAML file of at most {_MOST_BYTES // 1000} kB"
         return Document(name, {}), [Problem(name, "is too large for a description", allowed)]
     return parsed(text, name)
+
+
+def _readings(name: str) -> Problem:
+    """What to say of a file of readings, given where the file that describes it is meant."""
+    fix = f"{shlex.join(['kinacc', 'init', name])} writes it: give that"
+    return Problem(name, "holds readings", "the .yaml file that describes them", fix)
 
 
 def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:

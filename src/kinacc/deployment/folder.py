@@ -31,10 +31,11 @@ _WANTED = (
 _SAME = 1e-9
 
 
-def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
+def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarray]]:
     """The tables of a data set's results folder: columns (rows,) by table and name.
 
-    Units stand in the names (_mm, _rad). Raises InputError naming all tables that are missing.
+    ``more`` are read where they are there, beside those that every use needs. Units stand in the
+    names (_mm, _rad). Raises InputError naming all tables that are missing.
     """
     from kinacc.artifacts import store
 
@@ -45,7 +46,7 @@ def read_tables(folder: Path | str) -> dict[str, dict[str, np.ndarray]]:
         if not (folder / f"{name}.parquet").is_file()
     ]
     refuse(missing, f"{folder} holds no calibration")
-    names = dict.fromkeys((*_NEEDED, *_WANTED))
+    names = dict.fromkeys((*_NEEDED, *_WANTED, *more))
     present = [name for name in names if (folder / f"{name}.parquet").is_file()]
     return {name: store.read(folder / f"{name}.parquet") for name in present}
 

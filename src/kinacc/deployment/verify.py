@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +20,20 @@ from kinacc.calibration.frames import Frames, known
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors, cross_validated, errors
+from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.calibration.system import FlangeModel
 from kinacc.calibration.tables import frames_of
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.kinematics.tables import models
+from kinacc.measurements.folds import configurations, configurations_of
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
+LEAST = 20  # configurations that two means are compared of
+AS_GOOD = 0.25  # of the held-out mean: a calibration that is off by less more holds
+CONFIDENCE = 0.99  # of the interval of the difference of the means
+GOOD, WORSE, OPEN = "as good", "worse", "cannot be told"
 _SLACK = 1e-9  # rad and mm beyond the fitted range that are rounding
 
 
@@ -35,6 +43,105 @@ class Trial:
 
     rows: np.ndarray
     errors: dict[str, Errors]
+
+
+class Level(NamedTuple):
+    """Position errors of a model at readings: how many, of how many configurations, how large."""
+
+    readings: int
+    configurations: int
+    mean_mm: float
+    quantile_99_mm: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a model is as good ``here`` as at its ``held_out`` poses: GOOD, WORSE or OPEN.
+
+    ``reason`` says why it cannot be told. The mean here less that held out lies between ``low_mm``
+    and ``high_mm`` with ``CONFIDENCE``; NaN where that was not compared.
+    """
+
+    says: str
+    reason: str
+    here: Level | None
+    held_out: Level | None
+    difference_mm: float = np.nan
+    low_mm: float = np.nan
+    high_mm: float = np.nan
+
+
+def verdict(
+    tables: Tables,
+    model: str,
+    trials: Sequence[Trial],
+    observations: Observations,
+    there: np.ndarray,
+) -> Verdict:
+    """Hold the mean position error of ``model`` where it was measured, ``there`` (n,), to its own.
+
+    Of the largest of ``trials``. Its own is that at held-out poses which every model was tried on,
+    as ``kinacc fitted`` states it. Readings of one configuration are taken to err together.
+    """
+    sizes = np.full(len(observations), np.nan)
+    for trial in trials:  # the largest is the last
+        if model in trial.errors:
+            sizes[trial.rows] = np.linalg.norm(trial.errors[model].position_mm, axis=1)
+    rows = there & np.isfinite(sizes)
+    now, new = sizes[rows], configurations(observations.pose, observations.q_rad)[rows]
+    then, old = _held_out(tables, model)
+    here, held_out = _level(now, new), _level(then, old)
+    if held_out is None or held_out.configurations < LEAST:
+        return Verdict(OPEN, "too few held-out poses", here, held_out)
+    if here is None or here.configurations < LEAST:
+        return Verdict(OPEN, "too few readings where it was measured", here, held_out)
+    difference = here.mean_mm - held_out.mean_mm
+    margin = _margin(_variance_of_mean(now, new), _variance_of_mean(then, old))
+    low, high = difference - margin, difference + margin
+    says = GOOD if high <= AS_GOOD * held_out.mean_mm else OPEN
+    says = WORSE if low > 0.0 else says
+    reason = "the difference of the means is too uncertain" if says == OPEN else ""
+    return Verdict(says, reason, here, held_out, difference, low, high)
+
+
+def _held_out(tables: Tables, model: str) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes (m,) and configurations (m,) of the held-out position errors of a model."""
+    errors = tables.get("pose_errors")
+    if errors is None or "measurements" not in tables:
+        return np.zeros(0), np.zeros(0, dtype=int)
+    held = np.asarray(errors["estimate"]) == "cross_validated"
+    kind, row = np.asarray(errors["comparison"])[held], np.asarray(errors["row"])[held]
+    tried = [row[kind == each] for each in dict.fromkeys(kind)]
+    common = reduce(np.intersect1d, tried) if tried else row
+    ours = (kind == Comparison(MEASURED, model).name) & np.isin(row, common)
+    sizes = np.linalg.norm([np.asarray(errors[f"e{axis}_mm"])[held] for axis in "xyz"], axis=0)
+    return sizes[ours], configurations_of(tables["measurements"])[row[ours]]
+
+
+def _level(sizes: np.ndarray, configuration: np.ndarray) -> Level | None:
+    if not len(sizes):
+        return None
+    count = len(np.unique(configuration))
+    return Level(len(sizes), count, float(sizes.mean()), float(np.quantile(sizes, LARGE_SHARE)))
+
+
+def _variance_of_mean(sizes: np.ndarray, configuration: np.ndarray) -> tuple[float, int]:
+    """Variance of the mean of sizes that agree within a configuration; degrees of freedom."""
+    _, group = np.unique(configuration, return_inverse=True)
+    sums = np.bincount(group, sizes - sizes.mean())
+    free = len(sums) - 1
+    return float(np.sum(sums**2)) * len(sums) / free / len(sizes) ** 2, free
+
+
+def _margin(*parts: tuple[float, int]) -> float:
+    """Half the width of Welch's interval, of variances and their degrees of freedom."""
+    from scipy.special import stdtrit
+
+    variance = sum(each for each, _ in parts)
+    if variance == 0.0:
+        return 0.0
+    free = variance**2 / sum(each**2 / count for each, count in parts)
+    return float(stdtrit(free, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance))
 
 
 def with_kept_frames(tables: Tables, robot: Robot, observations: Observations) -> list[Trial]:
