@@ -295,6 +295,21 @@ def test_a_spreadsheet_gets_all_rows_all_digits_and_no_formula(tmp_path):
     assert (tmp_path / "table.csv").read_text() == said
 
 
+def test_a_spreadsheet_gets_no_more_rows_than_were_asked_for(tmp_path):
+    measurements(tmp_path, 60)
+    words = (tmp_path, "measurements", "--columns", "pose", "--rows")
+    assert show(*words, 5, "--csv").output.split() == ["pose", *"01234"]
+    assert len(show(*words, "all", "--csv").output.split()) == 61
+    rows = json.loads(show(*words, 3, "--json").output)["rows"]
+    assert rows == [{"pose": pose} for pose in range(3)]
+    out = tmp_path / "few.csv"
+    said = show(*words, 2, "--out", out).output
+    assert f"2 rows: {out}" in said
+    assert out.read_text().split() == ["pose", "0", "1"]
+    listed = show(tmp_path / "measurements", "--describe", "--rows", 2, "--csv").output
+    assert [line.split(",")[0] for line in listed.splitlines()] == ["column", "pose", "q1"]
+
+
 def test_a_program_gets_the_same_rows_as_json(tmp_path):
     path = residuals(tmp_path)
     told = json.loads(
