@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from small_results import SmallResults
 
 from kinacc.artifacts import provenance, store
 from kinacc.artifacts.error_models import ALWAYS
-from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.catalogue import CALIBRATION, STAGES
 from kinacc.workflow.plan import planned
 from kinacc.workflow.verification import check, rules
 
@@ -111,6 +112,49 @@ def test_a_map_may_be_left_out_where_the_claims_were_made_without_it(results):
     report = check.check_results(results.root)
     assert report.ok, str(report)
     assert any("accuracy_map, fig3 left out" in note for note in report.datasets[0].notes)
+
+
+def without_a_study(results) -> None:
+    """Leave what `kinacc calibrate` leaves: the tables of the calibration and the page."""
+    shutil.rmtree(results.folder / "figures")
+    shutil.rmtree(results.folder / "study_chunk")
+    of_calibration = {name for stage in CALIBRATION for name in STAGES[stage].outputs}
+    for path in results.folder.glob("*.parquet"):
+        if path.stem not in of_calibration:
+            path.unlink()
+
+
+@pytest.mark.parametrize("page", [True, False], ids=["with its page", "models only"])
+@pytest.mark.parametrize("configs", [(), ("--config", ROOT / "config.yaml")], ids=["", "config"])
+def test_a_calibration_without_a_study_is_well_and_told_once(planned_results, configs, page):
+    without_a_study(planned_results)
+    if not page:
+        (planned_results.folder / "report.html").unlink()
+    done = call("check-results", planned_results.root, *configs)
+    assert done.exit_code == 0, done.stdout
+    assert "all is well" in done.stdout
+    assert done.stdout.count("no study was made: kinacc study FILE.yaml makes one") == 1
+    assert "fig1" not in done.stdout
+
+
+def test_a_table_lost_from_a_calibration_without_a_study_is_the_one_problem(results):
+    without_a_study(results)
+    results.path("pose_errors").unlink()
+    (found,) = problems(results)
+    assert "pose_errors.parquet: missing" in found
+
+
+@pytest.mark.parametrize(
+    "left", ["figures/fig1.svg", "claims.parquet", "study_chunk/1-of-2.parquet"]
+)
+def test_a_study_of_which_one_file_is_left_lacks_all_the_others(results, left):
+    kept = (results.folder / left).read_bytes()
+    without_a_study(results)
+    (results.folder / left).parent.mkdir(exist_ok=True)
+    (results.folder / left).write_bytes(kept)
+    the_one(problems(results), "study.parquet: missing")
+    the_one(problems(results), "fig4.png: no such file")
+    assert "no study was made" not in str(check.check_results(results.root))
 
 
 @pytest.mark.parametrize(

@@ -180,6 +180,28 @@ def test_columns_too_wide_for_the_terminal_are_named_and_can_be_asked_for(tmp_pa
     assert heading.split() == ["z_mm", "pose", "s1", "s2", "s3", "s4", "s5", "s6"]
 
 
+def test_the_facts_of_a_summary_are_told_on_more_lines_rather_than_left_out(tmp_path):
+    statement = "a shift of the base along y cannot be told from a shift of the tool along z"
+    facts = [
+        ("held_out_orientation_error", "nominal", "mean", 12.345, "mrad", None),
+        ("like_measured", "ranges of all joints", "highest_order_set_by", 0.5, "1", None),
+        ("undetermined", "1", "statement", None, None, statement),
+    ]
+    path = write(tmp_path, "summary", facts)
+    said = show(path).output
+    assert max(map(len, said.splitlines())) <= 80
+    assert "too narrow" not in said
+    rows = table_of(said)
+    second = next(place for place, row in enumerate(rows) if row[0] == "like_measured")
+    third = next(place for place, row in enumerate(rows) if row[0] == "undetermined")
+    assert rows[0] == ["held_out_", "nominal", "mean", "12.345", "mrad", "-"]
+    assert "".join(row[0] for row in rows[:second]) == "held_out_orientation_error"
+    told = " ".join(" ".join(row) for row in rows[third:])
+    assert told.split() == f"undetermined 1 statement - - {statement}".split()
+    assert "held_out_orientation_error  nominal" in show(path, width=160).output
+    assert "too narrow for" in show(path, width=40).output
+
+
 def test_headings_tell_units_that_names_do_not(tmp_path):
     measurements(tmp_path)
     heading = show(tmp_path, "measurements", "--columns", "q1,x_mm,pose,qw").output.splitlines()
@@ -293,6 +315,21 @@ def test_a_spreadsheet_gets_all_rows_all_digits_and_no_formula(tmp_path):
     done = show(tmp_path, "measurements", "--csv", "--out", tmp_path / "table.csv")
     assert done.exit_code == 0
     assert (tmp_path / "table.csv").read_text() == said
+
+
+def test_a_spreadsheet_gets_no_more_rows_than_were_asked_for(tmp_path):
+    measurements(tmp_path, 60)
+    words = (tmp_path, "measurements", "--columns", "pose", "--rows")
+    assert show(*words, 5, "--csv").output.split() == ["pose", *"01234"]
+    assert len(show(*words, "all", "--csv").output.split()) == 61
+    rows = json.loads(show(*words, 3, "--json").output)["rows"]
+    assert rows == [{"pose": pose} for pose in range(3)]
+    out = tmp_path / "few.csv"
+    said = show(*words, 2, "--out", out).output
+    assert f"2 rows: {out}" in said
+    assert out.read_text().split() == ["pose", "0", "1"]
+    listed = show(tmp_path / "measurements", "--describe", "--rows", 2, "--csv").output
+    assert [line.split(",")[0] for line in listed.splitlines()] == ["column", "pose", "q1"]
 
 
 def test_a_program_gets_the_same_rows_as_json(tmp_path):

@@ -18,6 +18,7 @@ from kinacc.cli.sheet import Field, Sheet
 
 _GAP = 2
 _FLEXIBLE = 24  # a column of longer texts may be made as narrow as this
+_NARROWEST = 12  # or any text as narrow as this, names broken, where that spares every column
 _LONGEST_NAME, _LONGEST_TEXT = 40, 300
 _HEADINGS = (40, 16, 13, 10, 8, 0)  # characters before one is broken, as far as there is room
 _DIGITS_OF_LARGEST, _DIGITS_OF_TYPICAL = 5, 3
@@ -33,12 +34,16 @@ _MANY = 200
 
 @dataclass(frozen=True)
 class _Shown:
-    """A column as it is printed: name, heading on its lines, cells."""
+    """A column as it is printed: name, heading on its lines, cells.
+
+    ``folds``: a text is told on several lines, names too, broken after underscores.
+    """
 
     name: str
     heading: tuple[str, ...]
     cells: tuple[str, ...]
     is_text: bool
+    folds: bool = False
 
     @property
     def natural(self) -> int:
@@ -54,12 +59,20 @@ class _Shown:
     @property
     def least(self) -> int:
         """Characters it cannot do without."""
+        if self.folds and self.is_text:
+            words = (word for each in self.cells for word in _parts(each))
+            return min(self.natural, max(_NARROWEST, *map(len, (*self.heading, *words))))
         return max(_FLEXIBLE, *map(len, self.heading)) if self.is_long else self.natural
 
     def broken(self, width: int = 0) -> _Shown:
         """With a heading on as many lines as it takes not to be wider than its cells, or this."""
         heading = _broken(" ".join(self.heading), max(width, *map(len, self.cells)))
         return replace(self, heading=heading)
+
+    def cell(self, row: int, width: int) -> Text:
+        """What stands in a row, on its lines."""
+        lines = _broken(self.cells[row], width) if self.folds else (self.cells[row],)
+        return Text("\n".join(lines))
 
 
 @dataclass
@@ -252,8 +265,8 @@ def _shown(column: Field, places: Sequence[int]) -> _Shown:
 
 
 def _broken(name: str, width: int) -> tuple[str, ...]:
-    """A heading on lines no longer than ``width`` where it can be broken after underscores."""
-    parts = re.findall(r"[^_ ]+_?|_| ", name)
+    """A name or text on lines no longer than ``width``, if it can be broken after underscores."""
+    parts = _parts(name)
     width = max([width, *map(len, parts)])
     lines = [""]
     for part in parts:
@@ -263,10 +276,16 @@ def _broken(name: str, width: int) -> tuple[str, ...]:
     return tuple(line.rstrip() for line in lines)
 
 
+def _parts(name: str) -> list[str]:
+    """What stays together when a name or a text is broken."""
+    return re.findall(r"[^_ ]+_?|_| ", name)
+
+
 def _that_fit(columns: Sequence[_Shown], width: int) -> list[_Shown]:
     """The columns that stand beside each other, one at least, headings broken where that helps.
 
-    Long texts give way to the others; of each the first ones are taken.
+    Where all of them stand if names and short texts are folded too, they are. Else long texts give
+    way to the others; of each the first ones are taken.
     """
     if _sum(columns) <= width:
         return list(columns)
@@ -279,6 +298,10 @@ def _that_fit(columns: Sequence[_Shown], width: int) -> list[_Shown]:
             if taken and _sum([broken[j] for j in (*taken, i)]) > width:
                 break
             taken.append(i)
+    if len(taken) < len(columns) and len(columns[0].cells) <= _MANY:
+        folded = [replace(each, folds=True).broken() for each in columns]
+        if _sum(folded) <= width:
+            return folded
     taken.sort()
     for longest in _HEADINGS:
         kept = [columns[i].broken(longest) for i in taken]
@@ -335,5 +358,5 @@ def _table(
         ]
         return Group(table, *lines)
     for row in rows:
-        table.add_row(*(Text(each.cells[row]) for each in columns))
+        table.add_row(*(e.cell(row, width) for e, width in zip(columns, widths, strict=True)))
     return table

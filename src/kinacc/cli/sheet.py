@@ -7,7 +7,7 @@ import io
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -57,6 +57,12 @@ class Sheet:
 
     def __len__(self) -> int:
         return len(self.fields[0].values) if self.fields else 0
+
+    def first(self, rows: int | None) -> Sheet:
+        """The first ``rows`` of it; None for all."""
+        if rows is None or rows >= len(self):
+            return self
+        return replace(self, fields=[replace(f, values=f.values[:rows]) for f in self.fields])
 
     def as_json(self) -> str:
         """The facts, units and rows as one JSON object."""

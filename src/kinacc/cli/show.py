@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,10 +24,10 @@ _ROWS = 20
 class _Rows(click.ParamType):
     name = "rows"
 
-    def convert(self, value, param, ctx) -> int | None:
-        """A number of rows; None for all of them."""
-        if value is None or isinstance(value, int) or value == _ALL:
-            return None if value == _ALL else value
+    def convert(self, value, param, ctx) -> int:
+        """A number of rows; more than any table has for all of them."""
+        if isinstance(value, int) or value == _ALL:
+            return sys.maxsize if value == _ALL else value
         if not value.isdecimal() or int(value) < 1:
             self.fail(f"{value!r} is neither a number of rows nor {_ALL}", param, ctx)
         return int(value)
@@ -46,14 +47,13 @@ class _Rows(click.ParamType):
 @click.option(
     "--rows",
     type=_Rows(),
-    default=_ROWS,
     metavar="N|all",
-    help=f"Rows on the screen, of both ends. [{_ROWS}]",
+    help=f"Rows: of both ends on the screen [{_ROWS}], the first in CSV, JSON and --out [all].",
 )
 @click.option("--describe", is_flag=True, help="Say what the columns mean, and what they hold.")
 @click.option("--plot", is_flag=True, help="Draw it in the terminal, where there is a picture.")
-@click.option("--csv", "as_csv", is_flag=True, help="Print all rows and digits as CSV.")
-@answers("Print all rows as JSON.", table=True)
+@click.option("--csv", "as_csv", is_flag=True, help="Print rows with all digits as CSV.")
+@answers("Print rows as JSON.", table=True)
 def show(
     path: str,
     name: str | None,
@@ -90,7 +90,7 @@ def show(
         given = {"--columns": columns, "--where": conditions, "--describe": describe}
         refuse(_of_tables(place, {**given, "--plot": plot}))
         listed = show_files.listing(place)
-        answer.give(listed.sheet, None, below=listed.below)
+        answer.give(listed.sheet, rows, below=listed.below)
         return
     kept = show_table.where(show_table.read(place), conditions)
     chosen = show_table.choose(kept, columns)
@@ -101,14 +101,14 @@ def show(
         return
     above, below = show_table.words(chosen, describe)
     if describe:
-        answer.give(show_table.described(chosen), None, above, below)
+        answer.give(show_table.described(chosen), rows, above, below)
     else:
         answer.give(chosen.sheet, rows, above, below, columns is None, is_table=True)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Where a sheet goes: to the screen, or as a whole to a machine."""
+    """Where a sheet goes: to the screen, or to a machine."""
 
     out: Output
     as_csv: bool
@@ -122,14 +122,18 @@ class Answer:
         hoist: bool = False,
         is_table: bool = False,
     ) -> None:
-        """Hand out a sheet; what is said ``above`` and ``below`` is for the screen."""
+        """Hand out a sheet, ``rows`` of it at most where that is said.
+
+        What stands ``above`` and ``below`` is for the screen, and so is leaving out rows of a table
+        unasked.
+        """
         from kinacc.cli.screen import Screen
 
         if self.out.as_json or self.out.table is not None:
-            self.out.deliver(sheet)
+            self.out.deliver(sheet.first(rows))
             return
         if self.as_csv:
-            click.echo(sheet.as_csv(), nl=False)
+            click.echo(sheet.first(rows).as_csv(), nl=False)
             return
         screen = Screen.here()
         screen.words(sheet.title, "bold")
@@ -138,7 +142,7 @@ class Answer:
         if is_table and len(sheet) == 1:
             screen.record(sheet)
         else:
-            screen.table(sheet, rows, hoist)
+            screen.table(sheet, rows or (_ROWS if is_table else None), hoist)
         for line in below:
             screen.words(line, "dim")
         self.show(screen)

@@ -18,7 +18,15 @@ from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import FIGURE_FOLDER, PAGE, STAGES, TABLES, maker_of
+from kinacc.workflow.catalogue import (
+    CALIBRATION,
+    FIGURE_FOLDER,
+    PAGE,
+    STAGES,
+    TABLES,
+    Stage,
+    maker_of,
+)
 from kinacc.workflow.plan import RESULTS, Plan
 from kinacc.workflow.verification.conformity import check_file
 from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts
@@ -194,15 +202,23 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         except InputError:
             continue
     left_out = _left_out(folder, marks, tables, plan)
-    told = {n: r for n, r in left_out.items() if not (STAGES[n].measured or STAGES[n].fits)}
+    unmade = _not_studied(folder)
+    told = {
+        name: reason
+        for name, reason in left_out.items()
+        if not (STAGES[name].measured or STAGES[name].fits or name in unmade)
+    }
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
         f"{reason}"
         for reason in dict.fromkeys(told.values())
     ]
     notes += [f"{folder / name}.parquet: left from before, {why}" for name, why in behind.items()]
-    found += _missing(folder, left_out)
-    for name, picture in _pictures(folder, plan, left_out):
+    if unmade:
+        notes.append(f"{folder}: no study was made: kinacc study FILE.yaml makes one")
+    absent = {*left_out, *unmade}
+    found += _missing(folder, absent)
+    for name, picture in _pictures(folder, plan, absent):
         checked += [str(picture)] if picture.exists() else []
         look = check_page if STAGES[name].leaves == PAGE else check_picture
         found += [(problem, (Doubt(name),)) for problem in look(picture)]
@@ -340,7 +356,7 @@ def _without_models(folder: Path, tables: dict) -> dict[str, str]:
 
 
 def _without_map(folder: Path, marks: dict, no_claims: bool) -> dict[str, str]:
-    drawn = any((folder / FIGURE_FOLDER / f"fig3.{kind}").exists() for kind in FORMATS)
+    drawn = any(path.exists() for path in _files(folder, STAGES["fig3"]))
     if drawn or (folder / "accuracy_map.parquet").exists():
         return {}
     if no_claims:  # the one table that would tell whether there was a map
@@ -352,17 +368,48 @@ def _without_map(folder: Path, marks: dict, no_claims: bool) -> dict[str, str]:
     return dict.fromkeys(("accuracy_map", "fig3"), "the claims were made without a map")
 
 
+def _not_studied(folder: Path) -> set[str]:
+    """Stages beyond a calibration, if no file of theirs is there: a study not made, none lost.
+
+    The page is no sign of a study: a calibration may leave it too.
+    """
+    beyond = [
+        stage
+        for stage in STAGES.values()
+        if not (stage.name in CALIBRATION or stage.fits or stage.joint)
+    ]
+    there = {stage.name: stage.leaves for stage in beyond if _has_left(folder, stage)}
+    if set(there.values()) - {PAGE}:
+        return set()
+    return {stage.name for stage in beyond} - set(there)
+
+
+def _has_left(folder: Path, stage: Stage) -> bool:
+    """Whether any file of a stage is there, a part of a table included."""
+    there = any(each.exists() for each in _files(folder, stage))
+    return there or any(any((folder / name).glob("*.parquet")) for name in stage.outputs)
+
+
+def _files(folder: Path, stage: Stage, formats: Collection[str] = FORMATS) -> list[Path]:
+    """Whole files of a stage: its page, the formats of its figure, or its tables."""
+    if stage.leaves == PAGE:
+        return [folder / f"{stage.name}.html"]
+    if stage.is_figure:
+        return [folder / FIGURE_FOLDER / f"{stage.name}.{kind}" for kind in formats]
+    return [folder / f"{name}.parquet" for name in stage.outputs]
+
+
 def _missing(folder: Path, left_out: Collection[str]) -> list[Found]:
     return [
         (
-            Problem(str(folder / f"{name}.parquet"), "missing", fix=f"made by {stage.message}"),
+            Problem(str(path), "missing", fix=f"made by {stage.message}"),
             (Doubt(stage.name),),
         )
         for stage in STAGES.values()
         if stage.leaves == TABLES
         if not (stage.on_request or stage.scattered or stage.name in left_out)
-        for name in stage.outputs
-        if not (folder / f"{name}.parquet").exists()
+        for path in _files(folder, stage)
+        if not path.exists()
     ]
 
 
@@ -371,13 +418,8 @@ def _pictures(
 ) -> Iterator[tuple[str, Path]]:
     formats = FORMATS if plan is None else plan.formats
     for name, stage in STAGES.items():
-        if stage.on_request or name in left_out:
-            continue
-        if stage.leaves == PAGE:
-            yield name, folder / f"{name}.html"
-        elif stage.is_figure:
-            for kind in formats:
-                yield name, folder / FIGURE_FOLDER / f"{name}.{kind}"
+        if not (stage.leaves == TABLES or stage.on_request or name in left_out):
+            yield from ((name, path) for path in _files(folder, stage, formats))
 
 
 def _leftovers(folder: Path) -> list[Path]:
