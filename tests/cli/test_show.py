@@ -70,13 +70,27 @@ def pose_errors(folder):
 
 
 def accuracy_map(folder):
-    rows = [
+    names = (
+        "slice_deg",
+        "radius_mm",
+        "height_mm",
+        "position_max_mm",
+        "orientation_max_mrad",
+        "worst_branch",
+        "orientation_worst_branch",
+        "solutions",
+        "wanted",
+        "extrapolating",
+    )
+    joints = dict.fromkeys([f"q{i}" for i in range(1, 7)])
+    cells = [
         (angle, 1000.0 + 25 * i, 25.0 * j, None if i == j == 0 else 0.5 + i * j / 100, 1.0, "a",
          "b", int(i + j > 0), 1, 0)
         for angle in (0.0, 30.0)
         for i in range(12)
         for j in range(7)
     ]  # fmt: skip
+    rows = [dict(zip(names, each, strict=True)) | joints for each in cells]
     return write(folder, "accuracy_map", rows)
 
 
