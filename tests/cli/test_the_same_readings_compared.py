@@ -71,3 +71,40 @@ def test_a_file_that_grew_is_told_from_one_that_was_measured_anew(results):
     assert told["shared_readings"] == 0
     assert told["probability"] > 1e-3
     assert "readings are in both" not in compared(results, "before", "anew")
+
+
+def joints_of(path, shifts_deg):
+    """A file of the first readings, then of as many with joint 2 shifted, per shift."""
+    q_deg = tracked("ur10", 80, 21).q[:ROWS]
+    shifted = [q_deg[:30] + np.eye(6)[1] * shift for shift in shifts_deg]
+    path.write_text(table(Q, np.vstack(shifted)))
+    return path
+
+
+def test_vec_models_are_compared_only_where_both_say_something(results, tmp_path):
+    wide = joints_of(tmp_path / "wide.csv", (0.0, 400.0))
+    page = tmp_path / "moved.html"
+    options = ("--model", "vec", "--joints", wide)
+    said = compared(results, "before", "anew", *options, "--page", page)
+    assert "compared at 30 of 60 poses: the others lie outside the joint range" in said
+    assert "Compared at 30 of 60 poses" in page.read_text("utf-8")
+    told = compared(results, "before", "anew", *options, "--json")
+    assert (told["poses"], told["poses_given"]) == (30, 60)
+    own = joints_of(tmp_path / "own.csv", (0.0,))
+    alone = compared(results, "before", "anew", "--model", "vec", "--joints", own, "--json")
+    assert told["moved_max_mm"] == alone["moved_max_mm"]
+    assert (alone["poses"], alone["poses_given"]) == (30, 30)
+
+
+def test_vec_models_that_share_no_joints_are_refused_in_one_message(results, tmp_path):
+    far = joints_of(tmp_path / "far.csv", (400.0,))
+    done = call("compare", results / "before", results / "anew", "--model", "vec", "--joints", far,
+                "--page", tmp_path / "moved.html")  # fmt: skip
+    assert done.exit_code == 2, done.output
+    assert "none of the 30 poses to compare lie in the joint range" in done.output
+    assert "joint 2 is outside in 30" in done.output
+    assert "--joints FILE" in done.output
+    assert "--model dh" in done.output
+    assert not (tmp_path / "moved.html").exists()
+    by_dh = compared(results, "before", "anew", "--joints", far)
+    assert "flange poses moved" in by_dh

@@ -132,6 +132,31 @@ def test_vec_models_are_compared_by_their_poses():
     assert found.apart_from_frames.chance_mm > 0.0
 
 
+def test_poses_beyond_the_range_of_vec_models_are_left_out_and_too_few_are_refused():
+    before, after = calibrated("mh180", "vec", 80, 3), calibrated("mh180", "vec", 80, 4)
+    low, high = (
+        pick([each.model.domain[end] for each in (before, after)], axis=0)
+        for end, pick in ((0, np.max), (1, np.min))
+    )
+    beyond = np.vstack([high + 2.0, low - 2.0, high + 0.5]) @ np.linalg.inv(
+        robot.load("mh180").joint_map.T
+    )
+    within = joints("mh180", 40)
+    q_rad = np.insert(within, [0, 7, 40], beyond, axis=0)
+    found, alone = compare(before, after, q_rad), compare(before, after, within)
+    assert np.flatnonzero(~found.covered).tolist() == [0, 8, 42]
+    assert alone.covered.all()
+    assert found.as_they_stand.rms_mm == alone.as_they_stand.rms_mm
+    assert found.apart_from_frames.chance_mm == alone.apart_from_frames.chance_mm
+    with pytest.raises(
+        InputError, match=r"only 2 of the 5 poses .* allowed: 5 or more.*--model dh"
+    ):
+        compare(before, after, np.vstack([within[:2], beyond]))
+    assert compare(before, after, within[:2]).covered.all()
+    by_dh = calibrated("mh180", "dh", 80, 3), calibrated("mh180", "dh", 80, 4)
+    assert compare(*by_dh, beyond).covered.all()
+
+
 def test_arms_of_different_kinds_are_refused():
     with pytest.raises(InputError, match="has 7 joints"):
         compare(nominal(robot.load("mh180")), nominal(robot.load("iiwa14")), np.zeros((2, 6)))

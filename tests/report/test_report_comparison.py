@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
+from kinacc.cli import comparison_report
 from kinacc.config import schema
 from kinacc.deployment.applicability import measured_by_all
 from kinacc.deployment.compare import compare
@@ -93,6 +94,36 @@ def test_a_change_at_poses_of_one_alone_that_the_model_may_lack_is_in_doubt():
     assert "leaves 0.9 mm and 0.9 mm rms unexplained" in note(built, "CHECK")
     assert "None of the 40 poses lie where both were measured" in note(built, "CHECK")
     assert "before anything is changed at the robot" in note(built, "NEXT")
+
+
+@pytest.mark.parametrize("left_mm", [0.01, 0.9])
+def test_terminal_page_and_json_call_no_arm_changed_that_was_measured_elsewhere(left_mm):
+    left = Residual(left_mm, 1e-3, "validation")
+    first = replace(arm(), residual=left)
+    near = replace(arm("November", j3_alpha_rad=5e-4), residual=left)
+    q_rad = spread(first.robot, 40)
+    middle = np.median(q_rad[:, 0])
+    few = (np.array([q_rad[:, 0].min(), *[-9.0] * 5]), np.array([middle - 1e-6, *[9.0] * 5]))
+    weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+    for ranges, said in ((None, "changed"), (few, "change in doubt")):
+        second = replace(near, fitted_range_rad=ranges)
+        both, found = (first, second), compare(first, second, q_rad, weight)
+        measured = measured_by_all(both, q_rad)
+        if ranges is not None:  # less than half, but not by much
+            measured[np.flatnonzero(measured)[0]] = False
+            assert 10 < measured.sum() < 20
+        told, facts = in_words(found, both, measured), comparison_report.answer(
+            found, both, measured).facts  # fmt: skip
+        built = comparison_page(found, both, q_rad, measured)
+        text = " ".join(built.first.answers)
+        assert facts["verdict"] == said
+        assert built.first.badge == (said.upper(), True)
+        for each in (told, text):
+            assert ("the arm has changed" in each) == (said == "changed")
+            assert ("a change of the arm is in doubt: only" in each) == (said != "changed")
+        again = "measure the poses of the first again"
+        assert (again in told) == (said != "changed")
+    assert facts["poses_measured_by_both"] == measured.sum()
 
 
 class Curves(dh.DHModel):

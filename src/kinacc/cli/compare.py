@@ -25,7 +25,9 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
     FIRST and SECOND are results folders of data sets, or robot files. Parameters that the poses of
     either do not determine are marked, not counted. Poses are compared at the joints both were
     measured at: as they stand, and after the base and tool changes that bring them closest, each
-    beside what two calibrations of an unchanged arm would show by chance.
+    beside what two calibrations of an unchanged arm would show by chance. A VEC model says nothing
+    outside the joint range it was fitted in: poses there are left out. No change is called proven
+    where most poses lie where not both were measured.
 
     \b
     Example:
@@ -47,7 +49,7 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
         weight = schema.key("calibration.rotation_weight_mm_per_rad").default
         measured = measured_by_all(calibrations, q_rad)
         found = compared(*calibrations, q_rad, weight, comparison_report.shared((first, second)))
-    answer = comparison_report.answer(found, calibrations, len(q_rad))
+    answer = comparison_report.answer(found, calibrations, measured)
     if out.picture is not None:
         from kinacc.figures.comparison import draw
 

@@ -13,7 +13,7 @@ from kinacc.cli import choice, rows
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.deployment import shared_readings
 from kinacc.deployment.compare import Difference, require_alike
-from kinacc.deployment.compare_words import remarks, short_names, shown_in
+from kinacc.deployment.compare_words import remarks, short_names, shown_in, verdict
 from kinacc.deployment.record import Calibration, nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
 from kinacc.errors import InputError, Problem
@@ -75,14 +75,20 @@ def _measured(place: str) -> Columns | None:
     return store.read(_file(place)) if _file(place).is_file() else None
 
 
-def answer(found: Difference, calibrations: Sequence[Calibration], poses: int) -> Sheet:
-    """The sheet of ``kinacc compare``: one row per parameter, and what poses did as facts."""
+def answer(found: Difference, calibrations: Sequence[Calibration], measured: np.ndarray) -> Sheet:
+    """The sheet of ``kinacc compare``: one row per parameter, and what poses did as facts.
+
+    ``measured`` (n,): the poses given where both were measured.
+    """
     facts = {
         "first": calibrations[0].name,
         "second": calibrations[1].name,
         "model": calibrations[0].choice,
         "same_robot": found.same_robot,
-        "poses": poses,
+        "verdict": verdict(found, calibrations, measured),
+        "poses": int(found.covered.sum()),
+        "poses_given": len(found.covered),
+        "poses_measured_by_both": int(measured[found.covered].sum()),
         "shared_readings": found.shared.count,
         "first_fitted_to": found.shared.first,
         "second_fitted_to": found.shared.second,

@@ -13,11 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
+from kinacc.artifacts.error_models import model_name
 from kinacc.calibration.uncertainty import scale_of
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
-from kinacc.errors import Problem, refuse
+from kinacc.deployment.verify import says_there
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.dh import DHModel
@@ -28,6 +30,7 @@ _TOUCHED = 1e-4  # as in the fits: 1 % of a parameter in a direction nobody sees
 _STEPS = 8
 _ANOTHER = 0.005  # of the length of an arm; a calibration changes far less
 ROUNDING = 1e-9  # mm and mrad
+_FEWEST = 5  # poses: three would let base and tool take up nearly all
 
 
 class Parameters(NamedTuple):
@@ -66,12 +69,15 @@ class Difference:
     ``parameters`` is None unless both are DH tables. ``statistic`` is the squared distance in the
     ``directions`` both determine, in units of their covariances, and ``probability`` that of one at
     least as large where nothing changed; NaN where not both know their covariance.
-    ``as_they_stand`` are shifts of the flange in the base, ``apart_from_frames`` after the best
-    base and tool. ``robots_apart_mm`` is the rms by which the arms they were calibrated from differ
-    after the best base and tool, and ``same_robot`` whether that is no more than calibrations do.
-    ``shared`` are readings that both were fitted to, which are counted once.
+    ``covered`` (n,) are the poses compared, of all given: a VEC model says nothing outside the
+    joint range it was fitted in. ``as_they_stand`` are shifts of the flange in the base at these,
+    ``apart_from_frames`` after the best base and tool. ``robots_apart_mm`` is the rms by which the
+    arms they were calibrated from differ after the best base and tool, and ``same_robot`` whether
+    that is no more than calibrations do. ``shared`` are readings that both were fitted to,
+    which are counted once.
     """
 
+    covered: np.ndarray
     parameters: Parameters | None
     statistic: float
     directions: int
@@ -93,9 +99,12 @@ def compare(
     """What moved from ``first`` to ``second``, over reported joints ``q_rad`` (n, k), rad and mm.
 
     ``shared``: readings that both were fitted to; without it they count as apart.
-    Raises InputError where the two are of different kinds of arm.
+    Raises InputError where the two are of different kinds of arm, or both say something at hardly
+    any of the joints.
     """
     require_alike(first, second)
+    covered = _covered(first, second, q_rad)
+    q_rad = q_rad[covered]
     first, second = counted_once(first, second, shared)
     parameters, test = None, (np.nan, 0, np.nan)
     if first.model.comparable is not None and second.model.comparable is not None:
@@ -115,6 +124,7 @@ def compare(
     left = None if scatter is None else _without_frames(scatter, slopes, weights)
     apart_mm = _robots_apart(first, second, q_rad, weights)
     return Difference(
+        covered,
         parameters,
         *test,
         _shift(plain, scatter),
@@ -137,6 +147,29 @@ def require_alike(first: Calibration, second: Calibration) -> None:
     elif not np.array_equal(first.robot.joint_map, second.robot.joint_map):
         problems.append(Problem(second.name, "another joint_map", "the same reported joints"))
     refuse(problems, f"{first.name} and {second.name} are not the same kind of robot")
+
+
+def _covered(first: Calibration, second: Calibration, q_rad: np.ndarray) -> np.ndarray:
+    """True (n,) where both models say something. InputError where they do at hardly any joints."""
+    both = (first, second)
+    said = [says_there(each.model, each.robot.dh_joints(q_rad)) for each in both]
+    covered = np.all(said, axis=(0, 2))
+    count, given = int(covered.sum()), len(covered)
+    if count < min(_FEWEST, given):
+        outside = np.sum(~np.all(said, axis=0), axis=0)
+        joint = int(np.argmax(outside))
+        model = model_name(next(each for each in both if each.model.domain is not None).choice)
+        raise InputError(
+            Problem(
+                f"{first.name} and {second.name}",
+                f"{f'only {count}' if count else 'none'} of the {given} poses to compare lie in "
+                f"the joint range in which the {model} models were fitted; joint {joint + 1} is "
+                f"outside in {outside[joint]}",
+                f"{_FEWEST} or more, for a {model} model says nothing elsewhere",
+                "compare at poses measured by both (--joints FILE), or the DH models (--model dh)",
+            )
+        )
+    return covered
 
 
 def _robots_apart(

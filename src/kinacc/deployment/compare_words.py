@@ -16,6 +16,7 @@ from kinacc.deployment.shared_readings import SharedReadings
 _UNLIKELY = 0.001
 _ENOUGH = 0.5  # of the poses
 _NOTHING = 5e-5  # less is no digit of the four shown after the point
+AGAIN = "measure the poses of the first again, calibrate, and compare like with like"
 
 
 def short_names(calibrations: Sequence[Calibration]) -> tuple[str, str]:
@@ -25,14 +26,16 @@ def short_names(calibrations: Sequence[Calibration]) -> tuple[str, str]:
 
 
 def in_words(found: Difference, calibrations: Sequence[Calibration], measured: np.ndarray) -> str:
-    """What moved, in sentences; ``measured`` (n,): the poses where both were measured."""
-    lines = of_readings(found.shared, calibrations)
+    """What moved, in sentences; ``measured`` (n,): the poses given where both were measured."""
+    measured = measured[found.covered]
+    lines = [*of_readings(found.shared, calibrations), *of_covered(found, calibrations)]
     if says_nothing(calibrations, measured):
         why = nowhere(calibrations, measured)
-        lines.append(
+        return "\n".join([
+            *lines,
             f"these calibrations cannot be compared at these poses: {why}; compare at joints that "
-            "both cover (--joints), or the DH models (--model dh)"
-        )
+            "both cover (--joints), or the DH models (--model dh)",
+        ])  # fmt: skip
     if not found.same_robot:
         first, second = (calibration.robot.name for calibration in calibrations)
         lines.append(
@@ -41,28 +44,77 @@ def in_words(found: Difference, calibrations: Sequence[Calibration], measured: n
             "follows is no change of one arm"
         )
     elif np.isfinite(found.probability):
-        verdict = "the arm has changed" if has_changed(found) else "no change is proven"
+        said = by_parameters(found, measured)
         lines.append(
             f"{found.directions} directions both determine: squared distance "
-            f"{found.statistic:.1f}, probability of more by chance {found.probability:.2g}: "
-            f"{verdict}, if the residuals are independent noise"
+            f"{found.statistic:.1f}, probability of more by chance {found.probability:.2g}: {said}"
         )
+        if has_changed(found) and is_in_doubt(measured):
+            lines.append(f"{AGAIN}, before anything is changed at the robot")
     words = "flange poses differ" if found.shared.all_of_both else "flange poses moved"
     lines.append(moved(words, found.as_they_stand))
     lines.append(moved("after the best base and tool", found.apart_from_frames))
     return "\n".join(lines)
 
 
+def verdict(
+    found: Difference, calibrations: Sequence[Calibration], measured: np.ndarray
+) -> str | None:
+    """What a comparison says of the arm, in a few words; None where chance is not known."""
+    measured = measured[found.covered]
+    if not found.same_robot:
+        return "different robots"
+    if found.shared.all_of_both:
+        return "same readings"
+    if says_nothing(calibrations, measured):
+        return "not comparable here"
+    if not np.isfinite(found.probability):
+        return None
+    if not has_changed(found):
+        return "no change proven"
+    return "change in doubt" if is_in_doubt(measured) else "changed"
+
+
+def by_parameters(found: Difference, measured: np.ndarray) -> str:
+    """What the parameters prove; ``measured``: the poses compared where both were measured."""
+    noise = "if the residuals are independent noise"
+    if not has_changed(found):
+        return f"no change is proven, {noise}"
+    if not is_in_doubt(measured):
+        return f"the arm has changed, {noise}"
+    return (
+        f"a change of the arm is in doubt: {of_both(measured)}, and what a model leaves "
+        "unexplained gives other parameters of the same arm at other poses"
+    )
+
+
+def is_in_doubt(measured: np.ndarray) -> bool:
+    """Whether a change may be other poses: most lie where not both were measured."""
+    return float(np.mean(measured)) < _ENOUGH
+
+
+def of_covered(found: Difference, calibrations: Sequence[Calibration]) -> list[str]:
+    """At how many of the poses given a comparison was made, where not at all."""
+    if found.covered.all():
+        return []
+    bounded = next(each for each in calibrations if each.model.domain is not None)
+    return [
+        f"compared at {int(found.covered.sum())} of {len(found.covered)} poses: the others lie "
+        f"outside the joint range of the fits, where a {model_name(bounded.choice)} model says "
+        "nothing"
+    ]
+
+
 def says_nothing(calibrations: Sequence[Calibration], measured: np.ndarray) -> bool:
     """Whether most poses are where models without parameters of their own say nothing."""
     parametric = all(each.model.comparable is not None for each in calibrations)
-    return not parametric and float(np.mean(measured)) < _ENOUGH
+    return not parametric and is_in_doubt(measured)
 
 
 def nowhere(calibrations: Sequence[Calibration], measured: np.ndarray) -> str:
     """Why a comparison at such poses means nothing."""
     model = model_name(calibrations[0].choice)
-    return f"{of_both(measured)}, and a {model} model says nothing elsewhere"
+    return f"{of_both(measured)}, and a {model} model is not to be trusted elsewhere"
 
 
 def of_both(measured: np.ndarray) -> str:

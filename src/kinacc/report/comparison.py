@@ -9,14 +9,18 @@ import numpy as np
 from kinacc.artifacts.error_models import model_name
 from kinacc.deployment.compare import Difference, Parameters
 from kinacc.deployment.compare_words import (
+    AGAIN,
+    by_parameters,
     has_changed,
     nowhere,
     number,
     of_both,
+    of_covered,
     of_readings,
     says_nothing,
     short_names,
     shown_in,
+    verdict,
 )
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.kinematics.model import JointState
@@ -36,8 +40,11 @@ def comparison_page(
 ) -> Page:
     """The page of a comparison at reported joints ``q_rad`` (n, k), rad and mm.
 
-    ``measured`` (n,): the poses where both were measured.
+    ``measured`` (n,): the poses where both were measured. Both are of all poses given to the
+    comparison; the page shows those that were compared.
     """
+    badge = _badge(found, verdict(found, calibrations, measured))
+    q_rad, measured = q_rad[found.covered], measured[found.covered]
     case = _case(found, calibrations, q_rad, measured)
     first, second = case.names
     of_all = [each.robot.name for each in calibrations]
@@ -45,7 +52,7 @@ def comparison_page(
         f"{second} against {first}",
         f"{', '.join(dict.fromkeys(of_all))}, {model_name(case.model)} model; {len(q_rad)} poses "
         "of the flange",
-        _badge(case),
+        badge,
         _answers(case, calibrations),
         () if case.extrapolates else (_table(case),),
         _notes(case, calibrations),
@@ -68,26 +75,18 @@ def _case(
     position = one.pose(JointState(one.robot.dh_joints(q_rad)), "base", FLANGE).position_mm
     left = tuple(each.residual.position_mm for each in calibrations if each.residual is not None)
     return Case(
-        found, short_names(calibrations), one.choice, shown, one.robot.dh.prismatic, position,
-        measured, left, says_nothing(calibrations, measured),
+        found, short_names(calibrations), one.choice,
+        1 + np.flatnonzero(found.covered), shown, one.robot.dh.prismatic, position, measured, left,
+        says_nothing(calibrations, measured),
     )  # fmt: skip
 
 
-def _badge(case: Case) -> tuple[str, bool]:
-    found = case.found
-    if not found.same_robot:
-        return "DIFFERENT ROBOTS", True
-    if found.shared.all_of_both:
-        return "SAME READINGS", False
-    if case.extrapolates:
-        return "NOT COMPARABLE HERE", True
-    if not np.isfinite(found.probability):
-        times = _times_chance(found)
-        known = f"{times:.1f} TIMES CHANCE" if np.isfinite(times) else "CHANCE NOT KNOWN"
-        return known, times > _BEYOND
-    if not has_changed(found):
-        return "NO CHANGE PROVEN", False
-    return ("CHANGE IN DOUBT" if case.in_doubt else "CHANGED"), True
+def _badge(found: Difference, said: str | None) -> tuple[str, bool]:
+    if said is not None:
+        return said.upper(), said not in ("same readings", "no change proven")
+    times = _times_chance(found)
+    known = f"{times:.1f} TIMES CHANCE" if np.isfinite(times) else "CHANCE NOT KNOWN"
+    return known, times > _BEYOND
 
 
 def _times_chance(found: Difference) -> float:
@@ -131,14 +130,8 @@ def _answers(case: Case, calibrations: Sequence[Calibration]) -> tuple[str, ...]
             "say what chance would bring."
         )
     if found.same_robot and np.isfinite(found.probability):
-        verdict = "the arm has changed" if has_changed(found) else "no change is proven"
-        said = f"By the parameters both determine {verdict}, if the residuals are independent noise"
-        if has_changed(found) and case.in_doubt:
-            said += (
-                "; they may not be: the model leaves more unexplained than these poses moved, so "
-                "other poses give other parameters of an arm that is the same"
-            )
-        lines.append(f"{said}.")
+        said = by_parameters(found, case.measured)
+        lines.append(f"By the parameters both determine, {said}.")
     return tuple(lines)
 
 
@@ -156,7 +149,7 @@ def _table(case: Case) -> Table:
 def _notes(
     case: Case, calibrations: Sequence[Calibration]
 ) -> tuple[tuple[str, tuple[Text, ...]], ...]:
-    check = []
+    check = of_covered(case.found, calibrations)
     if case.left_mm:
         left = " and ".join(f"{number(each)} mm" for each in case.left_mm)
         check.append(f"the {model_name(case.model)} model leaves {left} rms unexplained")
@@ -213,10 +206,9 @@ def _next(case: Case) -> str:
         )
     if not (has_changed(found) or (np.isnan(found.probability) and times > _BEYOND)):
         return "nothing: keep the calibration that is loaded"
-    again = "measure the poses of the first again, calibrate, and compare like with like"
     if case.in_doubt:
-        return f"{again}, before anything is changed at the robot"
-    return f"{again}; where the change stays, load the new calibration and look for its cause"
+        return f"{AGAIN}, before anything is changed at the robot"
+    return f"{AGAIN}; where the change stays, load the new calibration and look for its cause"
 
 
 def _sentence(line: str) -> str:

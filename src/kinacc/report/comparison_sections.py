@@ -10,7 +10,7 @@ from bokeh.models import CDSView, ColumnDataSource, HoverTool, IndexFilter
 from bokeh.models.annotations import BoxAnnotation, Span
 
 from kinacc.deployment.compare import Difference, Parameters, Shift
-from kinacc.deployment.compare_words import number, remarks, shown_in
+from kinacc.deployment.compare_words import is_in_doubt, number, remarks, shown_in
 from kinacc.report import pictures
 from kinacc.report.page import Block, Control, Option, Picture, Section, Table
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
@@ -30,13 +30,15 @@ LOOKS = {
 class Case:
     """What the page is about: the names, the poses (n, 3) of the first, and where it may be read.
 
-    ``measured`` (n,): where both calibrations were measured; ``extrapolates``: at so few poses that
-    models without parameters of their own say nothing.
+    ``number`` (n,) are those of the poses among all given; ``measured`` (n,): where both
+    calibrations were measured; ``extrapolates``: at so few poses that models without parameters of
+    their own say nothing.
     """
 
     found: Difference
     names: tuple[str, str]
     model: str
+    number: np.ndarray
     joints: np.ndarray
     slides: np.ndarray
     position_mm: np.ndarray
@@ -51,9 +53,8 @@ class Case:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether a change may be other poses: less than is unexplained, mostly at poses of one."""
-        little = bool(self.left_mm) and self.found.apart_from_frames.rms_mm < max(self.left_mm)
-        return little and float(self.measured.mean()) < 0.5
+        """Whether a change may be other poses."""
+        return is_in_doubt(self.measured)
 
 
 def shown(value: float) -> str:
@@ -181,7 +182,7 @@ def _poses(case: Case) -> tuple[ColumnDataSource, np.ndarray, np.ndarray]:
     columns |= {f"q{n + 1}": case.joints[rows, n] for n in range(case.joints.shape[1])}
     columns |= {axis: case.position_mm[rows, i] for i, axis in enumerate("xyz")}
     words = np.where(case.measured[rows], "both were measured there", "not measured by both there")
-    columns |= {"number": rows + 1, "standing": words.astype(object)}
+    columns |= {"number": case.number[rows], "standing": words.astype(object)}
     return pictures.source("poses", columns), rows, largest
 
 
@@ -248,7 +249,7 @@ def _worst(case: Case, rows: np.ndarray, picks: list[int]) -> Table:
         heads,
         tuple(
             (
-                str(int(row) + 1),
+                str(case.number[row]),
                 *(shown(float(shift.position_mm[row])) for shift in case.shifts.values()),
                 *(f"{joint:.2f}" for joint in np.round(case.joints[row], 2) + 0.0),
             )
