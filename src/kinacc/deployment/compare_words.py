@@ -83,8 +83,8 @@ def by_parameters(found: Difference, measured: np.ndarray) -> str:
     if not is_in_doubt(measured):
         return f"the arm has changed, {noise}"
     return (
-        f"a change of the arm is in doubt: {of_both(measured)}, and what a model leaves "
-        "unexplained gives other parameters of the same arm at other poses"
+        f"a change of the arm is in doubt: {of_both(measured)}, and other poses "
+        "give other parameters of the same arm"
     )
 
 
