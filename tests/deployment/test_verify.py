@@ -238,7 +238,7 @@ def test_of_few_readings_where_it_was_measured_nothing_is_told_but_what_to_measu
     _, found = folder
     told = asked(found, later(3.0, 12))
     assert "verdict: cannot be told from these readings: too few readings" in told
-    assert "next: measure 20 new configurations or more" in told
+    assert "next: measure 60 new configurations near those of the calibration, 20 at least" in told
     below = told[told.index("VEC ") :].splitlines()
     assert "lie where the calibration was measured" in below[1]  # right after the table
 

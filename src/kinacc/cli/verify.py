@@ -27,7 +27,7 @@ _FAR_MM = 10.0
 @click.argument("files", nargs=-1, required=True, type=click.Path(), metavar="FILE.yaml...")
 @click.option(
     "--base-and-tool",
-    type=click.Choice(["fixed", "estimated"]),
+    type=choice.values_of("calibration.base_and_tool"),
     help="As they were fitted, or fitted anew to these readings.  [required]",
 )
 @click.option("--dataset", help="Data set of the files. [the only one]")
@@ -147,7 +147,7 @@ def _next(
     found: Verdict, base_and_tool: str, folder: str, files: Sequence[str], dataset: str | None
 ) -> tuple[str, str]:
     """What to do after a verdict, and the command for it."""
-    from kinacc.deployment.verify import GOOD, LEAST, OPEN
+    from kinacc.deployment.verify import ENOUGH, GOOD, LEAST, OPEN
 
     more = [] if dataset is None else ["--dataset", dataset]
     anew = shlex.join(["kinacc", "verify", folder, *files, *more, "--base-and-tool", "estimated"])
@@ -161,10 +161,12 @@ def _next(
         if found.reason.startswith("too few held-out"):
             step = "calibrate with folds (measurements.folds) and enough poses to hold some out"
             return step, shlex.join(["kinacc", "fitted", folder])
-        step = f"measure {LEAST} new configurations or more near those of the calibration"
+        step = (
+            f"measure {ENOUGH} new configurations near those of the calibration, {LEAST} at least"
+        )
         if found.reason.startswith("the difference"):
-            step = "measure more new configurations near those of the calibration"
-        return f"{step}, which this lists, and verify again", poses
+            step = f"measure {ENOUGH} new configurations or more near those of the calibration"
+        return f"{step}, and verify again; this lists those", poses
     if base_and_tool == "fixed":
         return "see whether the arm has changed, or only instrument or tool was moved", anew
     return "calibrate anew with these readings", again

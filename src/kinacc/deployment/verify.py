@@ -31,6 +31,7 @@ from kinacc.measurements.folds import configurations, configurations_of
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 LEAST = 20  # configurations that two means are compared of
+ENOUGH = 60  # of as many an arm that did not change is found as good in five cases of six
 AS_GOOD = 0.25  # of the held-out mean: a calibration that is off by less more holds
 CONFIDENCE = 0.99  # of the interval of the difference of the means
 GOOD, WORSE, OPEN = "as good", "worse", "cannot be told"
