@@ -40,7 +40,11 @@ def _below(name: str) -> Iterator[tuple[str, click.Command]]:
 
 def _entry(words: str, command: click.Command) -> str:
     context = click.Context(
-        command, info_name=f"kinacc {words}", max_content_width=80, terminal_width=80
+        command,
+        info_name=f"kinacc {words}",
+        max_content_width=80,
+        terminal_width=80,
+        help_option_names=main.context_settings["help_option_names"],
     )
     return f"### kinacc {words}\n\n```text\n{command.get_help(context)}\n```\n"
 

@@ -26,7 +26,7 @@ _MODEL_ERROR = (
 _VERDICTS = {ACCEPT: "WITHIN", REJECT: "BEYOND"}
 
 
-def section(state: State, tables: Mapping[str, Columns], key: str = "campaign") -> Section:
+def section(state: State, tables: Mapping[str, Columns], key: str) -> Section:
     """A campaign as one section of another page, by the tables of ``campaign.report.tables``.
 
     ``key`` tells several campaigns on one page apart.

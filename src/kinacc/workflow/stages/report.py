@@ -45,4 +45,4 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
 
 def _campaign(assessed: Assessed) -> Section:
     state, tables = report.tables(folder.open_(assessed.place))
-    return campaign.section(state, tables)
+    return campaign.section(state, tables, "campaign")
