@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,6 +31,9 @@ def command_line_markdown() -> str:
     return "\n".join(parts)
 
 
+_HELP = re.compile(r"\n(\nOptions:\n(?= +(?:-h, )?--help .*\Z))? +(?:-h, )?--help .*")
+
+
 def _below(name: str) -> Iterator[tuple[str, click.Command]]:
     command = main.commands[name]
     yield name, command
@@ -40,13 +44,10 @@ def _below(name: str) -> Iterator[tuple[str, click.Command]]:
 
 def _entry(words: str, command: click.Command) -> str:
     context = click.Context(
-        command,
-        info_name=f"kinacc {words}",
-        max_content_width=80,
-        terminal_width=80,
-        help_option_names=main.context_settings["help_option_names"],
+        command, info_name=f"kinacc {words}", max_content_width=80, terminal_width=80
     )
-    return f"### kinacc {words}\n\n```text\n{command.get_help(context)}\n```\n"
+    text = _HELP.sub("", command.get_help(context))  # every command has it
+    return f"### kinacc {words}\n\n```text\n{text}\n```\n"
 
 
 if __name__ == "__main__":
