@@ -76,14 +76,14 @@ def test_the_first_sentence_is_a_promise_with_its_odds_its_poses_and_its_conditi
         f"is off by more than {upper:.3f} mm, if the noise is at most 0.05 mm per axis and nothing "
         "moved (base, tool, instrument)."
     )
-    assert first.badge == ("WITHIN 2 mm", False)
+    assert first.badge == ("MODEL WITHIN 2 mm", False)
     assert "This is the error of the model" in first.answers[-1]
     assert "these 12 candidates (drawn)" in note(first, "VALID")
 
 
 def test_a_tolerance_below_the_lower_bound_is_a_warning():
     first = first_of(measured(tolerance_mm=0.1))
-    assert first.badge == ("BEYOND 0.1 mm", True)
+    assert first.badge == ("MODEL BEYOND 0.1 mm", True)
     assert "reject" in first.answers[-2]
 
 

@@ -23,7 +23,7 @@ _MODEL_ERROR = (
     "This is the error of the model at these poses: the robot itself improves only once the "
     "calibration is loaded into its controller, or its programs are compensated."
 )
-_VERDICTS = {ACCEPT: "WITHIN", REJECT: "BEYOND"}
+_VERDICTS = {ACCEPT: "MODEL WITHIN", REJECT: "MODEL BEYOND"}
 
 
 def section(state: State, tables: Mapping[str, Columns], key: str) -> Section:

@@ -124,6 +124,10 @@ def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
         lines.append("No pose was held out: errors at other poses are larger, and unknown.")
     if answers.campaign:
         first, *others = answers.campaign
+        others.append(
+            f"That is about the campaign's own poses: among the {rows} up to "
+            f"{size['largest']:.{digits}f} mm was seen."
+        )
         return [*lines, f"Largest error, by a campaign at poses of its own: {first}", *others]
     return [*lines, f"{_NO_CAMPAIGN} {size['largest']:.{digits}f} mm.", "Tolerance: none set."]
 
@@ -170,8 +174,9 @@ def _notes(
     """Lines under names in capitals; commands stand as code."""
     told = texts_of(facts, answers.more)
     notes = [(_OF_THE_PAPER[key], answers.claims[key]) for key in _OF_THE_PAPER if answers.claims]
-    notes.append(("DATA", told["data"][1:]))  # how many of what stands under the title
-    notes.append(("CHECK", [*map(_without_code, told["check"]), *_sized_by(told["check"])]))
+    data = [_of_delivered(each) for each in told["data"][1:]]  # the first stands in the title
+    notes.append(("DATA", data))
+    notes.append(("CHECK", [*_sized_by(told["check"]), *map(_without_code, told["check"])]))
     if answers.outdated:
         names = ", ".join(answers.outdated)
         words = f"{names}: made from other tables than those here, so not shown"
@@ -200,7 +205,12 @@ def _sized_by(findings: Sequence[str]) -> list[str]:
     """Whose errors the check speaks of, where it does: they are not those of the table."""
     if not any(" mm" in each for each in findings):
         return []
-    return ["sizes here are those of the check's own quick fit, not of the models above"]
+    return ["by a quick fit of its own, whose errors are not those of the models above:"]
+
+
+def _of_delivered(words: str) -> str:
+    """What is said of the models, told from the fits that judge them in turn."""
+    return words.replace("models fitted to", "the models delivered are fitted to", 1)
 
 
 def _captioned(commands: Sequence[str]) -> Iterator[str]:
