@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
+from copy import copy
 from pathlib import Path
 
 import click
@@ -31,9 +31,6 @@ def command_line_markdown() -> str:
     return "\n".join(parts)
 
 
-_HELP = re.compile(r"\n(\nOptions:\n(?= +(?:-h, )?--help .*\Z))? +(?:-h, )?--help .*")
-
-
 def _below(name: str) -> Iterator[tuple[str, click.Command]]:
     command = main.commands[name]
     yield name, command
@@ -43,11 +40,12 @@ def _below(name: str) -> Iterator[tuple[str, click.Command]]:
 
 
 def _entry(words: str, command: click.Command) -> str:
+    plain = copy(command)
+    plain.add_help_option = False  # every command has it
     context = click.Context(
-        command, info_name=f"kinacc {words}", max_content_width=80, terminal_width=80
+        plain, info_name=f"kinacc {words}", max_content_width=80, terminal_width=80
     )
-    text = _HELP.sub("", command.get_help(context))  # every command has it
-    return f"### kinacc {words}\n\n```text\n{text}\n```\n"
+    return f"### kinacc {words}\n\n```text\n{plain.get_help(context)}\n```\n"
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import shlex
 import subprocess
 import sys
 
@@ -482,7 +483,8 @@ def test_colours_are_for_terminals_that_want_them(tmp_path):
 
 def test_a_reader_who_has_seen_enough_is_left_in_peace(tmp_path):
     measurements(tmp_path, 2000)
-    command = f"{sys.executable} -m kinacc show {tmp_path} measurements --csv | head -1"
+    shown = shlex.join([sys.executable, "-m", "kinacc", "show", str(tmp_path), "measurements"])
+    command = f"{shown} --csv | head -1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True)
     assert done.stdout.startswith("pose,")
     assert done.stderr == ""
