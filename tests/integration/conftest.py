@@ -9,11 +9,11 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import shared_work
 
 from kinacc.workflow.catalogue import STAGES
 
@@ -161,28 +161,15 @@ def write_poses(path: Path, poses: int = 60) -> None:
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory) -> Project:
     """A project whose small study has been run; shared by all workers, never changed."""
-    base = tmp_path_factory.getbasetemp()
-    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    folder, done = base / "finished project", base / "finished"
-    try:
-        (base / "finishing").mkdir()
-    except FileExistsError:
-        for _ in range(600):
-            if done.exists() or (base / "over").exists():
-                break
-            time.sleep(0.5)
-        assert done.exists(), "the small study could not be run; see the other worker"
-        return Project(folder)
-    try:
-        _copy(ROOT, folder)
-        (folder / "small.yaml").write_text(SMALL)
-        write_poses(folder / "own data" / "poses.csv")
-        project = Project(folder)
+
+    def run(folder: Path) -> None:
+        project = Project(folder / "project")
+        _copy(ROOT, project.folder)
+        (project.folder / "small.yaml").write_text(SMALL)
+        write_poses(project.folder / "own data" / "poses.csv")
         project.snakemake()
-        done.touch()
-    finally:
-        (base / "over").touch()
-    return Project(folder)
+
+    return Project(shared_work.once(tmp_path_factory, "finished project", run) / "project")
 
 
 @pytest.fixture

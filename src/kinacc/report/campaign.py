@@ -17,12 +17,9 @@ from kinacc.campaign.report import facts, grounds, read_above
 from kinacc.campaign.state import State
 from kinacc.report.campaign_course import course, mm, scatter
 from kinacc.report.campaign_points import points, readings
-from kinacc.report.page import FirstScreen, Page, Section, Table, Text
+from kinacc.report.page import ROBOT_ITSELF, FirstScreen, Page, Section, Table, Text
 
-_MODEL_ERROR = (
-    "This is the error of the model at these poses: the robot itself improves only once the "
-    "calibration is loaded into its controller, or its programs are compensated."
-)
+_MODEL_ERROR = f"This is the error of the model at these poses: {ROBOT_ITSELF}."
 _VERDICTS = {ACCEPT: "MODEL WITHIN", REJECT: "MODEL BEYOND"}
 
 

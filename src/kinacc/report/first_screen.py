@@ -11,7 +11,7 @@ from kinacc.artifacts.allowed import FINDING_LEVELS
 from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
-from kinacc.report.page import FirstScreen, Table, Text, printed
+from kinacc.report.page import ROBOT_ITSELF, FirstScreen, Table, Text, printed
 
 _FIGURES = {
     "mean": "mean",
@@ -112,8 +112,7 @@ def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
         f"mm on average, {LARGE_SHARE:.0%} of them by less than {size['quantile_99']:.{digits}f} "
         "mm.",
         f"The arm as its maker describes it{placed} misses them by {plain:.{digits}f} mm on "
-        "average. These are errors of models: the robot itself improves only once the calibration "
-        "is loaded into its controller, or its programs are compensated.",
+        f"average. These are errors of models: {ROBOT_ITSELF}.",
     ]
     if held_out:
         lines.append(

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 TEMPLATES = "templates"
 _MADE_BY = {"kinacc_version": __version__}
+ROBOT_ITSELF = (
+    "the robot itself improves only once the calibration is loaded into its controller, or its "
+    "programs are compensated"
+)
 _DIGITS = 16  # of a digest, as shown
 
 
