@@ -27,16 +27,33 @@ def configurations(
     joints (n, k) agree within ``tolerance_rad`` in every joint, full turns apart (revisits). The
     relation is closed under chaining: no two configurations hold rows within the tolerance.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+    return configurations_among(np.arange(len(pose)), pose, neighbours(q_rad, tolerance_rad))
+
+
+def neighbours(q_rad: np.ndarray, tolerance_rad: float = SAME_CONFIGURATION_RAD) -> np.ndarray:
+    """Pairs (m, 2) of rows whose joints (n, k) agree within ``tolerance_rad``, full turns apart."""
     from scipy.spatial import cKDTree
 
     turn = 2.0 * np.pi
     wrapped = np.mod(q_rad, turn)
     wrapped[wrapped >= turn] = 0.0
-    pairs = cKDTree(wrapped, boxsize=turn).query_pairs(
+    return cKDTree(wrapped, boxsize=turn).query_pairs(
         tolerance_rad, p=np.inf, output_type="ndarray"
     )
+
+
+def configurations_among(rows: np.ndarray, pose: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Configuration number (r,) of ``rows`` (r,) as if there were no others; ``pose`` (n,) of all.
+
+    ``pairs``: the ``neighbours`` of all rows, found once for many selections of them.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    place = np.full(len(pose), -1)
+    place[rows] = np.arange(len(rows))
+    pairs, pose = place[pairs], pose[rows]
+    pairs = pairs[np.all(pairs >= 0, axis=1)]
     first_of_pose = np.unique(pose, return_index=True)[1]
     same_pose = np.stack([np.arange(len(pose)), first_of_pose[_ranks(pose)]], axis=1)
     links = np.concatenate([pairs.reshape(-1, 2), same_pose])
