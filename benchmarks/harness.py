@@ -44,11 +44,14 @@ LIMIT = "limit"
 
 @dataclass(frozen=True)
 class Contender:
-    """One way to do a work: ``run`` gives the outputs all others give, all preallocated or none."""
+    """One way to do a work: ``run`` gives the outputs all others give, all preallocated or none.
+
+    The kinacc of a work with ``today`` needs no ``run``: it is what ``today`` makes.
+    """
 
     name: str
     version: str
-    run: Callable[[], object]
+    run: Callable[[], object] | None = None
 
 
 @dataclass(frozen=True)
@@ -143,8 +146,8 @@ def _cpu_ns() -> float:
 class _Here:
     """A contender in this process."""
 
-    def __init__(self, contender: Contender):
-        self.name, self.version, self._run = contender.name, contender.version, contender.run
+    def __init__(self, name: str, version: str, run: Callable[[], object]):
+        self.name, self.version, self._run = name, version, run
 
     def output(self) -> object:
         return self._run()
@@ -152,27 +155,26 @@ class _Here:
     def sample(self, times: int) -> Sample:
         return timed(self._run, times)
 
-    def close(self) -> None:
-        pass
-
 
 class Elsewhere:
-    """kinacc of one tree in a process of its own, as ``worker.py`` answers for it."""
+    """kinacc of one tree in a process of its own, as ``worker.py`` answers for it.
 
-    def __init__(self, name: str, version: str, work: Work, tree: Path, smoke: bool):
+    It goes from work to work of a topic, so that what they share is prepared once.
+    """
+
+    def __init__(self, name: str, version: str, tree: Path):
         self.name, self.version = name, version
         answers, other_end = os.pipe()
         environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": str(tree / "src")}
-        made_by = [work.today.__module__, work.today.__qualname__, str(int(smoke)), str(other_end)]
         self._process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("worker.py")), *made_by],
+            [sys.executable, str(Path(__file__).with_name("worker.py")), str(other_end)],
             stdin=subprocess.PIPE, stdout=sys.stderr, pass_fds=[other_end],
             env=environment, cwd=tree,
         )  # fmt: skip
         os.close(other_end)
         self._answers = os.fdopen(answers, "rb")
 
-    def _ask(self, question: object) -> object:
+    def _ask(self, *question: object) -> object:
         try:
             pickle.dump(question, self._process.stdin)
             self._process.stdin.flush()
@@ -180,11 +182,15 @@ class Elsewhere:
         except (EOFError, BrokenPipeError):
             raise RuntimeError(f"{self.name}: its process ended, see above") from None
 
+    def prepare(self, work: Work, smoke: bool) -> None:
+        """Have the run of a work made."""
+        self._ask("prepare", work.today.__module__, work.today.__qualname__, smoke)
+
     def output(self) -> object:
         return self._ask("output")
 
     def sample(self, times: int) -> Sample:
-        return Sample(*self._ask(times))
+        return Sample(*self._ask("sample", times))
 
     def close(self) -> None:
         self._process.stdin.close()
@@ -192,30 +198,23 @@ class Elsewhere:
         self._answers.close()
 
 
-def measure(work: Work, tree: Path | None, commit: str, smoke: bool) -> list[Result]:
+def measure(work: Work, processes: Sequence[Elsewhere], smoke: bool) -> list[Result]:
     """All rows of a work. Raises what ``agree`` raises.
 
-    ``tree`` holds the sources of ``commit``; without one, and in smoke size, all runs stay here.
+    ``processes`` are kinacc's and today's; without them, as in smoke size, all runs stay here.
     """
-    sides: list[_Here | Elsewhere] = [_Here(each) for each in work.contenders]
-    absent = {
-        name: "not installed" for name in work.wanted if name not in (LIMIT, TODAY, *_names(sides))
-    }
-    try:
-        if work.today is not None and not smoke:
-            sides[0] = Elsewhere(sides[0].name, sides[0].version, work, ROOT, smoke)
-            if tree is None:
-                absent[TODAY] = f"commit {commit} is not in this repository"
-            else:
-                sides.append(Elsewhere(TODAY, commit, work, tree, smoke))
-        return [*_rows(work, sides, smoke), *(_absent(work, *each) for each in absent.items())]
-    finally:
-        for side in sides:
-            side.close()
-
-
-def _names(sides: Sequence[_Here | Elsewhere]) -> list[str]:
-    return [side.name for side in sides]
+    first, *others = work.contenders
+    sides: list[_Here | Elsewhere] = [_Here(each.name, each.version, each.run) for each in others]
+    if work.today is None or not processes:
+        run = work.today(smoke) if work.today else first.run
+        sides.insert(0, _Here(first.name, first.version, run))
+    else:
+        for process in processes:
+            process.prepare(work, smoke)
+        sides = [processes[0], *sides, *processes[1:]]
+    known = {LIMIT, TODAY, *(side.name for side in sides)}
+    absent = [_absent(work, name, "not installed") for name in work.wanted if name not in known]
+    return [*_rows(work, sides, smoke), *absent]
 
 
 def _rows(work: Work, sides: Sequence[_Here | Elsewhere], smoke: bool) -> list[Result]:

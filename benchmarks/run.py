@@ -38,16 +38,36 @@ def measure(topic: str, smoke: bool, today: tuple[str, Path | None]) -> tuple[li
     module = importlib.import_module(f"works.{topic}")
     if not hasattr(module, "works"):
         return list(module.measure(smoke)), []
-    commit, tree = today
     rows, wrong = [], []
-    for work in module.works(smoke):
-        try:
-            rows += harness.measure(work, tree, commit, smoke)
-        except Exception as error:
-            wrong.append(f"{topic}, {work.name}: {type(error).__name__}: {error}")
-        else:
-            print("\n".join(map(told, rows_of(rows, work.name))), flush=True)
+    works = module.works(smoke)
+    processes = _processes(works, today)
+    try:
+        for work in works:
+            try:
+                rows += harness.measure(work, processes, smoke)
+            except Exception as error:
+                wrong.append(f"{topic}, {work.name}: {type(error).__name__}: {error}")
+            else:
+                print("\n".join(map(told, rows_of(rows, work.name))), flush=True)
+    finally:
+        for process in processes:
+            process.close()
     return rows, wrong
+
+
+def _processes(
+    works: Sequence[harness.Work], today: tuple[str, Path | None]
+) -> list[harness.Elsewhere]:
+    """kinacc's process and today's; none where no work asks for them or that commit is not here."""
+    commit, tree = today
+    asking = [work for work in works if work.today is not None]
+    if not asking or tree is None:
+        return []
+    kinacc = asking[0].contenders[0]
+    return [
+        harness.Elsewhere(kinacc.name, kinacc.version, harness.ROOT),
+        harness.Elsewhere(harness.TODAY, commit, tree),
+    ]
 
 
 def rows_of(rows: Sequence[harness.Result], work: str) -> list[harness.Result]:

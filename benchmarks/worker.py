@@ -1,8 +1,8 @@
-"""The process that runs one work by the kinacc on its PYTHONPATH, as harness.py asks.
+"""The process that runs works by the kinacc on its PYTHONPATH, as harness.py asks.
 
-It is started with the topic's module, its function that makes the run, smoke (0 or 1) and the
-pipe for answers. Questions come pickled on standard input: "output", or how many runs a sample
-has.
+It is started with the pipe for answers. Questions come pickled on standard input: ("prepare",
+module of the topic, function that makes the run, smoke), ("output",), or ("sample", how many
+runs).
 """
 
 from __future__ import annotations
@@ -11,23 +11,32 @@ import importlib
 import os
 import pickle
 import sys
+from collections.abc import Callable
 
 from harness import timed
 
 
-def main(module: str, function: str, smoke: str, answers: str) -> None:
+def main(answers: str) -> None:
     """Answer until standard input ends."""
-    run = getattr(importlib.import_module(module), function)(smoke == "1")
+
+    def nothing() -> None:
+        raise RuntimeError("asked before a work was prepared")
+
+    run: Callable[[], object] = nothing
     with os.fdopen(int(answers), "wb") as out:
         while True:
             try:
-                question = pickle.load(sys.stdin.buffer)
+                kind, *rest = pickle.load(sys.stdin.buffer)
             except EOFError:
                 return
-            if question == "output":
-                answer: object = run()
+            answer: object = None
+            if kind == "prepare":
+                module, function, smoke = rest
+                run = getattr(importlib.import_module(module), function)(smoke)
+            elif kind == "output":
+                answer = run()
             else:
-                sample = timed(run, question)
+                sample = timed(run, *rest)
                 answer = (sample.wall_ns, sample.cpu_ns)
             pickle.dump(answer, out)
             out.flush()
