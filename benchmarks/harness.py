@@ -178,9 +178,12 @@ class Elsewhere:
         try:
             pickle.dump(question, self._process.stdin)
             self._process.stdin.flush()
-            return pickle.load(self._answers)
+            well, answer = pickle.load(self._answers)
         except (EOFError, BrokenPipeError):
-            raise RuntimeError(f"{self.name}: its process ended, see above") from None
+            raise RuntimeError(f"the process of {self.name} {self.version} ended") from None
+        if not well:
+            raise RuntimeError(f"{self.name} {self.version}: {answer}")
+        return answer
 
     def prepare(self, work: Work, smoke: bool) -> None:
         """Have the run of a work made."""
@@ -236,14 +239,15 @@ def _rows(work: Work, sides: Sequence[_Here | Elsewhere], smoke: bool) -> list[R
 
 def _enough(side: _Here | Elsewhere, smoke: bool) -> tuple[int, float, int]:
     """How many runs make a sample, how many seconds it takes, and how often it has run by now."""
+    if smoke:
+        return 1, SAMPLE_S, 1
     times = done = 1
     while True:
         lasted = times * side.sample(times).wall_ns / 1e9
         done += times
-        if smoke or lasted > SAMPLE_S / 4:
-            each = lasted / times
-            enough = 1 if smoke else max(1, round(SAMPLE_S / each))
-            return enough, each * enough, done
+        if lasted > SAMPLE_S / 4:
+            enough = max(1, round(SAMPLE_S * times / lasted))
+            return enough, enough * lasted / times, done
         times *= 4
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import io
 import math
 import os
 import subprocess
@@ -62,6 +63,17 @@ def kinacc(*words: object, cwd: Path, allowed: Sequence[int] = (0,)) -> str:
     return python("-m", "kinacc", *words, cwd=cwd, allowed=allowed)
 
 
+def called(*words: object, cwd: Path, allowed: Sequence[int] = (0,)) -> str:
+    """The same within this process: what is imported by now costs nothing."""
+    from kinacc.cli.group import main
+
+    with contextlib.chdir(cwd), contextlib.redirect_stdout(io.StringIO()) as said:
+        code = main(list(map(str, words)), standalone_mode=False)
+    if code not in (None, *allowed):
+        raise RuntimeError(f"{' '.join(map(str, words))}: {said.getvalue()}")
+    return said.getvalue()
+
+
 def snakemake(*words: object, cwd: Path) -> str:
     """What the workflow prints, run in ``cwd`` as from the project's own folder."""
     where = (
@@ -98,13 +110,9 @@ def measured_file(path: Path, poses: int, seed: int) -> None:
 @functools.cache
 def calibrated(poses: int) -> Path:
     """A folder with the configuration arm.yaml and its calibration in results/arm."""
-    from kinacc.cli.group import main
-
     made = folder()
     measured_file(made / "poses.csv", poses, seed=0)
     (made / "arm.yaml").write_text(CALIBRATED)
-    for stage in ("measurements", "vec", "dh", "residuals"):
-        words = ["run", stage, "--config", made / "arm.yaml", "--results", made / "results"]
-        with contextlib.redirect_stdout(sys.stderr):
-            main(list(map(str, words)), standalone_mode=False)
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals"):
+        called("run", stage, "--config", "arm.yaml", "--results", "results", cwd=made)
     return made

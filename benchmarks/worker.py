@@ -11,18 +11,15 @@ import importlib
 import os
 import pickle
 import sys
+import traceback
 from collections.abc import Callable
 
 from harness import timed
 
 
 def main(answers: str) -> None:
-    """Answer until standard input ends."""
-
-    def nothing() -> None:
-        raise RuntimeError("asked before a work was prepared")
-
-    run: Callable[[], object] = nothing
+    """Answer until standard input ends: True and the answer, or False and what went wrong."""
+    run: Callable[[], object] | None = None
     with os.fdopen(int(answers), "wb") as out:
         while True:
             try:
@@ -30,15 +27,20 @@ def main(answers: str) -> None:
             except EOFError:
                 return
             answer: object = None
-            if kind == "prepare":
-                module, function, smoke = rest
-                run = getattr(importlib.import_module(module), function)(smoke)
-            elif kind == "output":
-                answer = run()
-            else:
-                sample = timed(run, *rest)
-                answer = (sample.wall_ns, sample.cpu_ns)
-            pickle.dump(answer, out)
+            try:
+                if kind == "prepare":
+                    module, function, smoke = rest
+                    run = None
+                    run = getattr(importlib.import_module(module), function)(smoke)
+                elif kind == "output":
+                    answer = run()
+                else:
+                    sample = timed(run, *rest)
+                    answer = (sample.wall_ns, sample.cpu_ns)
+                told = True, answer
+            except Exception:
+                told = False, traceback.format_exc()
+            pickle.dump(told, out)
             out.flush()
 
 
