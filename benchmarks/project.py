@@ -68,7 +68,10 @@ def called(*words: object, cwd: Path, allowed: Sequence[int] = (0,)) -> str:
     from kinacc.cli.group import main
 
     with contextlib.chdir(cwd), contextlib.redirect_stdout(io.StringIO()) as said:
-        code = main(list(map(str, words)), standalone_mode=False)
+        try:
+            code = main(list(map(str, words)), standalone_mode=False)
+        except SystemExit as ended:
+            code = ended.code
     if code not in (None, *allowed):
         raise RuntimeError(f"{' '.join(map(str, words))}: {said.getvalue()}")
     return said.getvalue()
