@@ -20,6 +20,7 @@ from kinacc.calibration.held import (
     pose_system,
 )
 from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.system import FlangeModel, require_enough
@@ -130,6 +131,7 @@ class Unknowns:
     scale: np.ndarray
 
 
+@one_thread
 def solved(
     observations: Observations,
     unknowns: Unknowns,
@@ -208,6 +210,7 @@ def _placed(
     )
 
 
+@one_thread
 def unseen_anywhere(fit: DHFit, observations: Observations, threshold: float) -> np.ndarray:
     """Directions (m, P) of a fit's coordinates that no pose shows, whatever the joints.
 

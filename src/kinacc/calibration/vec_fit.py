@@ -19,6 +19,7 @@ from kinacc.calibration.held import (
 )
 from kinacc.calibration.map_estimate import minimise_with_prior
 from kinacc.calibration.observations import Observations
+from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
 from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.kinematics import vec
@@ -77,6 +78,7 @@ class VECFit:
     coordinates: FrameCoordinates | ConstrainedFrames
 
 
+@one_thread
 def fit(
     observations: Observations,
     empty: VECModel,
@@ -152,6 +154,7 @@ def frames_of(
     return placed(observations, empty.dh.pose, frames, terms, rotation_weight_mm_per_rad)
 
 
+@one_thread
 def gauge(
     observations: Observations, empty: VECModel, frames: Frames, rotation_weight_mm_per_rad: float
 ) -> Spectrum:
