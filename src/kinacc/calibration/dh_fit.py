@@ -27,7 +27,9 @@ from kinacc.calibration.system import FlangeModel, require_enough
 from kinacc.calibration.truncated_svd import unseen
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
+from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import JointState
 
 DH_FIX = "measure more poses"
 UNSEEN_POSES = 60
@@ -270,8 +272,15 @@ def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
     return FlangeModel(
         int(mask.sum()),
         lambda x, at: model(x).pose(at),
-        lambda x, at: model(x).parameter_jacobian(at)[:, :, mask],
+        lambda x, at: by_parameters(model(x), at, mask),
     )
+
+
+def by_parameters(
+    model: DHModel | ComplianceModel, at: JointState, free: np.ndarray
+) -> tuple[Pose, np.ndarray]:
+    """Poses (n, ...) of a model and their Jacobian (P, 6, n) in its parameters ``free``."""
+    return model.pose(at), model.parameter_jacobian(at).transpose(2, 1, 0)[free]
 
 
 def scales(free: np.ndarray) -> np.ndarray:

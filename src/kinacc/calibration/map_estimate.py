@@ -130,7 +130,7 @@ def _balanced(
 
 
 def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
-    full, count = solve.gram(system, x)
+    full, count = solve.gram(system, x), system.count
     gram, gradient = full[:-1, :-1] * np.outer(scale, scale), full[:-1, -1] * scale
     return _Normal(gram, gradient, float(full[-1, -1]), count)
 
