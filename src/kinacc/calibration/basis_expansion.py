@@ -67,8 +67,9 @@ def applied(columns: np.ndarray, groups: Sequence[Group], vectors: np.ndarray) -
         if group.basis is None:
             result += part @ own
             continue
-        for motion, each in enumerate(own.reshape(group.motions, -1, vectors.shape[1])):
-            result += part[:, :, motion, None] * (group.basis @ each)[:, None, :]
+        by_function = own.reshape(group.motions, -1, vectors.shape[1]).swapaxes(0, 1)
+        summed = group.basis @ by_function.reshape(group.basis.shape[1], -1)
+        result += part @ summed.reshape(len(columns), group.motions, -1)
     return result
 
 
