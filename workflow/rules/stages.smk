@@ -82,10 +82,8 @@ for stage in STAGES.values():
             ),
         message:
             plan.message(stage.name, folder)
-        # The same for every stage, and without a path: shared caches go by it.
         shell:
-            'exec "$KINACC_PYTHON" -P "$KINACC_STAGE" "$KINACC_FOLDER" --job {params.job:q}'
-            " --input {input:q} --output {output:q} --log {log:q}"
+            COMMAND
 
 
 # The whole study and the claims on further draws, whose shares go into claims.parquet.

@@ -1,7 +1,7 @@
-"""One stage as a job of the workflow, whose rules start it by a command in a shell.
+"""One stage as a job of the workflow, whose rules start it by one command in a shell.
 
-A job's text holds what its results depend on beside the contents of files, and no path: Snakemake
-goes by it where it decides what to make anew and what a shared cache has already.
+Snakemake goes by the command and by a job's text where it decides what to make anew, and what a
+shared cache has already: neither says where anything is, only what results depend on.
 """
 
 from __future__ import annotations
@@ -12,14 +12,20 @@ import re
 import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from logging import LogRecord
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from kinacc.workflow.catalogue import STAGES, TABLES
 from kinacc.workflow.runner import Job, Paths, execute
 
-_COMMAND = re.compile(r'exec "\$KINACC_PYTHON".* --log .*(?=\' (?:returned|died))', re.DOTALL)
+if TYPE_CHECKING:
+    from logging import LogRecord
+
+COMMAND = (
+    'exec "$KINACC_PYTHON" -P "$KINACC_STAGE" "$KINACC_FOLDER" --job {params.job:q}'
+    " --input {input:q} --output {output:q} --log {log:q}"
+)
+_AS_SAID = re.compile(r'exec "\$KINACC_PYTHON".* --log .*(?=\' (?:returned|died))', re.DOTALL)
 # More threads change the last bits of a sum. Has to be said before numpy is imported.
 _ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -80,7 +86,7 @@ def to_text(
 
 
 def from_words(words: Sequence[str]) -> Job:
-    """The job of a command: ``--job TEXT --input FILE.. --output FILE.. --log FILE``.
+    """The job of the command's options.
 
     Files stand in the order of their roles; inputs before them have to be there and are not read.
     """
@@ -146,7 +152,7 @@ def without_commands(record: LogRecord) -> bool:
         if hasattr(record, "shellcmd"):
             record.shellcmd = None
         if isinstance(record.msg, str):
-            record.msg = _COMMAND.sub("kinacc.workflow.stage", record.msg)
+            record.msg = _AS_SAID.sub("kinacc.workflow.stage", record.msg)
     return True
 
 
