@@ -22,7 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from kinacc.compiled import compiled
 
 GRID_PER_MM = 1000.0
 # Columns of the state (m, 3) of a run: how many readings there are of a point, the magnitude of
@@ -57,7 +58,7 @@ _ZERO = np.uint64(0)
 _ONE = np.uint64(1)
 
 
-@njit(cache=True)
+@compiled
 def _high_product(a, b):
     """Upper 64 bits of the 128-bit product of two uint64."""
     a_low, a_high = a & _LOW, a >> _HALF
@@ -67,7 +68,7 @@ def _high_product(a, b):
     return a_high * b_high + (middle >> _HALF) + (other >> _HALF)
 
 
-@njit(cache=True)
+@compiled
 def philox(key0, key1, counter0, counter1):
     """Four uint64 words of Philox 4x64-10 at counter (counter0, counter1, 0, 0)."""
     c0, c1, c2, c3 = counter0, counter1, _ZERO, _ZERO
@@ -80,7 +81,7 @@ def philox(key0, key1, counter0, counter1):
     return c0, c1, c2, c3
 
 
-@njit(cache=True)
+@compiled
 def normals(key0, key1, point, visit):
     """Three standard normal deviates of one reading, by Box and Muller."""
     x0, x1, x2, x3 = philox(key0, key1, np.uint64(visit), np.uint64(point))
@@ -93,7 +94,7 @@ def normals(key0, key1, point, visit):
     return r0 * math.cos(angle0), r0 * math.sin(angle0), r1 * math.cos(angle1)
 
 
-@njit(cache=True)
+@compiled
 def extend(world, i, wanted):
     """Compute the readings of row i of a world (its ``arrays``) up to number ``wanted``, from 0.
 
@@ -113,14 +114,14 @@ def extend(world, i, wanted):
     known[i] = max(known[i], wanted + 1)
 
 
-@njit(cache=True)
+@compiled
 def extend_all(world, wanted):
     """Compute the readings of every row up to number ``wanted``, from 0."""
     for i in range(world[0].shape[0]):
         extend(world, i, wanted)
 
 
-@njit(cache=True)
+@compiled
 def chi2_3(x):
     """Chi-square distribution function, three degrees of freedom (eq. 18)."""
     if x <= 0.0:
@@ -135,7 +136,7 @@ def chi2_3(x):
     return math.erf(math.sqrt(0.5 * x)) - _ROOT_2_OVER_PI * math.sqrt(x) * math.exp(-0.5 * x)
 
 
-@njit(cache=True)
+@compiled
 def _miss(size, weight, eta, squared):
     """1 - p-hat of one point: probability that a measurement comes out larger than this one."""
     excess = size - eta
@@ -145,6 +146,7 @@ def _miss(size, weight, eta, squared):
     return 1.0 - chi2_3(distance * distance if squared else distance)
 
 
+<<<<<<< HEAD
 @njit(cache=True)
 def _roots(power, budget):
     """Weight of a point with noise 1 after each number of readings."""
@@ -155,13 +157,18 @@ def _roots(power, budget):
 @njit(cache=True)
 def _add(sizes, sigma, roots, state, i):
     """Take the next reading of row i, which is known."""
+=======
+@compiled
+def _add(readings, sigma, state, i, power):
+    """Average the next reading of row i in."""
+>>>>>>> kernels
     v = int(state[i, READS])
     state[i, READS] = v + 1.0
     state[i, SIZE] = sizes[i, v]
     state[i, WEIGHT] = roots[v + 1] / sigma[i]
 
 
-@njit(cache=True)
+@compiled
 def run(world, eta, alpha, squared, power, budget):
     """One sequential run: (rejected, measurements, points visited, rejection probability)."""
     known, sigma, sizes = world[1], world[2], world[7]
@@ -197,7 +204,7 @@ def run(world, eta, alpha, squared, power, budget):
     return rejected, taken, visited, 1.0 - survival
 
 
-@njit(cache=True)
+@compiled
 def bisect(world, top, tolerance, alpha, squared, power, budget):
     """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
     low, high = 0.0, top
@@ -210,6 +217,7 @@ def bisect(world, top, tolerance, alpha, squared, power, budget):
     return high
 
 
+<<<<<<< HEAD
 @njit(cache=True)
 def _about(size, weight, eta, squared):
     """As :func:`_miss`, from a table of cubics and several times as fast."""
@@ -230,6 +238,9 @@ def _about(size, weight, eta, squared):
 
 
 @njit(cache=True)
+=======
+@compiled
+>>>>>>> kernels
 def _survival(k, state, active, squared, miss):
     """Product of about 1 - p-hat at bound k over the active rows, each kept in ``miss``."""
     eta = k / GRID_PER_MM
@@ -240,6 +251,7 @@ def _survival(k, state, active, squared, miss):
     return survival
 
 
+<<<<<<< HEAD
 @njit(cache=True)
 def _exact_survival(k, state, active, squared):
     """Product of 1 - p-hat at bound k, bit for bit as a run has it."""
@@ -251,6 +263,9 @@ def _exact_survival(k, state, active, squared):
 
 
 @njit(cache=True)
+=======
+@compiled
+>>>>>>> kernels
 def _side(survival, alpha, guard):
     """+1 above the threshold, -1 below it, 0 where rounding or the table could decide."""
     probability = 1.0 - survival
@@ -259,6 +274,7 @@ def _side(survival, alpha, guard):
     return -1 if probability < alpha - guard else 0
 
 
+<<<<<<< HEAD
 @njit(cache=True)
 def _side_at(k, state, active, squared, alpha, guard):
     """The side at bound k, from as many rows as it takes."""
@@ -272,6 +288,9 @@ def _side_at(k, state, active, squared, alpha, guard):
 
 
 @njit(cache=True)
+=======
+@compiled
+>>>>>>> kernels
 def _winner(k, state, active):
     """Row with the largest score at bound k, the first of equals; its score and the next one."""
     eta = k / GRID_PER_MM
@@ -285,8 +304,25 @@ def _winner(k, state, active):
     return row, best, second
 
 
+<<<<<<< HEAD
 @njit(cache=True)
 def _last_on_side(side, near, far, state, active, squared, alpha, guard):
+=======
+@compiled
+def _others(row, k, state, miss, active):
+    """Largest score at bound k and product of 1 - p-hat over the active rows other than ``row``."""
+    eta = k / GRID_PER_MM
+    best, survival = -np.inf, 1.0
+    for i in active:
+        if i != row:
+            best = max(best, (state[i, SIZE] - eta) * state[i, WEIGHT])
+            survival *= miss[i]
+    return best, survival
+
+
+@compiled
+def _last_on_side(side, near, far, state, active, squared, alpha, guard, spare):
+>>>>>>> kernels
     """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
     inside, outside = near, far
     while abs(outside - inside) > 1:
@@ -298,7 +334,7 @@ def _last_on_side(side, near, far, state, active, squared, alpha, guard):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _last_with_winner(row, near, far, state, active, margin):
     """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
     inside, outside = near, far
@@ -312,8 +348,13 @@ def _last_with_winner(row, near, far, state, active, margin):
     return inside
 
 
+<<<<<<< HEAD
 @njit(cache=True)
 def _resume(sizes, sigma, roots, state, path, low, rows):
+=======
+@compiled
+def _resume(world, state, path, power, low, rows):
+>>>>>>> kernels
     """Rebuild the state after the steps of a path; returns (points visited, active rows).
 
     A row is active if it can still exceed a bound of the interval that starts at ``low``: one whose
@@ -334,10 +375,15 @@ def _resume(sizes, sigma, roots, state, path, low, rows):
     return visited, count
 
 
+<<<<<<< HEAD
 @njit(cache=True)
 def _insist(
     i, bounds, rivals, world, roots, state, at_near, at_far, active, path, steps, setting, guards
 ):
+=======
+@compiled
+def _insist(i, near, far, world, state, at_near, at_far, active, path, steps, setting, guards):
+>>>>>>> kernels
     """Measure row i once, and on while it is sure for every bound that it must be measured again.
 
     Only row i changes meanwhile, so the other rows are multiplied once. Returns the steps taken and
@@ -378,13 +424,27 @@ def _insist(
             if _side(far_others * _about(size, weight, far_eta, squared), alpha, guard) != 1:
                 break
             far_sure = far_score
+<<<<<<< HEAD
     state[i, READS], state[i, SIZE], state[i, WEIGHT] = v, size, weight
     at_near[i] = _about(size, weight, near_eta, squared)
     at_far[i] = _about(size, weight, far_eta, squared)
     return steps, near_others * at_near[i], far_others * at_far[i]
+=======
+    at_near[i] = _miss(size, weight, near_eta, squared)
+    at_far[i] = _miss(size, weight, far_eta, squared)
+    return steps
 
 
-@njit(cache=True)
+@compiled
+def _product(miss, active):
+    survival = 1.0
+    for i in active:
+        survival *= miss[i]
+    return survival
+>>>>>>> kernels
+
+
+@compiled
 def scan(world, bottom, top, upward, alpha, squared, power, budget):
     """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
 
