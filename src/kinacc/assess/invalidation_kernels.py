@@ -22,7 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from kinacc.compiled import compiled
 
 GRID_PER_MM = 1000.0
 # Columns of the state (m, 6) of a run after the sum of the readings (0 to 2, mm): how many readings
@@ -41,7 +42,7 @@ _ZERO = np.uint64(0)
 _ONE = np.uint64(1)
 
 
-@njit(cache=True)
+@compiled
 def _high_product(a, b):
     """Upper 64 bits of the 128-bit product of two uint64."""
     a_low, a_high = a & _LOW, a >> _HALF
@@ -51,7 +52,7 @@ def _high_product(a, b):
     return a_high * b_high + (middle >> _HALF) + (other >> _HALF)
 
 
-@njit(cache=True)
+@compiled
 def philox(key0, key1, counter0, counter1):
     """Four uint64 words of Philox 4x64-10 at counter (counter0, counter1, 0, 0)."""
     c0, c1, c2, c3 = counter0, counter1, _ZERO, _ZERO
@@ -64,7 +65,7 @@ def philox(key0, key1, counter0, counter1):
     return c0, c1, c2, c3
 
 
-@njit(cache=True)
+@compiled
 def normals(key0, key1, point, visit):
     """Three standard normal deviates of one reading, by Box and Muller."""
     x0, x1, x2, x3 = philox(key0, key1, np.uint64(visit), np.uint64(point))
@@ -77,7 +78,7 @@ def normals(key0, key1, point, visit):
     return r0 * math.cos(angle0), r0 * math.sin(angle0), r1 * math.cos(angle1)
 
 
-@njit(cache=True)
+@compiled
 def extend(world, i, wanted):
     """Compute the readings of row i of a world (its ``arrays``) up to number ``wanted``, from 0."""
     readings, known, sigma, error, key, index = world
@@ -89,14 +90,14 @@ def extend(world, i, wanted):
     known[i] = max(known[i], wanted + 1)
 
 
-@njit(cache=True)
+@compiled
 def extend_all(world, wanted):
     """Compute the readings of every row up to number ``wanted``, from 0."""
     for i in range(world[0].shape[0]):
         extend(world, i, wanted)
 
 
-@njit(cache=True)
+@compiled
 def chi2_3(x):
     """Chi-square distribution function, three degrees of freedom (eq. 18)."""
     if x <= 0.0:
@@ -111,7 +112,7 @@ def chi2_3(x):
     return math.erf(math.sqrt(0.5 * x)) - _ROOT_2_OVER_PI * math.sqrt(x) * math.exp(-0.5 * x)
 
 
-@njit(cache=True)
+@compiled
 def _miss(size, weight, eta, squared):
     """1 - p-hat of one point: probability that a measurement comes out larger than this one."""
     excess = size - eta
@@ -121,7 +122,7 @@ def _miss(size, weight, eta, squared):
     return 1.0 - chi2_3(distance * distance if squared else distance)
 
 
-@njit(cache=True)
+@compiled
 def _add(readings, sigma, state, i, power):
     """Average the next reading of row i in."""
     v = int(state[i, READS])
@@ -136,7 +137,7 @@ def _add(readings, sigma, state, i, power):
     state[i, WEIGHT] = (math.sqrt(n) if power == 0.5 else math.sqrt(math.sqrt(n))) / sigma[i]
 
 
-@njit(cache=True)
+@compiled
 def run(world, eta, alpha, squared, power, budget):
     """One sequential run: (rejected, measurements, points visited, rejection probability)."""
     readings, known, sigma = world[0], world[1], world[2]
@@ -172,7 +173,7 @@ def run(world, eta, alpha, squared, power, budget):
     return rejected, taken, visited, 1.0 - survival
 
 
-@njit(cache=True)
+@compiled
 def bisect(world, top, tolerance, alpha, squared, power, budget):
     """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
     low, high = 0.0, top
@@ -185,7 +186,7 @@ def bisect(world, top, tolerance, alpha, squared, power, budget):
     return high
 
 
-@njit(cache=True)
+@compiled
 def _survival(k, state, active, squared, miss):
     """Product of 1 - p-hat at bound k over the active rows, each kept in ``miss``."""
     eta = k / GRID_PER_MM
@@ -196,7 +197,7 @@ def _survival(k, state, active, squared, miss):
     return survival
 
 
-@njit(cache=True)
+@compiled
 def _side(survival, alpha, guard):
     """+1 above the threshold, -1 below it, 0 where rounding could decide."""
     probability = 1.0 - survival
@@ -205,7 +206,7 @@ def _side(survival, alpha, guard):
     return -1 if probability < alpha - guard else 0
 
 
-@njit(cache=True)
+@compiled
 def _winner(k, state, active):
     """Row with the largest score at bound k, the first of equals, and its lead over the next."""
     eta = k / GRID_PER_MM
@@ -219,7 +220,7 @@ def _winner(k, state, active):
     return row, best - second
 
 
-@njit(cache=True)
+@compiled
 def _others(row, k, state, miss, active):
     """Largest score at bound k and product of 1 - p-hat over the active rows other than ``row``."""
     eta = k / GRID_PER_MM
@@ -231,7 +232,7 @@ def _others(row, k, state, miss, active):
     return best, survival
 
 
-@njit(cache=True)
+@compiled
 def _last_on_side(side, near, far, state, active, squared, alpha, guard, spare):
     """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
     inside, outside = near, far
@@ -244,7 +245,7 @@ def _last_on_side(side, near, far, state, active, squared, alpha, guard, spare):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _last_with_winner(row, near, far, state, active, margin):
     """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
     inside, outside = near, far
@@ -258,7 +259,7 @@ def _last_with_winner(row, near, far, state, active, margin):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _resume(world, state, path, power, low, rows):
     """Rebuild the state after the steps of a path; returns (points visited, active rows).
 
@@ -279,7 +280,7 @@ def _resume(world, state, path, power, low, rows):
     return visited, count
 
 
-@njit(cache=True)
+@compiled
 def _insist(i, near, far, world, state, at_near, at_far, active, path, steps, setting, guards):
     """Measure row i once, and on while it is sure for every bound that it must be measured again.
 
@@ -320,7 +321,7 @@ def _insist(i, near, far, world, state, at_near, at_far, active, path, steps, se
     return steps
 
 
-@njit(cache=True)
+@compiled
 def _product(miss, active):
     survival = 1.0
     for i in active:
@@ -328,7 +329,7 @@ def _product(miss, active):
     return survival
 
 
-@njit(cache=True)
+@compiled
 def scan(world, bottom, top, upward, alpha, squared, power, budget):
     """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
 
