@@ -30,6 +30,7 @@ class System(Protocol):
     """Residuals of a fit: P parameters, blocks of whitened residuals and their Jacobian."""
 
     size: int
+    count: int  # of residuals
 
     def cost(self, x: np.ndarray) -> float:
         """Sum of squared residuals at ``x``."""
