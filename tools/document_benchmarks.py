@@ -1,8 +1,8 @@
-"""Write docs/benchmarks.md and its pictures from benchmarks/results: ``python tools/document_benchmarks.py``.
+"""Write docs/benchmarks.md and its pictures: ``python tools/document_benchmarks.py``.
 
-``make bench`` measures first. What a section says is the docstring of the topic's file in
-benchmarks/works; its ``NOTES``, by the name of a work, say what was tried where a wish was not
-met.
+``make bench`` measures first, into benchmarks/results. What a section says is the docstring of
+the topic's file in benchmarks/works; its ``NOTES``, by the name of a work, say what was tried
+where a wish was not met.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from kinacc.figures import save, style
 
@@ -116,7 +117,14 @@ def _summary(tables: Mapping[str, Sequence[Mapping]]) -> str:
 def _what(row: Mapping) -> str:
     if "stage" in row:
         return f"memory of {row['stage']}"
-    return f"{row['work']} beside {row['contender']}"
+    return f"{row['work']} beside {_who(row)}"
+
+
+def _who(row: Mapping) -> str:
+    """A contender with its version; an earlier kinacc by its commit."""
+    if row["contender"] == "today":
+        return f"commit {row['version']}".strip()
+    return row["contender"]
 
 
 def _section(topic: str, rows: Sequence[Mapping]) -> str:
@@ -124,8 +132,17 @@ def _section(topic: str, rows: Sequence[Mapping]) -> str:
     told, notes = _told(topic)
     lines = [f"## {title}", "", told, "", table(rows), ""]
     lines += [f"![{title}: what was measured and what was wanted](benchmarks/{topic}.png)", ""]
-    lines += [f"- {work}: {words}" for work, words in notes.items()]
-    return "\n".join([*lines, ""] if notes else lines)
+    said = [*_limits(rows), *(f"- {work}: {words}" for work, words in notes.items())]
+    return "\n".join([*lines, *said, ""] if said else lines)
+
+
+def _limits(rows: Sequence[Mapping]) -> list[str]:
+    """What no program can go below, works with the same limit together."""
+    works: dict[str, list[str]] = {}
+    for row in rows:
+        if row.get("limit"):
+            works.setdefault(row["limit"], []).append(row["work"])
+    return [f"- Limit of {', '.join(dict.fromkeys(of))}: {limit}." for limit, of in works.items()]
 
 
 def _told(topic: str) -> tuple[str, dict[str, str]]:
@@ -171,14 +188,14 @@ def _plain(value: object) -> str:
 
 def _cells(row: Mapping, own: Mapping) -> list[str]:
     """One contender beside kinacc."""
-    who = f"{row['contender']} {row['version']}".strip()
+    who = _who(row) if row["contender"] == "today" else f"{_who(row)} {row['version']}".strip()
     if row["left_out"]:
         wanted = "" if row["wanted"] is None else _factor(row["wanted"])
         return [row["work"], who, row["left_out"], duration(own["ns"]), "", wanted]
     spread = ""
     if row["ratio_low"] is not None:
-        spread = " to ".join(f"{_size(each):.2g}" for each in (row["ratio_low"], row["ratio_high"]))
-        spread = f" ({spread})"
+        turned = [x if row["ratio"] >= 1 else 1 / x for x in (row["ratio_low"], row["ratio_high"])]
+        spread = " ({:.3g} to {:.3g})".format(*sorted(turned))
     a_unit = f" a {row['unit']}"
     if row["contender"] == "limit":
         reached, wanted = (
@@ -222,7 +239,7 @@ def picture(topic: str, rows: Sequence[Mapping]) -> Figure:
         words = "peak resident memory, MB; mark: at most"
     else:
         shown = [
-            (f"{row['work']}\nbeside {row['contender']}", row["ratio"], row["wanted"], row["met"])
+            (f"{row['work']}\nbeside {_who(row)}", row["ratio"], row["wanted"], row["met"])
             for row in rows
             if row["contender"] != "kinacc" and row["ratio"] is not None
         ]
@@ -238,6 +255,9 @@ def picture(topic: str, rows: Sequence[Mapping]) -> Figure:
                 axes.plot([wanted, wanted], [place - 0.4, place + 0.4], color=style.INK, lw=1.5)
         if "stage" not in rows[0]:
             axes.set_xscale("log")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda ratio, _: f"{ratio:g}"))
+            axes.xaxis.set_minor_locator(NullLocator())
             axes.axvline(1.0, color=style.INK, lw=0.6)
         axes.set_yticks(range(len(shown)), [each[0] for each in shown])
         axes.set(ylim=(len(shown) - 0.4, -0.6), xlabel=words)
