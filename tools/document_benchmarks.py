@@ -170,8 +170,8 @@ def table(rows: Sequence[Mapping]) -> str:
         ]
     elif "contender" in rows[0]:
         head = ["work", "beside", "its time", "kinacc's", "kinacc is", "wanted"]
-        own = {row["work"]: row for row in rows if row["contender"] == "kinacc"}
-        body = [_cells(row, own[row["work"]]) for row in rows if row["contender"] != "kinacc"]
+        own = _own(rows)
+        body = [_cells(row, own[row["work"]]) for row in rows if row is not own[row["work"]]]
     else:
         head = [name for name in rows[0] if name not in _FACTS]
         body = [[_plain(row[name]) for name in head] for row in rows]
@@ -180,6 +180,14 @@ def table(rows: Sequence[Mapping]) -> str:
 
 
 _FACTS = ("cpu", "cores", "write_gb_per_s", "python", "numpy", "commit", "measured_on")
+
+
+def _own(rows: Sequence[Mapping]) -> dict[str, Mapping]:
+    """kinacc's row of each work, its first."""
+    found: dict[str, Mapping] = {}
+    for row in rows:
+        found.setdefault(row["work"], row)
+    return found
 
 
 def _plain(value: object) -> str:
@@ -241,7 +249,7 @@ def picture(topic: str, rows: Sequence[Mapping]) -> Figure:
         shown = [
             (f"{row['work']}\nbeside {_who(row)}", row["ratio"], row["wanted"], row["met"])
             for row in rows
-            if row["contender"] != "kinacc" and row["ratio"] is not None
+            if row is not _own(rows)[row["work"]] and row["ratio"] is not None
         ]
         words = "time over kinacc's (logarithmic); mark: wanted"
     with style.house():
