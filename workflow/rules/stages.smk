@@ -53,26 +53,22 @@ for stage in STAGES.values():
             "../envs/kinacc.yaml"
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
-            stage=stage.name,
-            code=lambda w, name=stage.name, folder=folder: plan.code(name, w.get("dataset", folder)),
-            part=part,
-            label=lambda w, name=stage.name, folder=folder: label(
-                name, w.get("dataset", folder), w.get("part")
-            ),
-            doing=lambda w, name=stage.name, folder=folder: doing(
-                name, w.get("dataset", folder), w.get("part")
+            job=lambda w, name=stage.name, folder=folder: plan.job_text(
+                name,
+                w.get("dataset", folder),
+                w.get("part"),
+                on_request="robustness" in workflow.dag_settings.targets,
             ),
             contents=lambda w, name=stage.name, folder=folder: plan.contents(
                 name, w.get("dataset", folder)
             ),
-            seed=lambda w, folder=folder: plan.seed(w.get("dataset", folder)),
-            settings=lambda w, name=stage.name, folder=folder: plan.settings(
-                name, w.get("dataset", folder)
+            label=lambda w, name=stage.name, folder=folder: label(
+                name, w.get("dataset", folder), w.get("part")
             ),
         message:
             plan.message(stage.name, folder)
-        script:
-            "../scripts/stage.py"
+        shell:
+            COMMAND
 
 
 # The whole study and the claims on further draws, whose shares go into claims.parquet.
