@@ -146,22 +146,16 @@ def _miss(size, weight, eta, squared):
     return 1.0 - chi2_3(distance * distance if squared else distance)
 
 
-<<<<<<< HEAD
-@njit(cache=True)
+@compiled
 def _roots(power, budget):
     """Weight of a point with noise 1 after each number of readings."""
     roots = np.sqrt(np.arange(budget + 1.0))
     return roots if power == 0.5 else np.sqrt(roots)
 
 
-@njit(cache=True)
+@compiled
 def _add(sizes, sigma, roots, state, i):
     """Take the next reading of row i, which is known."""
-=======
-@compiled
-def _add(readings, sigma, state, i, power):
-    """Average the next reading of row i in."""
->>>>>>> kernels
     v = int(state[i, READS])
     state[i, READS] = v + 1.0
     state[i, SIZE] = sizes[i, v]
@@ -217,8 +211,7 @@ def bisect(world, top, tolerance, alpha, squared, power, budget):
     return high
 
 
-<<<<<<< HEAD
-@njit(cache=True)
+@compiled
 def _about(size, weight, eta, squared):
     """As :func:`_miss`, from a table of cubics and several times as fast."""
     excess = size - eta
@@ -237,10 +230,7 @@ def _about(size, weight, eta, squared):
     return max(1.0 - below, 0.0)
 
 
-@njit(cache=True)
-=======
 @compiled
->>>>>>> kernels
 def _survival(k, state, active, squared, miss):
     """Product of about 1 - p-hat at bound k over the active rows, each kept in ``miss``."""
     eta = k / GRID_PER_MM
@@ -251,8 +241,7 @@ def _survival(k, state, active, squared, miss):
     return survival
 
 
-<<<<<<< HEAD
-@njit(cache=True)
+@compiled
 def _exact_survival(k, state, active, squared):
     """Product of 1 - p-hat at bound k, bit for bit as a run has it."""
     eta = k / GRID_PER_MM
@@ -262,10 +251,7 @@ def _exact_survival(k, state, active, squared):
     return survival
 
 
-@njit(cache=True)
-=======
 @compiled
->>>>>>> kernels
 def _side(survival, alpha, guard):
     """+1 above the threshold, -1 below it, 0 where rounding or the table could decide."""
     probability = 1.0 - survival
@@ -274,8 +260,7 @@ def _side(survival, alpha, guard):
     return -1 if probability < alpha - guard else 0
 
 
-<<<<<<< HEAD
-@njit(cache=True)
+@compiled
 def _side_at(k, state, active, squared, alpha, guard):
     """The side at bound k, from as many rows as it takes."""
     eta = k / GRID_PER_MM
@@ -287,10 +272,7 @@ def _side_at(k, state, active, squared, alpha, guard):
     return _side(survival, alpha, guard)
 
 
-@njit(cache=True)
-=======
 @compiled
->>>>>>> kernels
 def _winner(k, state, active):
     """Row with the largest score at bound k, the first of equals; its score and the next one."""
     eta = k / GRID_PER_MM
@@ -304,25 +286,8 @@ def _winner(k, state, active):
     return row, best, second
 
 
-<<<<<<< HEAD
-@njit(cache=True)
+@compiled
 def _last_on_side(side, near, far, state, active, squared, alpha, guard):
-=======
-@compiled
-def _others(row, k, state, miss, active):
-    """Largest score at bound k and product of 1 - p-hat over the active rows other than ``row``."""
-    eta = k / GRID_PER_MM
-    best, survival = -np.inf, 1.0
-    for i in active:
-        if i != row:
-            best = max(best, (state[i, SIZE] - eta) * state[i, WEIGHT])
-            survival *= miss[i]
-    return best, survival
-
-
-@compiled
-def _last_on_side(side, near, far, state, active, squared, alpha, guard, spare):
->>>>>>> kernels
     """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
     inside, outside = near, far
     while abs(outside - inside) > 1:
@@ -348,13 +313,8 @@ def _last_with_winner(row, near, far, state, active, margin):
     return inside
 
 
-<<<<<<< HEAD
-@njit(cache=True)
-def _resume(sizes, sigma, roots, state, path, low, rows):
-=======
 @compiled
-def _resume(world, state, path, power, low, rows):
->>>>>>> kernels
+def _resume(sizes, sigma, roots, state, path, low, rows):
     """Rebuild the state after the steps of a path; returns (points visited, active rows).
 
     A row is active if it can still exceed a bound of the interval that starts at ``low``: one whose
@@ -375,15 +335,10 @@ def _resume(world, state, path, power, low, rows):
     return visited, count
 
 
-<<<<<<< HEAD
-@njit(cache=True)
+@compiled
 def _insist(
     i, bounds, rivals, world, roots, state, at_near, at_far, active, path, steps, setting, guards
 ):
-=======
-@compiled
-def _insist(i, near, far, world, state, at_near, at_far, active, path, steps, setting, guards):
->>>>>>> kernels
     """Measure row i once, and on while it is sure for every bound that it must be measured again.
 
     Only row i changes meanwhile, so the other rows are multiplied once. Returns the steps taken and
@@ -424,24 +379,10 @@ def _insist(i, near, far, world, state, at_near, at_far, active, path, steps, se
             if _side(far_others * _about(size, weight, far_eta, squared), alpha, guard) != 1:
                 break
             far_sure = far_score
-<<<<<<< HEAD
     state[i, READS], state[i, SIZE], state[i, WEIGHT] = v, size, weight
     at_near[i] = _about(size, weight, near_eta, squared)
     at_far[i] = _about(size, weight, far_eta, squared)
     return steps, near_others * at_near[i], far_others * at_far[i]
-=======
-    at_near[i] = _miss(size, weight, near_eta, squared)
-    at_far[i] = _miss(size, weight, far_eta, squared)
-    return steps
-
-
-@compiled
-def _product(miss, active):
-    survival = 1.0
-    for i in active:
-        survival *= miss[i]
-    return survival
->>>>>>> kernels
 
 
 @compiled
