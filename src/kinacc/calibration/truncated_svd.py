@@ -207,7 +207,7 @@ class Arrived:
             variance=variance,
             iterations=self.iterations,
             last_step=self.last,
-            converged=True,
+            converged=self.last <= solve.STEP_TOLERANCE,
             spectrum=split.others.spectrum,
             undetermined=told.undetermined(),
             scale=scale,
