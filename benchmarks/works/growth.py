@@ -94,6 +94,7 @@ def _elsewhere(problem: Problem, size: float) -> tuple[float, float, float]:
 def _settings(**changes: object) -> Mapping:
     """Settings of the paper's arm with other values by path, whose points are written as __."""
     import project
+
     from kinacc.workflow.contradictions import load
 
     found = load([project.tree() / "config.yaml"])["mh180"]
@@ -154,6 +155,7 @@ def _study(repetitions: float) -> tuple[float, Callable[[], object]]:
 
 def _data_sets(count: float) -> tuple[float, Callable[[], object]]:
     import project
+
     from kinacc.workflow.plan import planned
 
     path = project.folder() / "many.yaml"
