@@ -49,30 +49,41 @@ for stage in STAGES.values():
         log:
             plan.log(stage.name, folder, part),
         cache: stage.shared and workflow.enable_cache
+        # On a cluster stages of a data set share a job, and inside it start without further ado.
+        group:
+            (
+                lambda w, name=stage.name, folder=folder: cluster.group(
+                    plan, name, w.get("dataset", folder)
+                )
+            )
+            if workflow.resource_settings.nodes and not workflow.remote_exec
+            else None
+        localrule: workflow.remote_exec
         conda:
             "../envs/kinacc.yaml"
+        resources:
+            mem_mb=lambda w, attempt, name=stage.name: cluster.memory_mb(name, attempt),
+            runtime=lambda w, attempt, name=stage.name, folder=folder: cluster.runtime_min(
+                plan, name, w.get("dataset", folder), attempt
+            ),
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
-            stage=stage.name,
-            code=lambda w, name=stage.name, folder=folder: plan.code(name, w.get("dataset", folder)),
-            part=part,
-            label=lambda w, name=stage.name, folder=folder: label(
-                name, w.get("dataset", folder), w.get("part")
-            ),
-            doing=lambda w, name=stage.name, folder=folder: doing(
-                name, w.get("dataset", folder), w.get("part")
+            job=lambda w, name=stage.name, folder=folder: plan.job_text(
+                name,
+                w.get("dataset", folder),
+                w.get("part"),
+                on_request="robustness" in workflow.dag_settings.targets,
             ),
             contents=lambda w, name=stage.name, folder=folder: plan.contents(
                 name, w.get("dataset", folder)
             ),
-            seed=lambda w, folder=folder: plan.seed(w.get("dataset", folder)),
-            settings=lambda w, name=stage.name, folder=folder: plan.settings(
-                name, w.get("dataset", folder)
+            label=lambda w, name=stage.name, folder=folder: label(
+                name, w.get("dataset", folder), w.get("part")
             ),
         message:
             plan.message(stage.name, folder)
-        script:
-            "../scripts/stage.py"
+        shell:
+            COMMAND
 
 
 # The whole study and the claims on further draws, whose shares go into claims.parquet.

@@ -22,7 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from kinacc.compiled import compiled
 
 GRID_PER_MM = 1000.0
 # Columns of the state (m, 3) of a run: how many readings there are of a point, the magnitude of
@@ -57,7 +58,7 @@ _ZERO = np.uint64(0)
 _ONE = np.uint64(1)
 
 
-@njit(cache=True)
+@compiled
 def _high_product(a, b):
     """Upper 64 bits of the 128-bit product of two uint64."""
     a_low, a_high = a & _LOW, a >> _HALF
@@ -67,7 +68,7 @@ def _high_product(a, b):
     return a_high * b_high + (middle >> _HALF) + (other >> _HALF)
 
 
-@njit(cache=True)
+@compiled
 def philox(key0, key1, counter0, counter1):
     """Four uint64 words of Philox 4x64-10 at counter (counter0, counter1, 0, 0)."""
     c0, c1, c2, c3 = counter0, counter1, _ZERO, _ZERO
@@ -80,7 +81,7 @@ def philox(key0, key1, counter0, counter1):
     return c0, c1, c2, c3
 
 
-@njit(cache=True)
+@compiled
 def normals(key0, key1, point, visit):
     """Three standard normal deviates of one reading, by Box and Muller."""
     x0, x1, x2, x3 = philox(key0, key1, np.uint64(visit), np.uint64(point))
@@ -93,7 +94,7 @@ def normals(key0, key1, point, visit):
     return r0 * math.cos(angle0), r0 * math.sin(angle0), r1 * math.cos(angle1)
 
 
-@njit(cache=True)
+@compiled
 def extend(world, i, wanted):
     """Compute the readings of row i of a world (its ``arrays``) up to number ``wanted``, from 0.
 
@@ -113,14 +114,14 @@ def extend(world, i, wanted):
     known[i] = max(known[i], wanted + 1)
 
 
-@njit(cache=True)
+@compiled
 def extend_all(world, wanted):
     """Compute the readings of every row up to number ``wanted``, from 0."""
     for i in range(world[0].shape[0]):
         extend(world, i, wanted)
 
 
-@njit(cache=True)
+@compiled
 def chi2_3(x):
     """Chi-square distribution function, three degrees of freedom (eq. 18)."""
     if x <= 0.0:
@@ -135,7 +136,7 @@ def chi2_3(x):
     return math.erf(math.sqrt(0.5 * x)) - _ROOT_2_OVER_PI * math.sqrt(x) * math.exp(-0.5 * x)
 
 
-@njit(cache=True)
+@compiled
 def _miss(size, weight, eta, squared):
     """1 - p-hat of one point: probability that a measurement comes out larger than this one."""
     excess = size - eta
@@ -145,14 +146,14 @@ def _miss(size, weight, eta, squared):
     return 1.0 - chi2_3(distance * distance if squared else distance)
 
 
-@njit(cache=True)
+@compiled
 def _roots(power, budget):
     """Weight of a point with noise 1 after each number of readings."""
     roots = np.sqrt(np.arange(budget + 1.0))
     return roots if power == 0.5 else np.sqrt(roots)
 
 
-@njit(cache=True)
+@compiled
 def _add(sizes, sigma, roots, state, i):
     """Take the next reading of row i, which is known."""
     v = int(state[i, READS])
@@ -161,7 +162,7 @@ def _add(sizes, sigma, roots, state, i):
     state[i, WEIGHT] = roots[v + 1] / sigma[i]
 
 
-@njit(cache=True)
+@compiled
 def _about(size, weight, eta, squared):
     """As :func:`_miss`, from a table of cubics and several times as fast."""
     excess = size - eta
@@ -180,7 +181,7 @@ def _about(size, weight, eta, squared):
     return max(1.0 - below, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def _survival(eta, state, active, squared, miss):
     """Product of about 1 - p-hat at a bound over the active rows, each kept in ``miss``."""
     survival = 1.0
@@ -190,7 +191,7 @@ def _survival(eta, state, active, squared, miss):
     return survival
 
 
-@njit(cache=True)
+@compiled
 def _exact_survival(eta, state, active, squared):
     """Product of 1 - p-hat at a bound over the active rows, in the order of their visits."""
     survival = 1.0
@@ -199,7 +200,7 @@ def _exact_survival(eta, state, active, squared):
     return survival
 
 
-@njit(cache=True)
+@compiled
 def _side(survival, alpha, guard):
     """+1 above the threshold, -1 below it, 0 where rounding or the table could decide."""
     probability = 1.0 - survival
@@ -208,7 +209,7 @@ def _side(survival, alpha, guard):
     return -1 if probability < alpha - guard else 0
 
 
-@njit(cache=True)
+@compiled
 def _side_at(eta, state, active, squared, alpha, guard):
     """The side at a bound, from as many rows as it takes."""
     survival = 1.0
@@ -219,7 +220,7 @@ def _side_at(eta, state, active, squared, alpha, guard):
     return _side(survival, alpha, guard)
 
 
-@njit(cache=True)
+@compiled
 def _winner(eta, state, active):
     """Row with the largest score at a bound, the first of equals; its score and the next one."""
     row, best, second = -1, -np.inf, -np.inf
@@ -232,7 +233,7 @@ def _winner(eta, state, active):
     return row, best, second
 
 
-@njit(cache=True)
+@compiled
 def _last_on_side(side, near, far, state, active, squared, alpha, guard):
     """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
     inside, outside = near, far
@@ -245,7 +246,7 @@ def _last_on_side(side, near, far, state, active, squared, alpha, guard):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _last_with_winner(row, near, far, state, active, margin):
     """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
     inside, outside = near, far
@@ -259,7 +260,7 @@ def _last_with_winner(row, near, far, state, active, margin):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _resume(sizes, sigma, roots, state, path, low, rows):
     """Rebuild the state after the steps of a path; returns (points visited, active rows).
 
@@ -281,7 +282,7 @@ def _resume(sizes, sigma, roots, state, path, low, rows):
     return visited, count
 
 
-@njit(cache=True)
+@compiled
 def _insist(
     i, bounds, rivals, world, roots, state, at_near, at_far, active, path, steps, setting, guards
 ):
@@ -331,14 +332,14 @@ def _insist(
     return steps, near_others * at_near[i], far_others * at_far[i]
 
 
-@njit(cache=True)
+@compiled
 def _guards(largest_mm, points, sigma, power, budget):
     """How near a probability is to the threshold, and scores are to each other, to be in doubt."""
     margin = 1e-12 * largest_mm / sigma.min() * float(budget) ** power
     return 1e-9 + points * _ABOUT + margin, margin
 
 
-@njit(cache=True)
+@compiled
 def run(world, eta, alpha, squared, power, budget):
     """One sequential run: (rejected, measurements, points visited, rejection probability)."""
     sigma, sizes = world[2], world[7]
@@ -385,7 +386,7 @@ def run(world, eta, alpha, squared, power, budget):
     return rejected, steps, visited, 1.0 - _exact_survival(eta, state, rows[:count], squared)
 
 
-@njit(cache=True)
+@compiled
 def bisect(world, top, tolerance, alpha, squared, power, budget):
     """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
     low, high = 0.0, top
@@ -398,7 +399,7 @@ def bisect(world, top, tolerance, alpha, squared, power, budget):
     return high
 
 
-@njit(cache=True)
+@compiled
 def scan(world, bottom, top, upward, alpha, squared, power, budget):
     """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
 

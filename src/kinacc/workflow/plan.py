@@ -28,6 +28,7 @@ from kinacc.workflow.catalogue import (
 )
 from kinacc.workflow.configured import in_use, words_read
 from kinacc.workflow.runner import Job
+from kinacc.workflow.stage import job_of, to_text
 
 RESULTS = "results"
 # Installed, the rules stand in the package; in a clone beside src/.
@@ -338,20 +339,29 @@ class Plan:
 
     def job(self, name: str, dataset: str, part: str | None = None) -> Job:
         """One run of a stage, as a command carries it out."""
-        stage, settings = STAGES[name], self.settings(name, dataset)
-        inputs = self.inputs(name, dataset)
-        return Job(
-            stage.module,
-            inputs,
-            self.outputs(name, dataset, part),
-            settings,
-            self.seed(dataset),
+        return job_of(
+            name,
+            dataset,
             part,
-            label=label(name, dataset, part),
-            doing=doing(name, dataset, part),
-            log=self.log(name, dataset, part),
-            uses=stage.used(settings, inputs),
-            kind=stage.fits,
+            self.inputs(name, dataset),
+            self.outputs(name, dataset, part),
+            self.settings(name, dataset),
+            self.seed(dataset),
+            self.log(name, dataset, part),
+        )
+
+    def job_text(
+        self, name: str, dataset: str, part: str | None = None, on_request: bool = False
+    ) -> str:
+        """One run of a stage without its files, as the workflow hands it over."""
+        return to_text(
+            name,
+            dataset,
+            part,
+            self.inputs(name, dataset, on_request),
+            self.settings(name, dataset),
+            self.seed(dataset),
+            self.code(name, dataset),
         )
 
     def code(self, name: str, dataset: str) -> str:
@@ -440,16 +450,6 @@ def campaign_files(results: Path) -> dict[str, str]:
         if (campaign / JOURNAL).is_file():
             found[f"readings_{number}_file"] = str(campaign / JOURNAL)
     return found
-
-
-def label(name: str, dataset: str, part: str | None = None) -> str:
-    """What lines on screen about one run of a stage begin with."""
-    return " ".join(filter(None, [dataset, None if STAGES[name].joint else name, part]))
-
-
-def doing(name: str, dataset: str, part: str | None = None) -> str:
-    """What one run of a stage is doing, in words."""
-    return ", ".join(filter(None, [f"{dataset}: {STAGES[name].message}", part and f"part {part}"]))
 
 
 def _fix(role: str, dataset: str | bool) -> str:
