@@ -95,7 +95,7 @@ def test_a_short_job_does_not_wait_for_the_compiler():
         "arm = robot.load('mh180').dh",
         "[dh.forward(arm, np.zeros((3000, 6))) for _ in range(10)]",
         "print('numba' in sys.modules)",
-        "[dh.forward(arm, np.zeros((400_000, 6)))]",
+        "[dh.forward(arm, np.zeros((800_000, 6)))]",
         "print('numba' in sys.modules)",
     )
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
