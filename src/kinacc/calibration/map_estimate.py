@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpotri
+import scipy
 
 from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, System
@@ -231,6 +231,6 @@ def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
             f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
             "give every undetermined direction a prior"
         ) from None
-    half, _ = dpotri(factor.T)
+    half, _ = scipy.linalg.lapack.dpotri(factor.T)
     half = np.triu(half)
     return half + np.triu(half, 1).T
