@@ -27,8 +27,6 @@ def configurations(
     joints (n, k) agree within ``tolerance_rad`` in every joint, full turns apart (revisits). The
     relation is closed under chaining: no two configurations hold rows within the tolerance.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     turn = 2.0 * np.pi
@@ -38,6 +36,11 @@ def configurations(
         tolerance_rad, p=np.inf, output_type="ndarray"
     )
     first_of_pose = np.unique(pose, return_index=True)[1]
+    if not len(pairs) and len(first_of_pose) == len(pose):
+        return np.arange(len(pose))
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     same_pose = np.stack([np.arange(len(pose)), first_of_pose[_ranks(pose)]], axis=1)
     links = np.concatenate([pairs.reshape(-1, 2), same_pose])
     graph = coo_matrix((np.ones(len(links)), links.T), shape=(len(pose), len(pose)))
