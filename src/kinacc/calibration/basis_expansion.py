@@ -60,17 +60,16 @@ def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
 
 def applied(columns: np.ndarray, groups: Sequence[Group], vectors: np.ndarray) -> np.ndarray:
     """The spread Jacobian of ``columns`` (n, m, E) times ``vectors`` (P, c): (n, m, c)."""
-    result, begin = np.zeros((*columns.shape[:2], vectors.shape[1])), 0
+    moved, begin = np.empty((len(columns), columns.shape[2], vectors.shape[1])), 0
     for group in groups:
-        part, own = columns[:, :, group.columns], vectors[begin : begin + group.size]
+        own = vectors[begin : begin + group.size]
         begin += group.size
-        if group.basis is None:
-            result += part @ own
-            continue
-        by_function = own.reshape(group.motions, -1, vectors.shape[1]).swapaxes(0, 1)
-        summed = group.basis @ by_function.reshape(group.basis.shape[1], -1)
-        result += part @ summed.reshape(len(columns), group.motions, -1)
-    return result
+        if group.basis is not None:
+            by_function = own.reshape(group.motions, -1, own.shape[1]).swapaxes(0, 1)
+            own = group.basis @ by_function.reshape(group.basis.shape[1], -1)
+            own = own.reshape(len(columns), group.motions, -1)
+        moved[:, group.columns] = own
+    return columns @ moved
 
 
 def gram(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
