@@ -22,6 +22,7 @@ STUDIED = (
     *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
     "claims",
 )
+_FEW = 4  # data sets that are told of one by one
 WORDS = {"ignore_unknown_options": True}
 CORES = click.option(
     "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
@@ -39,11 +40,13 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
 
     Checks the measurements, fits the VEC and the DH model, holds poses out to judge them, and
     leaves all tables in results/, in the folder it is called in. What is up to date is not made
-    again. Several files are merged in order. Words after -- go to Snakemake.
+    again. Several files are merged in order. Of many data sets a table is shown, that of `kinacc
+    summary`, and no pages are written. Words after -- go to Snakemake.
 
     \b
     Example:
       kinacc calibrate tracker.yaml
+      kinacc calibrate robots/*.yaml
       kinacc calibrate tracker.yaml -- --dry-run
     """
     from kinacc.cli.fitted import summary
@@ -58,11 +61,24 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
         answers = {name: summary(folder) for name, folder in folders.items()}
         click.echo(json.dumps(answers, indent=2))
         return
+    if len(folders) > _FEW:
+        _show_many([Path(folder) for folder in folders.values()])
+        return
     more = shlex.join(["kinacc", "study", *configs])
     for folder in folders.values():
         written(folder, without=STUDIED)
         tables = {name: table for name, table in read(folder).items() if name not in STUDIED}
         click.echo("\n".join(["", *answer(folder, tables, following=[more])]))
+
+
+def _show_many(folders: list[Path]) -> None:
+    """The table of many data sets, for half pages of all of them would not be read."""
+    from kinacc.cli.summary import show
+    from kinacc.workflow.fleet import standings
+
+    one = shlex.quote(str(folders[0]))
+    more = [f"kinacc fitted {one} says half a page on one, kinacc report {one} writes its page"]
+    show(standings(folders), [None] * len(folders), "", ["", *more])
 
 
 def carried_out(

@@ -1,0 +1,36 @@
+"""Numba's compiler as all kernels ask for it, also where nothing can be kept.
+
+Compiled code is kept beside the package or, where that cannot be written, in the user's cache
+folder; numba keys what it keeps by the kind of processor, so machines of several kinds may share
+it. Where neither can be written every process compiles anew, and says so once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+
+_told = False
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """``function`` compiled at its first call; kept for other processes where that is possible.
+
+    It must not call helpers of another file: numba would not see them change.
+    """
+    global _told
+    try:
+        return njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # no folder to keep it in
+        if not _told:
+            _told = True
+            print(
+                "kinacc compiles its kernels anew in every process (some seconds), as it can write "
+                "neither to its own folder nor to the user's cache; NUMBA_CACHE_DIR can name "
+                "another folder.",
+                file=sys.stderr,
+            )
+        return njit(nogil=True)(function)
