@@ -18,7 +18,7 @@ import pytest
 from whole_project import ROOT, Project
 
 ABSENT = "Slurm absent: "
-PLUGINS = ROOT / ".venv" / "cluster"  # `make` installs requirements/cluster.txt there
+PLUGINS = ROOT / ".venv" / "cluster"  # where `make test` puts requirements/cluster.txt
 _DAEMONS = ("slurmctld", "slurmd")
 _PATIENCE_S = 150.0
 
@@ -214,7 +214,7 @@ def plugin_needed(name: str = "slurm") -> None:
     if PLUGINS.is_dir() and str(PLUGINS) not in sys.path:
         sys.path.append(str(PLUGINS))
     if find_spec(f"snakemake_executor_plugin_{name}") is None:
-        pytest.skip(f"{ABSENT}no plugin: make .venv/cluster")
+        pytest.skip(f"{ABSENT}no plugin {name} in .venv/cluster, which make test fills")
 
 
 def _free_ports(count: int) -> list[int]:

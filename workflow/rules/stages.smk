@@ -23,13 +23,17 @@ for stage in STAGES.values():
             lambda w, name=stage.name, folder=folder: plan.followed(
                 name, w.get("dataset", folder), w.get("part")
             ),
+            # Files from outside are read where they stand, also where results go to a storage.
             unpack(
-                lambda w, name=stage.name, folder=folder: plan.inputs(
-                    name,
-                    w.get("dataset", folder),
-                    # Asked here: the targets are not known yet when this file is read.
-                    on_request="robustness" in workflow.dag_settings.targets,
-                )
+                lambda w, name=stage.name, folder=folder: {
+                    role: local(paths) if role.endswith("_file") else paths
+                    for role, paths in plan.inputs(
+                        name,
+                        w.get("dataset", folder),
+                        # Asked here: the targets are not known yet when this file is read.
+                        on_request="robustness" in workflow.dag_settings.targets,
+                    ).items()
+                }
             ),
         output:
             **{
