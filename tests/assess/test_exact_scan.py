@@ -106,6 +106,14 @@ def test_scans_of_any_world_equal_every_single_run(
     check(world, *switches, alpha=alpha, measurements=budget)
 
 
+@pytest.mark.parametrize("squared", [True, False])
+def test_the_table_of_a_scan_is_as_near_as_its_guard_takes_it_to_be(squared):
+    sizes = np.concatenate([np.linspace(-0.1, 11.0, 5003), np.geomspace(1e-12, 200.0, 3001)])
+    about = [kernels._about(size, 1.0, 0.0, squared) for size in sizes]
+    exact = [kernels._miss(size, 1.0, 0.0, squared) for size in sizes]
+    assert np.max(np.abs(np.subtract(about, exact))) < kernels._ABOUT / 2
+
+
 def test_bisection_ends_within_a_micrometre_of_a_change_of_decision():
     for repetition in range(5):
         world = drawn_world(field(3, 60), 0.2, key_of(repetition), 80)

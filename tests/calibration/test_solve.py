@@ -20,6 +20,10 @@ class Linear:
     rows: int = 7
 
     @property
+    def count(self):
+        return len(self.b)
+
+    @property
     def size(self):
         return self.a.shape[1]
 

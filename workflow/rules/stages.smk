@@ -49,8 +49,23 @@ for stage in STAGES.values():
         log:
             plan.log(stage.name, folder, part),
         cache: stage.shared and workflow.enable_cache
+        # On a cluster stages of a data set share a job, and inside it start without further ado.
+        group:
+            (
+                lambda w, name=stage.name, folder=folder: cluster.group(
+                    plan, name, w.get("dataset", folder)
+                )
+            )
+            if workflow.resource_settings.nodes and not workflow.remote_exec
+            else None
+        localrule: workflow.remote_exec
         conda:
             "../envs/kinacc.yaml"
+        resources:
+            mem_mb=lambda w, attempt, name=stage.name: cluster.memory_mb(name, attempt),
+            runtime=lambda w, attempt, name=stage.name, folder=folder: cluster.runtime_min(
+                plan, name, w.get("dataset", folder), attempt
+            ),
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             job=lambda w, name=stage.name, folder=folder: plan.job_text(

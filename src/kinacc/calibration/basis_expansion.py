@@ -34,6 +34,10 @@ class Group:
         """Number of parameters."""
         return self.motions * (1 if self.basis is None else self.basis.shape[1])
 
+    def rows(self, some: slice) -> Group:
+        """The group for the observations ``some``."""
+        return self if self.basis is None else Group(self.columns, self.basis[some])
+
 
 def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     """Jacobian (n, m, P) in the parameters, from the motions ``columns`` (n, m, E)."""
@@ -63,8 +67,9 @@ def applied(columns: np.ndarray, groups: Sequence[Group], vectors: np.ndarray) -
         if group.basis is None:
             result += part @ own
             continue
-        for motion, each in enumerate(own.reshape(group.motions, -1, vectors.shape[1])):
-            result += part[:, :, motion, None] * (group.basis @ each)[:, None, :]
+        by_function = own.reshape(group.motions, -1, vectors.shape[1]).swapaxes(0, 1)
+        summed = group.basis @ by_function.reshape(group.basis.shape[1], -1)
+        result += part @ summed.reshape(len(columns), group.motions, -1)
     return result
 
 
@@ -92,3 +97,32 @@ def _block(products: np.ndarray, first: np.ndarray | None, second: np.ndarray | 
     block = products.reshape(count, -1).T @ both
     block = block.reshape(rows, columns, first.shape[1], second.shape[1]).transpose(0, 2, 1, 3)
     return block.reshape(rows * first.shape[1], columns * second.shape[1])
+
+
+def spread_rows(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
+    """As ``spread``, observations last: (P, m, n) from the motions ``columns`` (E, m, n)."""
+    if all(group.basis is None for group in groups):
+        return columns
+    full = np.empty((sum(group.size for group in groups), *columns.shape[1:]))
+    begin = 0
+    for group in groups:
+        part, into = columns[group.columns], full[begin : begin + group.size]
+        begin += group.size
+        if group.basis is None:
+            into[:] = part
+        else:
+            shaped = into.reshape(group.motions, -1, *columns.shape[1:])
+            np.multiply(part[:, None], np.ascontiguousarray(group.basis.T)[:, None], out=shaped)
+    return full
+
+
+def against(columns: np.ndarray, groups: Sequence[Group], values: np.ndarray) -> np.ndarray:
+    """Transposed spread Jacobian (P, m n) of ``columns`` (E, m, n) times ``values`` (m, n)."""
+    seen = np.einsum("emn,mn->en", columns, values)
+    parts = [
+        seen[group.columns].sum(axis=1)
+        if group.basis is None
+        else seen[group.columns] @ group.basis
+        for group in groups
+    ]
+    return np.concatenate([part.ravel() for part in parts])

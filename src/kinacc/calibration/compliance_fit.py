@@ -126,7 +126,7 @@ class ComplianceEstimator(Estimator):
         flange = FlangeModel(
             int(free.sum()),
             lambda x, at: model(x).pose(at),
-            lambda x, at: model(x).parameter_jacobian(at)[:, :, free],
+            lambda x, at: dh_fit.by_parameters(model(x), at, free),
         )
         more = len(names) - arm.free.size
         unknowns = Unknowns(

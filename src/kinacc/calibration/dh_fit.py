@@ -20,13 +20,16 @@ from kinacc.calibration.held import (
     pose_system,
 )
 from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.system import FlangeModel, require_enough
 from kinacc.calibration.truncated_svd import unseen
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
+from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import JointState
 
 DH_FIX = "measure more poses"
 UNSEEN_POSES = 60
@@ -130,6 +133,7 @@ class Unknowns:
     scale: np.ndarray
 
 
+@one_thread
 def solved(
     observations: Observations,
     unknowns: Unknowns,
@@ -208,6 +212,7 @@ def _placed(
     )
 
 
+@one_thread
 def unseen_anywhere(fit: DHFit, observations: Observations, threshold: float) -> np.ndarray:
     """Directions (m, P) of a fit's coordinates that no pose shows, whatever the joints.
 
@@ -267,8 +272,15 @@ def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
     return FlangeModel(
         int(mask.sum()),
         lambda x, at: model(x).pose(at),
-        lambda x, at: model(x).parameter_jacobian(at)[:, :, mask],
+        lambda x, at: by_parameters(model(x), at, mask),
     )
+
+
+def by_parameters(
+    model: DHModel | ComplianceModel, at: JointState, free: np.ndarray
+) -> tuple[Pose, np.ndarray]:
+    """Poses (n, ...) of a model and their Jacobian (P, 6, n) in its parameters ``free``."""
+    return model.pose(at), model.parameter_jacobian(at).transpose(2, 1, 0)[free]
 
 
 def scales(free: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from kinacc.calibration.solve import Solution, Spectrum, System
 TRUNCATED_GROWTH = 1e-3
 FRAME_THRESHOLD = 1e-6  # frames have no nominal value to keep: only exact ambiguities are cut
 MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
+GRAM_TELLS = 1e-5  # share of the largest singular value that a Gram matrix still resolves
 TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
 
 
@@ -47,65 +48,172 @@ def minimise_truncated(
     take the place of ``is_rotation``.
     Converged as ``ridge.minimise_with_prior`` is. Raises FitError where it does not converge.
     """
+    found = arrived(system, start, nominal, scale, threshold, frames, name, prior, is_rotation)
+    return found.solution(shared)
+
+
+def arrived(
+    system: System,
+    start: np.ndarray,
+    nominal: np.ndarray,
+    scale: np.ndarray,
+    threshold: float,
+    frames: int,
+    name: str,
+    prior: np.ndarray | None,
+    is_rotation: np.ndarray | None,
+) -> Arrived:
+    """Where ``minimise_truncated`` ends.
+
+    Steps follow from the Gram matrix of the Jacobian, which costs little but squares its condition;
+    the last one, and with it every rank, from the Jacobian's triangular factor.
+    """
     x = np.array(start, dtype=float)
     weight = np.zeros(system.size) if prior is None else prior
     held = _Held(nominal, scale, weight * scale, frames)
+    unit = np.append(scale, 1.0)
+    units, latest = np.outer(unit, unit), np.empty(0)
 
     def objective(at: np.ndarray) -> float:
-        return system.cost(at) + held.cost(at)
+        nonlocal latest
+        latest = solve.gram(system, at)
+        return latest[-1, -1] + held.cost(at)
 
-    cost, ranks, last = objective(x), None, np.inf
-    iterations = 0
-    while last > solve.STEP_TOLERANCE and iterations < solve.MAX_ITERATIONS:
+    cost, ranks, last, expected = objective(x), None, np.inf, np.inf
+    normal, iterations = latest, 0
+    while iterations < solve.MAX_ITERATIONS:
         iterations += 1
-        factor, count = solve.triangle(system, x, scale)
+        closely = expected <= solve.STEP_TOLERANCE or threshold < GRAM_TELLS
+        if closely:
+            factors, counts = solve.triangles(system, x, scale, is_rotation)
+            factor = solve.joined(factors)
+        else:
+            factor = solve.triangle_of_gram(normal * units)
         # A rank that has been lost is not taken back, so the iteration cannot swing between two.
         most = ranks if iterations > 3 else None
         split = _Split.of(held.joined(factor, x), held, threshold, most)
         ranks = split.ranks
-        step = scale * split.step(held.displacement(x))
-        before = cost
-        x, cost, last = solve.advance(objective, x, step, cost, scale, name, TRUNCATED_GROWTH)
-        if iterations >= solve.PATIENCE and abs(before - cost) <= solve.STANDSTILL * before:
+        step = split.step(held.displacement(x))
+        size = float(np.max(np.abs(step), initial=0.0))
+        if closely and size <= solve.STEP_TOLERANCE:
+            return Arrived(
+                system,
+                x + scale * step,
+                step,
+                factors,
+                counts,
+                split,
+                held,
+                threshold,
+                is_rotation,
+                iterations,
+                size,
+            )
+        before = cost, last
+        there, cost, last = solve.advance(
+            objective, x, scale * step, cost, scale, name, TRUNCATED_GROWTH
+        )
+        moved = there is not x
+        x, normal = there, latest if moved else normal
+        expected = last * min(1.0, last / before[1]) if np.isfinite(before[1]) else last
+        if iterations >= solve.PATIENCE and abs(before[0] - cost) <= solve.STANDSTILL * before[0]:
             break
     else:
-        solve.require_converged(name, iterations, last, cost, count)
-    factor, count = solve.triangle(system, x, scale)
-    split = _Split.of(held.joined(factor, x), held, threshold, ranks)
-    cost = float(np.sum(factor[:, -1] ** 2))
-    root = of_fit = split.root()
-    fitted = sum(split.ranks)
-    if weight.any():
-        fitted = float(np.sum((factor[:, :-1] @ root) ** 2))  # what the data, not the prior, decide
-    freedom = count - fitted
-    variance = cost / freedom if freedom > 0 else np.nan
-    told = split
-    if threshold > FRAME_THRESHOLD:  # fitted as they are, weak frames still count as undetermined
-        told = _Split.of(held.joined(factor, x), held, threshold, None, threshold)
-        root = told.root()
-    covariance = variance * (root @ root.T) * np.outer(scale, scale)
-    if freedom > 0 and (shared or is_rotation is not None):
-        roots = scale[:, None] * of_fit, scale[:, None] * root
-        if shared:
-            along = variances.along_root_shared(system, x, shared, *roots, variance)
-        else:
-            along = variances.along_root(system, x, is_rotation, *roots, variance)
-        covariance = roots[1] @ along @ roots[1].T
-    return Solution(
-        x=x,
-        std=np.where(told.touched(), np.nan, np.sqrt(np.diag(covariance))),
-        covariance=covariance,
-        cost=cost,
-        count=count,
-        degrees_of_freedom=freedom,
-        variance=variance,
-        iterations=iterations,
-        last_step=last,
-        converged=True,
-        spectrum=split.others.spectrum,
-        undetermined=told.undetermined(),
-        scale=scale,
+        solve.require_converged(name, iterations, last, cost, sum(counts))
+    factors, counts = solve.triangles(system, x, scale, is_rotation)
+    split = _Split.of(held.joined(solve.joined(factors), x), held, threshold, ranks)
+    return Arrived(
+        system,
+        x,
+        np.zeros(system.size),
+        factors,
+        counts,
+        split,
+        held,
+        threshold,
+        is_rotation,
+        iterations,
+        last,
     )
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """Where the fit of a ``system`` ended, and what is to be said of it when asked.
+
+    ``factors``: triangular factors of ``[J scale | r]`` of positions and of rotations one ``step``
+    (P,), in units of scale, before ``x``; ``counts`` their residuals.
+    """
+
+    system: System
+    x: np.ndarray
+    step: np.ndarray
+    factors: list[np.ndarray]
+    counts: list[int]
+    split: _Split
+    held: _Held
+    threshold: float
+    is_rotation: np.ndarray | None
+    iterations: int
+    last: float
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared residuals at ``x``."""
+        to = np.append(self.step, 1.0)
+        return float(sum(np.sum((factor @ to) ** 2) for factor in self.factors))
+
+    @property
+    def freedom(self) -> float:
+        """Residuals less fitted parameters; of these only what the data, not a prior, decide."""
+        fitted = float(sum(self.split.ranks))
+        if self.held.weight.any():
+            root = self.split.root()
+            fitted = float(sum(np.sum((factor[:, :-1] @ root) ** 2) for factor in self.factors))
+        return sum(self.counts) - fitted
+
+    @property
+    def variance(self) -> float:
+        """That of the residuals; NaN where none is left over."""
+        return self.cost / self.freedom if self.freedom > 0 else np.nan
+
+    def solution(self, shared: tuple[np.ndarray, ...]) -> Solution:
+        """The fit's outcome with its standard deviations."""
+        x, scale, held, split = self.x, self.held.scale, self.held, self.split
+        factors, variance, freedom = self.factors, self.variance, self.freedom
+        root = of_fit = split.root()
+        told = split
+        if self.threshold > FRAME_THRESHOLD:
+            # Fitted as they are, weak frames still count as undetermined.
+            joined = held.joined(solve.joined(factors), x)
+            told = _Split.of(joined, held, self.threshold, None, self.threshold)
+            root = told.root()
+        covariance = variance * (root @ root.T) * np.outer(scale, scale)
+        if freedom > 0 and (shared or self.is_rotation is not None):
+            if shared:
+                roots = scale[:, None] * of_fit, scale[:, None] * root
+                along = variances.along_root_shared(self.system, x, shared, *roots, variance)
+            else:
+                to = np.append(self.step, 1.0)
+                costs = np.array([np.sum((factor @ to) ** 2) for factor in factors])
+                fitted, seen = ([f[:, :-1] @ each for f in factors] for each in (of_fit, root))
+                along = variances.along_root(costs, np.array(self.counts), fitted, seen, variance)
+            covariance = (root @ along @ root.T) * np.outer(scale, scale)
+        return Solution(
+            x=x,
+            std=np.where(told.touched(), np.nan, np.sqrt(np.diag(covariance))),
+            covariance=covariance,
+            cost=self.cost,
+            count=sum(self.counts),
+            degrees_of_freedom=freedom,
+            variance=variance,
+            iterations=self.iterations,
+            last_step=self.last,
+            converged=True,
+            spectrum=split.others.spectrum,
+            undetermined=told.undetermined(),
+            scale=scale,
+        )
 
 
 def unseen(

@@ -12,12 +12,14 @@ import re
 import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from logging import LogRecord
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from kinacc.workflow.catalogue import STAGES, TABLES
 from kinacc.workflow.runner import Job, Paths, execute
+
+if TYPE_CHECKING:
+    from logging import LogRecord
 
 COMMAND = (
     'exec "$KINACC_PYTHON" -P "$KINACC_STAGE" "$KINACC_FOLDER" --job {params.job:q}'

@@ -1,0 +1,49 @@
+"""Priors of many widths at once: what each would find alone, by an eigendecomposition."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kinacc.calibration import ridge
+
+STD = np.array([0.01, 0.1, 1.0])
+
+
+def alone(normal, gradient, cost, freedom, std):
+    """The step under one prior and the variance it leaves, in eigendirections."""
+    values, vectors = np.linalg.eigh(normal)
+    turned, variance = vectors.T @ gradient, 1e-6 * cost / freedom
+    while True:
+        held = variance / std**2
+        step = -turned / (values + held)
+        left = cost + step @ (2.0 * turned + values * step)
+        found = left / (freedom - np.sum(values / (values + held)))
+        if abs(found - variance) <= 1e-4 * variance:
+            return vectors @ step
+        variance = found
+
+
+@pytest.mark.parametrize("size", [2, 7, 80])
+def test_every_width_of_a_prior_is_fitted_as_if_alone(size):
+    rng = np.random.default_rng(size)
+    jacobian = rng.normal(size=(3 * size, size)) * np.logspace(0, -3, size)
+    residual = jacobian @ rng.normal(size=size) + 0.1 * rng.normal(size=3 * size)
+    normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
+    problem = gradient, float(residual @ residual), 3 * size
+    found = ridge.steps(normal.copy(), *problem, STD)
+    wanted = np.stack([alone(normal, *problem, std) for std in STD], axis=1)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_directions_that_no_reading_shows_stay_where_they_are():
+    rng = np.random.default_rng(0)
+    jacobian = rng.normal(size=(60, 4)) @ rng.normal(size=(4, 20))
+    residual = jacobian @ rng.normal(size=20)  # free of noise: the variance falls to nothing
+    found = ridge.steps(
+        jacobian.T @ jacobian, jacobian.T @ residual, float(residual @ residual), 60, STD
+    )
+    assert np.isfinite(found).all()
+    unseen = np.linalg.svd(jacobian)[2][4:]
+    assert np.abs(unseen @ found).max() < 0.05
+    np.testing.assert_allclose(jacobian @ found, -residual[:, None].repeat(3, 1), atol=1e-4)
