@@ -2,21 +2,8 @@
 
 # With one data set its name stands in the paths, so that `snakemake -c1 dh` says which one it means.
 whose = "{dataset}" if len(plan.datasets) > 1 else next(iter(plan.datasets))
-
-
-# The targets are not known yet when this file is read.
-def with_robustness():
-    return "robustness" in workflow.dag_settings.targets
-
-
-# What has to be there and is not read is `ancient`: a stage is not made anew when that is, unless it
-# has to be made anew itself.
-def files_read(name, dataset, part):
-    gates = plan.gates(name, dataset)
-    if gates and not plan.followed(name, dataset, part):
-        gates = [ancient(gate) for gate in gates]
-    return {"after": gates, **plan.inputs(name, dataset, with_robustness())}
-
+# Asked for later: the targets are not known yet when this file is read.
+on_request = lambda: "robustness" in workflow.dag_settings.targets
 
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
@@ -27,9 +14,10 @@ for stage in STAGES.values():
             stage.name
         input:
             unpack(
-                lambda w, name=stage.name, folder=folder: files_read(
-                    name, w.get("dataset", folder), w.get("part")
+                lambda w, name=stage.name, folder=folder: plan.waited_for(
+                    name, w.get("dataset", folder), w.get("part"), ancient
                 )
+                | plan.inputs(name, w.get("dataset", folder), on_request())
             ),
         output:
             **{
@@ -69,7 +57,7 @@ for stage in STAGES.values():
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             job=lambda w, name=stage.name, folder=folder: plan.job_text(
-                name, w.get("dataset", folder), w.get("part"), with_robustness()
+                name, w.get("dataset", folder), w.get("part"), on_request()
             ),
             contents=lambda w, name=stage.name, folder=folder: plan.contents(
                 name, w.get("dataset", folder)

@@ -240,16 +240,23 @@ class Plan:
             seen |= read
         return [self._table(each, dataset) for each in found]
 
-    def followed(self, name: str, dataset: str, part: str | None = None) -> list[str]:
-        """Those of ``gates`` that a stage has to be made after: they and it are to be made anew.
+    def waited_for(
+        self, name: str, dataset: str, part: str | None, untouched: Callable[[str], str]
+    ) -> dict[str, list[str]]:
+        """``gates`` as inputs: through ``untouched`` unless they and the stage are to be made anew.
 
-        Snakemake asks for no other reason below a job that runs, so that a stage whose settings
-        changed together with those of a gate would stay as it is if the gate were ``ancient``.
+        A gate alone does not make a stage anew. Snakemake asks for no other reason below a job that
+        runs, so that a stage whose settings changed together with those of a gate would stay as it
+        is if the gate were ``ancient``.
         """
         gates = self.gates(name, dataset)
-        if not gates or all(self._is_made(Path(each).stem, dataset) for each in gates):
-            return []
-        return [] if self._is_made(name, dataset, part) else gates
+        if (
+            not gates
+            or all(self._is_made(Path(each).stem, dataset) for each in gates)
+            or self._is_made(name, dataset, part)
+        ):
+            gates = [untouched(gate) for gate in gates]
+        return {"gates": gates}
 
     def _is_made(self, name: str, dataset: str, part: str | None = None) -> bool:
         """Whether tables are there by these settings and code; of pictures nothing is known."""
@@ -269,7 +276,10 @@ class Plan:
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""
         files = self._files(STAGES[name], dataset)
-        return {role: _hash(os.path.abspath(path), os.stat(path).st_mtime_ns) for role, path in files.items()}
+        return {
+            role: _hash(os.path.abspath(path), os.stat(path).st_mtime_ns)
+            for role, path in files.items()
+        }
 
     def check_files(self) -> None:
         """Read every measured file that is newer than its table, or read by other settings.
