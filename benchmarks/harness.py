@@ -217,30 +217,47 @@ def measure(work: Work, processes: Sequence[Elsewhere], smoke: bool) -> list[Res
         sides = [processes[0], *sides, *processes[1:]]
     known = {LIMIT, TODAY, *(side.name for side in sides)}
     absent = [_absent(work, name, "not installed") for name in work.wanted if name not in known]
+    if work.today is not None and not processes and not smoke:
+        absent.append(_absent(work, TODAY, "that commit is not in this repository"))
     return [*_rows(work, sides, smoke), *absent]
 
 
 def _rows(work: Work, sides: Sequence[_Here | Elsewhere], smoke: bool) -> list[Result]:
-    work.agree([side.output() for side in sides])
-    times, lasted, warm_up = zip(*(_enough(side, smoke) for side in sides), strict=True)
-    fewest, most = ROUNDS
-    rounds = 1 if smoke else min(most, max(fewest, round(work.seconds / sum(lasted))))
-    samples: list[list[Sample]] = [[] for _ in sides]
-    for number in range(rounds):
-        for place in range(len(sides)):
-            turn = (place + number) % len(sides)
-            samples[turn].append(sides[turn].sample(times[turn]))
+    samples, runs = (_once if smoke else _in_turns)(work, sides)
     rows = [
-        _row(work, side, own, samples[0], (rounds, *counts))
-        for side, own, *counts in zip(sides, samples, times, warm_up, strict=True)
+        _row(work, side, own, samples[0], (len(own), *counts))
+        for side, own, counts in zip(sides, samples, runs, strict=True)
     ]
     return rows if work.limit_ns is None else [*rows, _limit(work, samples[0])]
 
 
-def _enough(side: _Here | Elsewhere, smoke: bool) -> tuple[int, float, int]:
+def _once(
+    work: Work, sides: Sequence[_Here | Elsewhere]
+) -> tuple[list[list[Sample]], list[tuple[int, int]]]:
+    """One run each, whose outputs are those compared."""
+    outputs: list[object] = []
+    samples = [[timed(lambda side=side: outputs.append(side.output()))] for side in sides]
+    work.agree(outputs)
+    return samples, [(1, 0)] * len(sides)
+
+
+def _in_turns(
+    work: Work, sides: Sequence[_Here | Elsewhere]
+) -> tuple[list[list[Sample]], list[tuple[int, int]]]:
+    """Samples of all rounds by side, and runs in each and before them."""
+    work.agree([side.output() for side in sides])
+    times, lasted, warm_up = zip(*map(_enough, sides), strict=True)
+    fewest, most = ROUNDS
+    samples: list[list[Sample]] = [[] for _ in sides]
+    for number in range(min(most, max(fewest, round(work.seconds / sum(lasted))))):
+        for place in range(len(sides)):
+            turn = (place + number) % len(sides)
+            samples[turn].append(sides[turn].sample(times[turn]))
+    return samples, list(zip(times, warm_up, strict=True))
+
+
+def _enough(side: _Here | Elsewhere) -> tuple[int, float, int]:
     """How many runs make a sample, how many seconds it takes, and how often it has run by now."""
-    if smoke:
-        return 1, SAMPLE_S, 1
     times = done = 1
     while True:
         lasted = times * side.sample(times).wall_ns / 1e9

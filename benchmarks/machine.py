@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
+SOURCES = ("src", "workflow", "profiles", "Snakefile", "config.yaml")  # what a run needs
 
 
 def facts() -> dict[str, str | int | float]:
@@ -66,10 +67,10 @@ def commit(of: str = "HEAD") -> str:
 
 
 def sources_of(of: str, folder: Path) -> Path | None:
-    """The tree of a commit in ``folder``, None without it; leaves no trace in the repository."""
+    """What of a commit is run, in ``folder``; None without it. Leaves the repository alone."""
     try:
         packed = folder / "tree.tar"
-        _git("archive", "--output", str(packed), of)
+        _git("archive", "--output", str(packed), of, "--", *SOURCES)
         subprocess.run(["tar", "-xf", packed.name], cwd=folder, check=True)
     except (OSError, subprocess.CalledProcessError):
         return None

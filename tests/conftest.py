@@ -12,6 +12,7 @@ from hypothesis import settings
 # Works in every pytest import mode, from tests/ and from any folder below it.
 TESTS = Path(__file__).resolve().parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "tools")]
+sys.path.append(str(TESTS.parent / "benchmarks"))
 
 # Files and folders left out of `make check`; measured with `pytest --durations=0`. The first ones
 # take longest: `make test` hands them out first, so that no worker is left alone with one.
@@ -31,6 +32,7 @@ SLOW = (
     "assess/test_oracle_invalidation.py",
     "assess/test_size_limits.py",
     "artifacts/test_check.py",
+    "benchmarks",
     "calibration/test_chosen_order.py",
     "calibration/test_convergence.py",
     "calibration/test_dh_fit.py",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+import scipy
 
 from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, System
@@ -51,12 +51,11 @@ def minimise_with_prior(
         normal = _normal_equations(system, x, scale)
         balance = _balanced(normal, weight_sq, prior.displacement(x), balance, name)
         here = _Point(x, normal.gradient, normal.cost)
-        most = MAX_ITERATIONS if iterations else 1
-        end = _descended(system, here, normal.count, balance, prior, most, name)
+        end = _descended(system, here, normal.count, balance, prior, iterations, name)
         iterations += end.steps
         moved = np.max(np.abs(end.at.x - x) / scale, initial=0.0)
         x, last = end.at.x, end.wanted
-        if moved <= CLOSE and (last <= solve.STEP_TOLERANCE or end.stands):
+        if end.stands or (moved <= CLOSE and last <= solve.STEP_TOLERANCE):
             break
     else:
         solve.require_converged(name, iterations, last, end.at.cost, normal.count)
@@ -113,13 +112,17 @@ def _descended(
     count: int,
     balance: _Balance,
     prior: _Prior,
-    most: int,
+    begun: int,
     name: str,
 ) -> _End:
-    """Down the objective in at most ``most`` steps, the first that of ``balance``."""
+    """Down the objective after ``begun`` steps; the next one is that of ``balance``.
+
+    The first of all is taken alone: the Gram matrix may be another where it leads.
+    """
     scale, step, variance = prior.scale, balance.step, balance.variance
+    wanted = first = float(np.max(np.abs(step), initial=0.0))
     moves: list[tuple[np.ndarray, np.ndarray]] = []  # steps, and how the data's gradient changed
-    for taken in range(1, most + 1):
+    for taken in range(1, MAX_ITERATIONS + 1 if begun else 2):
         latest = here
 
         def objective(at: np.ndarray, variance: float = variance) -> float:
@@ -131,15 +134,18 @@ def _descended(
         before = here.cost + variance * prior.cost(here.x)
         x, after, _ = solve.advance(objective, here.x, scale * step, before, scale, name)
         if x is here.x:
-            return _End(here, taken, float(np.max(np.abs(step))), True)
+            return _End(here, taken, wanted, True)
         moves.append(((x - here.x) / scale, latest.gradient - here.gradient))
+        if after > before:
+            moves.clear()  # rounding has been learned from
         here = latest
         variance = max(here.cost / max(count - balance.effective, 1.0), LEAST_VARIANCE)
         step = _learned_step(here, balance.inverse, variance, prior, moves[-MEMORY:])
         wanted = float(np.max(np.abs(step), initial=0.0))
         least = max(NO_CHANGE * variance, solve.STANDSTILL * before)
-        stands = taken >= solve.PATIENCE and abs(before - after) <= least
-        if wanted <= solve.STEP_TOLERANCE or stands:
+        stands = begun + taken >= solve.PATIENCE and abs(before - after) <= least
+        # A step longer than the first speaks of another Gram matrix than the one frozen.
+        if wanted <= solve.STEP_TOLERANCE or stands or wanted >= first:
             break
     return _End(here, taken, wanted, stands)
 
@@ -196,16 +202,15 @@ def _balanced(
     # From below: started at the variance of the whole misfit, a tight prior could pass for truth
     # and everything it forbids for noise.
     least = FIRST_VARIANCE * normal.cost / normal.count
-    variance = least if before is None else before.variance
+    variance = max(least, LEAST_VARIANCE) if before is None else before.variance
     for _ in range(MAX_VARIANCE_STEPS):
-        variance = max(variance, LEAST_VARIANCE)
         gram = normal.gram.copy()
         gram[np.diag_indices_from(gram)] += variance * weight_sq
         inverse = _inverse(gram, name)
         step = -inverse @ (normal.gradient + variance * weight_sq * displacement)
         cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
         effective = len(step) - variance * float(weight_sq @ np.diag(inverse))
-        found = max(cost, 0.0) / max(normal.count - effective, 1.0)
+        found = max(cost / max(normal.count - effective, 1.0), LEAST_VARIANCE)
         if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
             break
         variance = found
@@ -220,9 +225,12 @@ def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Norm
 
 def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
     try:
-        return cho_solve(cho_factor(gram, check_finite=False), np.eye(len(gram)))
+        factor = np.linalg.cholesky(gram)
     except np.linalg.LinAlgError:
         raise FitError(
             f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
             "give every undetermined direction a prior"
         ) from None
+    half, _ = scipy.linalg.lapack.dpotri(factor.T)
+    half = np.triu(half)
+    return half + np.triu(half, 1).T

@@ -35,14 +35,19 @@ def linearised(dh: DHModel, q_rad: np.ndarray, errors: np.ndarray) -> tuple[Pose
         after = _across(dh, joint, q_rad[:, joint], after)
         stands, into = before[joint], jacobian[joint]
         into[:3, :3] = stands.transpose(1, 0, 2)
+        reach, axes = after[:, 3], after[:, :3]
         seen = _product(rotation, stands)  # Q' before
         for axis in range(3):
             u, v = (axis + 1) % 3, (axis + 2) % 3
             # e_axis x r has two entries: -r_v along u and r_u along v.
-            into[3 + axis, :3] = stands[:, v] * after[u, 3] - stands[:, u] * after[v, 3]
+            np.multiply(stands[:, v], reach[u], out=into[3 + axis, :3])
+            into[3 + axis, :3] -= stands[:, u] * reach[v]
             # The skew part of Q' before [e_axis] after, written with columns and rows.
-            twist = _chain.cross(after[u, :3], seen[:, v]) - _chain.cross(after[v, :3], seen[:, u])
-            np.sum(rate * twist, axis=1, out=into[3 + axis, 3:])
+            apart = seen[:, v, None] * axes[u] - seen[:, u, None] * axes[v]
+            for row in range(3):
+                one, other = (row + 1) % 3, (row + 2) % 3
+                twist = apart[other, one] - apart[one, other]
+                into[3 + axis, 3:] += rate[:, row] * twist
         if joint:
             after = _disturbed(errors[joint], after)
     pose = Pose(turned, np.ascontiguousarray(frames.p_mm.T))
@@ -74,7 +79,10 @@ def _rate(rotation: np.ndarray, raw: np.ndarray) -> np.ndarray:
 
 def _product(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Transposed ``one`` (3, 3, n) times ``other`` (3, 3, n)."""
-    return sum(one[k, :, None] * other[k, None] for k in range(3))
+    found = one[0, :, None] * other[0]
+    found += one[1, :, None] * other[1]
+    found += one[2, :, None] * other[2]
+    return found
 
 
 def _across(dh: DHModel, joint: int, q_rad: np.ndarray, frames: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse import newton
-from kinacc.kinematics.inverse.chain_rows import behind_first, rows_of, targets_of
+from kinacc.kinematics.inverse.chain_rows import behind_first, targets_of
 from kinacc.kinematics.model import ErrorModel, JointState
 
 SAME_POSTURE_RAD = 1e-6
@@ -113,7 +113,7 @@ def _compiled(functions: Functions, goal: Pose, q_rad: np.ndarray) -> np.ndarray
     """Joints (m, k) after many steps of the compiled refinement."""
     from kinacc.kinematics.inverse import kernels
 
-    rows, q_rad = rows_of(functions.dh), np.ascontiguousarray(q_rad)
+    rows, q_rad = functions.dh.rows, np.ascontiguousarray(q_rad)
     if functions.first is not None:
         rows = rows[1:]
         goal = compose(invert(behind_first(functions.dh, functions.first)), goal)
