@@ -9,18 +9,13 @@ def with_robustness():
     return "robustness" in workflow.dag_settings.targets
 
 
-# What has to be there and is not read is `ancient`: a stage is not made anew when that is, unless it
-# has to be made anew itself. Files from outside are read where they stand, also where results go to
-# a storage.
+# Files from outside are read where they stand, also where results go to a storage.
 def files_read(name, dataset, part):
-    gates = plan.gates(name, dataset)
-    if gates and not plan.followed(name, dataset, part):
-        gates = [ancient(gate) for gate in gates]
     files = {
         role: local(paths) if role.endswith("_file") else paths
         for role, paths in plan.inputs(name, dataset, with_robustness()).items()
     }
-    return {"after": gates, **files}
+    return plan.waited_for(name, dataset, part, ancient) | files
 
 
 for stage in STAGES.values():

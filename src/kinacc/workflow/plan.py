@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, wraps
+from functools import cache, cached_property, wraps
 from pathlib import Path
 
 from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
-from kinacc.campaign.journal import JOURNAL, PLAN, of_results
+from kinacc.campaign.journal import JOURNAL, PLAN, of_each
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.workflow.catalogue import (
     FIGURE_FOLDER,
@@ -240,16 +240,23 @@ class Plan:
             seen |= read
         return [self._table(each, dataset) for each in found]
 
-    def followed(self, name: str, dataset: str, part: str | None = None) -> list[str]:
-        """Those of ``gates`` that a stage has to be made after: they and it are to be made anew.
+    def waited_for(
+        self, name: str, dataset: str, part: str | None, untouched: Callable[[str], str]
+    ) -> dict[str, list[str]]:
+        """``gates`` as inputs: through ``untouched`` unless they and the stage are to be made anew.
 
-        Snakemake asks for no other reason below a job that runs, so that a stage whose settings
-        changed together with those of a gate would stay as it is if the gate were ``ancient``.
+        A gate alone does not make a stage anew. Snakemake asks for no other reason below a job that
+        runs, so that a stage whose settings changed together with those of a gate would stay as it
+        is if the gate were ``ancient``.
         """
         gates = self.gates(name, dataset)
-        if not gates or all(self._is_made(Path(each).stem, dataset) for each in gates):
-            return []
-        return [] if self._is_made(name, dataset, part) else gates
+        if (
+            not gates
+            or all(self._is_made(Path(each).stem, dataset) for each in gates)
+            or self._is_made(name, dataset, part)
+        ):
+            gates = [untouched(gate) for gate in gates]
+        return {"gates": gates}
 
     def _is_made(self, name: str, dataset: str, part: str | None = None) -> bool:
         """Whether tables are there by these settings and code; of pictures nothing is known."""
@@ -269,7 +276,10 @@ class Plan:
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""
         files = self._files(STAGES[name], dataset)
-        return {role: _hash(os.path.abspath(path), os.stat(path).st_mtime_ns) for role, path in files.items()}
+        return {
+            role: _hash(os.path.abspath(path), os.stat(path).st_mtime_ns)
+            for role, path in files.items()
+        }
 
     def check_files(self) -> None:
         """Read every measured file that is newer than its table, or read by other settings.
@@ -434,6 +444,11 @@ class Plan:
         folder = f"{self.results}/{dataset}"
         return f"{folder}/{artefact}/{part}.parquet" if part else f"{folder}/{artefact}.parquet"
 
+    @cached_property
+    def _campaigns(self) -> dict[Path, list[Path]]:
+        """Campaigns on the calibration of every data set, by its results folder, sought once."""
+        return of_each(Path(self.results) / dataset for dataset in self.datasets)
+
     def _files(self, stage: Stage, dataset: str) -> dict[str, str]:
         """Files from outside by role; for the tournament ``<data set>/<role>``."""
         if dataset == TOURNAMENT:
@@ -444,7 +459,7 @@ class Plan:
             }
         config, found = self.datasets[dataset], {}
         if stage.leaves == PAGE:
-            found |= campaign_files(Path(self.results) / dataset)
+            found |= campaign_files(self._campaigns[Path(self.results) / dataset])
         for path in stage.files:
             value: object = config
             for key in path.split("."):
@@ -469,10 +484,10 @@ def _hash(path: str, changed_ns: int) -> str:
     return file_hash(path)
 
 
-def campaign_files(results: Path) -> dict[str, str]:
-    """Files of the campaigns on the calibration in a results folder, by role."""
+def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
+    """Files of campaigns on the calibration of a data set, by role."""
     found = {}
-    for number, campaign in enumerate(of_results(results), 1):
+    for number, campaign in enumerate(campaigns, 1):
         found[f"campaign_{number}_file"] = str(campaign / PLAN)
         if (campaign / JOURNAL).is_file():
             found[f"readings_{number}_file"] = str(campaign / JOURNAL)
