@@ -142,3 +142,23 @@ def test_quick_steps_say_what_they_do_not_reach_in_the_same_bits(monkeypatch):
     assert not met.all()
     back = dh.forward(model, results[0][0][met]).position_mm
     assert np.abs(back - dh.forward(model, q[met]).position_mm).max() < 1e-9
+
+
+def test_where_nothing_can_be_kept_kernels_are_compiled_anew_and_one_line_says_so():
+    import subprocess
+    import sys
+
+    lines = (
+        "import numpy as np, numba.core.caching as caching",
+        "caching.CacheImpl._locator_classes = []  # neither folder can be written",
+        "from kinacc.kinematics import dh, kernels, robot",
+        "from kinacc.kinematics.inverse import kernels as others",
+        "arm, q = robot.load('mh180').dh, np.full((3, 6), 0.5)",
+        "plain = dh.forward(arm, q)",
+        "dh.WORTH_NUMBA = 0",
+        "print(plain.position_mm.tobytes() == dh.forward(arm, q).position_mm.tobytes())",
+    )
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
+    assert done.stdout.split() == ["True"], done.stderr
+    [line] = done.stderr.splitlines()
+    assert "NUMBA_CACHE_DIR" in line
