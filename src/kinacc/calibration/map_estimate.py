@@ -14,7 +14,7 @@ from kinacc.errors import FitError
 MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slowly
 PATIENCE = 40  # steps after which standing still counts as arrived
 MAX_VARIANCE_STEPS = 20
-VARIANCE_TOLERANCE = 1e-9  # a prior that is weighed otherwise pulls weak directions elsewhere
+VARIANCE_TOLERANCE = 1e-7  # a prior that is weighed otherwise pulls weak directions elsewhere
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
 CLOSE = 1e-3  # mm and mrad from the end: a Gram matrix from there has the same inverse
 MEMORY = 20  # steps that the inverse has learned from
