@@ -115,13 +115,10 @@ def spread_rows(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     return full
 
 
-def against(columns: np.ndarray, groups: Sequence[Group], values: np.ndarray) -> np.ndarray:
-    """Transposed spread Jacobian (P, m n) of ``columns`` (E, m, n) times ``values`` (m, n)."""
-    seen = np.einsum("emn,mn->en", columns, values)
+def summed(values: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
+    """Sums (P,) over observations of ``values`` (E, n) of motions, spread as these are."""
     parts = [
-        seen[group.columns].sum(axis=1)
-        if group.basis is None
-        else seen[group.columns] @ group.basis
-        for group in groups
+        part.sum(axis=1) if group.basis is None else (part @ group.basis).ravel()
+        for group, part in ((each, values[each.columns]) for each in groups)
     ]
-    return np.concatenate([part.ravel() for part in parts])
+    return np.concatenate(parts)

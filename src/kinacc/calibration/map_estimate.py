@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpotri
+import scipy
 
 from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, System
@@ -14,7 +14,7 @@ from kinacc.errors import FitError
 MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slowly
 PATIENCE = 40  # steps after which standing still counts as arrived
 MAX_VARIANCE_STEPS = 20
-VARIANCE_TOLERANCE = 1e-9  # a prior that is weighed otherwise pulls weak directions elsewhere
+VARIANCE_TOLERANCE = 1e-7  # a prior that is weighed otherwise pulls weak directions elsewhere
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
 CLOSE = 1e-3  # mm and mrad from the end: a Gram matrix from there has the same inverse
 MEMORY = 20  # steps that the inverse has learned from
@@ -232,6 +232,6 @@ def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
             f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
             "give every undetermined direction a prior"
         ) from None
-    half, _ = dpotri(factor.T)
+    half, _ = scipy.linalg.lapack.dpotri(factor.T)
     half = np.triu(half)
     return half + np.triu(half, 1).T

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dpstrf, dtpqrt
+import scipy
 
 from kinacc.errors import FitError
 
@@ -150,7 +150,7 @@ def _reduced(factor: np.ndarray, rows: np.ndarray) -> np.ndarray:
     width = min(_PANEL, len(factor))
     for begin in range(0, len(rows), _ROWS):
         some = np.array(rows[begin : begin + _ROWS], order="F")
-        factor = dtpqrt(0, width, factor, some, overwrite_a=1, overwrite_b=1)[0]
+        factor = scipy.linalg.lapack.dtpqrt(0, width, factor, some, overwrite_a=1, overwrite_b=1)[0]
     return np.triu(factor)
 
 
@@ -161,7 +161,9 @@ def triangle_of_gram(gram: np.ndarray) -> np.ndarray:
     """
     unit = np.sqrt(np.maximum(np.diag(gram), 0.0))
     unit = np.where(unit > 0.0, unit, 1.0)
-    factor, order, rank, _ = dpstrf(gram / np.outer(unit, unit), tol=len(gram) * 2.3e-16)
+    factor, order, rank, _ = scipy.linalg.lapack.dpstrf(
+        gram / np.outer(unit, unit), tol=len(gram) * 2.3e-16
+    )
     factor = np.triu(factor)
     factor[rank:] = 0.0
     back = np.empty_like(factor)

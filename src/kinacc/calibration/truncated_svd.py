@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import qr
+import scipy
 
 from kinacc.calibration import solve, variances
 from kinacc.calibration.solve import Solution, Spectrum, System
@@ -247,7 +247,7 @@ class _Held:
         rows[np.arange(chosen.size), chosen] = self.weight[chosen]
         rows[:, -1] = (self.weight * self.displacement(x))[chosen]
         stacked = np.concatenate([factor, rows])
-        return qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
+        return scipy.linalg.qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
 
     @property
     def known_frames(self) -> np.ndarray:
