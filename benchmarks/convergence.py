@@ -3,10 +3,10 @@
     python benchmarks/convergence.py            # 100 starts per arm and kind of measurement
     python benchmarks/convergence.py 10 ur10    # fewer, of one arm
 
-A simulated arm (joint offsets and twists off by 1 mrad, lengths by 0.5 mm) is measured in 80 poses
-over its joint limits with 0.05 mm and 0.1 mrad noise, base and tool anywhere. Every fit starts from
-a description whose joint offsets are anywhere within 5 degrees of the arm's and d and a within 20
-mm, and knows nothing of base and tool.
+A simulated arm (joint offsets and twists off by 1 mrad, lengths by 0.5 mm) is measured in 80
+poses over its joint limits with 0.05 mm and 0.1 mrad noise, base and tool anywhere. Every fit
+starts from a description whose joint offsets are anywhere within 5 degrees of the arm's and d
+and a within 20 mm, and knows nothing of base and tool.
 """
 
 from __future__ import annotations

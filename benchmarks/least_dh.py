@@ -1,9 +1,9 @@
 """The least a DH model can leave of a measured UR10 series, found without kinacc.
 
-Own kinematics, every parameter of every joint free (beta too, and with --gear an error of the gear
-ratio), positions alone, all rows, base by closed form, scipy's trust region:
-    python benchmarks/least_dh.py ../shared/data/ur10_tmac/series_C.csv
-prints the position rms in mm. What is held out cannot be fitted better than what is fitted.
+Own kinematics, every parameter of every joint free (beta too, and with --gear an error of the
+gear ratio), positions alone, all rows, base by closed form, scipy's trust region: python
+benchmarks/least_dh.py ../shared/data/ur10_tmac/series_C.csv prints the position rms in mm. What
+is held out cannot be fitted better than what is fitted.
 """
 
 from __future__ import annotations

@@ -12,8 +12,26 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 from numba import njit
+from numba.np import linalg as _linear_algebra
 
 _told = False
+
+
+def _set_up_without_scipy() -> None:
+    """Have numba load its functions of arrays without scipy, half of what they take to load.
+
+    It loads scipy.linalg to see whether there is a BLAS. There is, as kinacc needs scipy; a kernel
+    that calls it has it loaded when it is compiled.
+    """
+    look = _linear_algebra.ensure_blas
+    _linear_algebra.ensure_blas = lambda: None
+    try:
+        import numba.np.arraymath  # noqa: F401
+    finally:
+        _linear_algebra.ensure_blas = look
+
+
+_set_up_without_scipy()
 
 
 def compiled(function: Callable[..., Any]) -> Any:

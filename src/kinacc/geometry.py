@@ -120,23 +120,24 @@ def project_so3(matrix: np.ndarray) -> np.ndarray:
     Newton's iteration for the polar factor on cofactors; quadratic near a rotation, where the
     first-order products of eq. 6 live.
     """
-    result = np.array(matrix, dtype=float)
-    settled = np.zeros(result.shape[:-2], dtype=bool)
+    given = np.asarray(matrix, dtype=float)
+    # Numbers first, matrices last: one operation for all of them.
+    result = np.moveaxis(given.reshape(-1, 3, 3), 0, 2).copy()
+    settled = np.zeros(result.shape[2], dtype=bool)
+    cofactor = np.empty_like(result)
     for _ in range(60):
-        rows = result[..., 0, :], result[..., 1, :], result[..., 2, :]
-        cofactor = np.stack(
-            [np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])],
-            axis=-2,
-        )
-        determinant = np.sum(rows[0] * cofactor[..., 0, :], axis=-1)
-        following = 0.5 * (result + cofactor / determinant[..., None, None])
-        change = np.max(np.abs(following - result), axis=(-2, -1))
+        for row in range(3):
+            (a, b, c), (u, v, w) = result[(row + 1) % 3], result[(row + 2) % 3]
+            cofactor[row] = b * w - c * v, c * u - a * w, a * v - b * u
+        determinant = np.sum(result[0] * cofactor[0], axis=0)
+        following = 0.5 * (result + cofactor / determinant)
+        change = np.max(np.abs(following - result), axis=(0, 1))
         # A settled matrix is left alone, so no result depends on what else is in the batch.
-        result = np.where(settled[..., None, None], result, following)
+        result = np.where(settled, result, following)
         settled = settled | (change < 1e-14)
         if settled.all():
             break
-    return result
+    return np.moveaxis(result, 2, 0).reshape(given.shape)
 
 
 def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -14,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.artifacts import store
-from kinacc.artifacts.atomic import replacing
+from kinacc.artifacts.atomic import remove_unfinished, replacing, unfinished
 from kinacc.artifacts.contract import PROVENANCE_KEYS, columns_of
 from kinacc.errors import InputError
 
@@ -156,6 +157,33 @@ def test_a_failure_while_writing_leaves_nothing_behind(tmp_path):
     with pytest.raises(RuntimeError, match="power cut"):
         stopped_half_way()
     assert not list(tmp_path.iterdir())
+
+
+def test_writers_of_one_number_on_two_machines_do_not_meet(tmp_path):
+    """Containers number their processes alike, and share a folder of results."""
+    path = tmp_path / "fig1.svg"
+    with replacing([path]) as (slow,):
+        slow.write_text("slow")
+        with replacing([path]) as (quick,):
+            quick.write_text("quick")
+        assert path.read_text() == "quick"
+    assert path.read_text() == "slow"
+
+
+def test_what_an_ended_process_began_is_removed_and_no_one_elses(tmp_path):
+    path = tmp_path / "fig1.svg"
+    begun = unfinished(path)
+    begun.write_text("half")
+    other_file, other_machine = (
+        unfinished(tmp_path / "fig2.svg"),
+        tmp_path / begun.name.replace(os.uname().nodename[:40], "another-machine"),
+    )
+    for kept in (other_file, other_machine):
+        kept.write_text("still written")
+    remove_unfinished(path, os.getpid() + 1)
+    assert begun.exists()
+    remove_unfinished(path, os.getpid())
+    assert set(tmp_path.iterdir()) == {other_file, other_machine}
 
 
 def test_unreadable_files_are_named(tmp_path):

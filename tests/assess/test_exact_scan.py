@@ -104,6 +104,23 @@ def test_scans_of_any_world_equal_every_single_run(
         sigma = noise_mm * rng.uniform(0.3, 2, points) if kind == "own_noise" else noise_mm
         world = drawn_world(error, sigma, key_of(seed), budget)
     check(world, *switches, alpha=alpha, measurements=budget)
+    plain = dict(zip(("distance", "covariance"), switches, strict=True))
+    single = paper.assessor("model_invalidation", alpha=alpha, measurements=budget, **plain)
+    for eta_mm in (0.0, 0.2, *rng.uniform(0.0, 1.2, 3)):
+        run, steps = single.run(world, eta_mm), single.history(world, eta_mm)
+        assert run.measurements == len(steps)
+        assert run.points_visited == len({step.row for step in steps})
+        assert run.rejection_probability == pytest.approx(
+            steps[-1].rejection_probability, abs=1e-12
+        )
+
+
+@pytest.mark.parametrize("squared", [True, False])
+def test_the_table_of_a_scan_is_as_near_as_its_guard_takes_it_to_be(squared):
+    sizes = np.concatenate([np.linspace(-0.1, 11.0, 5003), np.geomspace(1e-12, 200.0, 3001)])
+    about = [kernels._about(size, 1.0, 0.0, squared) for size in sizes]
+    exact = [kernels._miss(size, 1.0, 0.0, squared) for size in sizes]
+    assert np.max(np.abs(np.subtract(about, exact))) < kernels._ABOUT / 2
 
 
 def test_bisection_ends_within_a_micrometre_of_a_change_of_decision():

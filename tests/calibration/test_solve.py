@@ -20,6 +20,10 @@ class Linear:
     rows: int = 7
 
     @property
+    def count(self):
+        return len(self.b)
+
+    @property
     def size(self):
         return self.a.shape[1]
 
@@ -39,6 +43,10 @@ class Curve:
     t: np.ndarray
     y: np.ndarray
     size: int = 1
+
+    @property
+    def count(self):
+        return len(self.y)
 
     def cost(self, x):
         return float(np.sum((np.exp(x[0] * self.t) - self.y) ** 2))

@@ -7,12 +7,16 @@ import os
 import re
 import subprocess
 import sys
+import zlib
+from io import BytesIO
 from pathlib import Path
 
 import figure_tables as tables
 import matplotlib
 import pytest
 from figure_words import figures
+from fontTools.ttLib import TTFont
+from matplotlib.figure import Figure
 
 from kinacc.errors import InputError
 from kinacc.figures import fig1, fig4, save
@@ -39,6 +43,7 @@ def test_two_drawings_have_the_same_bytes(rendered):
 def test_another_process_gives_the_same_bytes(rendered):
     program = (
         "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
+        "import kinacc.workflow.runner\n"  # as a stage does
         "from figure_words import figures\n"
         "from kinacc.figures import save\n"
         "for name, figure in figures('mh180').items():\n"
@@ -85,6 +90,30 @@ def test_vector_files_hold_no_picture_but_the_maps(rendered):
         assert (b"<image" in files["svg"]) == (name == "fig3")
         assert len(files["svg"]) < 500_000
         assert len(files["pdf"]) < 250_000
+
+
+def test_a_format_is_drawn_once(monkeypatch):
+    drawn = []
+    draw = Figure.draw
+    monkeypatch.setattr(Figure, "draw", lambda self, renderer: drawn.append(draw(self, renderer)))
+    save.render(fig1.draw(), save.FORMATS)
+    assert len(drawn) == len(save.FORMATS)
+
+
+def test_a_pdf_carries_letters_and_not_the_rules_for_setting_text(rendered):
+    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", rendered["fig4"]["pdf"], re.DOTALL)
+    plain = [zlib.decompress(stream) for stream in streams if stream.startswith(b"x")]
+    fonts = [TTFont(BytesIO(font)) for font in plain if font.startswith(b"\0\1\0\0")]
+    assert fonts
+    assert all("glyf" in font and "GPOS" not in font for font in fonts)
+
+
+def test_a_person_who_draws_keeps_the_help_texts_of_matplotlib():
+    program = (
+        "import inspect; from kinacc.figures import fig4; from matplotlib.lines import Line2D\n"
+        "assert 'linewidth' in inspect.signature(Line2D.set).parameters"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 def test_unknown_formats_are_all_named():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -87,20 +90,30 @@ def test_sines_are_right_to_the_last_place_and_a_right_angle_stays_one():
 
 
 def test_a_short_job_does_not_wait_for_the_compiler():
-    import subprocess
-    import sys
-
     lines = (
         "import sys, numpy as np",
         "from kinacc.kinematics import dh, robot",
         "arm = robot.load('mh180').dh",
         "[dh.forward(arm, np.zeros((3000, 6))) for _ in range(10)]",
         "print('numba' in sys.modules)",
-        "[dh.forward(arm, np.zeros((400_000, 6)))]",
+        "[dh.forward(arm, np.zeros((800_000, 6)))]",
         "print('numba' in sys.modules)",
     )
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
     assert done.stdout.split() == ["False", "True"], done.stderr
+
+
+def test_compiled_code_starts_without_loading_linear_algebra_it_does_not_call():
+    program = (
+        "import sys, numpy; from kinacc.assess import random_numbers, world\n"
+        "world.drawn_world(numpy.ones((2, 3)), 0.1, random_numbers.key_of(1), 3).complete()\n"
+        "from numba.np import arraymath\n"
+        "print('scipy.linalg' in sys.modules, arraymath._HAVE_BLAS)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["False", "True"]
 
 
 def test_the_inverse_of_a_calibrated_arm_is_the_same_compiled_and_meets_its_poses(monkeypatch):
@@ -145,9 +158,6 @@ def test_quick_steps_say_what_they_do_not_reach_in_the_same_bits(monkeypatch):
 
 
 def test_where_nothing_can_be_kept_kernels_are_compiled_anew_and_one_line_says_so():
-    import subprocess
-    import sys
-
     lines = (
         "import numpy as np, numba.core.caching as caching",
         "caching.CacheImpl._locator_classes = []  # neither folder can be written",

@@ -1,21 +1,13 @@
-"""Run one stage of the catalogue for a job of the workflow."""
+"""Start one stage: what the command of every rule runs, by the Python it chooses.
 
-from kinacc.workflow.catalogue import STAGES
-from kinacc.workflow.runner import Job, execute
+python -P stage.py FOLDER --job TEXT --input FILE.. --output FILE.. --log FILE
+"""
 
-stage, part = snakemake.params.stage, snakemake.params.get("part")
-execute(
-    Job(
-        STAGES[stage].module,
-        uses=STAGES[stage].used(snakemake.params.settings, snakemake.input.keys()),
-        kind=STAGES[stage].fits,
-        inputs=dict(snakemake.input.items()),
-        outputs=dict(snakemake.output.items()),
-        settings=snakemake.params.settings,
-        seed=snakemake.params.seed,
-        part=part,
-        label=snakemake.params.label,
-        doing=snakemake.params.doing,
-        log=snakemake.log[0],
-    )
-)
+import sys
+
+# The package that planned the job stands in FOLDER; all else comes from where this Python has it.
+sys.path.insert(0, sys.argv[1])
+from kinacc.workflow.stage import main
+
+sys.path.pop(0)
+main(sys.argv[2:])

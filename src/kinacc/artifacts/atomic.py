@@ -7,10 +7,28 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+_ENDING = ".partial"
 
-def unfinished(path: Path | str, process: int) -> Path:
-    """Where a process writes a file before it is whole."""
-    return Path(path).with_name(f".{Path(path).name}.{process}.partial")
+
+def unfinished(path: Path | str) -> Path:
+    """Where to write a file before it is whole: a name of this machine and process, used once.
+
+    Two machines may write to one folder, and containers number their processes alike.
+    """
+    begun = _begun(Path(path), os.getpid())
+    return Path(path).with_name(f"{begun}{os.urandom(4).hex()}{_ENDING}")
+
+
+def remove_unfinished(path: Path | str, process: int) -> None:
+    """Remove what a process of this machine, since ended, had begun to write to a file."""
+    begun = _begun(Path(path), process)
+    for each in Path(path).parent.glob(f".*{_ENDING}"):
+        if each.name.startswith(begun):
+            each.unlink(missing_ok=True)
+
+
+def _begun(path: Path, process: int) -> str:
+    return f".{path.name}.{os.uname().nodename[:40]}.{process}."
 
 
 @contextmanager
@@ -20,7 +38,7 @@ def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[li
     ``on_disk``: the files have reached the disk when this returns, and not only the system.
     """
     targets = [Path(path) for path in paths]
-    temporary = [unfinished(path, os.getpid()) for path in targets]
+    temporary = [unfinished(path) for path in targets]
     for path in targets:
         path.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -13,8 +13,8 @@ falls as eta grows, and the point to measure again is the largest of functions t
 eta. So if both decisions agree at the two ends of an interval of bounds, every bound inside takes
 the same path. Where they do not, the interval is cut at the last grid bound that agrees with the
 end looked at first; the other piece waits and later resumes from the history it shares. Decisions
-closer than rounding could turn (``guard``, ``margin``) are left to single bounds, which are decided
-exactly as a run decides them.
+closer than rounding and the table of :func:`_about` could turn (``guard``, ``margin``) are left to
+single bounds, which are decided exactly as a run decides them.
 """
 
 from __future__ import annotations
@@ -26,11 +26,27 @@ import numpy as np
 from kinacc.compiled import compiled
 
 GRID_PER_MM = 1000.0
-# Columns of the state (m, 6) of a run after the sum of the readings (0 to 2, mm): how many readings
-# there are, the magnitude of their mean (mm), and the weight of the point (1/mm).
-READS, SIZE, WEIGHT = 3, 4, 5
+# Columns of the state (m, 3) of a run: how many readings there are of a point, the magnitude of
+# their mean (mm), and the weight of the point (1/mm).
+READS, SIZE, WEIGHT = 0, 1, 2
 _ROOT_2_OVER_PI = math.sqrt(2.0 / math.pi)
 _SERIES_BELOW = 0.02
+_NODES_PER_UNIT = 128
+_ABOUT = 1e-10  # at most this far off is _about
+
+
+def _nodes() -> np.ndarray:
+    """Chi distribution of three degrees of freedom at 0, 1 / 128, .. 10, and its slope there.
+
+    (n, 2): the value, and the slope times the distance of two nodes.
+    """
+    r = np.arange(10 * _NODES_PER_UNIT + 1) / _NODES_PER_UNIT
+    slope = _ROOT_2_OVER_PI * r * r * np.exp(-0.5 * r * r)
+    value = [math.erf(x * math.sqrt(0.5)) - _ROOT_2_OVER_PI * x * math.exp(-0.5 * x * x) for x in r]
+    return np.stack([value, slope / _NODES_PER_UNIT], axis=1)
+
+
+_TABLE = _nodes()
 _M0 = np.uint64(0xD2E7470EE14C6C93)
 _M1 = np.uint64(0xCA5A826395121157)
 _W0 = np.uint64(0x9E3779B97F4A7C15)
@@ -80,13 +96,21 @@ def normals(key0, key1, point, visit):
 
 @compiled
 def extend(world, i, wanted):
-    """Compute the readings of row i of a world (its ``arrays``) up to number ``wanted``, from 0."""
-    readings, known, sigma, error, key, index = world
+    """Compute the readings of row i of a world (its ``arrays``) up to number ``wanted``, from 0.
+
+    With each goes the magnitude of the mean of the readings up to it.
+    """
+    readings, known, sigma, error, key, index, sums, sizes = world
     for v in range(known[i], wanted + 1):
-        z0, z1, z2 = normals(key[0], key[1], index[i], v)
-        readings[i, v, 0] = error[i, 0] + sigma[i] * z0
-        readings[i, v, 1] = error[i, 1] + sigma[i] * z1
-        readings[i, v, 2] = error[i, 2] + sigma[i] * z2
+        z = normals(key[0], key[1], index[i], v)
+        square = 0.0
+        for axis in range(3):
+            reading = error[i, axis] + sigma[i] * z[axis]
+            readings[i, v, axis] = reading
+            sums[i, axis] += reading
+            mean = sums[i, axis] / (v + 1.0)
+            square += mean * mean
+        sizes[i, v] = math.sqrt(square)
     known[i] = max(known[i], wanted + 1)
 
 
@@ -123,54 +147,243 @@ def _miss(size, weight, eta, squared):
 
 
 @compiled
-def _add(readings, sigma, state, i, power):
-    """Average the next reading of row i in."""
+def _roots(power, budget):
+    """Weight of a point with noise 1 after each number of readings."""
+    roots = np.sqrt(np.arange(budget + 1.0))
+    return roots if power == 0.5 else np.sqrt(roots)
+
+
+@compiled
+def _add(sizes, sigma, roots, state, i):
+    """Take the next reading of row i, which is known."""
     v = int(state[i, READS])
     state[i, READS] = v + 1.0
-    n = state[i, READS]
-    square = 0.0
-    for axis in range(3):
-        state[i, axis] += readings[i, v, axis]
-        mean = state[i, axis] / n
-        square += mean * mean
-    state[i, SIZE] = math.sqrt(square)
-    state[i, WEIGHT] = (math.sqrt(n) if power == 0.5 else math.sqrt(math.sqrt(n))) / sigma[i]
+    state[i, SIZE] = sizes[i, v]
+    state[i, WEIGHT] = roots[v + 1] / sigma[i]
+
+
+@compiled
+def _about(size, weight, eta, squared):
+    """As :func:`_miss`, from a table of cubics and several times as fast."""
+    excess = size - eta
+    if excess <= 0.0:
+        return 1.0
+    place = excess * weight
+    place = (place if squared else math.sqrt(place)) * _NODES_PER_UNIT
+    if place >= _TABLE.shape[0] - 1:
+        return 0.0
+    node = int(place)
+    t = place - node
+    rise = _TABLE[node + 1, 0] - _TABLE[node, 0]
+    bend = _TABLE[node, 1] - rise
+    other = rise - _TABLE[node + 1, 1]
+    below = _TABLE[node, 0] + t * (rise + (1.0 - t) * (bend * (1.0 - t) + other * t))
+    return max(1.0 - below, 0.0)
+
+
+@compiled
+def _survival(eta, state, active, squared, miss):
+    """Product of about 1 - p-hat at a bound over the active rows, each kept in ``miss``."""
+    survival = 1.0
+    for i in active:
+        miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
+        survival *= miss[i]
+    return survival
+
+
+@compiled
+def _exact_survival(eta, state, active, squared):
+    """Product of 1 - p-hat at a bound over the active rows, in the order of their visits."""
+    survival = 1.0
+    for i in active:
+        survival *= _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
+    return survival
+
+
+@compiled
+def _side(survival, alpha, guard):
+    """+1 above the threshold, -1 below it, 0 where rounding or the table could decide."""
+    probability = 1.0 - survival
+    if probability > alpha + guard:
+        return 1
+    return -1 if probability < alpha - guard else 0
+
+
+@compiled
+def _side_at(eta, state, active, squared, alpha, guard):
+    """The side at a bound, from as many rows as it takes."""
+    survival = 1.0
+    for i in active:
+        survival *= _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
+        if 1.0 - survival > alpha + guard:
+            return 1
+    return _side(survival, alpha, guard)
+
+
+@compiled
+def _winner(eta, state, active):
+    """Row with the largest score at a bound, the first of equals; its score and the next one."""
+    row, best, second = -1, -np.inf, -np.inf
+    for i in active:
+        score = (state[i, SIZE] - eta) * state[i, WEIGHT]
+        if score > best:
+            row, best, second = i, score, best
+        elif score > second:
+            second = score
+    return row, best, second
+
+
+@compiled
+def _last_on_side(side, near, far, state, active, squared, alpha, guard):
+    """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
+    inside, outside = near, far
+    while abs(outside - inside) > 1:
+        middle = (inside + outside) // 2
+        if _side_at(middle / GRID_PER_MM, state, active, squared, alpha, guard) == side:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@compiled
+def _last_with_winner(row, near, far, state, active, margin):
+    """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
+    inside, outside = near, far
+    while abs(outside - inside) > 1:
+        middle = (inside + outside) // 2
+        other, best, rival = _winner(middle / GRID_PER_MM, state, active)
+        if other == row and best - rival > margin:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@compiled
+def _resume(sizes, sigma, roots, state, path, low, rows):
+    """Rebuild the state after the steps of a path; returns (points visited, active rows).
+
+    A row is active if it can still exceed a bound of the interval that starts at ``low``: one whose
+    mean lies within the lowest bound has p-hat 0 throughout and is never measured again.
+    """
+    state[:, READS] = 0.0
+    visited = 0
+    for i in path:
+        state[i, READS] += 1.0
+        visited = max(visited, i + 1)
+    count = 0
+    for i in range(visited):
+        v = int(state[i, READS])
+        state[i, SIZE], state[i, WEIGHT] = sizes[i, v - 1], roots[v] / sigma[i]
+        if state[i, SIZE] > low / GRID_PER_MM:
+            rows[count] = i
+            count += 1
+    return visited, count
+
+
+@compiled
+def _insist(
+    i, bounds, rivals, world, roots, state, at_near, at_far, active, path, steps, setting, guards
+):
+    """Measure row i once, and on while it is sure for every bound that it must be measured again.
+
+    Only row i changes meanwhile, so the other rows are multiplied once. Returns the steps taken and
+    the products of about 1 - p-hat at both ends.
+    """
+    known, sigma, sizes = world[1], world[2], world[7]
+    alpha, squared = setting
+    guard, margin = guards
+    near_eta, far_eta = bounds
+    near_others = far_others = 1.0
+    for row in active:
+        if row != i:
+            near_others *= at_near[row]
+            far_others *= at_far[row]
+    # Smallest scores seen to keep the probability above alpha: a larger one needs no p-hat.
+    near_sure = far_sure = np.inf
+    if _side(max(near_others, far_others), alpha, guard) == 1:
+        near_sure = far_sure = -np.inf
+    v = int(state[i, READS])
+    while True:
+        if v >= known[i]:
+            extend(world, i, v)
+        size = sizes[i, v]
+        v += 1
+        weight = roots[v] / sigma[i]
+        path[steps] = i
+        steps += 1
+        near_score, far_score = (size - near_eta) * weight, (size - far_eta) * weight
+        if steps == path.size or near_score <= rivals[0] + margin:
+            break
+        if far_score <= rivals[1] + margin:
+            break
+        if near_score < near_sure:
+            if _side(near_others * _about(size, weight, near_eta, squared), alpha, guard) != 1:
+                break
+            near_sure = near_score
+        if far_score < far_sure:
+            if _side(far_others * _about(size, weight, far_eta, squared), alpha, guard) != 1:
+                break
+            far_sure = far_score
+    state[i, READS], state[i, SIZE], state[i, WEIGHT] = v, size, weight
+    at_near[i] = _about(size, weight, near_eta, squared)
+    at_far[i] = _about(size, weight, far_eta, squared)
+    return steps, near_others * at_near[i], far_others * at_far[i]
+
+
+@compiled
+def _guards(largest_mm, points, sigma, power, budget):
+    """How near a probability is to the threshold, and scores are to each other, to be in doubt."""
+    margin = 1e-12 * largest_mm / sigma.min() * float(budget) ** power
+    return 1e-9 + points * _ABOUT + margin, margin
 
 
 @compiled
 def run(world, eta, alpha, squared, power, budget):
     """One sequential run: (rejected, measurements, points visited, rejection probability)."""
-    readings, known, sigma = world[0], world[1], world[2]
-    points = readings.shape[0]
-    state = np.zeros((points, 6))
-    miss = np.ones(points)
-    visited, taken, survival, rejected = 0, 0, 1.0, False
-    while taken < budget:
-        again = rejected
-        if again:
-            i, best = 0, -np.inf
-            for row in range(visited):
-                score = (state[row, SIZE] - eta) * state[row, WEIGHT]
-                if score > best:
-                    i, best = row, score
-        elif visited < points:
+    sigma, sizes = world[2], world[7]
+    points, roots = sigma.size, _roots(power, budget)
+    guard, margin = _guards(sizes[:, 0].max(), points, sigma, power, budget)
+    state, miss = np.zeros((points, 3)), np.ones(points)
+    rows, path = np.empty(points, np.int64), np.empty(budget, np.int64)
+    visited, count, steps, survival = 0, 0, 0, 1.0
+    while True:
+        active = rows[:count]
+        side = _side(survival, alpha, guard)
+        if side == 0:
+            survival = _exact_survival(eta, state, active, squared)
+        rejected = 1.0 - survival > alpha
+        if steps == budget or (not rejected and visited == points):
+            break
+        if rejected:
+            i, _, rival = _winner(eta, state, active)
+            steps, survival, _ = _insist(
+                i,
+                (eta, eta),
+                (rival, rival),
+                world,
+                roots,
+                state,
+                miss,
+                miss,
+                active,
+                path,
+                steps,
+                (alpha, squared),
+                (guard, margin),
+            )
+        else:
             i = visited
             visited += 1
-        else:
-            break
-        if state[i, READS] >= known[i]:
-            extend(world, i, int(state[i, READS]))
-        _add(readings, sigma, state, i, power)
-        miss[i] = _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
-        if again:
-            survival = 1.0
-            for row in range(visited):
-                survival *= miss[row]
-        else:
-            survival *= miss[i]
-        taken += 1
-        rejected = 1.0 - survival > alpha
-    return rejected, taken, visited, 1.0 - survival
+            _add(sizes, sigma, roots, state, i)
+            steps += 1
+            if state[i, SIZE] > eta:
+                rows[count] = i
+                count += 1
+                miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
+                survival *= miss[i]
+    return rejected, steps, visited, 1.0 - _exact_survival(eta, state, rows[:count], squared)
 
 
 @compiled
@@ -187,232 +400,90 @@ def bisect(world, top, tolerance, alpha, squared, power, budget):
 
 
 @compiled
-def _survival(k, state, active, squared, miss):
-    """Product of 1 - p-hat at bound k over the active rows, each kept in ``miss``."""
-    eta = k / GRID_PER_MM
-    survival = 1.0
-    for i in active:
-        miss[i] = _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
-        survival *= miss[i]
-    return survival
-
-
-@compiled
-def _side(survival, alpha, guard):
-    """+1 above the threshold, -1 below it, 0 where rounding could decide."""
-    probability = 1.0 - survival
-    if probability > alpha + guard:
-        return 1
-    return -1 if probability < alpha - guard else 0
-
-
-@compiled
-def _winner(k, state, active):
-    """Row with the largest score at bound k, the first of equals, and its lead over the next."""
-    eta = k / GRID_PER_MM
-    row, best, second = -1, -np.inf, -np.inf
-    for i in active:
-        score = (state[i, SIZE] - eta) * state[i, WEIGHT]
-        if score > best:
-            row, best, second = i, score, best
-        elif score > second:
-            second = score
-    return row, best - second
-
-
-@compiled
-def _others(row, k, state, miss, active):
-    """Largest score at bound k and product of 1 - p-hat over the active rows other than ``row``."""
-    eta = k / GRID_PER_MM
-    best, survival = -np.inf, 1.0
-    for i in active:
-        if i != row:
-            best = max(best, (state[i, SIZE] - eta) * state[i, WEIGHT])
-            survival *= miss[i]
-    return best, survival
-
-
-@compiled
-def _last_on_side(side, near, far, state, active, squared, alpha, guard, spare):
-    """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
-    inside, outside = near, far
-    while abs(outside - inside) > 1:
-        middle = (inside + outside) // 2
-        if _side(_survival(middle, state, active, squared, spare), alpha, guard) == side:
-            inside = middle
-        else:
-            outside = middle
-    return inside
-
-
-@compiled
-def _last_with_winner(row, near, far, state, active, margin):
-    """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
-    inside, outside = near, far
-    while abs(outside - inside) > 1:
-        middle = (inside + outside) // 2
-        other, lead = _winner(middle, state, active)
-        if other == row and lead > margin:
-            inside = middle
-        else:
-            outside = middle
-    return inside
-
-
-@compiled
-def _resume(world, state, path, power, low, rows):
-    """Rebuild the state after the steps of a path; returns (points visited, active rows).
-
-    A row is active if it can still exceed a bound of the interval that starts at ``low``: one whose
-    mean lies within the lowest bound has p-hat 0 throughout and is never measured again.
-    """
-    readings, sigma = world[0], world[2]
-    state[:] = 0.0
-    visited = 0
-    for i in path:
-        _add(readings, sigma, state, i, power)
-        visited = max(visited, i + 1)
-    count = 0
-    for i in range(visited):
-        if state[i, SIZE] > low / GRID_PER_MM:
-            rows[count] = i
-            count += 1
-    return visited, count
-
-
-@compiled
-def _insist(i, near, far, world, state, at_near, at_far, active, path, steps, setting, guards):
-    """Measure row i once, and on while it is sure for every bound that it must be measured again.
-
-    Only row i changes meanwhile, so the other rows are summed up once. Returns the steps taken.
-    """
-    readings, known, sigma = world[0], world[1], world[2]
-    alpha, squared, power = setting
-    guard, margin = guards
-    near_eta, far_eta = near / GRID_PER_MM, far / GRID_PER_MM
-    near_rival, near_others = _others(i, near, state, at_near, active)
-    far_rival, far_others = _others(i, far, state, at_far, active)
-    # Smallest scores seen to keep the probability above alpha: a larger one needs no p-hat.
-    near_sure = far_sure = np.inf
-    if _side(max(near_others, far_others), alpha, guard) == 1:
-        near_sure = far_sure = -np.inf
-    while True:
-        if state[i, READS] >= known[i]:
-            extend(world, i, int(state[i, READS]))
-        _add(readings, sigma, state, i, power)
-        size, weight = state[i, SIZE], state[i, WEIGHT]
-        path[steps] = i
-        steps += 1
-        near_score, far_score = (size - near_eta) * weight, (size - far_eta) * weight
-        if steps == path.size or near_score <= near_rival + margin:
-            break
-        if far_score <= far_rival + margin:
-            break
-        if near_score < near_sure:
-            if _side(near_others * _miss(size, weight, near_eta, squared), alpha, guard) != 1:
-                break
-            near_sure = near_score
-        if far_score < far_sure:
-            if _side(far_others * _miss(size, weight, far_eta, squared), alpha, guard) != 1:
-                break
-            far_sure = far_score
-    at_near[i] = _miss(size, weight, near_eta, squared)
-    at_far[i] = _miss(size, weight, far_eta, squared)
-    return steps
-
-
-@compiled
-def _product(miss, active):
-    survival = 1.0
-    for i in active:
-        survival *= miss[i]
-    return survival
-
-
-@compiled
 def scan(world, bottom, top, upward, alpha, squared, power, budget):
     """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
 
     upward: the lowest k not rejected (top + 1 if all are); otherwise the highest k rejected
     (bottom - 1 if none is). Returns (k, number of pieces whose path was followed to its end).
     """
-    readings, sigma = world[0], world[2]
-    points = readings.shape[0]
-    state = np.zeros((points, 6))
-    at_near, at_far, spare = np.ones(points), np.ones(points), np.ones(points)
+    sigma, sizes = world[2], world[7]
+    points, roots = sigma.size, _roots(power, budget)
+    state = np.zeros((points, 3))
+    at_near, at_far = np.ones(points), np.ones(points)
     rows = np.empty(points, np.int64)
     path = np.empty(budget, np.int64)
     waiting = np.empty((top - bottom + 2, 3), np.int64)  # near end, far end, steps shared
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = (bottom, top, 0) if upward else (top, bottom, 0)
     depth, pieces = 1, 0
     onward = 1 if upward else -1
-    margin = 1e-12 * top / GRID_PER_MM / sigma.min() * float(budget) ** power
-    guard = 1e-9 + margin
+    guard, margin = _guards(top / GRID_PER_MM, points, sigma, power, budget)
     while depth > 0:
         depth -= 1
         near, far, steps = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
-        visited, count = _resume(world, state, path[:steps], power, min(near, far), rows)
-        near_survival = _survival(near, state, rows[:count], squared, at_near)
-        far_survival = _survival(far, state, rows[:count], squared, at_far)
+        visited, count = _resume(sizes, sigma, roots, state, path[:steps], min(near, far), rows)
+        near_survival = _survival(near / GRID_PER_MM, state, rows[:count], squared, at_near)
+        far_survival = _survival(far / GRID_PER_MM, state, rows[:count], squared, at_far)
         while True:
             active = rows[:count]
             side = _side(near_survival, alpha, guard)
             if near != far and (side == 0 or _side(far_survival, alpha, guard) != side):
                 last = near
                 if side != 0:
-                    last = _last_on_side(
-                        side, near, far, state, active, squared, alpha, guard, spare
-                    )
+                    last = _last_on_side(side, near, far, state, active, squared, alpha, guard)
                 waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + onward, far, steps
                 depth += 1
                 far = last
-                far_survival = _survival(far, state, active, squared, at_far)
+                far_survival = _survival(far / GRID_PER_MM, state, active, squared, at_far)
+            if side == 0:
+                near_survival = _exact_survival(near / GRID_PER_MM, state, active, squared)
             rejected = 1.0 - near_survival > alpha
             if steps == budget or (not rejected and visited == points):
                 break
             if not rejected:
                 i = visited
                 visited += 1
-                _add(readings, sigma, state, i, power)
+                _add(sizes, sigma, roots, state, i)
                 path[steps] = i
                 steps += 1
                 size, weight = state[i, SIZE], state[i, WEIGHT]
                 if size > min(near, far) / GRID_PER_MM:
                     rows[count] = i
                     count += 1
-                    at_near[i] = _miss(size, weight, near / GRID_PER_MM, squared)
-                    at_far[i] = _miss(size, weight, far / GRID_PER_MM, squared)
+                    at_near[i] = _about(size, weight, near / GRID_PER_MM, squared)
+                    at_far[i] = _about(size, weight, far / GRID_PER_MM, squared)
                     near_survival *= at_near[i]
                     far_survival *= at_far[i]
             else:
-                i, lead = _winner(near, state, active)
+                i, best, rival = _winner(near / GRID_PER_MM, state, active)
+                far_rival = rival
                 if near != far:
-                    other, other_lead = _winner(far, state, active)
-                    if lead <= margin or other != i or other_lead <= margin:
+                    other, far_best, far_rival = _winner(far / GRID_PER_MM, state, active)
+                    sure = best - rival > margin
+                    if not sure or other != i or far_best - far_rival <= margin:
                         last = near
-                        if lead > margin:
+                        if sure:
                             last = _last_with_winner(i, near, far, state, active, margin)
                         waiting[depth, 0], waiting[depth, 1] = last + onward, far
                         waiting[depth, 2] = steps
                         depth += 1
                         far = last
-                        far_survival = _survival(far, state, active, squared, at_far)
-                steps = _insist(
+                        _survival(far / GRID_PER_MM, state, active, squared, at_far)
+                        far_rival = _winner(far / GRID_PER_MM, state, active)[2]
+                steps, near_survival, far_survival = _insist(
                     i,
-                    near,
-                    far,
+                    (near / GRID_PER_MM, far / GRID_PER_MM),
+                    (rival, far_rival),
                     world,
+                    roots,
                     state,
                     at_near,
                     at_far,
                     active,
                     path,
                     steps,
-                    (alpha, squared, power),
+                    (alpha, squared),
                     (guard, margin),
                 )
-                near_survival = _product(at_near, active)
-                far_survival = _product(at_far, active)
         pieces += 1
         if upward and not rejected:
             return min(near, far), pieces

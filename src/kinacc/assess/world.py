@@ -20,7 +20,9 @@ class World:
     readings_mm: (m, V, 3) error vectors, robot base frame, of which row i holds the first
     ``known[i]``; sigma_mm: (m,) noise per axis, equal in the three axes. A drawn world computes
     readings as they are asked for, from the errors (m, 3), the key and the points' own numbers
-    ``index``: what a reading is never depends on when it is asked for.
+    ``index``: what a reading is never depends on when it is asked for. Beside them: sums_mm (m, 3)
+    of the readings known, and sizes_mm (m, V), the magnitude of the mean of a point's readings up
+    to each.
     """
 
     readings_mm: np.ndarray
@@ -29,6 +31,8 @@ class World:
     error_mm: np.ndarray
     key: np.ndarray
     index: np.ndarray
+    sums_mm: np.ndarray
+    sizes_mm: np.ndarray
 
     @property
     def points(self) -> int:
@@ -50,6 +54,8 @@ class World:
             self.error_mm,
             self.key,
             self.index,
+            self.sums_mm,
+            self.sizes_mm,
         )
 
     def reading_mm(self, row: int, visit: int) -> np.ndarray:
@@ -66,7 +72,7 @@ class World:
 
     @cached_property
     def _first_magnitudes_mm(self) -> np.ndarray:
-        return np.sqrt(np.sum(self.readings_mm[:, 0] ** 2, axis=1))
+        return self.sizes_mm[:, 0].copy()
 
     def complete(self) -> World:
         """The same world with every reading computed."""
@@ -102,7 +108,10 @@ def measured_world(first_mm: ArrayLike, repeats_mm: ArrayLike, sigma_mm: ArrayLi
         raise InputError(problems + noise_problems, "a world cannot be made of these readings")
     readings = np.concatenate([first[:, None, :], repeats], axis=1)
     known = np.full(points, readings.shape[1], np.int64)
-    return World(readings, known, sigma, first, _NO_KEY, np.arange(points))
+    sums = np.cumsum(readings, axis=1)
+    means = sums / np.arange(1.0, readings.shape[1] + 1)[:, None]
+    sizes = np.sqrt(np.sum(means**2, axis=2))
+    return World(readings, known, sigma, first, _NO_KEY, np.arange(points), sums[:, -1], sizes)
 
 
 def drawn_world(
@@ -136,18 +145,20 @@ def drawn_world(
     return draw(error[index], sigma[index], key, visits, index)
 
 
-def draw(error_mm, sigma_mm, key, visits: int, index, readings=None) -> World:
+def draw(error_mm, sigma_mm, key, visits: int, index, lost: World | None = None) -> World:
     """As :func:`drawn_world`, rows already in visiting order and known to be good.
 
-    ``readings`` (m, visits, 3) is memory to draw into; a world drawn there earlier is lost.
+    ``lost`` is a world of the same shape that nobody needs any more, whose memory is drawn into.
     """
     from kinacc.assess.random_numbers import extend_all
 
     points = index.size
-    if readings is None:
-        readings = np.empty((points, visits, 3))  # repeats stay untouched until asked for
-    known = np.zeros(points, np.int64)
-    world = World(readings, known, sigma_mm, error_mm, key, index)
+    if lost is None:  # repeats stay untouched until asked for
+        readings, sizes = np.empty((points, visits, 3)), np.empty((points, visits))
+    else:
+        readings, sizes = lost.readings_mm, lost.sizes_mm
+    known, sums = np.zeros(points, np.int64), np.zeros((points, 3))
+    world = World(readings, known, sigma_mm, error_mm, key, index, sums, sizes)
     extend_all(world.arrays, 0)
     return world
 

@@ -34,6 +34,10 @@ class Group:
         """Number of parameters."""
         return self.motions * (1 if self.basis is None else self.basis.shape[1])
 
+    def rows(self, some: slice) -> Group:
+        """The group for the observations ``some``."""
+        return self if self.basis is None else Group(self.columns, self.basis[some])
+
 
 def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     """Jacobian (n, m, P) in the parameters, from the motions ``columns`` (n, m, E)."""
@@ -56,16 +60,16 @@ def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
 
 def applied(columns: np.ndarray, groups: Sequence[Group], vectors: np.ndarray) -> np.ndarray:
     """The spread Jacobian of ``columns`` (n, m, E) times ``vectors`` (P, c): (n, m, c)."""
-    result, begin = np.zeros((*columns.shape[:2], vectors.shape[1])), 0
+    moved, begin = np.empty((len(columns), columns.shape[2], vectors.shape[1])), 0
     for group in groups:
-        part, own = columns[:, :, group.columns], vectors[begin : begin + group.size]
+        own = vectors[begin : begin + group.size]
         begin += group.size
-        if group.basis is None:
-            result += part @ own
-            continue
-        for motion, each in enumerate(own.reshape(group.motions, -1, vectors.shape[1])):
-            result += part[:, :, motion, None] * (group.basis @ each)[:, None, :]
-    return result
+        if group.basis is not None:
+            by_function = own.reshape(group.motions, -1, own.shape[1]).swapaxes(0, 1)
+            own = group.basis @ by_function.reshape(group.basis.shape[1], -1)
+            own = own.reshape(len(columns), group.motions, -1)
+        moved[:, group.columns] = own
+    return columns @ moved
 
 
 def gram(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
@@ -92,3 +96,29 @@ def _block(products: np.ndarray, first: np.ndarray | None, second: np.ndarray | 
     block = products.reshape(count, -1).T @ both
     block = block.reshape(rows, columns, first.shape[1], second.shape[1]).transpose(0, 2, 1, 3)
     return block.reshape(rows * first.shape[1], columns * second.shape[1])
+
+
+def spread_rows(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
+    """As ``spread``, observations last: (P, m, n) from the motions ``columns`` (E, m, n)."""
+    if all(group.basis is None for group in groups):
+        return columns
+    full = np.empty((sum(group.size for group in groups), *columns.shape[1:]))
+    begin = 0
+    for group in groups:
+        part, into = columns[group.columns], full[begin : begin + group.size]
+        begin += group.size
+        if group.basis is None:
+            into[:] = part
+        else:
+            shaped = into.reshape(group.motions, -1, *columns.shape[1:])
+            np.multiply(part[:, None], np.ascontiguousarray(group.basis.T)[:, None], out=shaped)
+    return full
+
+
+def summed(values: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
+    """Sums (P,) over observations of ``values`` (E, n) of motions, spread as these are."""
+    parts = [
+        part.sum(axis=1) if group.basis is None else (part @ group.basis).ravel()
+        for group, part in ((each, values[each.columns]) for each in groups)
+    ]
+    return np.concatenate(parts)

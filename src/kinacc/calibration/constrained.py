@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates, left_jacobian, stacked
 from kinacc.calibration.observations import Observations
@@ -150,17 +150,34 @@ class ConstrainedSystem:
         for residual, jacobian in self.system.blocks(self._inner(y)):
             yield residual, np.concatenate([jacobian[:, :split] @ change, jacobian[:, split:]], 1)
 
+    def stacked(self, y: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+        """Rows of ``[J | r]`` (m, P+1), as ``PoseSystem.stacked``."""
+        split, change = self.frames.inner.size, self.frames.change(y[: self.frames.size])
+        for kind, rows in self.system.stacked(self._inner(y)):
+            yield kind, np.concatenate([rows[:, :split] @ change, rows[:, split:]], axis=1)
+
     @property
     def count(self) -> int:
         """Number of residuals."""
         return self.system.count
 
+    def weighted(self, root: np.ndarray) -> ConstrainedSystem:
+        """The same residuals times ``root`` (n,) by observation."""
+        return replace(self, system=self.system.weighted(root))
+
     def gram(self, y: np.ndarray) -> np.ndarray:
         """Gram matrix (P+1, P+1) of ``[J | r]``."""
-        change = block_diag(
+        change = self._change(y)
+        return change.T @ self.system.gram(self._inner(y)) @ change
+
+    def gradient(self, y: np.ndarray) -> np.ndarray:
+        """The last row (P+1,) of ``gram`` alone."""
+        return self.system.gradient(self._inner(y)) @ self._change(y)
+
+    def _change(self, y: np.ndarray) -> np.ndarray:
+        return scipy.linalg.block_diag(
             self.frames.change(y[: self.frames.size]), np.eye(self.system.model.size + 1)
         )
-        return change.T @ self.system.gram(self._inner(y)) @ change
 
     def _inner(self, y: np.ndarray) -> np.ndarray:
         split = self.frames.size

@@ -20,6 +20,7 @@ from kinacc.calibration.held import (
     pose_system,
 )
 from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.system import FlangeModel, require_enough
@@ -27,6 +28,7 @@ from kinacc.calibration.truncated_svd import unseen
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import JointState
 
 DH_FIX = "measure more poses"
 UNSEEN_POSES = 60
@@ -130,6 +132,7 @@ class Unknowns:
     scale: np.ndarray
 
 
+@one_thread
 def solved(
     observations: Observations,
     unknowns: Unknowns,
@@ -208,6 +211,7 @@ def _placed(
     )
 
 
+@one_thread
 def unseen_anywhere(fit: DHFit, observations: Observations, threshold: float) -> np.ndarray:
     """Directions (m, P) of a fit's coordinates that no pose shows, whatever the joints.
 
@@ -264,10 +268,15 @@ def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
         vector[mask] = x
         return dh.with_vector(nominal, vector)
 
+    def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
+        pose, jacobian = dh.pose_and_parameter_jacobian(model(x), at.q_rad)
+        return pose, jacobian.reshape(len(at), 6, -1).transpose(2, 1, 0)[chosen]
+
+    chosen = np.flatnonzero(mask)
     return FlangeModel(
         int(mask.sum()),
         lambda x, at: model(x).pose(at),
-        lambda x, at: model(x).parameter_jacobian(at)[:, :, mask],
+        linearised,
     )
 
 

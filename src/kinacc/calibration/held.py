@@ -84,9 +84,7 @@ def placed(
     where they are stated, and the others follow; where no target takes part, the base stays.
     """
     coords = _coordinates(observations, start, terms)
-    nothing = FlangeModel(
-        0, lambda x, at: described(at), lambda x, at: np.zeros((len(at.q_rad), 6, 0))
-    )
+    nothing = FlangeModel(0, lambda x, at: described(at))
     system = pose_system(observations, nothing, coords, rotation_weight_mm_per_rad)
     found = Placed(coords, np.zeros(coords.size, dtype=bool), np.zeros((0, coords.size)))
     factor, _ = solve.triangle(system, np.zeros(coords.size), found.scale)
@@ -197,10 +195,24 @@ class Kept:
         for residual, jacobian in self.system.blocks(self.whole(x)):
             yield residual, jacobian[:, self.keep]
 
+    def stacked(self, x: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+        """Rows of ``[J | r]`` (m, P+1), as ``PoseSystem.stacked``."""
+        keep = np.append(self.keep, True)
+        for kind, rows in self.system.stacked(self.whole(x)):
+            yield kind, rows[:, keep]
+
+    def weighted(self, root: np.ndarray) -> Kept:
+        """The same residuals times ``root`` (n,) by observation."""
+        return replace(self, system=self.system.weighted(root))
+
     def gram(self, x: np.ndarray) -> np.ndarray:
         """Gram matrix of ``[J | r]``."""
         keep = np.append(self.keep, True)
         return self.system.gram(self.whole(x))[np.ix_(keep, keep)]
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """The last row of ``gram`` alone."""
+        return self.system.gradient(self.whole(x))[np.append(self.keep, True)]
 
     def whole(self, x: np.ndarray) -> np.ndarray:
         """All parameters (P,)."""

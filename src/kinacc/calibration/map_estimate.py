@@ -5,16 +5,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+import scipy
 
 from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, System
 from kinacc.errors import FitError
 
 MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slowly
+PATIENCE = 40  # steps after which standing still counts as arrived
 MAX_VARIANCE_STEPS = 20
-VARIANCE_TOLERANCE = 1e-5
+VARIANCE_TOLERANCE = 1e-7  # a prior that is weighed otherwise pulls weak directions elsewhere
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
+CLOSE = 1e-3  # mm and mrad from the end: a Gram matrix from there has the same inverse
+MEMORY = 20  # steps that the inverse has learned from
 NO_CHANGE = 1e-4  # of chi-square: a hundredth of a standard deviation along one direction
 LEAST_VARIANCE = 1e-8  # mm^2: the prior must stay above rounding where data are free of noise
 
@@ -32,36 +35,32 @@ def minimise_with_prior(
     The variance of the residuals is estimated along with ``x``: what they leave over the number of
     residuals less the effective number of parameters (the trace of the hat matrix), so the balance
     against the prior follows the data. ``std`` is the posterior one.
-    Converged where the step falls below ``solve.STEP_TOLERANCE``, or where after ``solve.PATIENCE``
-    steps the objective moves by less than NO_CHANGE (or ``solve.STANDSTILL`` of itself): steps
-    along directions that poses hardly show die out slowly, and change nothing but these.
+    The Gram matrix of the Jacobian is formed where the fit starts, after the first step and close
+    to the end. In between, its inverse learns from exact gradients (L-BFGS; Nocedal and Wright,
+    Numerical Optimization, 7.2): these cost less, and find their way through directions that poses
+    hardly show, in which Gauss-Newton steps die out slowly.
+    Converged where the step that the last gradient asks for, ``last_step``, is not above
+    ``solve.STEP_TOLERANCE``, or where a step moves the objective by less than NO_CHANGE (or
+    ``solve.STANDSTILL`` of itself) after ``PATIENCE`` of them; then ``converged`` is False.
     Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
     weight_sq = (scale / prior_std) ** 2
-    last, iterations, balance = np.inf, 0, None
-    while last > solve.STEP_TOLERANCE and iterations < MAX_ITERATIONS:
-        iterations += 1
+    prior = _Prior(prior_mean, weight_sq, scale)
+    iterations, balance = 0, None
+    while iterations < MAX_ITERATIONS:
         normal = _normal_equations(system, x, scale)
-        balance = _balanced(normal, weight_sq, (x - prior_mean) / scale, balance, name)
-
-        def held(at: np.ndarray, variance: float = balance.variance) -> float:
-            return variance * float(np.sum(((at - prior_mean) / prior_std) ** 2))
-
-        before = normal.cost + held(x)
-        x, after, last = solve.advance(
-            lambda at, held=held: system.cost(at) + held(at),
-            x,
-            scale * balance.step,
-            before,
-            scale,
-            name,
-        )
-        if iterations >= solve.PATIENCE and abs(before - after) <= _least(balance, before):
+        balance = _balanced(normal, weight_sq, prior.displacement(x), balance, name)
+        here = _Point(x, normal.gradient, normal.cost)
+        end = _descended(system, here, normal.count, balance, prior, iterations, name)
+        iterations += end.steps
+        moved = np.max(np.abs(end.at.x - x) / scale, initial=0.0)
+        x, last = end.at.x, end.wanted
+        if end.stands or (moved <= CLOSE and last <= solve.STEP_TOLERANCE):
             break
     else:
-        solve.require_converged(name, iterations, last, system.cost(x), normal.count)
-    cost = system.cost(x)
+        solve.require_converged(name, iterations, last, end.at.cost, normal.count)
+    cost, freedom = end.at.cost, normal.count - balance.effective
     covariance = balance.variance * balance.inverse * np.outer(scale, scale)
     return Solution(
         x=x,
@@ -69,17 +68,108 @@ def minimise_with_prior(
         covariance=covariance,
         cost=cost,
         count=normal.count,
-        degrees_of_freedom=normal.count - balance.effective,
-        variance=balance.variance,
+        degrees_of_freedom=freedom,
+        variance=max(cost / max(freedom, 1.0), LEAST_VARIANCE),
         iterations=iterations,
         last_step=last,
-        converged=True,
+        converged=last <= solve.STEP_TOLERANCE,
     )
 
 
-def _least(balance: _Balance, objective: float) -> float:
-    """Change of the objective that is none: nothing to chi-square, or to its own digits."""
-    return max(NO_CHANGE * balance.variance, solve.STANDSTILL * objective)
+class _Prior(NamedTuple):
+    """Means, squared weights of displacements in units of ``scale``, and these units."""
+
+    mean: np.ndarray
+    weight_sq: np.ndarray
+    scale: np.ndarray
+
+    def displacement(self, x: np.ndarray) -> np.ndarray:
+        return (x - self.mean) / self.scale
+
+    def cost(self, x: np.ndarray) -> float:
+        return float(self.weight_sq @ self.displacement(x) ** 2)
+
+
+class _End(NamedTuple):
+    """Where steps have led, how many, the size of the one still wanted, and whether they stood."""
+
+    at: _Point
+    steps: int
+    wanted: float
+    stands: bool
+
+
+class _Point(NamedTuple):
+    """A point with J'r in scaled parameters and r'r."""
+
+    x: np.ndarray
+    gradient: np.ndarray
+    cost: float
+
+
+def _descended(
+    system: System,
+    here: _Point,
+    count: int,
+    balance: _Balance,
+    prior: _Prior,
+    begun: int,
+    name: str,
+) -> _End:
+    """Down the objective after ``begun`` steps; the next one is that of ``balance``.
+
+    The first of all is taken alone: the Gram matrix may be another where it leads.
+    """
+    scale, step, variance = prior.scale, balance.step, balance.variance
+    wanted = first = float(np.max(np.abs(step), initial=0.0))
+    moves: list[tuple[np.ndarray, np.ndarray]] = []  # steps, and how the data's gradient changed
+    for taken in range(1, MAX_ITERATIONS + 1 if begun else 2):
+        latest = here
+
+        def objective(at: np.ndarray, variance: float = variance) -> float:
+            nonlocal latest
+            found = solve.gradient(system, at)
+            latest = _Point(at, found[:-1] * scale, float(found[-1]))
+            return latest.cost + variance * prior.cost(at)
+
+        before = here.cost + variance * prior.cost(here.x)
+        x, after, _ = solve.advance(objective, here.x, scale * step, before, scale, name)
+        if x is here.x:
+            return _End(here, taken, wanted, True)
+        moves.append(((x - here.x) / scale, latest.gradient - here.gradient))
+        if after > before:
+            moves.clear()  # rounding has been learned from
+        here = latest
+        variance = max(here.cost / max(count - balance.effective, 1.0), LEAST_VARIANCE)
+        step = _learned_step(here, balance.inverse, variance, prior, moves[-MEMORY:])
+        wanted = float(np.max(np.abs(step), initial=0.0))
+        least = max(NO_CHANGE * variance, solve.STANDSTILL * before)
+        stands = begun + taken >= PATIENCE and abs(before - after) <= least
+        # A step longer than the first speaks of another Gram matrix than the one frozen.
+        if wanted <= solve.STEP_TOLERANCE or stands or wanted >= first:
+            break
+    return _End(here, taken, wanted, stands)
+
+
+def _learned_step(
+    here: _Point,
+    inverse: np.ndarray,
+    variance: float,
+    prior: _Prior,
+    moves: list[tuple[np.ndarray, np.ndarray]],
+) -> np.ndarray:
+    """The L-BFGS step, which begins with ``inverse`` (P, P) of the Hessian."""
+    rest = here.gradient + variance * prior.weight_sq * prior.displacement(here.x)
+    pairs = [(step, change + variance * prior.weight_sq * step) for step, change in moves]
+    pairs = [(step, change, step @ change) for step, change in pairs if step @ change > 0.0]
+    shares = []
+    for step, change, product in reversed(pairs):
+        shares.append(step @ rest / product)
+        rest = rest - shares[-1] * change
+    found = inverse @ rest
+    for (step, change, product), share in zip(pairs, reversed(shares), strict=True):
+        found = found + (share - change @ found / product) * step
+    return -found
 
 
 class _Normal(NamedTuple):
@@ -113,16 +203,15 @@ def _balanced(
     # From below: started at the variance of the whole misfit, a tight prior could pass for truth
     # and everything it forbids for noise.
     least = FIRST_VARIANCE * normal.cost / normal.count
-    variance = least if before is None else before.variance
+    variance = max(least, LEAST_VARIANCE) if before is None else before.variance
     for _ in range(MAX_VARIANCE_STEPS):
-        variance = max(variance, LEAST_VARIANCE)
         gram = normal.gram.copy()
         gram[np.diag_indices_from(gram)] += variance * weight_sq
         inverse = _inverse(gram, name)
         step = -inverse @ (normal.gradient + variance * weight_sq * displacement)
         cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
         effective = len(step) - variance * float(weight_sq @ np.diag(inverse))
-        found = max(cost, 0.0) / max(normal.count - effective, 1.0)
+        found = max(cost / max(normal.count - effective, 1.0), LEAST_VARIANCE)
         if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
             break
         variance = found
@@ -130,16 +219,19 @@ def _balanced(
 
 
 def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
-    full, count = solve.gram(system, x)
+    full, count = solve.gram(system, x), system.count
     gram, gradient = full[:-1, :-1] * np.outer(scale, scale), full[:-1, -1] * scale
     return _Normal(gram, gradient, float(full[-1, -1]), count)
 
 
 def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
     try:
-        return cho_solve(cho_factor(gram, check_finite=False), np.eye(len(gram)))
+        factor = np.linalg.cholesky(gram)
     except np.linalg.LinAlgError:
         raise FitError(
             f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
             "give every undetermined direction a prior"
         ) from None
+    half, _ = scipy.linalg.lapack.dpotri(factor.T)
+    half = np.triu(half)
+    return half + np.triu(half, 1).T

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration import robust
+from kinacc.calibration import robust, truncated_svd
 from kinacc.calibration.held import Kept
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution, System
-from kinacc.calibration.truncated_svd import minimise_truncated
+from kinacc.calibration.truncated_svd import Arrived
 from kinacc.errors import FitError
 
 MAX_PASSES = 100
@@ -52,23 +51,21 @@ class Task:
             frames=int(keep[: self.frames].sum()),
         )
 
-    def solved(
+    def arrived(
         self, start: np.ndarray, variance: float, weights: Weights | None = None
-    ) -> Solution:
+    ) -> Arrived:
         """One pass from ``start`` with residuals of ``variance``."""
         known = np.isfinite(self.prior_std)
-        system = self.system if weights is None else _Weighted(self.system, weights.root)
-        return minimise_truncated(
-            system,
-            start=start,
-            nominal=self.nominal,
-            scale=self.scale,
-            threshold=self.threshold,
-            frames=self.frames,
-            name=self.name,
-            prior=np.sqrt(variance) / self.prior_std if known.any() else None,
-            is_rotation=self.is_rotation,
-            shared=self.shared,
+        return truncated_svd.arrived(
+            self.system if weights is None else self.system.weighted(np.sqrt(weights.row)),
+            start,
+            self.nominal,
+            self.scale,
+            self.threshold,
+            self.frames,
+            self.name,
+            np.sqrt(variance) / self.prior_std if known.any() else None,
+            self.is_rotation,
         )
 
 
@@ -81,22 +78,22 @@ def minimise(task: Task, observations: Observations, loss: str) -> tuple[Solutio
     ``variance`` is then that of its scale.
     Raises FitError where the passes do not settle.
     """
-    solution, weights = task.solved(task.start, 0.0), None
+    found, weights = task.arrived(task.start, 0.0), None
     if loss == robust.SQUARES and np.isinf(task.prior_std).all():
-        return solution, None
+        return found.solution(task.shared), None
     for number in range(MAX_PASSES):
-        before = solution.x
+        before = found.x
         if loss != robust.SQUARES:
             scale = weights.scale_mm if weights and number >= SCALE_PASSES else None
             residual = task.system.residual(before)
             weights = robust.weights(loss, residual, observations, scale)
-        variance = solution.variance if weights is None else weights.scale_mm**2
+        variance = found.variance if weights is None else weights.scale_mm**2
         if not np.isfinite(variance):
             raise FitError(f"{task.name}: no residuals are left over to weigh a prior by")
-        solution = task.solved(before, variance, weights)
-        if np.all(np.abs(solution.x - before) <= SETTLED * task.scale):
-            return _scaled(solution, weights), weights
-    moved = np.max(np.abs(solution.x - before) / task.scale)
+        found = task.arrived(before, variance, weights)
+        if np.all(np.abs(found.x - before) <= SETTLED * task.scale):
+            return _scaled(found.solution(task.shared), weights), weights
+    moved = np.max(np.abs(found.x - before) / task.scale)
     raise FitError(
         f"{task.name}: loss {loss} and priors have not settled after {MAX_PASSES} passes; the last "
         f"one moved a parameter by {moved:.3g} mm or mrad (wanted {SETTLED:g})"
@@ -114,25 +111,3 @@ def _scaled(solution: Solution, weights: Weights | None) -> Solution:
         covariance=factor * solution.covariance,
         std=np.sqrt(factor) * solution.std,
     )
-
-
-@dataclass(frozen=True)
-class _Weighted:
-    """A system whose residuals (m,) are multiplied by ``root``."""
-
-    system: System
-    root: np.ndarray
-
-    @property
-    def size(self) -> int:
-        return self.system.size
-
-    def cost(self, x: np.ndarray) -> float:
-        return float(np.sum((self.root * self.system.residual(x)) ** 2))
-
-    def blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        begin = 0
-        for residual, jacobian in self.system.blocks(x):
-            root = self.root[begin : begin + len(residual)]
-            begin += len(residual)
-            yield root * residual, root[:, None] * jacobian

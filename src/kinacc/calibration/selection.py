@@ -13,38 +13,27 @@ the nearest of them. So a candidate that goes astray where others do not gets no
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import block_diag
 
-from kinacc.calibration import vec_fit
-from kinacc.calibration.basis_expansion import Group, applied, gram
+from kinacc.calibration.block_sums import BlockSums, weights
 from kinacc.calibration.held import Placed
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.vec import VECModel
-from kinacc.measurements.folds import configurations
+from kinacc.measurements.folds import configurations_among, neighbours
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)
 ALWAYS_TRIED = 12  # above it orders are tried as long as that pays
 PRIOR_STD = (0.01, 0.03, 0.1, 0.3, 1.0)  # mm and mrad
 PRIOR_DECAY = (0.7, 0.85, 1.0)
 LEAST_PRIOR = 0.01  # share of a prior left at an order below which it adds nothing to lower ones
-FAR = 4.0  # medians of the error; a reading farther off than that counts less
 MOST_EXCESS = 0.25  # of the least squared error: one of few configurations allows any by its own
 CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
 MOST_BLOCKS = 5
 _FIX = "measure more configurations, or state calibration.vec.order and prior"
-_SCREENINGS = 3  # of the rows trained on; the weights hardly change any more
-_VARIANCE_STEPS = 40
-_VARIANCE_TOLERANCE = 1e-4
-_LEAST_SHARE = 1e-6  # of the mean squared misfit, where the residual variance starts
-_CONSTANT = Prior(1.0, 1e-3, 1.0, 1e-3)  # of what is screened with, which leans on no prior
-_GAUGE_RIDGE = 1e-9  # holds constants no pose shows, as a share of those it does
 
 
 @dataclass(frozen=True)
@@ -71,20 +60,21 @@ def highest_order(components: int, joints: int, frames: int) -> int:
     return (components - frames) // (6 * joints) - 1
 
 
-def distinct(held_out: Observations) -> Observations:
-    """One reading of every configuration and target.
-
-    Another one of the same tells nothing new of the arm.
-    """
-    same = np.stack([configurations(held_out.pose, held_out.q_rad), held_out.target], axis=1)
-    return held_out.select(np.unique(same, axis=0, return_index=True)[1])
-
-
 def carried(held_out: Observations) -> int:
-    """Residual components that every fit of a chosen order has, those without a fold as well."""
-    folds = np.unique(held_out.fold)
-    without = [distinct(held_out.select(held_out.fold != fold)).components for fold in folds]
-    return min(each for each in (distinct(held_out).components, *without) if each > 0)
+    """Residual components that every fit of a chosen order has, those without a fold as well.
+
+    Of one reading of every configuration and target: another one of the same tells nothing new.
+    """
+    near, folds = neighbours(held_out.q_rad), np.unique(held_out.fold)
+    seen = [np.arange(len(held_out))]
+    seen += [np.flatnonzero(held_out.fold != fold) for fold in folds]
+    found = []
+    for rows in seen:
+        same = configurations_among(rows, held_out.pose, near)
+        both = np.stack([same, held_out.target[rows]], axis=1)
+        distinct = rows[np.unique(both, axis=0, return_index=True)[1]]
+        found.append(held_out.select(distinct).components)
+    return min(each for each in found if each > 0)
 
 
 @dataclass(frozen=True)
@@ -163,10 +153,11 @@ def choices(
     if len(numbers) < 2:
         what = f"{len(numbers)} folds hold rows: no order or prior can be tried on held-out ones"
         raise InputError(Problem("measurements", what, "rows in two folds or more", _FIX))
-    sums = _Sums.of(observations, block, empty, frames, rotation_weight_mm_per_rad)
+    sums = BlockSums.of(observations, block, empty, frames, rotation_weight_mm_per_rad)
     # Of two blocks nothing would be left to try candidates on.
     held_out = [*numbers, None] if len(numbers) > 2 else [None]
-    searches = {out: _Search.of(observations, block, out) for out in held_out}
+    near = neighbours(observations.q_rad)
+    searches = {out: _Search.of(observations, block, out, near) for out in held_out}
     pairs = {frozenset({out, test}) for out in held_out for test in numbers if test != out}
     far = {pair: sums.far(pair) for pair in pairs}
     for order in (
@@ -182,7 +173,7 @@ def choices(
                     pair = frozenset({out, test})
                     if pair not in trained:
                         trained[pair] = sums.trained(order, priors, far[pair])
-                    errors[block == test] = sums.errors(trained[pair], test)
+                    errors[block == test] = sums.errors(trained[pair], order, test)
             search.add(order, priors, errors)
     return [search.choice() for search in searches.values()]
 
@@ -200,10 +191,12 @@ class _Search:
     tried: list[tuple[int, tuple[Prior, ...], np.ndarray]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, observations: Observations, block: np.ndarray, out: int | None) -> _Search:
+    def of(
+        cls, observations: Observations, block: np.ndarray, out: int | None, near: np.ndarray
+    ) -> _Search:
         folds = np.unique(observations.fold[block == out]) if out is not None else ()
         rows = np.flatnonzero((block >= 0) & (block != (-1 if out is None else out)))
-        same = configurations(observations.pose[rows], observations.q_rad[rows])
+        same = configurations_among(rows, observations.pose, near)
         return cls(tuple(int(each) for each in folds), rows, same)
 
     def add(self, order: int, priors: tuple[Prior, ...], squared_mm2: np.ndarray) -> None:
@@ -219,7 +212,7 @@ class _Search:
     def choice(self) -> Choice:
         """One-standard-error rule, paired by configuration."""
         nearest = [errors.min(axis=1) for *_, errors in self.tried]
-        weight = _weights(np.min(nearest, axis=0))
+        weight = weights(np.min(nearest, axis=0))
         trials = []
         for order, priors, errors in self.tried:
             weighted = weight[:, None] * errors
@@ -231,149 +224,3 @@ class _Search:
             if excess <= min(error, MOST_EXCESS * best.rms_mm**2):
                 break
         return Choice(self.held_out, tuple(trials), trial)
-
-
-def _weights(squared_mm2: np.ndarray) -> np.ndarray:
-    """Weights (n,) that bound squared errors (n,)."""
-    far = max(FAR**2 * float(np.median(squared_mm2)), np.finfo(float).tiny)
-    return far / np.maximum(squared_mm2, far)
-
-
-@dataclass(frozen=True)
-class _Sums:
-    """By block: the Gram matrix of ``[J | r]``, the count of residuals, and ``[J | r]`` as motions
-    (rows, 6, E) and their groups, part by part."""
-
-    normal: dict[int, np.ndarray]
-    components: dict[int, int]
-    motions: dict[int, list[tuple[np.ndarray, list[Group]]]]
-    kept: np.ndarray  # (E, f) derivative of the frames' motions by what is not held of them
-    order: np.ndarray  # (P,) Chebyshev order; -1 for frames and offsets, which stay as they are
-    empty: VECModel
-    free: np.ndarray
-
-    @classmethod
-    def of(
-        cls,
-        observations: Observations,
-        block: np.ndarray,
-        empty: VECModel,
-        frames: Placed,
-        weight: float,
-    ) -> _Sums:
-        coords, kept = frames.inner, frames.kept
-        free, flange = vec_fit.flange_model(observations, empty)
-        normal, components, motions = {}, {}, {}
-        for number in (int(each) for each in np.unique(block[block >= 0])):
-            part = observations.select(block == number)
-            system = PoseSystem(part, flange, coords, weight)
-            parts = list(system.gram_blocks(np.zeros(system.size)))
-            normal[number] = _in(kept, sum(gram(columns, groups) for columns, groups in parts))
-            components[number] = part.components
-            motions[number] = parts
-        terms = np.tile(np.arange(empty.order + 1), empty.coefficients.size // (empty.order + 1))
-        order = np.concatenate([terms, np.full(empty.direction_offsets_rad.size, -1)])[free]
-        order = np.concatenate([np.full(kept.shape[1], -1), order])
-        return cls(normal, components, motions, kept, order, empty, free)
-
-    def far(self, left_out: Collection[int | None]) -> dict[int, np.ndarray]:
-        """Share (rows,) taken from every row of the blocks trained on: 0 but of far ones."""
-        kept = [number for number in self.normal if number not in left_out]
-        shares = {number: np.zeros(1) for number in kept}
-        for _ in range(_SCREENINGS):
-            constant = self.trained(0, (_CONSTANT,), shares)
-            squared = [self.errors(constant, number)[:, 0] for number in kept]
-            ends = np.cumsum([len(each) for each in squared])[:-1]
-            weights = np.split(_weights(np.concatenate(squared)), ends)
-            shares = {number: 1.0 - each for number, each in zip(kept, weights, strict=True)}
-        return shares
-
-    def trained(
-        self, order: int, priors: Sequence[Prior], far: Mapping[int, np.ndarray]
-    ) -> np.ndarray:
-        """Coefficients (P, priors) fitted to the blocks of ``far``, less these shares of rows."""
-        normal = sum(self.normal[number] - self._weighted(number, far[number]) for number in far)
-        count = sum(self.components[number] for number in far)
-        return np.stack(list(self._solutions(normal, count, order, priors)), axis=1)
-
-    def _weighted(self, number: int, share: np.ndarray) -> np.ndarray | float:
-        """Gram matrix of the rows of a block, each times its ``share`` (rows,); 0 for none."""
-        if not share.any():
-            return 0.0
-        found, begin = [], 0
-        for columns, groups in self.motions[number]:
-            own = share[begin : begin + len(columns)]
-            begin += len(columns)
-            rows = np.flatnonzero(own)
-            some = [
-                Group(each.columns, None if each.basis is None else each.basis[rows])
-                for each in groups
-            ]
-            found.append(gram(columns[rows] * np.sqrt(own[rows])[:, None, None], some))
-        return _in(self.kept, sum(found))
-
-    def errors(self, trained: np.ndarray, test: int) -> np.ndarray:
-        """Squared position errors (rows, priors) in block ``test``, mm^2."""
-        frames, rest = np.split(trained, [self.kept.shape[1]])
-        vectors = np.concatenate([self.kept @ frames, rest, np.ones((1, trained.shape[1]))])
-        parts = [
-            np.sum(applied(columns[:, :3], groups, vectors) ** 2, axis=1)
-            for columns, groups in self.motions[test]
-        ]
-        return np.concatenate(parts)
-
-    def _solutions(
-        self, normal: np.ndarray, count: int, order: int, priors: Sequence[Prior]
-    ) -> Iterator[np.ndarray]:
-        """Posterior means (P,) of one order under every prior, residual variance found along."""
-        flat = np.flatnonzero(self.order <= 0)
-        bent = np.flatnonzero((self.order > 0) & (self.order <= order))
-        # Frames, constants and offsets have no prior worth the name: eliminated once for all.
-        own = normal[np.ix_(flat, flat)]
-        own = own + np.diag(_GAUGE_RIDGE * np.maximum(np.diag(own), own.trace() / max(len(own), 1)))
-        sides = np.linalg.solve(own, normal[np.ix_(flat, [*bent, -1])])
-        rest = normal[np.ix_(bent, bent)] - normal[np.ix_(bent, flat)] @ sides[:, :-1]
-        right = normal[bent, -1] - normal[np.ix_(bent, flat)] @ sides[:, -1]
-        cost = normal[-1, -1] - normal[-1, flat] @ sides[:, -1]
-        spectra: dict[float, tuple] = {}
-        for prior in priors:
-            unit = self._prior_std(prior)[bent] / prior.delta_mm
-            shape = prior.decay
-            if shape not in spectra:
-                values, vectors = np.linalg.eigh(rest * np.outer(unit, unit))
-                spectra[shape] = np.maximum(values, 0.0), vectors, vectors.T @ (right * unit)
-            values, vectors, gradient = spectra[shape]
-            own_step = _ridge(values, gradient, cost, count - len(flat), prior.delta_mm)
-            solution = np.zeros(len(self.order))
-            solution[bent] = unit * (vectors @ own_step)
-            solution[flat] = -sides[:, -1] - sides[:, :-1] @ solution[bent]
-            yield solution
-
-    def _prior_std(self, prior: Prior) -> np.ndarray:
-        frames = len(self.order) - int(self.free.sum())
-        return np.concatenate([np.ones(frames), prior.std(self.empty)[self.free]])
-
-
-def _in(kept: np.ndarray, gram: np.ndarray) -> np.ndarray:
-    """A Gram matrix whose first coordinates are those that ``kept`` (E, f) is the derivative by."""
-    if np.array_equal(kept, np.eye(len(kept))):
-        return gram
-    change = block_diag(kept, np.eye(len(gram) - len(kept)))
-    return change.T @ gram @ change
-
-
-def _ridge(
-    values: np.ndarray, gradient: np.ndarray, cost: float, freedom: int, std: float
-) -> np.ndarray:
-    """Step in eigendirections under a prior of ``std``, at the residual variance it leaves."""
-    variance = _LEAST_SHARE * cost / max(freedom, 1)
-    for _ in range(_VARIANCE_STEPS):
-        held = variance / std**2
-        step = -gradient / (values + held)
-        left = cost + step @ (2.0 * gradient + values * step)
-        effective = np.sum(values / (values + held))
-        found = max(left, 0.0) / max(freedom - effective, 1.0)
-        if abs(found - variance) <= _VARIANCE_TOLERANCE * variance:
-            break
-        variance = found
-    return step

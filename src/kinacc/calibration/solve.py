@@ -6,12 +6,12 @@ take a system that hands out residual and Jacobian in blocks, so memory stays bo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import qr
+import scipy
 
 from kinacc.errors import FitError
 
@@ -22,12 +22,15 @@ STANDSTILL = 1e-9  # share of the objective
 MAX_HALVINGS = 12
 COST_RESOLUTION = 1e-9  # close to the optimum the cost no longer resolves a step
 LEAST_COST = 1e-10  # mm^2: of noise-free data
+_PANEL = 32  # columns reduced at once
+_ROWS = 512
 
 
 class System(Protocol):
     """Residuals of a fit: P parameters, blocks of whitened residuals and their Jacobian."""
 
     size: int
+    count: int  # of residuals
 
     def cost(self, x: np.ndarray) -> float:
         """Sum of squared residuals at ``x``."""
@@ -62,14 +65,15 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Solution:
-    """Outcome of a fit of P parameters to ``count`` residuals; only converged fits are returned.
+    """Outcome of a fit of P parameters to ``count`` residuals.
 
     ``std`` (P,) and ``covariance`` (P, P) in the parameters' own units for residuals of
     ``variance``. The covariance is that of the determined directions; ``undetermined`` (m, P) are
     the others, unit displacements in units of ``scale`` that change no residual, and ``std`` is NaN
     where one of them reaches a parameter. ``cost`` is the sum of squared residuals,
     ``degrees_of_freedom`` their number less the (effective) number of fitted parameters,
-    ``last_step`` the largest last change in units of ``scale``. ``spectrum`` is None where a prior
+    ``last_step`` the largest last change in units of ``scale``; ``converged`` where it is not above
+    STEP_TOLERANCE, else the objective stood still before. ``spectrum`` is None where a prior
     made it needless; see ``spectrum``. ``scale`` (P,) are the units of ``undetermined``.
     """
 
@@ -101,31 +105,91 @@ def triangle(system: System, x: np.ndarray, scale: np.ndarray) -> tuple[np.ndarr
 
     Orthogonal reduction block by block: singular values keep their digits, unlike through J'J.
     """
-    size = system.size + 1
-    factor, count = np.zeros((0, size)), 0
+    factors, counts = triangles(system, x, scale)
+    return joined(factors), sum(counts)
+
+
+def triangles(
+    system: System, x: np.ndarray, scale: np.ndarray, is_rotation: np.ndarray | None = None
+) -> tuple[list[np.ndarray], list[int]]:
+    """As ``triangle``, of the rows that ``is_rotation`` (m,) says are not and are, one by one.
+
+    A system with rows ``stacked`` by kind and a ``count`` of its own has them cheaper.
+    """
+    size, unit = system.size + 1, np.append(scale, 1.0)
+    factors, counts = [np.zeros((size, size), order="F") for _ in range(2)], [0, 0]
+    if hasattr(system, "stacked"):
+        for kind, rows in system.stacked(x):
+            factors[kind] = _reduced(factors[kind], rows)
+        turned = 0 if is_rotation is None else int(is_rotation.sum())
+        return [factor * unit for factor in factors], [system.count - turned, turned]
     for residual, jacobian in system.blocks(x):
-        stacked = np.concatenate([jacobian * scale, residual[:, None]], axis=1)
-        stacked = np.concatenate([factor, stacked])
-        factor = qr(stacked, overwrite_a=True, mode="r", check_finite=False)[0][:size]
-        count += len(residual)
-    if len(factor) < size:
-        factor = np.concatenate([factor, np.zeros((size - len(factor), size))])
-    return factor, count
+        rows = np.concatenate([jacobian, residual[:, None]], axis=1)
+        begin = sum(counts)
+        own = None if is_rotation is None else is_rotation[begin : begin + len(rows)]
+        for kind, some in enumerate([rows] if own is None else [rows[~own], rows[own]]):
+            factors[kind] = _reduced(factors[kind], some)
+            counts[kind] += len(some)
+    return [factor * unit for factor in factors], counts
 
 
-def gram(system: System, x: np.ndarray) -> tuple[np.ndarray, int]:
-    """Gram matrix (P+1, P+1) of ``[J | r]`` and the number of residuals.
+def joined(factors: Sequence[np.ndarray]) -> np.ndarray:
+    """Triangular factor (P, P) of rows whose triangular factors are ``factors``."""
+    found = factors[0]
+    for factor in factors[1:]:
+        if factor.any():
+            found = _reduced(found, factor) if found.any() else factor
+    return found
 
-    A system with a ``gram(x)`` and a ``count`` of its own knows how to sum it up cheaper.
+
+def _reduced(factor: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Triangular factor (P, P) of ``factor`` and ``rows`` (m, P) below it.
+
+    Some rows at a time, so that they stay in the cache.
+    """
+    width = min(_PANEL, len(factor))
+    for begin in range(0, len(rows), _ROWS):
+        some = np.array(rows[begin : begin + _ROWS], order="F")
+        factor = scipy.linalg.lapack.dtpqrt(0, width, factor, some, overwrite_a=1, overwrite_b=1)[0]
+    return np.triu(factor)
+
+
+def triangle_of_gram(gram: np.ndarray) -> np.ndarray:
+    """Triangular factor (P, P) of a matrix with the Gram matrix ``gram`` (P, P).
+
+    Singular values below 1e-7 of the largest, of columns made equally long, are rounding.
+    """
+    unit = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    unit = np.where(unit > 0.0, unit, 1.0)
+    factor, order, rank, _ = scipy.linalg.lapack.dpstrf(
+        gram / np.outer(unit, unit), tol=len(gram) * 2.3e-16
+    )
+    factor = np.triu(factor)
+    factor[rank:] = 0.0
+    back = np.empty_like(factor)
+    back[:, order - 1] = factor
+    return np.linalg.qr(back, mode="r") * unit
+
+
+def gram(system: System, x: np.ndarray) -> np.ndarray:
+    """Gram matrix (P+1, P+1) of ``[J | r]``: normal equations and, last, the cost.
+
+    A system with a ``gram(x)`` of its own knows how to sum it up cheaper.
     """
     if hasattr(system, "gram"):
-        return system.gram(x), system.count
-    total, count = np.zeros((system.size + 1, system.size + 1)), 0
+        return system.gram(x)
+    total = np.zeros((system.size + 1, system.size + 1))
     for residual, jacobian in system.blocks(x):
         both = np.concatenate([jacobian, residual[:, None]], axis=1)
         total += both.T @ both
-        count += len(residual)
-    return total, count
+    return total
+
+
+def gradient(system: System, x: np.ndarray) -> np.ndarray:
+    """The last row (P+1,) of ``gram``: J'r and, last, the cost; cheaper where ``system`` has it."""
+    if hasattr(system, "gradient"):
+        return system.gradient(x)
+    return gram(system, x)[-1]
 
 
 def advance(

@@ -78,6 +78,11 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
     ]
 
 
+def facts_in(table: Mapping[str, np.ndarray]) -> list[Fact]:
+    """The facts that a table ``summary`` holds."""
+    return [Fact(*row) for row in zip(*(table[name] for name in Fact._fields), strict=True)]
+
+
 def selected(choice: Mapping) -> str:
     """The model that a ``model_selection`` table says is selected."""
     return next(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import qr
+import scipy
 
 from kinacc.calibration import solve, variances
 from kinacc.calibration.solve import Solution, Spectrum, System
@@ -15,6 +15,8 @@ from kinacc.calibration.solve import Solution, Spectrum, System
 TRUNCATED_GROWTH = 1e-3
 FRAME_THRESHOLD = 1e-6  # frames have no nominal value to keep: only exact ambiguities are cut
 MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
+NEAR = 1e-4  # mm and mrad, of steps from which on the Jacobian itself is reduced
+GRAM_TELLS = 1e-5  # share of the largest singular value that a Gram matrix still resolves
 TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
 
 
@@ -47,65 +49,169 @@ def minimise_truncated(
     take the place of ``is_rotation``.
     Converged as ``ridge.minimise_with_prior`` is. Raises FitError where it does not converge.
     """
+    found = arrived(system, start, nominal, scale, threshold, frames, name, prior, is_rotation)
+    return found.solution(shared)
+
+
+def arrived(
+    system: System,
+    start: np.ndarray,
+    nominal: np.ndarray,
+    scale: np.ndarray,
+    threshold: float,
+    frames: int,
+    name: str,
+    prior: np.ndarray | None,
+    is_rotation: np.ndarray | None,
+) -> Arrived:
+    """Where ``minimise_truncated`` ends.
+
+    Steps follow from the Gram matrix of the Jacobian, which costs little but squares its condition;
+    the last one, and with it every rank, from the Jacobian's triangular factor.
+    """
     x = np.array(start, dtype=float)
     weight = np.zeros(system.size) if prior is None else prior
     held = _Held(nominal, scale, weight * scale, frames)
-
-    def objective(at: np.ndarray) -> float:
-        return system.cost(at) + held.cost(at)
-
-    cost, ranks, last = objective(x), None, np.inf
+    unit = np.append(scale, 1.0)
+    seen = _Seen(system, scale, np.outer(unit, unit), is_rotation, held)
+    closely = threshold < GRAM_TELLS
+    cost, ranks, last = seen.look(x, closely), None, np.inf
     iterations = 0
-    while last > solve.STEP_TOLERANCE and iterations < solve.MAX_ITERATIONS:
+    while iterations < solve.MAX_ITERATIONS:
         iterations += 1
-        factor, count = solve.triangle(system, x, scale)
         # A rank that has been lost is not taken back, so the iteration cannot swing between two.
         most = ranks if iterations > 3 else None
-        split = _Split.of(held.joined(factor, x), held, threshold, most)
+        split = _Split.of(held.joined(seen.factor, x), held, threshold, most)
         ranks = split.ranks
-        step = scale * split.step(held.displacement(x))
-        before = cost
-        x, cost, last = solve.advance(objective, x, step, cost, scale, name, TRUNCATED_GROWTH)
+        step = split.step(held.displacement(x))
+        size = float(np.max(np.abs(step), initial=0.0))
+        if seen.closely and size <= solve.STEP_TOLERANCE:
+            return Arrived(seen, x + scale * step, step, split, threshold, iterations, size)
+        # Where steps go on shortening as they did, the next one may be the last.
+        expected = size * min(1.0, size / last) if iterations > 1 else size
+        closely = closely or expected <= NEAR
+        before, at = cost, x
+        x, cost, last = solve.advance(
+            lambda at, how=closely: seen.look(at, how), x, scale * step, cost, scale, name,
+            TRUNCATED_GROWTH,
+        )  # fmt: skip
+        if x is at:
+            seen.look(x, closely)
         if iterations >= solve.PATIENCE and abs(before - cost) <= solve.STANDSTILL * before:
             break
     else:
-        solve.require_converged(name, iterations, last, cost, count)
-    factor, count = solve.triangle(system, x, scale)
-    split = _Split.of(held.joined(factor, x), held, threshold, ranks)
-    cost = float(np.sum(factor[:, -1] ** 2))
-    root = of_fit = split.root()
-    fitted = sum(split.ranks)
-    if weight.any():
-        fitted = float(np.sum((factor[:, :-1] @ root) ** 2))  # what the data, not the prior, decide
-    freedom = count - fitted
-    variance = cost / freedom if freedom > 0 else np.nan
-    told = split
-    if threshold > FRAME_THRESHOLD:  # fitted as they are, weak frames still count as undetermined
-        told = _Split.of(held.joined(factor, x), held, threshold, None, threshold)
-        root = told.root()
-    covariance = variance * (root @ root.T) * np.outer(scale, scale)
-    if freedom > 0 and (shared or is_rotation is not None):
-        roots = scale[:, None] * of_fit, scale[:, None] * root
-        if shared:
-            along = variances.along_root_shared(system, x, shared, *roots, variance)
-        else:
-            along = variances.along_root(system, x, is_rotation, *roots, variance)
-        covariance = roots[1] @ along @ roots[1].T
-    return Solution(
-        x=x,
-        std=np.where(told.touched(), np.nan, np.sqrt(np.diag(covariance))),
-        covariance=covariance,
-        cost=cost,
-        count=count,
-        degrees_of_freedom=freedom,
-        variance=variance,
-        iterations=iterations,
-        last_step=last,
-        converged=True,
-        spectrum=split.others.spectrum,
-        undetermined=told.undetermined(),
-        scale=scale,
-    )
+        solve.require_converged(name, iterations, last, cost, system.count)
+    seen.look(x, True)
+    split = _Split.of(held.joined(seen.factor, x), held, threshold, ranks)
+    return Arrived(seen, x, np.zeros(system.size), split, threshold, iterations, last)
+
+
+class _Seen:
+    """What a fit sees of its ``system`` at the latest point it looked at.
+
+    ``factor``: triangular factor of ``[J scale | r]``, that of the Gram matrix, or ``closely`` that
+    of the Jacobian; then ``factors`` has those of positions and of rotations, and ``counts`` how
+    many residuals these are.
+    """
+
+    def __init__(self, system, scale, units, is_rotation, held) -> None:
+        self.system, self.scale, self.units = system, scale, units
+        self.is_rotation, self.held = is_rotation, held
+        self.closely, self.factor = False, np.zeros((0, 0))
+        self.factors: list[np.ndarray] = []
+        self.counts: list[int] = []
+
+    def look(self, x: np.ndarray, closely: bool) -> float:
+        """Look at ``x``: the objective there."""
+        self.closely = closely
+        if closely:
+            self.factors, self.counts = solve.triangles(
+                self.system, x, self.scale, self.is_rotation
+            )
+            self.factor = solve.joined(self.factors)
+            return float(np.sum(self.factor[:, -1] ** 2)) + self.held.cost(x)
+        gram = solve.gram(self.system, x)
+        self.factor = solve.triangle_of_gram(gram * self.units)
+        return float(gram[-1, -1]) + self.held.cost(x)
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """Where a fit ended, and what is to be said of it when asked.
+
+    What was ``seen`` last was one ``step`` (P,), in units of scale, before ``x``.
+    """
+
+    seen: _Seen
+    x: np.ndarray
+    step: np.ndarray
+    split: _Split
+    threshold: float
+    iterations: int
+    last: float
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared residuals at ``x``."""
+        to = np.append(self.step, 1.0)
+        return float(sum(np.sum((factor @ to) ** 2) for factor in self.seen.factors))
+
+    @property
+    def freedom(self) -> float:
+        """Residuals less fitted parameters; of these only what the data, not a prior, decide."""
+        fitted = float(sum(self.split.ranks))
+        if self.seen.held.weight.any():
+            root = self.split.root()
+            fitted = float(
+                sum(np.sum((factor[:, :-1] @ root) ** 2) for factor in self.seen.factors)
+            )
+        return sum(self.seen.counts) - fitted
+
+    @property
+    def variance(self) -> float:
+        """That of the residuals; NaN where none is left over."""
+        return self.cost / self.freedom if self.freedom > 0 else np.nan
+
+    def solution(self, shared: tuple[np.ndarray, ...]) -> Solution:
+        """The fit's outcome with its standard deviations."""
+        x, seen, split, scale = self.x, self.seen, self.split, self.seen.scale
+        variance, freedom = self.variance, self.freedom
+        root = of_fit = split.root()
+        told = split
+        if self.threshold > FRAME_THRESHOLD and seen.held.frames:
+            # Fitted as they are, weak frames still count as undetermined.
+            joined = seen.held.joined(seen.factor, x)
+            told = _Split.of(joined, seen.held, self.threshold, None, self.threshold)
+            root = told.root()
+        covariance = variance * (root @ root.T) * np.outer(scale, scale)
+        if freedom > 0 and (shared or seen.is_rotation is not None):
+            if shared:
+                roots = scale[:, None] * of_fit, scale[:, None] * root
+                along = variances.along_root_shared(seen.system, x, shared, *roots, variance)
+            else:
+                to = np.append(self.step, 1.0)
+                costs = np.array([np.sum((factor @ to) ** 2) for factor in seen.factors])
+                fitted, spoken = (
+                    [factor[:, :-1] @ each for factor in seen.factors] for each in (of_fit, root)
+                )
+                counts = np.array(seen.counts)
+                along = variances.along_root(costs, counts, fitted, spoken, variance)
+            covariance = (root @ along @ root.T) * np.outer(scale, scale)
+        return Solution(
+            x=x,
+            std=np.where(told.touched(), np.nan, np.sqrt(np.diag(covariance))),
+            covariance=covariance,
+            cost=self.cost,
+            count=sum(seen.counts),
+            degrees_of_freedom=freedom,
+            variance=variance,
+            iterations=self.iterations,
+            last_step=self.last,
+            converged=self.last <= solve.STEP_TOLERANCE,
+            spectrum=split.others.spectrum,
+            undetermined=told.undetermined(),
+            scale=scale,
+        )
 
 
 def unseen(
@@ -141,7 +247,7 @@ class _Held:
         rows[np.arange(chosen.size), chosen] = self.weight[chosen]
         rows[:, -1] = (self.weight * self.displacement(x))[chosen]
         stacked = np.concatenate([factor, rows])
-        return qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
+        return scipy.linalg.qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
 
     @property
     def known_frames(self) -> np.ndarray:

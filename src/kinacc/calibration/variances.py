@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -15,25 +16,26 @@ LEAST_FREEDOM = 1e-12  # in residuals
 
 
 def along_root(
-    system: System,
-    x: np.ndarray,
-    is_rotation: np.ndarray,
-    fitted: np.ndarray,
-    told: np.ndarray,
+    costs: np.ndarray,
+    counts: np.ndarray,
+    fitted: Sequence[np.ndarray],
+    told: Sequence[np.ndarray],
     pooled: float,
 ) -> np.ndarray:
-    """Covariance (r, r) of coordinates along the root ``told``: ``told C told'`` is that of x.
+    """Covariance (r, r) of coordinates along a root: root C root' is that of the parameters.
 
     The sandwich of a least-squares estimator between residuals of two variances; were they equal
     it would be ``pooled`` times the identity. A root (P, r) times its transpose inverts J'J and the
-    prior's rows; ``fitted`` is that of the fit, ``told`` of the directions spoken of.
-    ``is_rotation`` (m,) of the residuals; ``pooled`` is the variance of the prior's rows too.
+    prior's rows. ``fitted``: the Jacobian of positions and that of rotations along the root of the
+    fit, or their triangular factors (m, r), which have the same products; ``told`` along that of
+    the directions spoken of. ``costs`` and ``counts`` (2,) of residuals; ``pooled`` is the variance
+    of the prior's rows too.
     """
-    costs, counts, parts = _shares(system, x, is_rotation, fitted)
+    parts = np.stack([each.T @ each for each in fitted])
     apart = of_kinds(costs, counts, parts, pooled)
-    parts = _shares(system, x, is_rotation, told)[2]
+    parts = np.stack([each.T @ each for each in told])
     own = np.einsum("i,iab->ab", apart - pooled, parts)
-    return pooled * np.eye(told.shape[1]) + own
+    return pooled * np.eye(parts.shape[1]) + own
 
 
 def of_kinds(costs: np.ndarray, counts: np.ndarray, parts: np.ndarray, pooled: float) -> np.ndarray:
@@ -57,23 +59,6 @@ def of_kinds(costs: np.ndarray, counts: np.ndarray, parts: np.ndarray, pooled: f
     freedom = counts - used
     left = freedom > 0.5  # less than one residual in two tells nothing
     return np.where(left, costs / np.where(left, freedom, 1.0), pooled)
-
-
-def _shares(
-    system: System, x: np.ndarray, is_rotation: np.ndarray, root: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sums of squares (2,), counts (2,) and shares (2, r, r) of position and rotation rows."""
-    costs, counts = np.zeros(2), np.zeros(2)
-    parts, begin = np.zeros((2, root.shape[1], root.shape[1])), 0
-    for residual, jacobian in system.blocks(x):
-        seen = jacobian @ root
-        turned = is_rotation[begin : begin + len(residual)]
-        begin += len(residual)
-        for kind, rows in enumerate((~turned, turned)):
-            costs[kind] += np.sum(residual[rows] ** 2)
-            counts[kind] += np.count_nonzero(rows)
-            parts[kind] += seen[rows].T @ seen[rows]
-    return costs, counts, parts
 
 
 def shared_errors(observations: Observations) -> tuple[np.ndarray, ...]:

@@ -19,8 +19,10 @@ from kinacc.calibration.held import (
 )
 from kinacc.calibration.map_estimate import minimise_with_prior
 from kinacc.calibration.observations import Observations
+from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
-from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
+from kinacc.calibration.system import FlangeModel, PoseSystem, Pull, require_enough
+from kinacc.geometry import Pose
 from kinacc.kinematics import vec
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import ERRORS, VECModel
@@ -77,6 +79,7 @@ class VECFit:
     coordinates: FrameCoordinates | ConstrainedFrames
 
 
+@one_thread
 def fit(
     observations: Observations,
     empty: VECModel,
@@ -152,6 +155,7 @@ def frames_of(
     return placed(observations, empty.dh.pose, frames, terms, rotation_weight_mm_per_rad)
 
 
+@one_thread
 def gauge(
     observations: Observations, empty: VECModel, frames: Frames, rotation_weight_mm_per_rad: float
 ) -> Spectrum:
@@ -223,10 +227,16 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
         vector[free] = x
         return vec.with_vector(empty, vector)
 
-    def jacobian(x: np.ndarray, at: JointState) -> np.ndarray:
-        motions = vec.elementary_jacobian(model(x), at.q_rad, at.s)
-        about_z = motions[:, :, directed, ERRORS.index("eps_z")]
-        return np.concatenate([motions.reshape(len(motions), 6, -1), about_z], axis=2)
+    about_z = np.concatenate([np.arange(errors * empty.joints), errors * directed + errors - 1])
+
+    def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
+        moved = vec.motions(model(x), at.q_rad, at.s)
+        jacobian = moved.jacobian()
+        return moved.pose, jacobian[about_z] if directed.size else jacobian
+
+    def pulled(x: np.ndarray, at: JointState) -> tuple[Pose, Pull]:
+        moved = vec.motions(model(x), at.q_rad, at.s)
+        return moved.pose, lambda *wrench: moved.pulled(*wrench)[about_z]
 
     def expansion(at: JointState) -> list[Group]:
         basis, travelled = vec.chebyshev_basis(empty, at.q_rad), vec.direction_basis(at.s)
@@ -238,7 +248,9 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
             groups.append(Group(slice(number, number + 1), travelled[:, joint, seen[joint]]))
         return groups
 
-    return FlangeModel(int(free.sum()), lambda x, at: model(x).pose(at), jacobian, expansion)
+    return FlangeModel(
+        int(free.sum()), lambda x, at: model(x).pose(at), linearised, expansion, pulled
+    )
 
 
 def _is_angle(model: VECModel) -> np.ndarray:

@@ -28,6 +28,11 @@ class Opened:
         """Where it stands; ``watch`` as in ``kinacc.campaign.state.restore``."""
         return state.restore(self.plan, self.journal.entries, watch)
 
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """When its entries were made, as the journal has it."""
+        return tuple(str(each["at"]) for each in self.journal.entries if "at" in each)
+
     def write(self, entry: Mapping) -> None:
         """Append an entry, with the time; on disk when this returns. Only while ``writing``."""
         stamped = {**entry, "at": datetime.now(UTC).isoformat(timespec="seconds")}

@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -145,15 +145,33 @@ def of_results(results: Path) -> list[Path]:
     They are sought beside it, beside all results, and in the folder one stands in; each is named
     as a person there would.
     """
-    within = results.absolute().parent
-    near = {within.resolve(): results.parent, within.parent.resolve(): results.parent / ".."}
-    places = [*(near | {Path.cwd(): Path()}).values()]
-    plans = [plan for place in places for plan in sorted(place.glob(f"*/{PLAN}"))]
-    return [plan.parent for plan in plans if _is_about(plan, results.resolve().name)]
+    return of_each([results])[results]
 
 
-def _is_about(plan: Path, calibration: str) -> bool:
-    try:
-        return bool(json.loads(plan.read_bytes())["about"]["calibration"] == calibration)
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return False  # no campaign, or one that cannot say whose it is
+def of_each(folders: Iterable[Path]) -> dict[Path, list[Path]]:
+    """The same for each of many results folders; every place is looked through once."""
+    there: dict[Path, dict[str, list[Path]]] = {}
+    found = {}
+    for results in folders:
+        within = results.absolute().parent
+        near = {within.resolve(): results.parent, within.parent.resolve(): results.parent / ".."}
+        places = [*(near | {Path.cwd(): Path()}).values()]
+        for place in places:
+            if place not in there:
+                there[place] = _by_calibration(place)
+        name = results.resolve().name
+        found[results] = [each for place in places for each in there[place].get(name, ())]
+    return found
+
+
+def _by_calibration(place: Path) -> dict[str, list[Path]]:
+    """Campaigns in the folders of a place, by the name of the calibration they are about."""
+    found: dict[str, list[Path]] = {}
+    for plan in sorted(place.glob(f"*/{PLAN}")):
+        try:
+            name = json.loads(plan.read_bytes())["about"]["calibration"]
+        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            continue  # no campaign, or one that cannot say whose it is
+        if isinstance(name, str):
+            found.setdefault(name, []).append(plan.parent)
+    return found

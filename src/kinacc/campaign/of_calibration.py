@@ -26,11 +26,15 @@ _SAME_MM = 1e-6  # modelled positions that differ by less are of one model
 
 @dataclass(frozen=True)
 class Assessed:
-    """A campaign at its place, how it stands, and what it says: of all candidates if it can."""
+    """A campaign at its place, how it stands, and what it says: of all candidates if it can.
+
+    ``recorded`` is when its last entry was made; empty where there is none.
+    """
 
     place: Path
     state: State
     said: Statement | None
+    recorded: str = ""
 
     @property
     def next_command(self) -> str:
@@ -102,7 +106,8 @@ def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> 
         if others := [str(each) for each in found[number:]]:
             remarks.append(f"there are older campaigns: {', '.join(others)}")
         said = sorted(state.statements(), key=lambda each: _ORDER.index(each.target))
-        return Sought(Assessed(place, state, said[0] if said else None), tuple(remarks))
+        recorded = max(opened.recorded, default="")
+        return Sought(Assessed(place, state, said[0] if said else None, recorded), tuple(remarks))
     return Sought(None, tuple(remarks))
 
 

@@ -201,8 +201,7 @@ def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markd
         ),
         f"assessor {plan.assessor.name}: {(type(plan.assessor).__doc__ or '').splitlines()[0]}",
     ]
-    times = [each["at"] for each in opened.journal.entries if "at" in each]
-    if times:
+    if times := opened.recorded:
         lines.append(f"recorded from {min(times)} to {max(times)}")
     if state.in_hand:
         lines.append(f"{len(state.in_hand)} readings were taken and not asked for: not used")

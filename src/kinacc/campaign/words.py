@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -112,13 +112,18 @@ def pledge(said: Statement, state: State) -> str:
         CANDIDATES: f"none of these {points} candidates {limit}",
         REGION: f"no more than {1.0 - said.share:.1%} of the region {limit}",
     }
-    moved = "nothing moved (base, tool, instrument)"
-    needed = [reason(said.assumption) or "", _noise_assumed(said, state), moved]
-    conditions = [each for each in needed if each]
     return (
         f"By a procedure whose bound is right in {how_often(said.confidence)}, "
-        f"{of_all[said.target]}, if {', '.join(conditions[:-1])} and {conditions[-1]}."
+        f"{of_all[said.target]}, if {conditions(said, state)}."
     )
+
+
+def conditions(said: Statement, state: State) -> str:
+    """On what an upper bound hangs."""
+    moved = "nothing moved (base, tool, instrument)"
+    needed = [reason(said.assumption) or "", _noise_assumed(said, state), moved]
+    named = [each for each in needed if each]
+    return f"{', '.join(named[:-1])} and {named[-1]}"
 
 
 def how_often(confidence: float) -> str:
@@ -140,22 +145,22 @@ def _noise_assumed(said: Statement, state: State) -> str:
 
 def statement(said: Statement, state: State) -> str:
     """One sentence a person may quote."""
-    about = _about(said, state)
+    whose = about(said, state)
     if said.withheld and math.isnan(said.upper_mm):
         seen = ""
         if not math.isnan(said.value_mm):
             seen = f"; it is estimated at {said.value_mm:.3f} mm"
         if not math.isnan(said.lower_mm):
             seen += f", and at least {said.lower_mm:.3f} mm ({_sure(said)})"
-        return f"No upper bound for {about}: {reason(said.withheld)}{seen}."
+        return f"No upper bound for {whose}: {reason(said.withheld)}{seen}."
     parts = [f"at most {said.upper_mm:.3f} mm"] if not math.isnan(said.upper_mm) else []
     if not math.isnan(said.lower_mm):
         parts.append(f"at least {said.lower_mm:.3f} mm")
     value = f"estimated at {said.value_mm:.3f} mm" if not math.isnan(said.value_mm) else ""
     if not parts:
-        return f"{about[0].upper()}{about[1:]} is {value}; no bound is stated."
+        return f"{whose[0].upper()}{whose[1:]} is {value}; no bound is stated."
     each = "each " if len(parts) > 1 else ""
-    text = f"{about[0].upper()}{about[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
+    text = f"{whose[0].upper()}{whose[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
     text += f", if {reason(said.assumption)}" if said.assumption else ""
     against = doubt(said, state).replace("The bounds contradict", "They contradict")
@@ -199,7 +204,8 @@ def _visited(state: State) -> int:
     return len({each.reading.point for each in state.told})
 
 
-def _about(said: Statement, state: State) -> str:
+def about(said: Statement, state: State) -> str:
+    """Whose largest error a statement is on."""
     if said.target == MEASURED:
         visited = _visited(state)
         points = "one measured point" if visited == 1 else f"{visited} measured points"
@@ -228,6 +234,12 @@ def doubt(said: Statement, state: State) -> str:
         f"{found}: the noise is stated too small, or this is one of the few campaigns the "
         "confidence allows to be wrong"
     )
+
+
+def against(said: Iterable[Statement], state: State) -> list[str]:
+    """Why the bounds of a campaign cannot be relied on, without a full stop."""
+    doubts = (doubt(each, state) for each in said)
+    return [each for each in (*consistency.contradicted(state), *doubts) if each]
 
 
 def _sure(said: Statement) -> str:

@@ -7,6 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,16 +40,19 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
 
     Checks the measurements, fits the VEC and the DH model, holds poses out to judge them, and
     leaves all tables in results/, in the folder it is called in. What is up to date is not made
-    again. Several files are merged in order. Words after -- go to Snakemake.
+    again. Several files are merged in order. Of many data sets a table is shown, that of `kinacc
+    summary`, and no pages are written. Words after -- go to Snakemake.
 
     \b
     Example:
       kinacc calibrate tracker.yaml
+      kinacc calibrate robots/*.yaml
       kinacc calibrate tracker.yaml -- --dry-run
     """
     from kinacc.cli.fitted import summary
     from kinacc.cli.report import written
     from kinacc.workflow.answer import answer, read
+    from kinacc.workflow.fleet import FEW
 
     configs, plan = carried_out("calibration", words, cores, default=None)
     if plan is None:
@@ -58,11 +62,25 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
         answers = {name: summary(folder) for name, folder in folders.items()}
         click.echo(json.dumps(answers, indent=2))
         return
+    if len(folders) > FEW:
+        show_many([*folders.values()])
+        return
     more = shlex.join(["kinacc", "study", *configs])
     for folder in folders.values():
         written(folder, without=STUDIED)
         tables = {name: table for name, table in read(folder).items() if name not in STUDIED}
         click.echo("\n".join(["", *answer(folder, tables, following=[more])]))
+
+
+def show_many(folders: Sequence[str], more: Sequence[str] = ()) -> None:
+    """The table of many data sets, for half pages of all of them would not be read."""
+    from kinacc.cli.summary import show
+    from kinacc.workflow.fleet import standings
+
+    found = standings([Path(folder) for folder in folders])
+    one = shlex.quote(folders[0])
+    words = f"kinacc fitted {one} says half a page on one, kinacc report {one} writes its page"
+    show(found, [None] * len(found), "", ["", words, *more])
 
 
 def carried_out(
@@ -95,7 +113,9 @@ def carried_out(
         command += profile_options()  # Snakemake would say that it uses them
     command += more or ["--quiet", "all"]  # stages say how far they are, and what goes wrong
     command += ["--no-hooks"]  # what a run ends with is said by the command
-    done = subprocess.run([*command, "--", target], env=os.environ | ONE_THREAD, check=False)
+    # Words for Snakemake may change what is read.
+    known = ONE_THREAD | ({} if words[first:] else {"KINACC_FILES_READ": "1"})
+    done = subprocess.run([*command, "--", target], env=os.environ | known, check=False)
     if done.returncode:
         raise SystemExit(done.returncode)
     ran = not {"-n", "--dry-run", "--dryrun", "--unlock", "--lint"} & set(more)

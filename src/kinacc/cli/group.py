@@ -58,7 +58,8 @@ _MEANT = {
     "print": "show",
     "table": "show",
     "view": "show",
-    "summary": "fitted",
+    "fleet": "summary",
+    "overview": "summary",
     "undo": "strike",
     "validate": "check-data",
 }
@@ -223,6 +224,7 @@ SECTIONS = {
     },
     "A calibrated arm": {
         "fitted": "what the fits are worth, and what the poses leave open",
+        "summary": "what many calibrations are worth, a row each",
         "report": "one page of it all, to read, mail and keep",
         "predict": "joints to the pose of the tool, with uncertainty",
         "compensate": "poses to the joints that put the tool there",

@@ -123,10 +123,13 @@ class Screen:
         code = self.console.encoding
         return lines.encode(code, "replace").decode(code)
 
-    def table(self, sheet: Sheet, rows: int | None, hoist: bool) -> None:
+    def table(
+        self, sheet: Sheet, rows: int | None, hoist: bool, option: str = "--csv has them"
+    ) -> None:
         """A sheet's columns, at most ``rows`` of its rows.
 
-        ``hoist``: what is the same in every row is said once, above.
+        ``hoist``: what is the same in every row is said once, above. ``option``: what shows columns
+        that are left out, ``{0}`` for the first of them.
         """
         count = len(sheet)
         if not count:
@@ -152,7 +155,7 @@ class Screen:
         if left_out := [each.name for each in shown if each.name not in names]:
             self.words(
                 f"{self.width} characters are too narrow for {', '.join(left_out)}: "
-                f"--columns {left_out[0]},.. shows them",
+                f"{option.format(left_out[0])}",
                 "dim",
             )
 

@@ -82,8 +82,8 @@ def show(
     """
     from kinacc.cli import show_files, show_table
 
-    refuse(_at_odds({"--csv": as_csv, "--json": out.as_json, "--plot": plot}))
-    refuse(_at_odds({"--plot": plot, "--describe": describe, "--out": out.table is not None}))
+    refuse(at_odds({"--csv": as_csv, "--json": out.as_json, "--plot": plot}))
+    refuse(at_odds({"--plot": plot, "--describe": describe, "--out": out.table is not None}))
     answer = Answer(out, as_csv)
     place = show_files.found(path, name)
     if place.is_dir():
@@ -111,7 +111,7 @@ class Answer:
     """Where a sheet goes: to the screen, or to a machine."""
 
     out: Output
-    as_csv: bool
+    as_csv: bool = False
 
     def give(
         self,
@@ -142,7 +142,8 @@ class Answer:
         if is_table and len(sheet) == 1:
             screen.record(sheet)
         else:
-            screen.table(sheet, rows or (_ROWS if is_table else None), hoist)
+            more = ["--columns {0},.. shows them"] if is_table else []
+            screen.table(sheet, rows or (_ROWS if is_table else None), hoist, *more)
         for line in below:
             screen.words(line, "dim")
         self.show(screen)
@@ -152,7 +153,7 @@ class Answer:
         click.echo(screen.text(), nl=False, color=True)
 
 
-def _at_odds(given: dict[str, bool]) -> list[Problem]:
+def at_odds(given: dict[str, bool]) -> list[Problem]:
     """The problem with options of which only one can be had."""
     both = [name for name, is_given in given.items() if is_given]
     return [Problem(" and ".join(both), "cannot be had together", "one")] if both[1:] else []

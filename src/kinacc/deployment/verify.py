@@ -197,7 +197,7 @@ def frames_under(
 ) -> Frames:
     """Base and targets of ``observations`` alone, the arm held at ``model``, of whatever kind."""
     nothing, stated = np.zeros(0), known(robot.base, carried(robot), *_counts(observations))
-    held = FlangeModel(0, lambda x, at: model.pose(at), lambda x, at: np.zeros((len(at), 6, 0)))
+    held = FlangeModel(0, lambda x, at: model.pose(at))
     unknowns = dh_fit.Unknowns("fit of base and tool", held, nothing, nothing, nothing, nothing)
     coordinates, solution, _ = dh_fit.solved(
         observations,

@@ -6,7 +6,8 @@ Dates, versions and random identifiers are left out, fonts are embedded (PDF) or
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from io import BytesIO
 from pathlib import Path
 
@@ -45,9 +46,11 @@ def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
 
 def settle(figure: Figure) -> None:
     """Run the layout once and freeze it, so later drawing neither repeats nor changes it."""
-    if figure.get_layout_engine() is not None:
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        # "none" would leave a placeholder, for which matplotlib draws everything twice.
+        figure.set_layout_engine(None)
 
 
 def write(figure: Figure, paths: Mapping[str, Path]) -> None:
@@ -61,5 +64,29 @@ def write(figure: Figure, paths: Mapping[str, Path]) -> None:
 def _bytes(figure: Figure, name: str) -> bytes:
     buffer = BytesIO()
     dpi = PNG_DPI if name == "png" else RASTER_DPI
-    figure.savefig(buffer, format=name, dpi=dpi, metadata=_METADATA[name])
+    with _glyphs_alone() if name == "pdf" else nullcontext():
+        figure.savefig(buffer, format=name, dpi=dpi, metadata=_METADATA[name])
     return buffer.getvalue()
+
+
+@contextmanager
+def _glyphs_alone() -> Iterator[None]:
+    """Embed fonts without their rules for setting text, most of the time that a PDF takes.
+
+    matplotlib places every letter itself, so no reader of the file asks for them.
+    """
+    from fontTools import subset
+
+    load = subset.load_font
+
+    def load_font(*args, **options):
+        font = load(*args, **options)
+        for rules in {"GDEF", "GPOS", "GSUB", "kern"} & set(font.keys()):
+            del font[rules]
+        return font
+
+    subset.load_font = load_font
+    try:
+        yield
+    finally:
+        subset.load_font = load

@@ -27,7 +27,7 @@ from kinacc.kinematics.model import JointState
 PARAMETERS = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad")
 
 _BLOCK = 1024  # columns of one block stay in the cache
-WORTH_NUMBA = 2_000_000  # joint values that the plain twins take the time of its import for
+WORTH_NUMBA = 4_000_000  # joint values that the plain twins take the time of its start for
 
 
 @dataclass(frozen=True)

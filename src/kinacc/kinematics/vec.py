@@ -19,6 +19,7 @@ from kinacc.kinematics import chain as _chain
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.model import JointState
+from kinacc.kinematics.vec_motions import Motions
 
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
 _DIRECTIONS = np.array([-1, 1])
@@ -217,23 +218,23 @@ def joint_jacobian(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = No
     return jacobian
 
 
-def elementary_jacobian(
-    model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
-) -> np.ndarray:
-    """Jacobian (n, 6, k, 6) of ``pose`` in the six errors of every joint, as ``ERRORS``. Exact."""
-    return _elementary_jacobian(_split(model, q_rad, s))
+def motions(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Motions:
+    """Poses (n, ...) as ``pose``, and how the joints' errors move them."""
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    return Motions(model.dh, q_rad, errors(model, q_rad, s))
 
 
 def parameter_jacobian(
     model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
 ) -> np.ndarray:
     """Jacobian (n, 6, P) of ``pose`` in the coefficients, ordered as ``to_vector``. Exact."""
-    split = _split(model, q_rad, s)
-    elementary = _elementary_jacobian(split)
-    count, cut = len(elementary), model.coefficients.size
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    count, cut = len(q_rad), model.coefficients.size
+    moved = motions(model, q_rad, s).jacobian().reshape(model.joints, len(ERRORS), 6, count)
+    elementary, basis = moved.transpose(3, 2, 0, 1), chebyshev_basis(model, q_rad)
     jacobian = np.empty((count, 6, cut + model.direction_offsets_rad.size))
     expanded = jacobian[:, :, :cut].reshape(count, 6, *model.coefficients.shape)
-    np.multiply(elementary[..., None], split.basis[:, None, :, None, :], out=expanded)
+    np.multiply(elementary[..., None], basis[:, None, :, None, :], out=expanded)
     offsets = jacobian[:, :, cut:].reshape(count, 6, model.joints, 2)
     if s is None:
         offsets[:] = 0.0
@@ -252,7 +253,6 @@ def direction_basis(s: np.ndarray) -> np.ndarray:
 class _Split:
     """The chain cut at every error matrix: what stands before it and what follows it."""
 
-    basis: np.ndarray  # (n, k, order + 1)
     errors: np.ndarray  # (n, k, 6)
     before: list[np.ndarray]  # k of (n, 3, 3): rotation from the base up to the error matrix
     after: list[Pose]  # k of n poses: flange seen from behind the error matrix
@@ -294,37 +294,7 @@ def _split(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None) -> _Split:
     stretch = rotation_t @ raw
     trace = np.trace(stretch, axis1=1, axis2=2)
     rate_matrix = np.linalg.inv(trace[:, None, None] * np.eye(3) - stretch)
-    return _Split(basis, joint_errors, before, after, rotation, rotation_t, rate_matrix)
-
-
-def _elementary_jacobian(split: _Split) -> np.ndarray:
-    """Jacobian (n, 6, k, 6) of the projected pose in the elements of every error matrix."""
-    # Arrays of one number per pose, poses last: small batched cross products would cost 5 times.
-    before = np.stack(split.before).transpose(2, 3, 0, 1)  # row, column, joint, pose
-    after = np.stack([pose.rotation for pose in split.after]).transpose(2, 3, 0, 1)
-    reach = np.stack([pose.position_mm for pose in split.after]).transpose(2, 0, 1)
-    turned = np.einsum("nji,gnjk->ikgn", split.rotation, np.stack(split.before))
-    rate = (split.rotation @ split.rate_matrix).transpose(1, 2, 0)[:, :, None]
-    jacobian = np.zeros((6, len(ERRORS), *reach.shape[1:]))
-    jacobian[:3, :3] = before
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        # e_axis x r has two entries: -r_v along u and r_u along v.
-        jacobian[:3, 3 + axis] = before[:, v] * reach[u] - before[:, u] * reach[v]
-        # The skew part of turned [e_axis] after, written with columns and rows.
-        twist = _cross(after[u], turned[:, v]) - _cross(after[v], turned[:, u])
-        for row in range(3):
-            jacobian[3 + row, 3 + axis] = (
-                rate[row, 0] * twist[0] + rate[row, 1] * twist[1] + rate[row, 2] * twist[2]
-            )
-    return np.ascontiguousarray(jacobian.transpose(3, 0, 2, 1))
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross product of vectors along the first axis."""
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+    return _Split(joint_errors, before, after, rotation, rotation_t, rate_matrix)
 
 
 def _angular_rate(split: _Split, twist: np.ndarray) -> np.ndarray:
@@ -344,7 +314,8 @@ def _basis(x: np.ndarray, order: int) -> np.ndarray:
 
 
 def _errors(model: VECModel, basis: np.ndarray, s: np.ndarray | None) -> np.ndarray:
-    values = np.einsum("nkt,ket->nke", basis, model.coefficients)
+    values = np.matmul(basis.transpose(1, 0, 2), model.coefficients.transpose(0, 2, 1))
+    values = np.ascontiguousarray(values.transpose(1, 0, 2))
     if s is not None:
         s = np.asarray(s)
         values[..., 5] += np.where(s == -1, model.direction_offsets_rad[:, 0], 0.0)

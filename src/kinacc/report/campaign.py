@@ -144,8 +144,7 @@ def _leading(state: State, said: Sequence[Statement]) -> Statement:
 
 def _against(state: State, said: Sequence[Statement]) -> list[str]:
     """Why the bounds cannot be relied on, a sentence each."""
-    doubts = (words.doubt(each, state) for each in said)
-    return [_sentence(text) for text in (*consistency.contradicted(state), *doubts) if text]
+    return [_sentence(text) for text in words.against(said, state)]
 
 
 def _badge(state: State, said: Sequence[Statement], lead: Statement) -> tuple[str, bool]:

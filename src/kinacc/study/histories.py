@@ -137,12 +137,11 @@ def examples(
     def search(name: str, bound: float, wanted: Callable, less: Callable) -> Example:
         second = None
         simulations = range(settings.simulations_searched)
-        memory = None
+        world = None
         for simulation in (
             progress(simulations, "simulations searched") if progress else simulations
         ):
-            world = world_of(error_mm, settings.noise_mm, simulation, visits, seed, memory)
-            memory = world.readings_mm
+            world = world_of(error_mm, settings.noise_mm, simulation, visits, seed, world)
             if wanted(world):
                 return Example(name, simulation, bound, RULES[name], True)
             if second is None and less(world):

@@ -78,12 +78,12 @@ def world_of(
     repetition: int,
     visits: Visits,
     seed: int,
-    memory: np.ndarray | None = None,
+    lost: World | None = None,
 ) -> World:
     """The world of one simulation: true errors (m, 3), robot base frame, mm, plus its noise.
 
-    Holds the points the budget can reach, in visiting order. ``memory`` (points, measurements, 3)
-    is reused for the readings if given; the world drawn there before is lost.
+    Holds the points the budget can reach, in visiting order. ``lost``: a world of the same points
+    and visits that is not needed any more, whose memory is used again.
     """
     from kinacc.assess.random_numbers import key_of
 
@@ -93,7 +93,7 @@ def world_of(
         order = np.random.default_rng([*entropy, _SHUFFLE]).permutation(order)
     order = order[: visits.measurements]
     sigma = np.full(order.size, float(noise_mm))
-    return draw(error_mm[order], sigma, key_of(*entropy), visits.measurements, order, memory)
+    return draw(error_mm[order], sigma, key_of(*entropy), visits.measurements, order, lost)
 
 
 def simulate(
@@ -114,11 +114,9 @@ def simulate(
     """
     errors = checked_errors(error_mm)
     jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
-    reachable = min(errors.shape[0], visits.measurements)
-    memory = np.empty((reachable, visits.measurements, 3))
-    rows = []
+    rows, world = [], None
     for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
-        world = world_of(errors, noise, repetition, visits, seed, memory)
+        world = world_of(errors, noise, repetition, visits, seed, world)
         rows += [_row(noise, repetition, each, world) for each in assessors]
     return ordered(columns_of("study_chunk", rows))
 

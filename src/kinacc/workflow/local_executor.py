@@ -58,14 +58,14 @@ def _alone(job: Job) -> None:
 
 
 def _end(running: Iterable[tuple[Process, Job]]) -> None:
-    from kinacc.artifacts.atomic import unfinished
+    from kinacc.artifacts.atomic import remove_unfinished
 
     for process, _ in running:
         process.kill()  # a compiled kernel would keep a politer signal waiting
     for process, job in running:
         process.join()
         for path in job.outputs.values():
-            unfinished(path, process.pid).unlink(missing_ok=True)
+            remove_unfinished(path, process.pid)
 
 
 @contextmanager

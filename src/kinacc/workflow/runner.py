@@ -33,7 +33,8 @@ class Job:
     artefact to its file, or a picture format to its file. ``settings`` are the configuration values
     of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2"), ``uses``
     what its results depend on beside what its module imports, ``kind`` the error model it fits.
-    ``label`` begins what is said of faults, ``doing`` what is said of progress.
+    ``label`` begins what is said of faults, ``doing`` what is said of progress. ``code``: hash of
+    the code, where that is known already.
     """
 
     module: str
@@ -47,6 +48,7 @@ class Job:
     log: str | None = None
     uses: tuple[str, ...] = ()
     kind: str = ""
+    code: str = ""
 
 
 def execute(job: Job, bar: bool = False) -> None:
@@ -100,7 +102,7 @@ def stage_provenance(job: Job) -> dict[str, object]:
     return {
         "kinacc_version": __version__,
         "config_hash": provenance.config_hash(job.settings),
-        "code_hash": provenance.stage_code_hash(job.module, job.uses),
+        "code_hash": job.code or provenance.stage_code_hash(job.module, job.uses),
         "inputs_hash": provenance.inputs_hash(
             {name: _content(name, paths) for name, paths in job.inputs.items()}
         ),

@@ -86,13 +86,16 @@ def made_without(folder: Path, artefact: str, marks: Marks) -> bool:
         stage for stage in STAGES.values() if artefact in stage.optional and stage.leaves == TABLES
     ]
     return bool(users) and all(
-        stage.outputs[0] in marks
-        and any(
-            _expected(stage, inputs, {}, 0)["inputs_hash"]
-            == marks[stage.outputs[0]].get("inputs_hash")
-            for inputs in _candidates(folder, stage)
-        )
+        stage.outputs[0] in marks and made_of_these(folder, stage, marks[stage.outputs[0]])
         for stage in users
+    )
+
+
+def made_of_these(folder: Path, stage: Stage, own: Mapping[str, str]) -> bool:
+    """Whether a stage's table with the provenance ``own`` was made from the tables now there."""
+    return any(
+        _expected(stage, inputs, {}, 0)["inputs_hash"] == own.get("inputs_hash")
+        for inputs in _candidates(folder, stage)
     )
 
 

@@ -1,0 +1,1 @@
+"""One file a topic: what is measured, and the limit it cannot pass."""

@@ -1,0 +1,210 @@
+"""What the calibrations of many robots are worth: what ``kinacc summary`` says of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from kinacc.artifacts import store
+from kinacc.artifacts.error_models import model_name
+from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.statement import CANDIDATES, Statement
+from kinacc.calibration.summary import LARGE_SHARE, facts_in, of
+from kinacc.campaign import journal, of_calibration, words
+from kinacc.campaign.of_calibration import Sought
+from kinacc.deployment import folder as results
+from kinacc.errors import InputError, Problem
+from kinacc.workflow.catalogue import STAGES, TOURNAMENT
+from kinacc.workflow.verification.lineage import made_of_these
+
+FEW = 4  # data sets of which each is told of at the end of a run
+BOUND, HELD_OUT = "bound", "held-out"
+_SUMMARY = STAGES["summary"]
+_DAY = 10  # characters of a time
+_FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an error is within a tolerance: ``accept``, ``reject`` or ``undecided``, and why."""
+
+    says: str
+    because: str
+    tolerance_mm: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What is known of the calibration in the results folder of a data set.
+
+    ``model`` is the error model that is selected, ``held_out`` its errors at poses that no fit has
+    seen: ``n``, ``mean``, ``quantile_99`` and ``largest`` in mm, empty where none are held out.
+    ``written``: day on which the file of its summary was written, by the file's time. ``problem``
+    is why nothing is known; None where something is.
+    """
+
+    folder: Path
+    robot: str | None = None
+    model: str | None = None
+    held_out: Mapping[str, float] = field(default_factory=dict)
+    campaigns: Sought = field(default_factory=lambda: Sought(None))
+    written: str | None = None
+    problem: Problem | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the data set."""
+        return self.folder.resolve().name
+
+    def bound(self) -> dict[str, object]:
+        """The bound of its campaign, on what it is and if what; empty where there is none."""
+        found = self.campaigns.assessed
+        if found is None:
+            return {}
+        state, said = found.state, found.said or Statement(CANDIDATES)
+        known = {
+            "campaign": str(found.place),
+            "campaign_date": found.recorded[:_DAY] or None,
+            "readings": state.taken,
+        }
+        if math.isnan(said.upper_mm):
+            return known
+        about = state.plan.about
+        model = model_name(str(about["model"]))
+        return known | {
+            "bound_mm": said.upper_mm,
+            "lower_mm": said.lower_mm,
+            "confidence": said.confidence,
+            "bound_of": f"{words.about(said, state)}, {about['point']} by the {model} model",
+            "bound_if": words.conditions(said, state),
+        }
+
+    def doubts(self) -> list[str]:
+        """What has to be known beside the figures, a line each."""
+        if self.problem is not None:
+            return [str(self.problem)]
+        found, lines = self.campaigns.assessed, list(self.campaigns.remarks)
+        if found is None:
+            return lines
+        if found.said is None or math.isnan(found.said.upper_mm):
+            why = words.reason(found.said.withheld) if found.said else None
+            lines.append(f"no bound so far: {why or 'its campaign has not enough readings'}")
+        lines += [*_against(self.campaigns), *words.begun_against(found.state.plan)]
+        about = str(found.state.plan.about["model"])
+        if about != self.model:
+            lines.append(f"the bound is about {model_name(about)}, which is not the model selected")
+        return lines
+
+    def verdict(self, by: str, tolerance_mm: float | None) -> Verdict | None:
+        """The verdict ``by`` the bound of its campaign, or by errors held out.
+
+        Where no tolerance is given, the campaign's own counts; None where it has none.
+        """
+        found = self.campaigns.assessed
+        if tolerance_mm is None and found is not None:
+            tolerance_mm = found.state.plan.limits.tolerance_mm
+        if tolerance_mm is None:
+            return None
+        says, because = UNDECIDED, "no campaign bounds it"
+        if self.problem is not None:
+            because = "there are no results to go by"
+        elif by == HELD_OUT:
+            says, because = self._held_out_within(tolerance_mm)
+        elif _against(self.campaigns):
+            because = "its bound cannot be relied on"
+        elif found is not None and found.said is None:
+            because = "its campaign says nothing yet"
+        elif found is not None and found.said is not None:
+            decided = decide(found.said, tolerance_mm)
+            says, because = decided.verdict, words.reason(decided.reason) or ""
+        return Verdict(says, because, tolerance_mm)
+
+    def _held_out_within(self, tolerance_mm: float) -> tuple[str, str]:
+        known = self.held_out
+        if not known:
+            return UNDECIDED, "no error is held out"
+        if known["quantile_99"] > tolerance_mm:
+            return REJECT, "more than 1 % of the errors held out are beyond the tolerance"
+        if known["n"] < _FEWEST:
+            few = f"{known['n']:.0f} errors are held out, too few to tell of 1 % of them"
+            return UNDECIDED, few
+        return ACCEPT, "99 % of the errors held out are within the tolerance"
+
+
+def _against(campaigns: Sought) -> list[str]:
+    found = campaigns.assessed
+    said = [] if found is None or found.said is None else [found.said]
+    return words.against(said, found.state) if found is not None else []
+
+
+def data_sets(folders: Iterable[Path]) -> list[Path]:
+    """Results folders of data sets among the ``folders`` and in them, in the order of their names.
+
+    Campaigns and the tournament are none. Raises InputError for each folder that holds nothing.
+    """
+    found: dict[Path, None] = {}
+    problems = []
+    for folder in folders:
+        if not folder.is_dir():
+            what = "is no folder" if folder.exists() else "no such folder"
+            fix = "name the folder of all results, or of one data set"
+            problems.append(Problem(str(folder), what, fix=fix))
+            continue
+        inside = [folder] if any(folder.glob("*.parquet")) else sorted(map(Path, folder.iterdir()))
+        own = [each for each in inside if _may_be_one(each)]
+        found |= dict.fromkeys(own)
+        if not own:
+            fix = "calibrate one: kinacc calibrate FILE.yaml"
+            problems.append(Problem(str(folder), "holds no results", "results of data sets", fix))
+    if problems:
+        raise InputError(problems)
+    return list(found)
+
+
+def _may_be_one(folder: Path) -> bool:
+    hidden = folder.name.startswith(".") or folder.name == TOURNAMENT
+    return folder.is_dir() and not hidden and not (folder / journal.PLAN).is_file()
+
+
+def standings(folders: Sequence[Path]) -> list[Standing]:
+    """What is known of every data set's results, or what is wrong with them."""
+    campaigns = journal.of_each(folders)
+    found = []
+    for folder in folders:
+        try:
+            found.append(_standing(folder, campaigns[folder]))
+        except InputError as error:
+            found.append(Standing(folder, problem=error.problems[0]))
+    return found
+
+
+def _standing(folder: Path, campaigns: Sequence[Path]) -> Standing:
+    path = folder / "summary.parquet"
+    if not path.is_file():
+        fix = "kinacc calibrate FILE.yaml, with the file of this data set, makes one"
+        raise InputError(Problem(str(folder), "holds no summary.parquet", fix=fix))
+    robot, model, held_out = _told(path)
+    if not made_of_these(folder, _SUMMARY, store.read_metadata(path)):
+        what = "was made from other tables than those now beside it"
+        raise InputError(Problem(str(path), what, fix=store.remake(path)))
+    tables = results.read_tables(folder, "robot") if campaigns else {}
+    sought = of_calibration.sought(folder.resolve().name, tables, campaigns)
+    written = datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
+    return Standing(folder, robot, model, held_out, sought, written)
+
+
+def _told(path: Path) -> tuple[str, str, dict[str, float]]:
+    """Of a summary the robot, the model selected, and its errors held out."""
+    try:
+        facts = facts_in(store.read(path))
+        (robot,) = [str(each.text) for each in facts if each[:3:2] == ("robot", "name")]
+        chosen = of(facts, "selection").items()
+        (model,) = [item for item, known in chosen if known["selected"].value]
+        held_out = of(facts, "held_out_error").get(model, {})
+        return robot, model, {name: float(each.value) for name, each in held_out.items()}
+    except (LookupError, TypeError, ValueError):
+        what = "does not say which robot it is about, or which model is selected"
+        raise InputError(Problem(str(path), what, fix=store.remake(path))) from None

@@ -1,0 +1,137 @@
+"""A stage as the workflow starts it: by a command that any folder and Python can carry out."""
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from snakemake.utils import format as in_shell
+
+from kinacc.artifacts.provenance import PACKAGE
+from kinacc.workflow.catalogue import STAGES, TOURNAMENT
+from kinacc.workflow.plan import planned
+from kinacc.workflow.stage import COMMAND, from_words
+
+WORKFLOW = Path(__file__).parents[2] / "workflow"
+MEASURED = """\
+datasets:
+  own:
+    robot: {folder}/my {{robot}}.yaml
+    measurements:
+      source: file
+      file: {{path: {folder}/$HOME poses.csv, columns: {{q1: "1", q2: "J2 [deg]"}}}}
+    calibration: {{compliance: {{joints: [2, 3]}}}}
+    study: {{chunks: 3}}
+"""
+
+
+@pytest.fixture(params=["the paper's arm", "a measured one"])
+def plan(request, tmp_path):
+    """A plan of one data set; names of its files would mean something to a shell."""
+    if request.param == "the paper's arm":
+        return planned([WORKFLOW.parent / "config.yaml"])
+    (tmp_path / "my {robot}.yaml").write_bytes(
+        (PACKAGE / "kinematics" / "robots" / "mh180.yaml").read_bytes()
+    )
+    (tmp_path / "$HOME poses.csv").write_text("")
+    config = tmp_path / "own.yaml"
+    config.write_text(MEASURED.format(folder=tmp_path))
+    return planned([config])
+
+
+def files(given) -> list[str]:
+    return [path for each in given for path in ([each] if isinstance(each, str) else each)]
+
+
+def command(plan, name, dataset, part, gates=()) -> list[str]:
+    """What the shell makes of the rule's command, without what comes before its options."""
+
+    class params:
+        job = plan.job_text(name, dataset, part)
+
+    text = in_shell(
+        COMMAND,
+        params=params,
+        input=[*gates, *files(plan.inputs(name, dataset).values())],
+        output=list(plan.outputs(name, dataset, part).values()),
+        log=[plan.log(name, dataset, part)],
+    )
+    done = subprocess.run(
+        ["bash", "-c", text.replace('exec "$KINACC_PYTHON" -P', "exec printf '%s\\0'")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    words = done.stdout.split("\0")
+    return words[words.index("--job") : -1]
+
+
+def test_every_stage_gets_by_its_command_what_was_planned(plan, monkeypatch):
+    monkeypatch.setenv("KINACC_PYTHON", sys.executable)
+    (dataset,) = plan.datasets
+    for name in {**plan.stages(dataset), **plan.stages(TOURNAMENT)}:
+        whose = TOURNAMENT if STAGES[name].joint else dataset
+        part = plan.part_names(name, whose)[-1]
+        wanted = replace(plan.job(name, whose, part), code=plan.code(name, whose))
+        assert from_words(command(plan, name, whose, part, ["a gate"])) == wanted, name
+
+
+def test_another_python_than_the_one_that_planned_says_itself_what_it_runs(plan, monkeypatch):
+    monkeypatch.setenv("KINACC_PYTHON", "python")
+    (dataset,) = plan.datasets
+    assert from_words(command(plan, "fig1", dataset, None)).code == ""
+
+
+def test_the_package_that_planned_is_the_one_that_runs_and_nothing_of_the_folder(tmp_path):
+    package = tmp_path / "their code" / "kinacc" / "workflow"
+    package.mkdir(parents=True)
+    for folder in (package.parent, package):
+        (folder / "__init__.py").write_text("")
+    (package / "stage.py").write_text("def main(words): import json; print(json.dumps(words))")
+    (tmp_path / "json.py").write_text("raise SystemExit('not this one')")
+    script = WORKFLOW / "scripts" / "stage.py"
+    done = subprocess.run(
+        [sys.executable, "-P", script, tmp_path / "their code", "--job", "x"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ('["--job", "x"]\n', "")
+
+
+STOPPED = """\
+import sys, time
+from kinacc.artifacts.atomic import replacing
+from kinacc.workflow import stage
+
+def half_written(words):
+    with replacing(["table"]) as (part,):
+        part.write_text("half")
+        print("begun", flush=True)
+        time.sleep(60)
+
+stage.from_words, stage.execute = half_written, print
+stage.main([])
+"""
+
+
+@pytest.mark.parametrize("by", [signal.SIGTERM, signal.SIGINT], ids=["SIGTERM", "Ctrl-C"])
+def test_a_stage_that_is_told_to_stop_leaves_nothing_half_written(tmp_path, by):
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
+    started = subprocess.Popen(
+        ["bash", "-c", f"exec {shlex.quote(sys.executable)} -c {shlex.quote(STOPPED)}"],
+        cwd=tmp_path,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert started.stdout.readline() == "begun\n"
+    started.send_signal(by)
+    said = started.communicate(timeout=30)[1]
+    assert (started.returncode, said, list(tmp_path.iterdir())) == (-by, "", [])
