@@ -37,7 +37,7 @@ from typing import Literal
 ROOT = Path(__file__).resolve().parents[1]
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
 SAMPLE_S = 0.02  # a sample repeats its run until it takes about this long
-ROUNDS = (5, 25)  # fewest and most
+ROUNDS = (3, 25)  # fewest and most
 TODAY = "today"
 LIMIT = "limit"
 
@@ -246,25 +246,28 @@ def _in_turns(
 ) -> tuple[list[list[Sample]], list[tuple[int, int]]]:
     """Samples of all rounds by side, and runs in each and before them."""
     work.agree([side.output() for side in sides])
-    times, lasted, warm_up = zip(*map(_enough, sides), strict=True)
+    tried = [_enough(side) for side in sides]
+    # Where a single run is enough for all, trying was the first round.
+    counts = all(times == done == 1 for times, done, _ in tried)
+    samples = [[last] if counts else [] for _, _, last in tried]
     fewest, most = ROUNDS
-    samples: list[list[Sample]] = [[] for _ in sides]
-    for number in range(min(most, max(fewest, round(work.seconds / sum(lasted))))):
+    rounds = round(work.seconds / sum(times * last.wall_ns / 1e9 for times, _, last in tried))
+    for number in range(counts, min(most, max(fewest, rounds))):
         for place in range(len(sides)):
             turn = (place + number) % len(sides)
-            samples[turn].append(sides[turn].sample(times[turn]))
-    return samples, list(zip(times, warm_up, strict=True))
+            samples[turn].append(sides[turn].sample(tried[turn][0]))
+    return samples, [(times, 1 if counts else 1 + done) for times, done, _ in tried]
 
 
-def _enough(side: _Here | Elsewhere) -> tuple[int, float, int]:
-    """How many runs make a sample, how many seconds it takes, and how often it has run by now."""
-    times = done = 1
+def _enough(side: _Here | Elsewhere) -> tuple[int, int, Sample]:
+    """How many runs make a sample, how many have been tried, and what one of the last took."""
+    times, done = 1, 0
     while True:
-        lasted = times * side.sample(times).wall_ns / 1e9
+        sample = side.sample(times)
         done += times
-        if lasted > SAMPLE_S / 4:
-            enough = max(1, round(SAMPLE_S * times / lasted))
-            return enough, enough * lasted / times, done
+        lasted_s = times * sample.wall_ns / 1e9
+        if lasted_s > SAMPLE_S / 4:
+            return max(1, round(SAMPLE_S * times / lasted_s)), done, sample
         times *= 4
 
 

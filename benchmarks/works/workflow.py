@@ -74,7 +74,7 @@ def works(smoke: bool) -> list[Work]:
     return [
         Work(
             name, "run", 1, (Contender("kinacc", kinacc.__version__), other), _agree,
-            {other.name: 1 / 7}, today=make, seconds=60.0,
+            {other.name: 1 / 7}, today=make, seconds=30.0,
             limit="a start of Snakemake, a start of Python with numpy for each job, their work",
         )
         for name, make in (("new file to Fig. 4", new_file), ("paper, snakemake -c2", paper))

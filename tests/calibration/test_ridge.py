@@ -36,6 +36,20 @@ def test_every_width_of_a_prior_is_fitted_as_if_alone(size):
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
 
 
+def test_a_matrix_that_rounding_left_with_negative_directions_has_steps():
+    """As few readings of an arm leave it, whose own numbers were eliminated before."""
+    rng = np.random.default_rng(1)
+    jacobian = rng.normal(size=(60, 4)) @ rng.normal(size=(4, 20))
+    both = np.column_stack([jacobian @ rng.normal(size=20), jacobian])
+    normal = both.T @ both
+    noise = rng.normal(size=(20, 20))
+    normal[1:, 1:] += 1e-11 * np.trace(normal) * (noise + noise.T)
+    assert np.linalg.eigvalsh(normal)[0] < 0.0
+    found = ridge.steps(normal, 60, 1e3 * STD)
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(jacobian @ found, -both[:, :1].repeat(3, 1), atol=1e-4)
+
+
 def test_directions_that_no_reading_shows_stay_where_they_are():
     rng = np.random.default_rng(0)
     jacobian = rng.normal(size=(60, 4)) @ rng.normal(size=(4, 20))

@@ -71,6 +71,9 @@ class _Reduced:
         reflectors = begun.reshape((size, size - 1), order="F")
         cost, slope = float(diagonal[0]), float(beside[0])
         least = max(_ROUNDING * float(diagonal[1:].sum()), np.finfo(float).tiny)
+        # What was taken off the matrix before it came here may have left more rounding than that.
+        while lapack.dpttrf(diagonal[1:] + least, beside[1:])[2] > 0:
+            least *= 10.0
         return cls(diagonal[1:], beside[1:], slope, cost, least, reflectors, scales)
 
     def at(self, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -65,14 +65,15 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Solution:
-    """Outcome of a fit of P parameters to ``count`` residuals; only converged fits are returned.
+    """Outcome of a fit of P parameters to ``count`` residuals.
 
     ``std`` (P,) and ``covariance`` (P, P) in the parameters' own units for residuals of
     ``variance``. The covariance is that of the determined directions; ``undetermined`` (m, P) are
     the others, unit displacements in units of ``scale`` that change no residual, and ``std`` is NaN
     where one of them reaches a parameter. ``cost`` is the sum of squared residuals,
     ``degrees_of_freedom`` their number less the (effective) number of fitted parameters,
-    ``last_step`` the largest last change in units of ``scale``. ``spectrum`` is None where a prior
+    ``last_step`` the largest last change in units of ``scale``; ``converged`` where it is not above
+    STEP_TOLERANCE, else the objective stood still before. ``spectrum`` is None where a prior
     made it needless; see ``spectrum``. ``scale`` (P,) are the units of ``undetermined``.
     """
 
