@@ -14,7 +14,7 @@ from kinacc.errors import FitError
 MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slowly
 PATIENCE = 40  # steps after which standing still counts as arrived
 MAX_VARIANCE_STEPS = 20
-VARIANCE_TOLERANCE = 1e-7  # a prior that is weighed otherwise pulls weak directions elsewhere
+VARIANCE_TOLERANCE = 1e-9  # a prior that is weighed otherwise pulls weak directions elsewhere
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
 CLOSE = 1e-3  # mm and mrad from the end: a Gram matrix from there has the same inverse
 MEMORY = 20  # steps that the inverse has learned from
@@ -47,21 +47,22 @@ def minimise_with_prior(
     x = np.array(start, dtype=float)
     weight_sq = (scale / prior_std) ** 2
     prior = _Prior(prior_mean, weight_sq, scale)
-    iterations, balance = 0, None
+    iterations, variance = 0, None
     while iterations < MAX_ITERATIONS:
         normal = _normal_equations(system, x, scale)
-        balance = _balanced(normal, weight_sq, prior.displacement(x), balance, name)
+        balance = _balanced(normal, weight_sq, prior.displacement(x), variance, name)
         here = _Point(x, normal.gradient, normal.cost)
         end = _descended(system, here, normal.count, balance, prior, iterations, name)
         iterations += end.steps
         moved = np.max(np.abs(end.at.x - x) / scale, initial=0.0)
-        x, last = end.at.x, end.wanted
+        x, last, variance = end.at.x, end.wanted, end.variance
         if end.stands or (moved <= CLOSE and last <= solve.STEP_TOLERANCE):
             break
     else:
         solve.require_converged(name, iterations, last, end.at.cost, normal.count)
-    cost, freedom = end.at.cost, normal.count - balance.effective
-    covariance = balance.variance * balance.inverse * np.outer(scale, scale)
+    held = _held(normal, end.variance, weight_sq, name)
+    cost, freedom = end.at.cost, normal.count - held.effective
+    covariance = end.variance * held.inverse * np.outer(scale, scale)
     return Solution(
         x=x,
         std=np.sqrt(np.diag(covariance)),
@@ -69,7 +70,7 @@ def minimise_with_prior(
         cost=cost,
         count=normal.count,
         degrees_of_freedom=freedom,
-        variance=max(cost / max(freedom, 1.0), LEAST_VARIANCE),
+        variance=end.variance,
         iterations=iterations,
         last_step=last,
         converged=last <= solve.STEP_TOLERANCE,
@@ -91,12 +92,16 @@ class _Prior(NamedTuple):
 
 
 class _End(NamedTuple):
-    """Where steps have led, how many, the size of the one still wanted, and whether they stood."""
+    """Where steps have led, how many, the size of the one still wanted, and whether they stood.
+
+    ``variance``: that of the residuals there.
+    """
 
     at: _Point
     steps: int
     wanted: float
     stands: bool
+    variance: float
 
 
 class _Point(NamedTuple):
@@ -135,7 +140,7 @@ def _descended(
         before = here.cost + variance * prior.cost(here.x)
         x, after, _ = solve.advance(objective, here.x, scale * step, before, scale, name)
         if x is here.x:
-            return _End(here, taken, wanted, True)
+            return _End(here, taken, wanted, True, variance)
         moves.append(((x - here.x) / scale, latest.gradient - here.gradient))
         if after > before:
             moves.clear()  # rounding has been learned from
@@ -146,9 +151,9 @@ def _descended(
         least = max(NO_CHANGE * variance, solve.STANDSTILL * before)
         stands = begun + taken >= PATIENCE and abs(before - after) <= least
         # A step longer than the first speaks of another Gram matrix than the one frozen.
-        if wanted <= solve.STEP_TOLERANCE or stands or wanted >= first:
+        if wanted <= solve.STEP_TOLERANCE or stands or wanted >= max(first, CLOSE):
             break
-    return _End(here, taken, wanted, stands)
+    return _End(here, taken, wanted, stands, variance)
 
 
 def _learned_step(
@@ -197,25 +202,36 @@ def _balanced(
     normal: _Normal,
     weight_sq: np.ndarray,
     displacement: np.ndarray,
-    before: _Balance | None,
+    variance: float | None,
     name: str,
 ) -> _Balance:
     # From below: started at the variance of the whole misfit, a tight prior could pass for truth
     # and everything it forbids for noise.
-    least = FIRST_VARIANCE * normal.cost / normal.count
-    variance = max(least, LEAST_VARIANCE) if before is None else before.variance
+    if variance is None:
+        variance = max(FIRST_VARIANCE * normal.cost / normal.count, LEAST_VARIANCE)
     for _ in range(MAX_VARIANCE_STEPS):
-        gram = normal.gram.copy()
-        gram[np.diag_indices_from(gram)] += variance * weight_sq
-        inverse = _inverse(gram, name)
+        inverse, effective = _held(normal, variance, weight_sq, name)
         step = -inverse @ (normal.gradient + variance * weight_sq * displacement)
         cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
-        effective = len(step) - variance * float(weight_sq @ np.diag(inverse))
         found = max(cost / max(normal.count - effective, 1.0), LEAST_VARIANCE)
         if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
             break
         variance = found
     return _Balance(step, variance, inverse, effective)
+
+
+class _HeldGram(NamedTuple):
+    """Inverse (P, P) of J'J plus the prior's part, and how many parameters the data decide."""
+
+    inverse: np.ndarray
+    effective: float
+
+
+def _held(normal: _Normal, variance: float, weight_sq: np.ndarray, name: str) -> _HeldGram:
+    gram = normal.gram.copy()
+    gram[np.diag_indices_from(gram)] += variance * weight_sq
+    inverse = _inverse(gram, name)
+    return _HeldGram(inverse, len(gram) - variance * float(weight_sq @ np.diag(inverse)))
 
 
 def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
