@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dpotrf, dtrtri
 
 from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, System
@@ -62,7 +62,7 @@ def minimise_with_prior(
         solve.require_converged(name, iterations, last, end.at.cost, normal.count)
     held = _held(normal, end.variance, weight_sq, name)
     cost, freedom = end.at.cost, normal.count - held.effective
-    covariance = end.variance * held.inverse * np.outer(scale, scale)
+    covariance = end.variance * (held.half.T @ held.half) * np.outer(scale, scale)
     return Solution(
         x=x,
         std=np.sqrt(np.diag(covariance)),
@@ -146,7 +146,7 @@ def _descended(
             moves.clear()  # rounding has been learned from
         here = latest
         variance = max(here.cost / max(count - balance.effective, 1.0), LEAST_VARIANCE)
-        step = _learned_step(here, balance.inverse, variance, prior, moves[-MEMORY:])
+        step = _learned_step(here, balance.half, variance, prior, moves[-MEMORY:])
         wanted = float(np.max(np.abs(step), initial=0.0))
         least = max(NO_CHANGE * variance, solve.STANDSTILL * before)
         stands = begun + taken >= PATIENCE and abs(before - after) <= least
@@ -158,12 +158,12 @@ def _descended(
 
 def _learned_step(
     here: _Point,
-    inverse: np.ndarray,
+    half: np.ndarray,
     variance: float,
     prior: _Prior,
     moves: list[tuple[np.ndarray, np.ndarray]],
 ) -> np.ndarray:
-    """The L-BFGS step, which begins with ``inverse`` (P, P) of the Hessian."""
+    """The L-BFGS step, which begins with ``half`` of the inverse Hessian."""
     rest = here.gradient + variance * prior.weight_sq * prior.displacement(here.x)
     pairs = [(step, change + variance * prior.weight_sq * step) for step, change in moves]
     pairs = [(step, change, step @ change) for step, change in pairs if step @ change > 0.0]
@@ -171,7 +171,7 @@ def _learned_step(
     for step, change, product in reversed(pairs):
         shares.append(step @ rest / product)
         rest = rest - shares[-1] * change
-    found = inverse @ rest
+    found = half.T @ (half @ rest)
     for (step, change, product), share in zip(pairs, reversed(shares), strict=True):
         found = found + (share - change @ found / product) * step
     return -found
@@ -189,12 +189,12 @@ class _Normal(NamedTuple):
 class _Balance(NamedTuple):
     """Step and residual variance that agree on the linearised residuals.
 
-    ``inverse`` (P, P) of J'J plus the prior's part, all scaled; ``effective`` parameters fitted.
+    ``half`` (P, P) and ``effective`` are those of ``_HeldGram``.
     """
 
     step: np.ndarray
     variance: float
-    inverse: np.ndarray
+    half: np.ndarray
     effective: float
 
 
@@ -210,44 +210,40 @@ def _balanced(
     if variance is None:
         variance = max(FIRST_VARIANCE * normal.cost / normal.count, LEAST_VARIANCE)
     for _ in range(MAX_VARIANCE_STEPS):
-        inverse, effective = _held(normal, variance, weight_sq, name)
-        step = -inverse @ (normal.gradient + variance * weight_sq * displacement)
+        half, effective = _held(normal, variance, weight_sq, name)
+        step = -half.T @ (half @ (normal.gradient + variance * weight_sq * displacement))
         cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
         found = max(cost / max(normal.count - effective, 1.0), LEAST_VARIANCE)
         if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
             break
         variance = found
-    return _Balance(step, variance, inverse, effective)
+    return _Balance(step, variance, half, effective)
 
 
 class _HeldGram(NamedTuple):
-    """Inverse (P, P) of J'J plus the prior's part, and how many parameters the data decide."""
+    """Triangular ``half`` (P, P): half' half inverts J'J plus the prior's part.
 
-    inverse: np.ndarray
+    ``effective``: how many parameters the data decide.
+    """
+
+    half: np.ndarray
     effective: float
 
 
 def _held(normal: _Normal, variance: float, weight_sq: np.ndarray, name: str) -> _HeldGram:
     gram = normal.gram.copy()
     gram[np.diag_indices_from(gram)] += variance * weight_sq
-    inverse = _inverse(gram, name)
-    return _HeldGram(inverse, len(gram) - variance * float(weight_sq @ np.diag(inverse)))
+    factor, failed = dpotrf(gram, lower=1)
+    if failed:
+        raise FitError(
+            f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
+            "give every undetermined direction a prior"
+        )
+    half, _ = dtrtri(factor, lower=1, overwrite_c=1)
+    return _HeldGram(half, len(gram) - variance * float(weight_sq @ np.sum(half**2, axis=0)))
 
 
 def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
     full, count = solve.gram(system, x), system.count
     gram, gradient = full[:-1, :-1] * np.outer(scale, scale), full[:-1, -1] * scale
     return _Normal(gram, gradient, float(full[-1, -1]), count)
-
-
-def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
-    try:
-        factor = np.linalg.cholesky(gram)
-    except np.linalg.LinAlgError:
-        raise FitError(
-            f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
-            "give every undetermined direction a prior"
-        ) from None
-    half, _ = dpotri(factor.T)
-    half = np.triu(half)
-    return half + np.triu(half, 1).T

@@ -22,7 +22,6 @@ from kinacc.kinematics.model import JointState
 
 BLOCK_ROWS = 1024
 WRITTEN_OUT = 350  # parameters up to which the written-out Jacobian is the shorter way to J'J
-_IN_CACHE = 192  # observations whose written-out Jacobian stays in the cache
 _NEAR = 0.5  # cosine of the angle below which a rotation vector follows from the skew part alone
 _SMALL_ANGLE_RAD = 1e-3
 
@@ -187,11 +186,8 @@ class PoseSystem:
             columns, groups = self._columns(x, part), self._groups(part)
             if self.size > WRITTEN_OUT:
                 total += gram(np.ascontiguousarray(columns.transpose(2, 1, 0)), groups)
-                continue
-            for begin in range(0, len(part.turned), _IN_CACHE):
-                some = slice(begin, begin + _IN_CACHE)
-                rows = spread_rows(columns[..., some], [group.rows(some) for group in groups])
-                rows = rows.reshape(len(rows), -1)
+            else:
+                rows = spread_rows(columns, groups).reshape(len(total), -1)
                 total += rows @ rows.T
         return total
 
