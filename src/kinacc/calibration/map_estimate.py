@@ -15,6 +15,7 @@ MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slow
 PATIENCE = 40  # steps after which standing still counts as arrived
 MAX_VARIANCE_STEPS = 20
 VARIANCE_TOLERANCE = 1e-9  # a prior that is weighed otherwise pulls weak directions elsewhere
+FIRST_TOLERANCE = 1e-3  # of the first step, which leads elsewhere
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
 CLOSE = 1e-3  # mm and mrad from the end: a Gram matrix from there has the same inverse
 MEMORY = 20  # steps that the inverse has learned from
@@ -207,14 +208,16 @@ def _balanced(
 ) -> _Balance:
     # From below: started at the variance of the whole misfit, a tight prior could pass for truth
     # and everything it forbids for noise.
+    tolerance = VARIANCE_TOLERANCE
     if variance is None:
+        tolerance = FIRST_TOLERANCE
         variance = max(FIRST_VARIANCE * normal.cost / normal.count, LEAST_VARIANCE)
     for _ in range(MAX_VARIANCE_STEPS):
         half, effective = _held(normal, variance, weight_sq, name)
         step = -half.T @ (half @ (normal.gradient + variance * weight_sq * displacement))
         cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
         found = max(cost / max(normal.count - effective, 1.0), LEAST_VARIANCE)
-        if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
+        if abs(found - variance) <= tolerance * variance:
             break
         variance = found
     return _Balance(step, variance, half, effective)
