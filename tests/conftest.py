@@ -18,6 +18,7 @@ sys.path.append(str(TESTS.parent / "benchmarks"))
 # take longest: `make test` hands them out first, so that no worker is left alone with one.
 SLOW = (
     "integration/test_installed.py",
+    "slurm/test_on_slurm.py",
     "integration/test_changed_artefacts.py",
     "integration/test_shared_cache.py",
     "integration/test_same_bytes.py",
@@ -116,13 +117,17 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Say how many tests were skipped because measured data or a browser is absent."""
+    """Say how many tests were skipped because measured data, a browser or Slurm is absent."""
     import shared_data
 
     reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())]
     absent = sum(shared_data.ABSENT in reason for reason in reasons)
     if absent:
         line = f"{absent} skipped: the measured data sets are expected in {shared_data.FOLDER}"
+        terminalreporter.write_line(line, yellow=True)
+    alone = sum("Slurm absent" in reason for reason in reasons)
+    if alone:
+        line = f"{alone} skipped: runs on a cluster need Debian's slurm-wlm, root and .venv/cluster"
         terminalreporter.write_line(line, yellow=True)
     unseen = sum("Chromium absent" in reason for reason in reasons)
     if unseen:

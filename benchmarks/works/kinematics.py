@@ -1,4 +1,10 @@
-"""Kinematics of many poses beside pinocchio, OPW kinematics, robotics-toolbox and C.
+"""Kinematics of many poses beside pinocchio, C, py-opw-kinematics and robotics-toolbox.
+
+The inverse gives all postures of a *calibrated* arm, each verified to 1e-9 mm; py-opw-kinematics
+gives those of the nominal arm, which has a closed form (``reach`` all of a pose, ``batch_inverse``
+one a pose), robotics-toolbox's ``ik_LM`` one posture of the calibrated arm. Poses at which the
+Jacobian of a posture has a condition above ``WORST_CONDITION`` (a radian as a metre) are left out
+on all sides. Arms without a closed form are searched by a table of postures and are not measured.
 
 Limits. *Memory*: a pose of six joints is read as 48 bytes and written as 96; its Jacobian in the
 joints has 288 bytes, in the parameters 1,440. At 10 GB/s these take 10, 29 and 144 ns.
@@ -8,6 +14,8 @@ and 51 sums and products of the frame: 600 a pose. Four at once (AVX2) with two 
 of its plain code. The C kernel fuses. *Gram matrix* of the Jacobian in 30 parameters: 12 columns
 have no rotation, so 3 x 465 + 3 x 171 = 1,908 products and sums, 80 ns four at once: three times
 the rate of 60 % of the write bandwidth (57 ns a pose at 14 GB/s) is beyond one core with AVX2.
+*Inverse*: from 1 mm off three Newton steps: four poses, three Jacobians and normal equations of
+about 430 products and sums; 4,800 operations, 200 ns, and some 20 divisions and roots a step.
 """
 
 from __future__ import annotations
@@ -30,7 +38,9 @@ C_KERNEL = r"""
 #include <stddef.h>
 typedef double v __attribute__((vector_size(64)));
 typedef long long w __attribute__((vector_size(64)));
-static inline v either(w which, v one, v other) { return (v)(((w)one & which) | ((w)other & ~which)); }
+static inline v either(w which, v one, v other) {
+    return (v)(((w)one & which) | ((w)other & ~which));
+}
 static inline void sincos8(v x, v *s, v *c) {
     v shifted = x * 0.6366197723675814 + 0x1.8p52, k = shifted - 0x1.8p52;
     w number = (w)shifted;
@@ -47,7 +57,8 @@ static inline void sincos8(v x, v *s, v *c) {
     *s = (v)((w)either(swapped, even, odd) ^ ((number & 2) << 62));
     *c = (v)((w)either(swapped, odd, even) ^ (((number + 1) & 2) << 62));
 }
-void forward(ptrdiff_t n, ptrdiff_t k, const double *rows, const double *q, double *turn, double *at) {
+void forward(
+    ptrdiff_t n, ptrdiff_t k, const double *rows, const double *q, double *turn, double *at) {
     for (ptrdiff_t begin = 0; begin < n; begin += 8) {
         ptrdiff_t many = n - begin < 8 ? n - begin : 8;
         v f[4][3] = {0};
@@ -68,13 +79,15 @@ void forward(ptrdiff_t n, ptrdiff_t k, const double *rows, const double *q, doub
         }
         for (ptrdiff_t i = 0; i < many; i++)
             for (int r = 0; r < 3; r++) {
-                for (int col = 0; col < 3; col++) turn[9 * (begin + i) + 3 * r + col] = f[col][r][i];
+                for (int c = 0; c < 3; c++) turn[9 * (begin + i) + 3 * r + c] = f[c][r][i];
                 at[3 * (begin + i) + r] = f[3][r][i];
             }
     }
 }
 """
 POSES = 200_000
+GOALS, FEW_GOALS = 20_000, 60
+WORST_CONDITION = 100.0
 
 
 def works(smoke: bool) -> list[Work]:
@@ -108,6 +121,28 @@ def works(smoke: bool) -> list[Work]:
             "forward kinematics and parameter Jacobian", "pose", count // 2, (kinacc,), _agree,
             {"limit": 0.6, "today": 1.0},
             1536 * each_ns, "1,536 bytes a pose at the write bandwidth", _parameter_jacobian,
+        ),
+        *_inverse_works(smoke, kinacc),
+    ]  # fmt: skip
+
+
+def _inverse_works(smoke: bool, kinacc: Contender) -> list[Work]:
+    goal, found = goals(smoke)
+    few = 2 if smoke else FEW_GOALS
+    return [
+        Work(
+            "inverse, all branches", "solution", int(found.sum()), (kinacc, *_opw(goal, found)),
+            _verified(goal, found), {"py-opw-kinematics, batch_inverse": 2.0, "today": 1.0},
+            200.0, "4,800 operations a solution", _inverse,
+        ),
+        Work(
+            "inverse, all branches, few poses", "solution", int(found[:few].sum()),
+            (
+                Contender("kinacc", kinacc.version, _inverse(smoke, slice(few))),
+                *_toolbox(goal, found, few),
+            ),
+            _verified(goal, found, few), {"robotics-toolbox, ik_LM": 10.0},
+            200.0, "4,800 operations a solution",
         ),
     ]  # fmt: skip
 
@@ -270,3 +305,110 @@ def _in_c(smoke: bool) -> tuple[Contender, ...]:
         return turn, at
 
     return (Contender("C", told.stdout.strip(), run),)
+
+
+@functools.cache
+def goals(smoke: bool):
+    """Rotations and positions to reach, and which branches (n, 8) the nominal arm has there."""
+    from kinacc.kinematics import dh, inverse, robot
+    from kinacc.kinematics.inverse import closed_form
+
+    model, q_rad = problem(smoke)
+    pose = dh.forward(model, q_rad[: 50 if smoke else GOALS])
+    arm = robot.load("mh180")
+    form = inverse.closed_form_of(arm)
+    start, found = form.solve(form.arm, pose, inverse.branches_of(arm), closed_form.Start())
+    slopes = dh.joint_jacobian(model, np.nan_to_num(start).reshape(-1, 6))
+    slopes[:, 3:] *= 1000.0
+    condition = np.linalg.cond(slopes).reshape(found.shape)
+    keep = np.where(found, condition, 0.0).max(axis=1) < WORST_CONDITION
+    return (pose.rotation[keep], pose.position_mm[keep]), found[keep]
+
+
+def _inverse(smoke: bool, part: slice = slice(None)) -> Callable[[], object]:
+    from kinacc.geometry import Pose
+    from kinacc.kinematics import inverse, robot
+
+    arm, (model, _) = robot.load("mh180"), problem(smoke)
+    goal = Pose(*(each[part] for each in goals(smoke)[0]))
+    return _compiled(lambda: (inverse.solve(arm, model, goal).q_rad,), smoke)
+
+
+def _verified(goal, found: np.ndarray, few: int | None = None) -> Callable:
+    def agree(outputs: Sequence[object]) -> None:
+        """kinacc's joints lead back to the poses, all of them; others say where theirs lead."""
+        from kinacc.kinematics import dh
+
+        model, _ = problem(True)
+        turn, at = (each[:few] for each in goal)
+        for number, output in enumerate(outputs):
+            if len(output) == 1:  # joints of a kinacc
+                [q_rad] = output
+                row, branch = np.nonzero(np.isfinite(q_rad).all(axis=2))
+                assert len(row) == found[:few].sum()
+                back = dh.forward(model, q_rad[row, branch])
+                worst_mm = 1e-6 if number else 1e-9  # today's
+                np.testing.assert_allclose(back.position_mm, at[row], rtol=0, atol=worst_mm)
+                np.testing.assert_allclose(back.rotation, turn[row], rtol=0, atol=1e-8)
+            else:
+                row, _, back_mm = output
+                assert len(row) == found[:few].sum()
+                np.testing.assert_allclose(back_mm(), at[row], rtol=0, atol=1e-4)
+
+    return agree
+
+
+def _opw(goal, found: np.ndarray) -> tuple[Contender, ...]:
+    try:
+        import py_opw_kinematics as opw
+        from scipy.spatial.transform import RigidTransform
+    except ImportError:
+        return ()
+    arm = opw.Robot(  # the table of the MH180 in metres; base and flange have the same frames
+        opw.KinematicModel(a1=0.325, a2=-0.3, b=0.0, c1=0.0, c2=1.15, c3=1.225, c4=0.225),
+        degrees=False,
+    )
+    matrices = np.tile(np.eye(4), (len(found), 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = goal[0], goal[1] / 1000.0
+    pose, row = RigidTransform.from_matrix(matrices), np.nonzero(found)[0]
+    each = RigidTransform.from_matrix(matrices[row])
+
+    def back_mm(q_rad: np.ndarray) -> np.ndarray:
+        return arm.batch_forward(q_rad).as_matrix()[:, :3, 3] * 1000.0
+
+    def all_of_a_pose() -> object:
+        q_rad = arm.reach(pose).joints
+        at = np.nonzero(np.isfinite(q_rad).all(axis=2))
+        return at[0], q_rad, lambda: back_mm(np.ascontiguousarray(q_rad[at]))
+
+    def one_of_a_pose() -> object:
+        q_rad = arm.batch_inverse(each)
+        return row, q_rad, lambda: back_mm(q_rad)
+
+    version = _version("py-opw-kinematics")
+    return (
+        Contender("py-opw-kinematics, batch_inverse", version, one_of_a_pose),
+        Contender("py-opw-kinematics, reach", version, all_of_a_pose),
+    )
+
+
+def _toolbox(goal, found: np.ndarray, few: int) -> tuple[Contender, ...]:
+    try:
+        import roboticstoolbox as toolbox
+    except ImportError:
+        return ()
+    model, _ = problem(True)
+    make, arm = toolbox.ET, toolbox.ETS()
+    for i in range(6):  # a list of turns and shifts: not for *=
+        arm = arm * make.Rz() * make.Rz(model.theta_offset_rad[i]) * make.tz(model.d_mm[i] / 1e3)
+        arm = arm * make.tx(model.a_mm[i] / 1e3) * make.Rx(model.alpha_rad[i])
+        arm = arm * make.Ry(model.beta_rad[i])
+    row = np.nonzero(found[:few])[0]
+    matrices = np.tile(np.eye(4), (len(row), 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = goal[0][row], goal[1][row] / 1000.0
+
+    def run() -> object:
+        q_rad = [arm.ik_LM(matrix, tol=1e-16).q for matrix in matrices]  # 1e-8 m
+        return row, q_rad, lambda: np.array([np.asarray(arm.fkine(q))[:3, 3] for q in q_rad]) * 1e3
+
+    return (Contender("robotics-toolbox, ik_LM", _version("roboticstoolbox-python"), run),)

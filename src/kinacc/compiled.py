@@ -9,11 +9,29 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from numba import njit
+from numba.np import linalg as _linear_algebra
 
 _told = False
+
+
+def _set_up_without_scipy() -> None:
+    """Have numba load its functions of arrays without scipy, half of what they take to load.
+
+    It loads scipy.linalg to see whether there is a BLAS. There is, as kinacc needs scipy; a kernel
+    that calls it has it loaded when it is compiled.
+    """
+    look = _linear_algebra.ensure_blas
+    _linear_algebra.ensure_blas = lambda: None
+    try:
+        import numba.np.arraymath  # noqa: F401
+    finally:
+        _linear_algebra.ensure_blas = look
+
+
+_set_up_without_scipy()
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -21,9 +39,18 @@ def compiled(function: Callable[..., Any]) -> Any:
 
     It must not call helpers of another file: numba would not see them change.
     """
+    return _compiled(function, "python")
+
+
+def compiled_without_checks(function: Callable[..., Any]) -> Any:
+    """As ``compiled``, but a division by zero gives what IEEE 754 says, as in numpy."""
+    return _compiled(function, "numpy")
+
+
+def _compiled(function: Callable[..., Any], error_model: Literal["python", "numpy"]) -> Any:
     global _told
     try:
-        return njit(cache=True, nogil=True)(function)
+        return njit(cache=True, nogil=True, error_model=error_model)(function)
     except RuntimeError:  # no folder to keep it in
         if not _told:
             _told = True
@@ -33,4 +60,4 @@ def compiled(function: Callable[..., Any]) -> Any:
                 "another folder.",
                 file=sys.stderr,
             )
-        return njit(nogil=True)(function)
+        return njit(nogil=True, error_model=error_model)(function)

@@ -135,3 +135,11 @@ def test_the_report_of_a_run_has_every_figure_and_table(project):
     page = (project.folder / "report.html").read_text(encoding="utf-8")
     for name in ("fig4.svg", "claims.parquet", "dh_model.parquet"):
         assert name in page
+
+
+def test_a_stage_has_its_short_name_among_many_data_sets_too(project):
+    many = "".join(f"  arm{number}: {{robot: mh180}}\n" for number in range(25))
+    (project.folder / "small.yaml").write_text(f"datasets:\n{many}")
+    text = project.snakemake("arm7_fig1", options=("--dry-run",))
+    assert "arm7: drawing Fig. 1" in text
+    assert "arm8: " not in text

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 from kinacc.geometry import Pose
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import dh, inverse, robot
 from kinacc.kinematics.chain import sincos
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.inverse import quick
 
 FUNCTIONS = {
     "forward": lambda model, q: tuple(dh.forward(model, q)),
@@ -86,17 +90,85 @@ def test_sines_are_right_to_the_last_place_and_a_right_angle_stays_one():
 
 
 def test_a_short_job_does_not_wait_for_the_compiler():
-    import subprocess
-    import sys
-
     lines = (
         "import sys, numpy as np",
         "from kinacc.kinematics import dh, robot",
         "arm = robot.load('mh180').dh",
         "[dh.forward(arm, np.zeros((3000, 6))) for _ in range(10)]",
         "print('numba' in sys.modules)",
-        "[dh.forward(arm, np.zeros((400_000, 6)))]",
+        "[dh.forward(arm, np.zeros((800_000, 6)))]",
         "print('numba' in sys.modules)",
     )
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
     assert done.stdout.split() == ["False", "True"], done.stderr
+
+
+def test_compiled_code_starts_without_loading_linear_algebra_it_does_not_call():
+    program = (
+        "import sys, numpy; from kinacc.assess import random_numbers, world\n"
+        "world.drawn_world(numpy.ones((2, 3)), 0.1, random_numbers.key_of(1), 3).complete()\n"
+        "from numba.np import arraymath\n"
+        "print('scipy.linalg' in sys.modules, arraymath._HAVE_BLAS)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["False", "True"]
+
+
+def test_the_inverse_of_a_calibrated_arm_is_the_same_compiled_and_meets_its_poses(monkeypatch):
+    arm = robot.load("mh180")
+    rng = np.random.default_rng(5)
+    errors = rng.normal(size=(6, 5)) * np.array([1e-3, 0.3, 0.3, 5e-4, 5e-4])
+    model = dh.with_vector(arm.dh, dh.to_vector(arm.dh) + errors.ravel())
+    share = rng.uniform(0.2, 0.8, (40, 6))
+    goal = dh.forward(model, arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad))
+    solutions = []
+    for worth in (10**12, 0):
+        monkeypatch.setattr(dh, "WORTH_NUMBA", worth)
+        solutions.append(inverse.solve(arm, model, goal))
+    assert same_bits(solutions[0][:2], solutions[1][:2])
+    pose, branch = np.nonzero(np.isfinite(solutions[1].q_rad).all(axis=2))
+    reached = dh.forward(model, solutions[1].q_rad[pose, branch])
+    apart = np.abs(reached.position_mm - goal.position_mm[pose]).max(axis=1)
+    assert len(pose) > 200
+    assert np.mean(apart < 1e-9) > 0.97  # beside singular postures 1e-6 mm is promised
+    assert (apart < 1e-6).all()
+
+
+def test_quick_steps_say_what_they_do_not_reach_in_the_same_bits(monkeypatch):
+    model = some_arm(6, seed=7)
+    model = DHModel(*(getattr(model, name) for name in dh.PARAMETERS))
+    rng = np.random.default_rng(8)
+    q = rng.uniform(-3.0, 3.0, (300, 6))
+    far = rng.normal(size=(300, 6)) * rng.choice([1e-9, 1e-3, 0.3, 2.0], (300, 1))
+    far[7] = np.nan
+    results = []
+    for worth in (10**12, 0):
+        monkeypatch.setattr(dh, "WORTH_NUMBA", worth)
+        results.append(quick.refine(model, dh.forward(model, q), q + np.nan_to_num(far)))
+        results.append(quick.refine(model, dh.forward(model, q), q + far))
+    assert same_bits(results[0], results[2])
+    assert same_bits(results[1], results[3])
+    met = results[0][1]
+    assert met[np.abs(far).max(axis=1) < 1e-8].all()
+    assert not met.all()
+    back = dh.forward(model, results[0][0][met]).position_mm
+    assert np.abs(back - dh.forward(model, q[met]).position_mm).max() < 1e-9
+
+
+def test_where_nothing_can_be_kept_kernels_are_compiled_anew_and_one_line_says_so():
+    lines = (
+        "import numpy as np, numba.core.caching as caching",
+        "caching.CacheImpl._locator_classes = []  # neither folder can be written",
+        "from kinacc.kinematics import dh, kernels, robot",
+        "from kinacc.kinematics.inverse import kernels as others",
+        "arm, q = robot.load('mh180').dh, np.full((3, 6), 0.5)",
+        "plain = dh.forward(arm, q)",
+        "dh.WORTH_NUMBA = 0",
+        "print(plain.position_mm.tobytes() == dh.forward(arm, q).position_mm.tobytes())",
+    )
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
+    assert done.stdout.split() == ["True"], done.stderr
+    [line] = done.stderr.splitlines()
+    assert "NUMBA_CACHE_DIR" in line

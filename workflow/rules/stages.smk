@@ -3,32 +3,32 @@
 # With one data set its name stands in the paths, so that `snakemake -c1 dh` says which one it means.
 whose = "{dataset}" if len(plan.datasets) > 1 else next(iter(plan.datasets))
 
+
+# The targets are not known yet when this file is read.
+def with_robustness():
+    return "robustness" in workflow.dag_settings.targets
+
+
+# Files from outside are read where they stand, also where results go to a storage.
+def files_read(name, dataset, part):
+    files = {
+        role: local(paths) if role.endswith("_file") else paths
+        for role, paths in plan.inputs(name, dataset, with_robustness()).items()
+    }
+    return plan.waited_for(name, dataset, part, ancient) | files
+
+
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
     folder = TOURNAMENT if stage.joint else whose
 
-    # What has to be there and is not read is `ancient`: a stage is not made anew when that is,
-    # unless it has to be made anew itself.
     rule:
         name:
             stage.name
         input:
-            ancient(
-                lambda w, name=stage.name, folder=folder: [
-                    gate
-                    for gate in plan.gates(name, w.get("dataset", folder))
-                    if gate not in plan.followed(name, w.get("dataset", folder), w.get("part"))
-                ]
-            ),
-            lambda w, name=stage.name, folder=folder: plan.followed(
-                name, w.get("dataset", folder), w.get("part")
-            ),
             unpack(
-                lambda w, name=stage.name, folder=folder: plan.inputs(
-                    name,
-                    w.get("dataset", folder),
-                    # Asked here: the targets are not known yet when this file is read.
-                    on_request="robustness" in workflow.dag_settings.targets,
+                lambda w, name=stage.name, folder=folder: files_read(
+                    name, w.get("dataset", folder), w.get("part")
                 )
             ),
         output:
@@ -69,17 +69,12 @@ for stage in STAGES.values():
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             job=lambda w, name=stage.name, folder=folder: plan.job_text(
-                name,
-                w.get("dataset", folder),
-                w.get("part"),
-                on_request="robustness" in workflow.dag_settings.targets,
+                name, w.get("dataset", folder), w.get("part"), with_robustness()
             ),
             contents=lambda w, name=stage.name, folder=folder: plan.contents(
                 name, w.get("dataset", folder)
             ),
-            label=lambda w, name=stage.name, folder=folder: label(
-                name, w.get("dataset", folder), w.get("part")
-            ),
+            label=label(stage.name, folder, part),
         message:
             plan.message(stage.name, folder)
         shell:

@@ -68,7 +68,8 @@ def code_hash(
     return digest.hexdigest()[:16]
 
 
-def stage_code_hash(module: str, uses: Iterable[str] = ()) -> str:
+@cache
+def stage_code_hash(module: str, uses: tuple[str, ...] = ()) -> str:
     """Hash of the code of a stage, of what reads and writes its files and of the runner.
 
     ``uses`` is what the stage depends on beside what its module imports, see :func:`code_hash`.

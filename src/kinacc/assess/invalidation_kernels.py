@@ -163,55 +163,6 @@ def _add(sizes, sigma, roots, state, i):
 
 
 @compiled
-def run(world, eta, alpha, squared, power, budget):
-    """One sequential run: (rejected, measurements, points visited, rejection probability)."""
-    known, sigma, sizes = world[1], world[2], world[7]
-    points, roots = known.size, _roots(power, budget)
-    state = np.zeros((points, 3))
-    miss = np.ones(points)
-    visited, taken, survival, rejected = 0, 0, 1.0, False
-    while taken < budget:
-        again = rejected
-        if again:
-            i, best = 0, -np.inf
-            for row in range(visited):
-                score = (state[row, SIZE] - eta) * state[row, WEIGHT]
-                if score > best:
-                    i, best = row, score
-        elif visited < points:
-            i = visited
-            visited += 1
-        else:
-            break
-        if state[i, READS] >= known[i]:
-            extend(world, i, int(state[i, READS]))
-        _add(sizes, sigma, roots, state, i)
-        miss[i] = _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
-        if again:
-            survival = 1.0
-            for row in range(visited):
-                survival *= miss[row]
-        else:
-            survival *= miss[i]
-        taken += 1
-        rejected = 1.0 - survival > alpha
-    return rejected, taken, visited, 1.0 - survival
-
-
-@compiled
-def bisect(world, top, tolerance, alpha, squared, power, budget):
-    """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
-    low, high = 0.0, top
-    while high - low > tolerance:
-        middle = 0.5 * (low + high)
-        if run(world, middle, alpha, squared, power, budget)[0]:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-@compiled
 def _about(size, weight, eta, squared):
     """As :func:`_miss`, from a table of cubics and several times as fast."""
     excess = size - eta
@@ -231,9 +182,8 @@ def _about(size, weight, eta, squared):
 
 
 @compiled
-def _survival(k, state, active, squared, miss):
-    """Product of about 1 - p-hat at bound k over the active rows, each kept in ``miss``."""
-    eta = k / GRID_PER_MM
+def _survival(eta, state, active, squared, miss):
+    """Product of about 1 - p-hat at a bound over the active rows, each kept in ``miss``."""
     survival = 1.0
     for i in active:
         miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
@@ -242,9 +192,8 @@ def _survival(k, state, active, squared, miss):
 
 
 @compiled
-def _exact_survival(k, state, active, squared):
-    """Product of 1 - p-hat at bound k, bit for bit as a run has it."""
-    eta = k / GRID_PER_MM
+def _exact_survival(eta, state, active, squared):
+    """Product of 1 - p-hat at a bound over the active rows, in the order of their visits."""
     survival = 1.0
     for i in active:
         survival *= _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
@@ -261,9 +210,8 @@ def _side(survival, alpha, guard):
 
 
 @compiled
-def _side_at(k, state, active, squared, alpha, guard):
-    """The side at bound k, from as many rows as it takes."""
-    eta = k / GRID_PER_MM
+def _side_at(eta, state, active, squared, alpha, guard):
+    """The side at a bound, from as many rows as it takes."""
     survival = 1.0
     for i in active:
         survival *= _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
@@ -273,9 +221,8 @@ def _side_at(k, state, active, squared, alpha, guard):
 
 
 @compiled
-def _winner(k, state, active):
-    """Row with the largest score at bound k, the first of equals; its score and the next one."""
-    eta = k / GRID_PER_MM
+def _winner(eta, state, active):
+    """Row with the largest score at a bound, the first of equals; its score and the next one."""
     row, best, second = -1, -np.inf, -np.inf
     for i in active:
         score = (state[i, SIZE] - eta) * state[i, WEIGHT]
@@ -292,7 +239,7 @@ def _last_on_side(side, near, far, state, active, squared, alpha, guard):
     inside, outside = near, far
     while abs(outside - inside) > 1:
         middle = (inside + outside) // 2
-        if _side_at(middle, state, active, squared, alpha, guard) == side:
+        if _side_at(middle / GRID_PER_MM, state, active, squared, alpha, guard) == side:
             inside = middle
         else:
             outside = middle
@@ -305,7 +252,7 @@ def _last_with_winner(row, near, far, state, active, margin):
     inside, outside = near, far
     while abs(outside - inside) > 1:
         middle = (inside + outside) // 2
-        other, best, rival = _winner(middle, state, active)
+        other, best, rival = _winner(middle / GRID_PER_MM, state, active)
         if other == row and best - rival > margin:
             inside = middle
         else:
@@ -386,6 +333,73 @@ def _insist(
 
 
 @compiled
+def _guards(largest_mm, points, sigma, power, budget):
+    """How near a probability is to the threshold, and scores are to each other, to be in doubt."""
+    margin = 1e-12 * largest_mm / sigma.min() * float(budget) ** power
+    return 1e-9 + points * _ABOUT + margin, margin
+
+
+@compiled
+def run(world, eta, alpha, squared, power, budget):
+    """One sequential run: (rejected, measurements, points visited, rejection probability)."""
+    sigma, sizes = world[2], world[7]
+    points, roots = sigma.size, _roots(power, budget)
+    guard, margin = _guards(sizes[:, 0].max(), points, sigma, power, budget)
+    state, miss = np.zeros((points, 3)), np.ones(points)
+    rows, path = np.empty(points, np.int64), np.empty(budget, np.int64)
+    visited, count, steps, survival = 0, 0, 0, 1.0
+    while True:
+        active = rows[:count]
+        side = _side(survival, alpha, guard)
+        if side == 0:
+            survival = _exact_survival(eta, state, active, squared)
+        rejected = 1.0 - survival > alpha
+        if steps == budget or (not rejected and visited == points):
+            break
+        if rejected:
+            i, _, rival = _winner(eta, state, active)
+            steps, survival, _ = _insist(
+                i,
+                (eta, eta),
+                (rival, rival),
+                world,
+                roots,
+                state,
+                miss,
+                miss,
+                active,
+                path,
+                steps,
+                (alpha, squared),
+                (guard, margin),
+            )
+        else:
+            i = visited
+            visited += 1
+            _add(sizes, sigma, roots, state, i)
+            steps += 1
+            if state[i, SIZE] > eta:
+                rows[count] = i
+                count += 1
+                miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
+                survival *= miss[i]
+    return rejected, steps, visited, 1.0 - _exact_survival(eta, state, rows[:count], squared)
+
+
+@compiled
+def bisect(world, top, tolerance, alpha, squared, power, budget):
+    """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
+    low, high = 0.0, top
+    while high - low > tolerance:
+        middle = 0.5 * (low + high)
+        if run(world, middle, alpha, squared, power, budget)[0]:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@compiled
 def scan(world, bottom, top, upward, alpha, squared, power, budget):
     """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
 
@@ -402,14 +416,13 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = (bottom, top, 0) if upward else (top, bottom, 0)
     depth, pieces = 1, 0
     onward = 1 if upward else -1
-    margin = 1e-12 * top / GRID_PER_MM / sigma.min() * float(budget) ** power
-    guard = 1e-9 + points * _ABOUT + margin
+    guard, margin = _guards(top / GRID_PER_MM, points, sigma, power, budget)
     while depth > 0:
         depth -= 1
         near, far, steps = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
         visited, count = _resume(sizes, sigma, roots, state, path[:steps], min(near, far), rows)
-        near_survival = _survival(near, state, rows[:count], squared, at_near)
-        far_survival = _survival(far, state, rows[:count], squared, at_far)
+        near_survival = _survival(near / GRID_PER_MM, state, rows[:count], squared, at_near)
+        far_survival = _survival(far / GRID_PER_MM, state, rows[:count], squared, at_far)
         while True:
             active = rows[:count]
             side = _side(near_survival, alpha, guard)
@@ -420,9 +433,9 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
                 waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + onward, far, steps
                 depth += 1
                 far = last
-                far_survival = _survival(far, state, active, squared, at_far)
+                far_survival = _survival(far / GRID_PER_MM, state, active, squared, at_far)
             if side == 0:
-                near_survival = _exact_survival(near, state, active, squared)
+                near_survival = _exact_survival(near / GRID_PER_MM, state, active, squared)
             rejected = 1.0 - near_survival > alpha
             if steps == budget or (not rejected and visited == points):
                 break
@@ -441,10 +454,10 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
                     near_survival *= at_near[i]
                     far_survival *= at_far[i]
             else:
-                i, best, rival = _winner(near, state, active)
+                i, best, rival = _winner(near / GRID_PER_MM, state, active)
                 far_rival = rival
                 if near != far:
-                    other, far_best, far_rival = _winner(far, state, active)
+                    other, far_best, far_rival = _winner(far / GRID_PER_MM, state, active)
                     sure = best - rival > margin
                     if not sure or other != i or far_best - far_rival <= margin:
                         last = near
@@ -454,8 +467,8 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
                         waiting[depth, 2] = steps
                         depth += 1
                         far = last
-                        _survival(far, state, active, squared, at_far)
-                        far_rival = _winner(far, state, active)[2]
+                        _survival(far / GRID_PER_MM, state, active, squared, at_far)
+                        far_rival = _winner(far / GRID_PER_MM, state, active)[2]
                 steps, near_survival, far_survival = _insist(
                     i,
                     (near / GRID_PER_MM, far / GRID_PER_MM),

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpotri
+import scipy
 
 from kinacc.calibration import solve
 from kinacc.calibration.solve import Solution, System
 from kinacc.errors import FitError
 
 MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slowly
+PATIENCE = 40  # steps after which standing still counts as arrived
 MAX_VARIANCE_STEPS = 20
-VARIANCE_TOLERANCE = 1e-9  # a prior that is weighed otherwise pulls weak directions elsewhere
+VARIANCE_TOLERANCE = 1e-7  # a prior that is weighed otherwise pulls weak directions elsewhere
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
 CLOSE = 1e-3  # mm and mrad from the end: a Gram matrix from there has the same inverse
 MEMORY = 20  # steps that the inverse has learned from
@@ -40,7 +41,7 @@ def minimise_with_prior(
     hardly show, in which Gauss-Newton steps die out slowly.
     Converged where the step that the last gradient asks for, ``last_step``, is not above
     ``solve.STEP_TOLERANCE``, or where a step moves the objective by less than NO_CHANGE (or
-    ``solve.STANDSTILL`` of itself) after ``solve.PATIENCE`` of them.
+    ``solve.STANDSTILL`` of itself) after ``PATIENCE`` of them; then ``converged`` is False.
     Raises FitError where it does not converge.
     """
     x = np.array(start, dtype=float)
@@ -71,7 +72,7 @@ def minimise_with_prior(
         variance=max(cost / max(freedom, 1.0), LEAST_VARIANCE),
         iterations=iterations,
         last_step=last,
-        converged=True,
+        converged=last <= solve.STEP_TOLERANCE,
     )
 
 
@@ -143,7 +144,7 @@ def _descended(
         step = _learned_step(here, balance.inverse, variance, prior, moves[-MEMORY:])
         wanted = float(np.max(np.abs(step), initial=0.0))
         least = max(NO_CHANGE * variance, solve.STANDSTILL * before)
-        stands = begun + taken >= solve.PATIENCE and abs(before - after) <= least
+        stands = begun + taken >= PATIENCE and abs(before - after) <= least
         # A step longer than the first speaks of another Gram matrix than the one frozen.
         if wanted <= solve.STEP_TOLERANCE or stands or wanted >= first:
             break
@@ -231,6 +232,6 @@ def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
             f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
             "give every undetermined direction a prior"
         ) from None
-    half, _ = dpotri(factor.T)
+    half, _ = scipy.linalg.lapack.dpotri(factor.T)
     half = np.triu(half)
     return half + np.triu(half, 1).T

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
+import scipy
 
 _VARIANCE_STEPS = 40
 _VARIANCE_TOLERANCE = 1e-4
@@ -61,8 +61,8 @@ class _Reduced:
     @classmethod
     def of(cls, normal: np.ndarray) -> _Reduced:
         size = len(normal)
-        lwork = int(lapack.dsytrd_lwork(size, lower=1)[0])
-        full, diagonal, beside, scales, info = lapack.dsytrd(
+        lwork = int(scipy.linalg.lapack.dsytrd_lwork(size, lower=1)[0])
+        full, diagonal, beside, scales, info = scipy.linalg.lapack.dsytrd(
             normal.T, lower=1, lwork=lwork, overwrite_a=1
         )
         _require(info)
@@ -83,17 +83,19 @@ class _Reduced:
         beside = np.zeros(shape)
         beside[:, :-1] = self.beside
         diagonal = (self.diagonal + held[:, None]).ravel()
-        pivots, below, info = lapack.dpttrf(diagonal, beside.ravel()[:-1], overwrite_d=1)
+        pivots, below, info = scipy.linalg.lapack.dpttrf(
+            diagonal, beside.ravel()[:-1], overwrite_d=1
+        )
         _require(info)
         gradient = np.zeros(shape)
         gradient[:, 0] = -self.slope
-        step, info = lapack.dpttrs(pivots, below, gradient.ravel(), overwrite_b=1)
+        step, info = scipy.linalg.lapack.dpttrs(pivots, below, gradient.ravel(), overwrite_b=1)
         _require(info)
         # The derivative of the pivots by the shift: that of the log determinant is the trace of
         # the inverse.
         links = np.ones((2, len(pivots)), order="F")
         np.multiply(below, -below, out=links[1, :-1])
-        slopes, info = lapack.dtbtrs(links, np.ones(len(pivots)), uplo="L", diag="U")
+        slopes, info = scipy.linalg.lapack.dtbtrs(links, np.ones(len(pivots)), uplo="L", diag="U")
         _require(info)
         traces = np.sum((slopes.ravel() / pivots).reshape(shape), axis=1)
         return step.reshape(shape), shape[1] - held * traces
@@ -101,7 +103,7 @@ class _Reduced:
     def turned_back(self, steps: np.ndarray) -> np.ndarray:
         """``steps`` (n, c) out of the basis."""
         work = 64 * steps.shape[1] + 65 * 64
-        found, _, info = lapack.dormqr(
+        found, _, info = scipy.linalg.lapack.dormqr(
             "L", "N", self.reflectors, self.scales, np.array(steps, order="F"), work, overwrite_c=1
         )
         _require(info)

@@ -27,7 +27,7 @@ from kinacc.kinematics.model import JointState
 PARAMETERS = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad")
 
 _BLOCK = 1024  # columns of one block stay in the cache
-WORTH_NUMBA = 2_000_000  # joint values that the plain twins take the time of its import for
+WORTH_NUMBA = 4_000_000  # joint values that the plain twins take the time of its start for
 
 
 @dataclass(frozen=True)
@@ -237,11 +237,17 @@ def _twisted(row: np.ndarray, frames: Columns) -> Columns:
     return _chain.rotate_y(frames, row[6], row[5]) if row[6] != 0.0 else frames
 
 
-def _forward(rows: np.ndarray, q_rad: np.ndarray, rotation: np.ndarray, p_mm: np.ndarray) -> None:
-    frames = _chain.start(len(q_rad))
+def walk(rows: np.ndarray, q_rad: np.ndarray) -> tuple[list[Columns], Columns]:
+    """The frames before every joint, and those of the flange."""
+    frames, before = _chain.start(len(q_rad)), []
     for row, *motion in _motions(rows, q_rad):
+        before.append(frames)
         frames = _twisted(row, _turned_and_shifted(row, frames, *motion))
-    _chain.write(frames, rotation, p_mm)
+    return before, frames
+
+
+def _forward(rows: np.ndarray, q_rad: np.ndarray, rotation: np.ndarray, p_mm: np.ndarray) -> None:
+    _chain.write(walk(rows, q_rad)[1], rotation, p_mm)
 
 
 def _joint_jacobian(
@@ -251,11 +257,7 @@ def _joint_jacobian(
     p_mm: np.ndarray,
     jacobian: np.ndarray,
 ) -> None:
-    frames = _chain.start(len(q_rad))
-    before = []
-    for row, *motion in _motions(rows, q_rad):
-        before.append(frames)
-        frames = _twisted(row, _turned_and_shifted(row, frames, *motion))
+    before, frames = walk(rows, q_rad)
     for joint, at in enumerate(before):
         if rows[joint, 7] > 0.0:
             jacobian[:, :3, joint], jacobian[:, 3:, joint] = at.z.T, 0.0

@@ -14,8 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from kinacc.compiled import compiled
+from kinacc.compiled import compiled_without_checks as compiled
 from kinacc.kinematics.chain import COSINE, HALF_PI, LARGEST_RAD, SINE
+from kinacc.kinematics.inverse.quick import LEVER_MM, LONGEST_RAD, ROUND_OFF, STEPS, TOLERANCE_MM
 
 _BLOCK = 32
 _QUADRANTS = 2.0 / np.pi
@@ -243,3 +244,126 @@ def parameter_jacobian(rows, q, rotation, position, jacobian):
         _spread(kept, source, begin, count, flat)
         _write(w, begin, count, rotation, position)
     return far
+
+
+@njit(inline="always")
+def _slopes_of(kept, count, slopes):
+    """Slopes of six turning joints, six rows each: position, then rotation times the lever."""
+    for joint in range(6):
+        for r in range(3):
+            for i in range(count):
+                slopes[6 * joint + r, i] = kept[6 * joint + 3 + r, i]
+                slopes[6 * joint + 3 + r, i] = LEVER_MM * kept[6 * joint + r, i]
+
+
+@njit(inline="always")
+def _error(goal, count, w, error, met):
+    """Rows of position (mm) and turn times the lever; marks what is within tolerance."""
+    for r in range(3):
+        u, v = (r + 1) % 3, (r + 2) % 3
+        for i in range(count):
+            error[r, i] = goal[_P + r, i] - w[_P + r, i]
+            turn = w[u, i] * goal[v, i] - w[v, i] * goal[u, i]
+            turn += w[3 + u, i] * goal[3 + v, i] - w[3 + v, i] * goal[3 + u, i]
+            turn += w[6 + u, i] * goal[6 + v, i] - w[6 + v, i] * goal[6 + u, i]
+            error[3 + r, i] = (0.5 * LEVER_MM) * turn
+    for i in range(count):
+        along = w[0, i] * goal[0, i] + w[1, i] * goal[1, i] + w[2, i] * goal[2, i]
+        along += w[3, i] * goal[3, i] + w[4, i] * goal[4, i] + w[5, i] * goal[5, i]
+        shift = (error[0, i] * error[0, i] + error[1, i] * error[1, i]) + error[2, i] * error[2, i]
+        turn = (error[3, i] * error[3, i] + error[4, i] * error[4, i]) + error[5, i] * error[5, i]
+        met[i] = shift < TOLERANCE_MM**2 and turn < TOLERANCE_MM**2 and along > 1.0
+
+
+@njit(inline="always")
+def _solve(slopes, error, count, normal, step):
+    """Least squares for the step of six joints, through the normal equations (Cholesky)."""
+    for a in range(6):
+        p = 6 * a
+        for b in range(a + 1):
+            q = 6 * b
+            for i in range(count):
+                normal[p + b, i] = (
+                    slopes[p, i] * slopes[q, i]
+                    + slopes[p + 1, i] * slopes[q + 1, i]
+                    + slopes[p + 2, i] * slopes[q + 2, i]
+                    + slopes[p + 3, i] * slopes[q + 3, i]
+                    + slopes[p + 4, i] * slopes[q + 4, i]
+                    + slopes[p + 5, i] * slopes[q + 5, i]
+                )
+        for i in range(count):
+            normal[7 * a, i] *= 1.0 + ROUND_OFF
+            step[a, i] = (
+                slopes[p, i] * error[0, i]
+                + slopes[p + 1, i] * error[1, i]
+                + slopes[p + 2, i] * error[2, i]
+                + slopes[p + 3, i] * error[3, i]
+                + slopes[p + 4, i] * error[4, i]
+                + slopes[p + 5, i] * error[5, i]
+            )
+    for a in range(6):
+        for b in range(a + 1):
+            for c in range(b):
+                for i in range(count):
+                    normal[6 * a + b, i] -= normal[6 * a + c, i] * normal[6 * b + c, i]
+            if a == b:
+                for i in range(count):
+                    normal[7 * a, i] = np.sqrt(normal[7 * a, i])
+            else:
+                for i in range(count):
+                    normal[6 * a + b, i] /= normal[7 * b, i]
+        for c in range(a):
+            for i in range(count):
+                step[a, i] -= normal[6 * a + c, i] * step[c, i]
+        for i in range(count):
+            step[a, i] /= normal[7 * a, i]
+    for a in range(5, -1, -1):
+        for c in range(a + 1, 6):
+            for i in range(count):
+                step[a, i] -= normal[6 * c + a, i] * step[c, i]
+        for i in range(count):
+            step[a, i] /= normal[7 * a, i]
+
+
+@compiled
+def onto_poses(rows, rotation, position, q, met):
+    """Move joints ``q`` (n, 6) in place onto poses; see ``quick.onto_poses``, its plain twin."""
+    w, kept = np.empty((_ROWS, _BLOCK)), np.empty((36, _BLOCK))
+    goal, slopes, error = np.empty((12, _BLOCK)), np.empty((36, _BLOCK)), np.empty((6, _BLOCK))
+    normal, step, done = np.empty((36, _BLOCK)), np.empty((6, _BLOCK)), np.empty(_BLOCK, np.bool_)
+    for begin in range(0, q.shape[0], _BLOCK):
+        count = min(_BLOCK, q.shape[0] - begin)
+        for i in range(count):
+            for r in range(3):
+                goal[r, i] = rotation[begin + i, r, 0]
+                goal[3 + r, i] = rotation[begin + i, r, 1]
+                goal[6 + r, i] = rotation[begin + i, r, 2]
+                goal[9 + r, i] = position[begin + i, r]
+        for number in range(STEPS + 1):
+            _begin(w)
+            far = 0
+            for joint in range(6):
+                row = rows[joint]
+                kept[6 * joint : 6 * joint + 3] = w[_Z : _Z + 3]
+                kept[6 * joint + 3 : 6 * joint + 6] = w[_P : _P + 3]
+                far += _turns(row, q, begin, count, joint, w)
+                _turn_and_shift(row, q, begin, count, joint, w)
+                _twist(row, count, w)
+            _error(goal, count, w, error, done)
+            left = 0
+            for i in range(count):
+                left += not done[i]
+            if left == 0 or number == STEPS:
+                break
+            for joint in range(6):
+                _lever(6 * joint, 6 * joint + 3, count, kept, w)
+            _slopes_of(kept, count, slopes)
+            _solve(slopes, error, count, normal, step)
+            for i in range(count):
+                if not done[i]:
+                    for joint in range(6):
+                        moved = q[begin + i, joint] + step[joint, i]
+                        ok = abs(step[joint, i]) <= LONGEST_RAD and abs(moved) <= LARGEST_RAD
+                        q[begin + i, joint] = moved if ok else np.nan
+        for i in range(count):
+            met[begin + i] = done[i]

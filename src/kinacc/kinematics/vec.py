@@ -17,9 +17,9 @@ import numpy as np
 from kinacc.geometry import Pose, project_so3, skew, vee
 from kinacc.kinematics import chain as _chain
 from kinacc.kinematics import dh as _dh
-from kinacc.kinematics import vec_motions as _motions
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.model import JointState
+from kinacc.kinematics.vec_motions import Motions
 
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
 _DIRECTIONS = np.array([-1, 1])
@@ -218,12 +218,10 @@ def joint_jacobian(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = No
     return jacobian
 
 
-def linearised(
-    model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
-) -> tuple[Pose, np.ndarray]:
-    """Poses (n, ...) as ``pose`` and their Jacobian (6k, 6, n) in the joints' errors. Exact."""
+def motions(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Motions:
+    """Poses (n, ...) as ``pose``, and how the joints' errors move them."""
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    return _motions.linearised(model.dh, q_rad, errors(model, q_rad, s))
+    return Motions(model.dh, q_rad, errors(model, q_rad, s))
 
 
 def parameter_jacobian(
@@ -232,8 +230,8 @@ def parameter_jacobian(
     """Jacobian (n, 6, P) of ``pose`` in the coefficients, ordered as ``to_vector``. Exact."""
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
     count, cut = len(q_rad), model.coefficients.size
-    motions = linearised(model, q_rad, s)[1].reshape(model.joints, len(ERRORS), 6, count)
-    elementary, basis = motions.transpose(3, 2, 0, 1), chebyshev_basis(model, q_rad)
+    moved = motions(model, q_rad, s).jacobian().reshape(model.joints, len(ERRORS), 6, count)
+    elementary, basis = moved.transpose(3, 2, 0, 1), chebyshev_basis(model, q_rad)
     jacobian = np.empty((count, 6, cut + model.direction_offsets_rad.size))
     expanded = jacobian[:, :, :cut].reshape(count, 6, *model.coefficients.shape)
     np.multiply(elementary[..., None], basis[:, None, :, None, :], out=expanded)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from kinacc.artifacts.error_models import ALWAYS, FITTED
@@ -510,6 +511,7 @@ MAP_READINGS = ("map_readings_chunk", "map_readings", "fig3_readings")
 CHOICES = ("choices_chunk", "choices_table", "choices_reasons", "claims_over_choices")
 
 
+@cache
 def maker_of(artefact: str) -> Stage:
     """The stage that leaves an artefact."""
     return next(stage for stage in STAGES.values() if artefact in stage.outputs)

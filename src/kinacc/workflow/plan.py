@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, wraps
 from pathlib import Path
 
 from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
-from kinacc.campaign.journal import JOURNAL, PLAN, of_results
+from kinacc.campaign.journal import JOURNAL, PLAN, of_each
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.workflow.catalogue import (
     FIGURE_FOLDER,
@@ -78,6 +79,22 @@ def planned(
     )
 
 
+def _once(method: Callable) -> Callable:
+    """A method of a plan that goes by its configuration alone, worked out once for each argument.
+
+    A run of many data sets asks for the same of every stage a dozen times.
+    """
+
+    @wraps(method)
+    def kept(self: Plan, *given: str) -> object:
+        key = (method.__name__, *given)
+        if key not in self.known:
+            self.known[key] = method(self, *given)
+        return self.known[key]
+
+    return kept
+
+
 @dataclass(frozen=True)
 class Plan:
     """The validated configuration of every data set, and where results go.
@@ -87,8 +104,8 @@ class Plan:
     stages are computed in, those of the study and those of the choices; ``formats`` are the
     picture formats; ``tournament`` is the configuration's section of that name, which is one for
     all data sets. ``files_absolute``: files from outside are named in full, as a module of another
-    workflow needs them, whose results may have a folder put before them. ``made`` keeps which
-    tables were up to date when that was asked first.
+    workflow needs them, whose results may have a folder put before them. ``known`` keeps what was
+    worked out, and which tables were up to date when that was asked first.
     """
 
     datasets: Mapping[str, Mapping[str, object]]
@@ -97,7 +114,7 @@ class Plan:
     results: str = RESULTS
     tournament: Mapping[str, object] = field(default_factory=dict)
     files_absolute: bool = False
-    made: dict[tuple, bool] = field(default_factory=dict, repr=False, compare=False)
+    known: dict[tuple, object] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def contest(
         self,
@@ -128,6 +145,7 @@ class Plan:
         own = {name: value for name, value in given.items() if value}
         return replace(self, tournament={**self.tournament, **own})
 
+    @_once
     def stages(self, dataset: str) -> dict[str, Stage]:
         """The stages a data set, or the tournament, goes through, in order."""
         if dataset == TOURNAMENT:
@@ -137,6 +155,7 @@ class Plan:
             name: stage for name, stage in STAGES.items() if name not in missing and not stage.joint
         }
 
+    @_once
     def left_out(self, dataset: str) -> dict[str, str]:
         """Stages a data set cannot go through, each with the reason."""
         config = self.datasets[dataset]
@@ -185,15 +204,14 @@ class Plan:
         stage = STAGES[name]
         if stage.joint:
             return self._joint_inputs(stage)
-        available = {
-            made
-            for each in self.stages(dataset).values()
-            for made in each.outputs
-            if each.on_request <= on_request or os.path.exists(self._table(made, dataset))
-        }
-        wanted = (*stage.inputs, *(extra for extra in stage.optional if extra in available))
-        found = {artefact: self._made(artefact, dataset) for artefact in wanted}
+        there = (each for each in stage.optional if self._is_there(each, dataset, on_request))
+        found = {artefact: self._made(artefact, dataset) for artefact in (*stage.inputs, *there)}
         return found | self._files(stage, dataset)
+
+    def _is_there(self, artefact: str, dataset: str, on_request: bool) -> bool:
+        maker = maker_of(artefact)
+        made = on_request or not maker.on_request or os.path.exists(self._table(artefact, dataset))
+        return made and maker.name in self.stages(dataset)
 
     def absent(self, name: str, dataset: str) -> list[Problem]:
         """Files a stage reads that are not there."""
@@ -204,6 +222,7 @@ class Plan:
             if not os.path.isfile(path)
         ]
 
+    @_once
     def gates(self, name: str, dataset: str) -> list[str]:
         """Tables that have to be there before a stage runs, and that it does not read.
 
@@ -221,35 +240,46 @@ class Plan:
             seen |= read
         return [self._table(each, dataset) for each in found]
 
-    def followed(self, name: str, dataset: str, part: str | None = None) -> list[str]:
-        """Those of ``gates`` that a stage has to be made after: they and it are to be made anew.
+    def waited_for(
+        self, name: str, dataset: str, part: str | None, untouched: Callable[[str], str]
+    ) -> dict[str, list[str]]:
+        """``gates`` as inputs: through ``untouched`` unless they and the stage are to be made anew.
 
-        Snakemake asks for no other reason below a job that runs, so that a stage whose settings
-        changed together with those of a gate would stay as it is if the gate were ``ancient``.
+        A gate alone does not make a stage anew. Snakemake asks for no other reason below a job that
+        runs, so that a stage whose settings changed together with those of a gate would stay as it
+        is if the gate were ``ancient``.
         """
         gates = self.gates(name, dataset)
-        if not gates or all(self._is_made(Path(each).stem, dataset) for each in gates):
-            return []
-        return [] if self._is_made(name, dataset, part) else gates
+        if (
+            not gates
+            or all(self._is_made(Path(each).stem, dataset) for each in gates)
+            or self._is_made(name, dataset, part)
+        ):
+            gates = [untouched(gate) for gate in gates]
+        return {"gates": gates}
 
     def _is_made(self, name: str, dataset: str, part: str | None = None) -> bool:
         """Whether tables are there by these settings and code; of pictures nothing is known."""
         if STAGES[name].leaves != TABLES:
             return False
-        known = (name, dataset, part)
-        if known not in self.made:
+        known = ("made", name, dataset, part)
+        if known not in self.known:
             wanted = {
                 "config_hash": config_hash(self.settings(name, dataset)),
                 "code_hash": self.code(name, dataset),
                 "seed": str(self.seed(dataset)),
             }
             paths = self.outputs(name, dataset, part).values()
-            self.made[known] = all(_marks(path).items() >= wanted.items() for path in paths)
-        return self.made[known]
+            self.known[known] = all(_marks(path).items() >= wanted.items() for path in paths)
+        return self.known[known]
 
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""
-        return {role: file_hash(path) for role, path in self._files(STAGES[name], dataset).items()}
+        files = self._files(STAGES[name], dataset)
+        return {
+            role: _hash(os.path.abspath(path), os.stat(path).st_mtime_ns)
+            for role, path in files.items()
+        }
 
     def check_files(self) -> None:
         """Read every measured file that is newer than its table, or read by other settings.
@@ -329,6 +359,7 @@ class Plan:
         """Log file of a stage."""
         return f"{self.results}/{dataset}/logs/{name}{f'.{part}' if part else ''}.log"
 
+    @_once
     def settings(self, name: str, dataset: str) -> dict[str, object]:
         """The configuration values a stage depends on, nested as in the configuration."""
         config, chosen, stage = self._config(dataset), {}, STAGES[name]
@@ -413,6 +444,11 @@ class Plan:
         folder = f"{self.results}/{dataset}"
         return f"{folder}/{artefact}/{part}.parquet" if part else f"{folder}/{artefact}.parquet"
 
+    @cached_property
+    def _campaigns(self) -> dict[Path, list[Path]]:
+        """Campaigns on the calibration of every data set, by its results folder, sought once."""
+        return of_each(Path(self.results) / dataset for dataset in self.datasets)
+
     def _files(self, stage: Stage, dataset: str) -> dict[str, str]:
         """Files from outside by role; for the tournament ``<data set>/<role>``."""
         if dataset == TOURNAMENT:
@@ -423,7 +459,7 @@ class Plan:
             }
         config, found = self.datasets[dataset], {}
         if stage.leaves == PAGE:
-            found |= campaign_files(Path(self.results) / dataset)
+            found |= campaign_files(self._campaigns[Path(self.results) / dataset])
         for path in stage.files:
             value: object = config
             for key in path.split("."):
@@ -442,10 +478,16 @@ class Plan:
         return found
 
 
-def campaign_files(results: Path) -> dict[str, str]:
-    """Files of the campaigns on the calibration in a results folder, by role."""
+@cache
+def _hash(path: str, changed_ns: int) -> str:
+    """Content hash of a file, which several stages read."""
+    return file_hash(path)
+
+
+def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
+    """Files of campaigns on the calibration of a data set, by role."""
     found = {}
-    for number, campaign in enumerate(of_results(results), 1):
+    for number, campaign in enumerate(campaigns, 1):
         found[f"campaign_{number}_file"] = str(campaign / PLAN)
         if (campaign / JOURNAL).is_file():
             found[f"readings_{number}_file"] = str(campaign / JOURNAL)
