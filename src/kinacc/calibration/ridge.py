@@ -72,7 +72,7 @@ class _Reduced:
         cost, slope = float(diagonal[0]), float(beside[0])
         least = max(_ROUNDING * float(diagonal[1:].sum()), np.finfo(float).tiny)
         # What was taken off the matrix before it came here may have left more rounding than that.
-        while lapack.dpttrf(diagonal[1:] + least, beside[1:])[2] > 0:
+        while scipy.linalg.lapack.dpttrf(diagonal[1:] + least, beside[1:])[2] > 0:
             least *= 10.0
         return cls(diagonal[1:], beside[1:], slope, cost, least, reflectors, scales)
 
