@@ -217,7 +217,7 @@ def measure(work: Work, processes: Sequence[Elsewhere], smoke: bool) -> list[Res
         sides = [processes[0], *sides, *processes[1:]]
     known = {LIMIT, TODAY, *(side.name for side in sides)}
     absent = [_absent(work, name, "not installed") for name in work.wanted if name not in known]
-    if work.today is not None and not processes and not smoke:
+    if work.today is not None and not processes:
         absent.append(_absent(work, TODAY, "that commit is not in this repository"))
     return [*_rows(work, sides, smoke), *absent]
 
