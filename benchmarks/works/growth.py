@@ -62,6 +62,10 @@ def measure(smoke: bool) -> list[dict[str, str | float | bool | None]]:
             }
             for size, cpu, peak in found
         ]
+        if not smoke:
+            print(
+                f"  {problem.work} against {problem.against}: exponent {exponent:.2f}", flush=True
+            )
     return rows
 
 
@@ -175,7 +179,7 @@ PROBLEMS = (
     Problem("order auto, up to 12", "poses", (500, 2000, 8000, 16000), (60, 80), _chosen),
     Problem("accuracy map", "grid cells", (25.0, 12.5, 6.25), (300.0, 200.0), _map),
     Problem("assessment points", "points", (200, 800, 3200), (8, 16), _points),
-    Problem("study", "repetitions", (100, 400, 1600), (1, 2), _study),
+    Problem("study", "repetitions", (50, 100, 200), (1, 2), _study),
     Problem("plan of the workflow", "data sets", (10, 100, 1000), (1, 2), _data_sets),
 )  # fmt: skip
 
