@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -103,12 +104,15 @@ def _machine(tables: Mapping[str, Sequence[Mapping]]) -> str:
 
 
 def _summary(tables: Mapping[str, Sequence[Mapping]]) -> str:
-    """How many wishes were met, and which were not."""
-    asked = [
-        (topic, row) for topic, rows in tables.items() for row in rows if row.get("met") is not None
-    ]
+    """How many wishes were met, and which were not, each once."""
+    asked = {
+        (topic, _what(row)): row["met"]
+        for topic, rows in tables.items()
+        for row in rows
+        if row.get("met") is not None
+    }
     missed = [
-        f"{_what(row)} ({TITLES.get(topic, topic)})" for topic, row in asked if not row["met"]
+        f"{what} ({TITLES.get(topic, topic)})" for (topic, what), met in asked.items() if not met
     ]
     counts = f"Of {len(asked)} wishes {len(asked) - len(missed)} are met."
     return counts if not missed else f"{counts} Out of reach: {'; '.join(missed)}."
@@ -117,6 +121,8 @@ def _summary(tables: Mapping[str, Sequence[Mapping]]) -> str:
 def _what(row: Mapping) -> str:
     if "stage" in row:
         return f"memory of {row['stage']}"
+    if "against" in row:
+        return f"{row['work']} against {row['against']}"
     return f"{row['work']} beside {_who(row)}"
 
 
@@ -168,18 +174,47 @@ def table(rows: Sequence[Mapping]) -> str:
             [r["stage"], f"{r['peak_mb']:.0f}", _wish(f"{r['wanted_mb']:.0f}", r["met"])]
             for r in rows
         ]
-    elif "contender" in rows[0]:
+    elif "against" in rows[0]:
+        head = [
+            "work",
+            "against",
+            "sizes",
+            "CPU time",
+            "exponent",
+            "at most",
+            "peak, MB",
+            "MB a thousand",
+        ]
+        body = [_grown(of) for of in _problems(rows).values()]
+    else:
         head = ["work", "beside", "its time", "kinacc's", "kinacc is", "wanted"]
         own = _own(rows)
         body = [_cells(row, own[row["work"]]) for row in rows if row is not own[row["work"]]]
-    else:
-        head = [name for name in rows[0] if name not in _FACTS]
-        body = [[_plain(row[name]) for name in head] for row in rows]
     cells = [head, ["---"] * len(head), *body]
     return "\n".join(f"| {' | '.join(line)} |" for line in cells)
 
 
-_FACTS = ("cpu", "cores", "write_gb_per_s", "python", "numpy", "commit", "measured_on")
+def _problems(rows: Sequence[Mapping]) -> dict[str, list[Mapping]]:
+    """The rows of growth, problem by problem."""
+    found: dict[str, list[Mapping]] = {}
+    for row in rows:
+        found.setdefault(_what(row), []).append(row)
+    return found
+
+
+def _grown(rows: Sequence[Mapping]) -> list[str]:
+    """One problem from its smallest to its largest size."""
+    first, last = rows[0], rows[-1]
+    return [
+        first["work"],
+        first["against"],
+        f"{first['size']:,.0f} to {last['size']:,.0f}",
+        f"{duration(1e9 * first['cpu_s'])} to {duration(1e9 * last['cpu_s'])}",
+        f"{last['exponent']:.2f}",
+        "" if last["wanted"] is None else _wish(f"{last['wanted']:.2f}", last["met"]),
+        f"{first['peak_mb']:.0f} to {last['peak_mb']:.0f}",
+        f"{last['mb_a_thousand']:.3g}",
+    ]
 
 
 def _own(rows: Sequence[Mapping]) -> dict[str, Mapping]:
@@ -188,10 +223,6 @@ def _own(rows: Sequence[Mapping]) -> dict[str, Mapping]:
     for row in rows:
         found.setdefault(row["work"], row)
     return found
-
-
-def _plain(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _cells(row: Mapping, own: Mapping) -> list[str]:
@@ -241,37 +272,72 @@ def duration(ns: float) -> str:
 
 
 def picture(topic: str, rows: Sequence[Mapping]) -> Figure:
-    """Bars of all rows that were measured, with a mark where the wish is."""
-    if "stage" in rows[0]:
-        shown = [(row["stage"], row["peak_mb"], row["wanted_mb"], row["met"]) for row in rows]
-        words = "peak resident memory, MB; mark: at most"
-    else:
-        shown = [
+    """What was measured in a topic, and what was wanted."""
+    with style.house():
+        if "stage" in rows[0]:
+            bars = [(row["stage"], row["peak_mb"], row["wanted_mb"], row["met"]) for row in rows]
+            return _bars(bars, 0.0, "peak resident memory, MB; mark: at most")
+        if "against" in rows[0]:
+            return _growth(_problems(rows))
+        own = _own(rows)
+        bars = [
             (f"{row['work']}\nbeside {_who(row)}", row["ratio"], row["wanted"], row["met"])
             for row in rows
-            if row is not _own(rows)[row["work"]] and row["ratio"] is not None
+            if row is not own[row["work"]] and row["ratio"] is not None
         ]
-        words = "time over kinacc's (logarithmic); mark: wanted"
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 0.3 * len(shown) + 0.6)
-        axes = figure.subplots()
-        for place, (_, value, wanted, met) in enumerate(shown):
-            colour = {None: style.MUTED, True: style.BLUE, False: style.VERMILION}[met]
-            start = 0.0 if "stage" in rows[0] else 1.0
-            axes.barh(place, value - start, left=start, height=0.6, color=colour)
-            if wanted is not None:
-                axes.plot([wanted, wanted], [place - 0.4, place + 0.4], color=style.INK, lw=1.5)
-        if "stage" not in rows[0]:
-            axes.set_xscale("log")
-            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda ratio, _: f"{ratio:g}"))
-            axes.xaxis.set_minor_locator(NullLocator())
-            axes.axvline(1.0, color=style.INK, lw=0.6)
-        axes.set_yticks(range(len(shown)), [each[0] for each in shown])
-        axes.set(ylim=(len(shown) - 0.4, -0.6), xlabel=words)
-        axes.grid(visible=False, axis="y")
-        axes.tick_params(axis="y", length=0)
+        return _bars(bars, 1.0, "time over kinacc's (logarithmic); mark: wanted")
+
+
+def _bars(
+    rows: Sequence[tuple[str, float, float | None, bool | None]], start: float, words: str
+) -> Figure:
+    """Bars from ``start``, on a logarithmic scale where that is 1, with a mark at the wish."""
+    figure = style.new_figure(style.DOUBLE_COLUMN_IN, 0.3 * len(rows) + 0.6)
+    axes = figure.subplots()
+    for place, (_, value, wanted, met) in enumerate(rows):
+        colour = {None: style.MUTED, True: style.BLUE, False: style.VERMILION}[met]
+        axes.barh(place, value - start, left=start, height=0.6, color=colour)
+        if wanted is not None:
+            axes.plot([wanted, wanted], [place - 0.4, place + 0.4], color=style.INK, lw=1.5)
+    if start:
+        axes.set_xscale("log")
+        _plain_ticks(axes.xaxis)
+        axes.axvline(start, color=style.INK, lw=0.6)
+    axes.set_yticks(range(len(rows)), [each[0] for each in rows])
+    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel=words)
+    axes.grid(visible=False, axis="y")
+    axes.tick_params(axis="y", length=0)
     return figure
+
+
+def _growth(problems: Mapping[str, Sequence[Mapping]]) -> Figure:
+    """Time and memory of every problem by its size, relative to the smallest."""
+    figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.6)
+    both = figure.subplots(1, 2, sharex=True)
+    colours = [style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY]
+    colours += [style.INK, style.MUTED, "#A6761D", "#CC79A7"]
+    for number, (name, rows) in enumerate(problems.items()):
+        size = np.array([row["size"] for row in rows]) / rows[0]["size"]
+        look = {"color": colours[number % len(colours)], "marker": "osDv^P"[number % 6], "ms": 3.5}
+        both[0].plot(size, [row["cpu_s"] / rows[0]["cpu_s"] for row in rows], label=name, **look)
+        both[1].plot(size, [row["peak_mb"] for row in rows], **look)
+    largest = max(rows[-1]["size"] / rows[0]["size"] for rows in problems.values())
+    both[0].plot([1.0, largest], [1.0, largest], "--", color=style.INK, lw=0.8, label="linear")
+    both[0].set(xscale="log", yscale="log", ylabel="CPU time over that of the smallest")
+    both[1].set(yscale="log", ylabel="peak resident memory, MB")
+    for axes in both:
+        axes.set_xlabel("size over the smallest")
+        _plain_ticks(axes.xaxis)
+        _plain_ticks(axes.yaxis)
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def _plain_ticks(axis: Axis) -> None:
+    """Numbers, not powers, at the places of a logarithmic axis."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=9))
+    axis.set_major_formatter(FuncFormatter(lambda number, _: f"{number:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def main() -> None:
