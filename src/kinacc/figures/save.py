@@ -64,20 +64,22 @@ def write(figure: Figure, paths: Mapping[str, Path]) -> None:
 def _bytes(figure: Figure, name: str) -> bytes:
     buffer = BytesIO()
     dpi = PNG_DPI if name == "png" else RASTER_DPI
-    with _glyphs_alone() if name == "pdf" else nullcontext():
+    with _lean_pdf() if name == "pdf" else nullcontext():
         figure.savefig(buffer, format=name, dpi=dpi, metadata=_METADATA[name])
     return buffer.getvalue()
 
 
 @contextmanager
-def _glyphs_alone() -> Iterator[None]:
-    """Embed fonts without their rules for setting text, most of the time that a PDF takes.
+def _lean_pdf() -> Iterator[None]:
+    """Embed fonts without their rules for setting text, and keep of a mesh what is drawn.
 
-    matplotlib places every letter itself, so no reader of the file asks for them.
+    Reading the rules is most of the time that a PDF takes, and matplotlib places every letter
+    itself. A mesh is cut out of a raster of the whole figure, which would be kept for each.
     """
     from fontTools import subset
+    from matplotlib.backends.backend_pdf import PdfFile
 
-    load = subset.load_font
+    load, add = subset.load_font, PdfFile.imageObject
 
     def load_font(*args, **options):
         font = load(*args, **options)
@@ -85,8 +87,18 @@ def _glyphs_alone() -> Iterator[None]:
             del font[rules]
         return font
 
-    subset.load_font = load_font
+    with (
+        _replaced(subset, "load_font", load_font),
+        _replaced(PdfFile, "imageObject", lambda file, image: add(file, image.copy())),
+    ):
+        yield
+
+
+@contextmanager
+def _replaced(owner: object, name: str, value: object) -> Iterator[None]:
+    kept = getattr(owner, name)
+    setattr(owner, name, value)
     try:
         yield
     finally:
-        subset.load_font = load
+        setattr(owner, name, kept)
