@@ -135,3 +135,30 @@ def test_a_stage_that_is_told_to_stop_leaves_nothing_half_written(tmp_path, by):
     started.send_signal(by)
     said = started.communicate(timeout=30)[1]
     assert (started.returncode, said, list(tmp_path.iterdir())) == (-by, "", [])
+
+
+LIBRARIES = """\
+import sys
+from kinacc.workflow import stage
+
+def libraries(words):
+    import scipy.linalg, scipy.special, scipy.optimize
+    print(*sorted({"numpy.f2py", "numpy.testing"} & sys.modules.keys()))
+    from numpy.testing import assert_allclose
+    import numpy.testing
+    assert_allclose(numpy.testing.assert_allclose is assert_allclose, True)
+
+stage.from_words, stage.execute = libraries, str
+stage.main([])
+"""
+
+
+def test_a_stage_that_uses_scipy_does_not_wait_for_numpys_compiler_and_test_tools():
+    done = subprocess.run(
+        [sys.executable, "-c", LIBRARIES],
+        env=os.environ | {"PYTHONPATH": str(PACKAGE.parent)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("\n", "")
