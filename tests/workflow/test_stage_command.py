@@ -7,14 +7,16 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import format as in_shell
 
 from kinacc.artifacts.provenance import PACKAGE
 from kinacc.workflow.catalogue import STAGES, TOURNAMENT
 from kinacc.workflow.plan import planned
-from kinacc.workflow.stage import COMMAND, from_words
+from kinacc.workflow.stage import COMMAND, from_words, python_of_stages
 
 WORKFLOW = Path(__file__).parents[2] / "workflow"
 MEASURED = """\
@@ -84,6 +86,22 @@ def test_another_python_than_the_one_that_planned_says_itself_what_it_runs(plan,
     monkeypatch.setenv("KINACC_PYTHON", "python")
     (dataset,) = plan.datasets
     assert from_words(command(plan, "fig1", dataset, None)).code == ""
+
+
+@pytest.mark.parametrize(
+    ("methods", "image", "python"),
+    [
+        ((), None, sys.executable),
+        ((DeploymentMethod.CONDA,), None, "python"),
+        ((DeploymentMethod.APPTAINER,), None, sys.executable),
+        ((DeploymentMethod.APPTAINER,), "docker://kinacc", "python"),
+    ],
+)
+def test_an_environment_of_conda_or_a_container_brings_its_own_python(methods, image, python):
+    deployment = SimpleNamespace(deployment_method=set(methods))
+    modifier = SimpleNamespace(global_container_img=image)
+    workflow = SimpleNamespace(deployment_settings=deployment, modifier=modifier)
+    assert python_of_stages(workflow) == python
 
 
 def test_the_package_that_planned_is_the_one_that_runs_and_nothing_of_the_folder(tmp_path):

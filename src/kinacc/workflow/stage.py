@@ -151,7 +151,7 @@ def python_of_stages(workflow: Any) -> str:
     Where it is not its own, the environment has it in its PATH.
     """
     methods = {method.name for method in workflow.deployment_settings.deployment_method}
-    image = "APPTAINER" in methods and workflow.global_container_img
+    image = "APPTAINER" in methods and workflow.modifier.global_container_img
     return "python" if "CONDA" in methods or image else sys.executable
 
 
