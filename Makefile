@@ -3,6 +3,7 @@
 # make public-robots  every measured arm in examples/data calibrated blind, and the page about it
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
+# make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make lock        renew requirements/*.txt (needs uv)
 # make clean       remove results/ and public-robots/; make distclean removes .venv as well
@@ -10,7 +11,7 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test docs docs-links lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test bench docs docs-links lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -28,6 +29,7 @@ key = $(shell { cat $(1); pwd; } | cksum | tr -d ' ')
 PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
 KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
+PEERS := .venv-bench/.peers-$(call key,requirements/run.txt requirements/bench.txt pyproject.toml)
 
 reproduce: $(KINACC)
 	@$(PY) -m snakemake --cores $(CORES) --no-hooks
@@ -53,6 +55,11 @@ test: lint
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PYTEST)
+
+# The other libraries have an environment of their own: nothing else needs them.
+bench: $(PEERS)
+	@.venv-bench/bin/python benchmarks/run.py $(TOPICS)
+	@.venv-bench/bin/python tools/document_benchmarks.py
 
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
 docs: $(KINACC) $(TOOLS)
@@ -85,15 +92,28 @@ $(TOOLS): $(PACKAGES)
 	@$(PIP) --require-hashes -r requirements/test.txt
 	@touch $@
 
+PEERS_PIP = .venv-bench/bin/python -m pip install -qq --disable-pip-version-check
+$(PEERS):
+	@echo "kinacc: installing kinacc and the other libraries into .venv-bench (some minutes)"
+	@"$$(sh requirements/find-python $(PYTHON))" -m venv --clear .venv-bench
+	@$(PEERS_PIP) --require-hashes -r requirements/run.txt
+	@$(PEERS_PIP) --require-hashes -r requirements/bench.txt || \
+	  echo "kinacc: the other libraries cannot be installed here, and are left out"
+	@$(PEERS_PIP) --no-build-isolation --no-deps --editable .
+	@.venv-bench/bin/python -m compileall -q src
+	@.venv-bench/bin/python -m kinacc.workflow.warm_up
+	@touch $@
+
 # One lock for every supported Python and platform: names, versions and hashes, nothing else.
 LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
   --no-header --no-emit-index-url --no-emit-find-links
 lock:
 	$(LOCK) requirements/test.in --output-file requirements/test.txt
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
+	$(LOCK) requirements/bench.in --constraints requirements/test.txt --output-file requirements/bench.txt
 
 clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv
+	rm -rf .venv .venv-bench

@@ -37,7 +37,7 @@ from typing import Literal
 ROOT = Path(__file__).resolve().parents[1]
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
 SAMPLE_S = 0.02  # a sample repeats its run until it takes about this long
-ROUNDS = (5, 25)  # fewest and most
+ROUNDS = (3, 25)  # fewest and most
 TODAY = "today"
 LIMIT = "limit"
 
@@ -217,37 +217,57 @@ def measure(work: Work, processes: Sequence[Elsewhere], smoke: bool) -> list[Res
         sides = [processes[0], *sides, *processes[1:]]
     known = {LIMIT, TODAY, *(side.name for side in sides)}
     absent = [_absent(work, name, "not installed") for name in work.wanted if name not in known]
+    if work.today is not None and not processes:
+        absent.append(_absent(work, TODAY, "that commit is not in this repository"))
     return [*_rows(work, sides, smoke), *absent]
 
 
 def _rows(work: Work, sides: Sequence[_Here | Elsewhere], smoke: bool) -> list[Result]:
-    work.agree([side.output() for side in sides])
-    times, lasted, warm_up = zip(*(_enough(side, smoke) for side in sides), strict=True)
-    fewest, most = ROUNDS
-    rounds = 1 if smoke else min(most, max(fewest, round(work.seconds / sum(lasted))))
-    samples: list[list[Sample]] = [[] for _ in sides]
-    for number in range(rounds):
-        for place in range(len(sides)):
-            turn = (place + number) % len(sides)
-            samples[turn].append(sides[turn].sample(times[turn]))
+    samples, runs = (_once if smoke else _in_turns)(work, sides)
     rows = [
-        _row(work, side, own, samples[0], (rounds, *counts))
-        for side, own, *counts in zip(sides, samples, times, warm_up, strict=True)
+        _row(work, side, own, samples[0], (len(own), *counts))
+        for side, own, counts in zip(sides, samples, runs, strict=True)
     ]
     return rows if work.limit_ns is None else [*rows, _limit(work, samples[0])]
 
 
-def _enough(side: _Here | Elsewhere, smoke: bool) -> tuple[int, float, int]:
-    """How many runs make a sample, how many seconds it takes, and how often it has run by now."""
-    if smoke:
-        return 1, SAMPLE_S, 1
-    times = done = 1
+def _once(
+    work: Work, sides: Sequence[_Here | Elsewhere]
+) -> tuple[list[list[Sample]], list[tuple[int, int]]]:
+    """One run each, whose outputs are those compared."""
+    outputs: list[object] = []
+    samples = [[timed(lambda side=side: outputs.append(side.output()))] for side in sides]
+    work.agree(outputs)
+    return samples, [(1, 0)] * len(sides)
+
+
+def _in_turns(
+    work: Work, sides: Sequence[_Here | Elsewhere]
+) -> tuple[list[list[Sample]], list[tuple[int, int]]]:
+    """Samples of all rounds by side, and runs in each and before them."""
+    work.agree([side.output() for side in sides])
+    tried = [_enough(side) for side in sides]
+    # Where a single run is enough for all, trying was the first round.
+    counts = all(times == done == 1 for times, done, _ in tried)
+    samples = [[last] if counts else [] for _, _, last in tried]
+    fewest, most = ROUNDS
+    rounds = round(work.seconds / sum(times * last.wall_ns / 1e9 for times, _, last in tried))
+    for number in range(counts, min(most, max(fewest, rounds))):
+        for place in range(len(sides)):
+            turn = (place + number) % len(sides)
+            samples[turn].append(sides[turn].sample(tried[turn][0]))
+    return samples, [(times, 1 if counts else 1 + done) for times, done, _ in tried]
+
+
+def _enough(side: _Here | Elsewhere) -> tuple[int, int, Sample]:
+    """How many runs make a sample, how many have been tried, and what one of the last took."""
+    times, done = 1, 0
     while True:
-        lasted = times * side.sample(times).wall_ns / 1e9
+        sample = side.sample(times)
         done += times
-        if lasted > SAMPLE_S / 4:
-            enough = max(1, round(SAMPLE_S * times / lasted))
-            return enough, enough * lasted / times, done
+        lasted_s = times * sample.wall_ns / 1e9
+        if lasted_s > SAMPLE_S / 4:
+            return max(1, round(SAMPLE_S * times / lasted_s)), done, sample
         times *= 4
 
 

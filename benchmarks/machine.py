@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
+SOURCES = ("src", "workflow", "profiles", "Snakefile", "config.yaml")  # what a run needs
 
 
 def facts() -> dict[str, str | int | float]:
@@ -43,13 +44,13 @@ def cpu() -> str:
 
 @functools.cache
 def write_bandwidth_bytes_per_s(size_bytes: int = 1 << 28) -> float:
-    """What one thread writes into memory that is there already, best of seven."""
+    """What one thread writes into memory that is there already, by CPU time, best of seven."""
     array = np.zeros(size_bytes // 8)
     best = float("inf")
     for value in range(7):
-        begin = time.perf_counter()
+        begin = time.process_time()
         array.fill(value)
-        best = min(best, time.perf_counter() - begin)
+        best = min(best, time.process_time() - begin)
     return array.nbytes / best
 
 
@@ -66,10 +67,10 @@ def commit(of: str = "HEAD") -> str:
 
 
 def sources_of(of: str, folder: Path) -> Path | None:
-    """The tree of a commit in ``folder``, None without it; leaves no trace in the repository."""
+    """What of a commit is run, in ``folder``; None without it. Leaves the repository alone."""
     try:
         packed = folder / "tree.tar"
-        _git("archive", "--output", str(packed), of)
+        _git("archive", "--output", str(packed), of, "--", *SOURCES)
         subprocess.run(["tar", "-xf", packed.name], cwd=folder, check=True)
     except (OSError, subprocess.CalledProcessError):
         return None

@@ -14,15 +14,18 @@ RESULTS = Path(__file__).resolve().parent / "results"
 KINDS = {"int": pa.int64(), "float": pa.float64(), "str": pa.string(), "bool": pa.bool_()}
 
 
-def table(rows: Sequence[Mapping], facts: Mapping[str, str | int | float]) -> pa.Table:
-    """Rows with the machine's facts beside each, so that tables of machines can be joined."""
-    return pa.Table.from_pylist([{**row, **facts} for row in rows])
+def table(
+    rows: Sequence[Result] | Sequence[Mapping], facts: Mapping[str, str | int | float]
+) -> pa.Table:
+    """Rows with the machine's facts beside each, so that tables of machines can be joined.
 
-
-def results_table(rows: Sequence[Result], facts: Mapping[str, str | int | float]) -> pa.Table:
-    """Rows of contenders with columns of stated kinds, however few of them hold a number."""
-    kinds = {each.name: KINDS[each.type.partition(" ")[0]] for each in fields(Result)}
-    plain = pa.Table.from_pylist([asdict(row) for row in rows], pa.schema(kinds.items()))
+    Columns of contenders have the kind their record states, however few of them hold a number.
+    """
+    if isinstance(rows[0], Result):
+        kinds = {each.name: KINDS[each.type.partition(" ")[0]] for each in fields(Result)}
+        plain = pa.Table.from_pylist([asdict(row) for row in rows], pa.schema(kinds.items()))
+    else:
+        plain = pa.Table.from_pylist(list(rows))
     for name, value in facts.items():
         plain = plain.append_column(name, pa.array([value] * len(rows)))
     return plain
@@ -34,9 +37,3 @@ def write(found: pa.Table, topic: str, folder: Path = RESULTS) -> Path:
     path = folder / f"{topic}.parquet"
     pq.write_table(found, path, compression="zstd")
     return path
-
-
-def read(topic: str, folder: Path = RESULTS) -> list[dict]:
-    """Rows of one topic; none where it has not been measured."""
-    path = folder / f"{topic}.parquet"
-    return pq.read_table(path).to_pylist() if path.exists() else []

@@ -18,8 +18,6 @@ from pathlib import Path
 
 import harness
 
-os.environ.update(harness.ONE_THREAD)  # before numpy is imported
-
 TODAY = "f4528a6"
 WORKS = Path(__file__).resolve().parent / "works"
 
@@ -97,6 +95,7 @@ def main() -> int:
     if unknown:
         parser.error(f"no such topic: {', '.join(unknown)}; there are {', '.join(topics())}")
 
+    os.environ.update(harness.ONE_THREAD)  # before numpy is imported
     import machine
     import measured
 
@@ -109,12 +108,7 @@ def main() -> int:
             rows, problems = measure(topic, given.smoke, (given.today, tree))
             wrong += problems
             if rows and not given.smoke:
-                make = (
-                    measured.results_table
-                    if isinstance(rows[0], harness.Result)
-                    else measured.table
-                )
-                measured.write(make(rows, machine.facts()), topic)
+                measured.write(measured.table(rows, machine.facts()), topic)
             print(f"  {time.perf_counter() - begin:.0f} s", flush=True)
     print("\n".join(wrong), file=sys.stderr)
     return 1 if wrong else 0

@@ -12,11 +12,13 @@ from hypothesis import settings
 # Works in every pytest import mode, from tests/ and from any folder below it.
 TESTS = Path(__file__).resolve().parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "tools")]
+sys.path.append(str(TESTS.parent / "benchmarks"))
 
 # Files and folders left out of `make check`; measured with `pytest --durations=0`. The first ones
 # take longest: `make test` hands them out first, so that no worker is left alone with one.
 SLOW = (
     "integration/test_installed.py",
+    "slurm/test_on_slurm.py",
     "integration/test_changed_artefacts.py",
     "integration/test_shared_cache.py",
     "integration/test_same_bytes.py",
@@ -31,6 +33,7 @@ SLOW = (
     "assess/test_oracle_invalidation.py",
     "assess/test_size_limits.py",
     "artifacts/test_check.py",
+    "benchmarks",
     "calibration/test_chosen_order.py",
     "calibration/test_convergence.py",
     "calibration/test_dh_fit.py",
@@ -114,13 +117,17 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Say how many tests were skipped because measured data or a browser is absent."""
+    """Say how many tests were skipped because measured data, a browser or Slurm is absent."""
     import shared_data
 
     reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())]
     absent = sum(shared_data.ABSENT in reason for reason in reasons)
     if absent:
         line = f"{absent} skipped: the measured data sets are expected in {shared_data.FOLDER}"
+        terminalreporter.write_line(line, yellow=True)
+    alone = sum("Slurm absent" in reason for reason in reasons)
+    if alone:
+        line = f"{alone} skipped: runs on a cluster need Debian's slurm-wlm, root and .venv/cluster"
         terminalreporter.write_line(line, yellow=True)
     unseen = sum("Chromium absent" in reason for reason in reasons)
     if unseen:

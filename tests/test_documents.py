@@ -100,6 +100,7 @@ def test_commands_are_there_and_take_what_is_shown(page):
 # Looked up, never read from top to bottom.
 REFERENCE = (
     "artifacts",
+    "benchmarks",
     "command-line",
     "claims",
     "configuration",

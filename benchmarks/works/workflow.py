@@ -30,11 +30,10 @@ datasets:
 
 def paper(smoke: bool) -> Callable[[], list[str]]:
     """The paper's study in an empty folder; which files it leaves."""
-    targets = ["results/mh180/measurements.parquet"] if smoke else []
 
     def run() -> list[str]:
         cwd = project.folder()
-        project.snakemake("--cores", 2, "--no-hooks", "--", *targets, cwd=cwd)
+        project.snakemake("--cores", 2, "--no-hooks", cwd=cwd)
         return _left(cwd / "results")
 
     return run
@@ -68,17 +67,18 @@ def plain() -> Callable[[], list[str]]:
 
 
 def works(smoke: bool) -> list[Work]:
-    """The paper and a new file; in smoke size to their first stage."""
+    """The paper and a new file; in smoke size the file to its first stage."""
     import kinacc
 
     other = Contender("plain Snakemake", version("snakemake"), plain())
     return [
         Work(
             name, "run", 1, (Contender("kinacc", kinacc.__version__), other), _agree,
-            {other.name: 1 / 7}, today=make, seconds=60.0,
+            {other.name: 1 / 7}, today=make, seconds=30.0,
             limit="a start of Snakemake, a start of Python with numpy for each job, their work",
         )
-        for name, make in (("paper, snakemake -c2", paper), ("new file to Fig. 4", new_file))
+        for name, make in (("new file to Fig. 4", new_file), ("paper, snakemake -c2", paper))
+        if not (smoke and make is paper)
     ]  # fmt: skip
 
 

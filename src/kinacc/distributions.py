@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import digamma, gammaincinv, zeta
 
 from kinacc.errors import InputError, Problem
 
@@ -54,7 +54,7 @@ def quantile(fitted: GammaFit, probability: float) -> float:
     """Quantile of a fitted gamma distribution, in the unit of its sample."""
     if np.isinf(fitted.shape):
         return fitted.mean
-    return float(gammaincinv(fitted.shape, probability) * fitted.scale)
+    return float(scipy.special.gammaincinv(fitted.shape, probability) * fitted.scale)
 
 
 def gamma99(magnitudes: ArrayLike) -> float:
@@ -66,8 +66,8 @@ def _solve_shape(gap: float) -> float:
     # Minka's start, good to 1.5 % everywhere; his step converges quadratically from it.
     shape = (3.0 - gap + np.sqrt((gap - 3.0) ** 2 + 24.0 * gap)) / (12.0 * gap)
     for _ in range(50):
-        miss = np.log(shape) - digamma(shape) - gap
-        slope = shape**2 * zeta(2.0, shape) - shape  # d miss / d (1/shape)
+        miss = np.log(shape) - scipy.special.digamma(shape) - gap
+        slope = shape**2 * scipy.special.zeta(2.0, shape) - shape  # d miss / d (1/shape)
         inverse = 1.0 / shape - miss / slope
         step = 1.0 / inverse - shape
         shape = 1.0 / inverse

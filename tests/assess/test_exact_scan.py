@@ -104,6 +104,15 @@ def test_scans_of_any_world_equal_every_single_run(
         sigma = noise_mm * rng.uniform(0.3, 2, points) if kind == "own_noise" else noise_mm
         world = drawn_world(error, sigma, key_of(seed), budget)
     check(world, *switches, alpha=alpha, measurements=budget)
+    plain = dict(zip(("distance", "covariance"), switches, strict=True))
+    single = paper.assessor("model_invalidation", alpha=alpha, measurements=budget, **plain)
+    for eta_mm in (0.0, 0.2, *rng.uniform(0.0, 1.2, 3)):
+        run, steps = single.run(world, eta_mm), single.history(world, eta_mm)
+        assert run.measurements == len(steps)
+        assert run.points_visited == len({step.row for step in steps})
+        assert run.rejection_probability == pytest.approx(
+            steps[-1].rejection_probability, abs=1e-12
+        )
 
 
 @pytest.mark.parametrize("squared", [True, False])

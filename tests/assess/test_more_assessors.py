@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,7 +60,7 @@ def test_effects_are_the_derivatives_of_the_arm():
             for sign in (-1, 1):
                 values = getattr(ARM.dh, name).copy()
                 values[joint + 1] += sign * step
-                pose = dh.forward(dh.DHModel(**{**vars(ARM.dh), name: values}), angles)
+                pose = dh.forward(replace(ARM.dh, **{name: values}), angles)
                 moved.append(pose.position_mm + pose.rotation @ np.array([10.0, 20.0, 30.0]))
             slope = (moved[1] - moved[0]) / (2 * step) / unit
             assert effects[:, :, joint, cause] == pytest.approx(slope, abs=1e-6)

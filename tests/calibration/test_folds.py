@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -115,3 +116,27 @@ def test_a_label_with_enough_rows_outside_each_fold_is_held_out():
     fold, label = np.array([0, 0, 0, 1, 1, 1, 1, 0]), np.array([*"aaaaaa", "b", "b"])
     found = folds.always_trained(fold, {"target": label}, np.arange(8))
     assert [each.value for each in found] == ["b"]
+
+
+@pytest.mark.parametrize("looked_at", [50, -1])
+def test_neighbours_are_found_however_they_are_searched_and_across_a_full_turn(
+    monkeypatch, looked_at
+):
+    monkeypatch.setattr(folds, "MOST_LOOKED_AT", looked_at)
+    rng = np.random.default_rng(5)
+    near = 2.0 * np.pi * rng.integers(0, 3, (60, 3)) / 3.0 + rng.normal(0.0, 0.02, (60, 3))
+    apart = np.abs(np.mod(near[:, None] - near[None] + np.pi, 2.0 * np.pi) - np.pi)
+    wanted = np.argwhere(np.triu(np.all(apart <= 0.03, axis=2), 1))
+    found = np.sort(folds.neighbours(near, 0.03), axis=1)
+    assert len(wanted) > 10
+    np.testing.assert_array_equal(np.unique(found, axis=0), wanted)
+
+
+def test_rows_chosen_are_told_apart_as_if_there_were_no_others():
+    rng = np.random.default_rng(6)
+    q = rng.integers(0, 4, (80, 2)) * 0.1 + rng.normal(0.0, 0.01, (80, 2))
+    pose = rng.integers(0, 60, 80)
+    pairs = folds.neighbours(q, 0.02)
+    for rows in (np.arange(80), np.arange(0, 80, 2), np.flatnonzero(rng.random(80) < 0.3)):
+        wanted = folds.configurations(pose[rows], q[rows], 0.02)
+        np.testing.assert_array_equal(folds.configurations_among(rows, pose, pairs), wanted)

@@ -44,6 +44,10 @@ class Curve:
     y: np.ndarray
     size: int = 1
 
+    @property
+    def count(self):
+        return len(self.y)
+
     def cost(self, x):
         return float(np.sum((np.exp(x[0] * self.t) - self.y) ** 2))
 

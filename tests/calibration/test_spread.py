@@ -45,3 +45,21 @@ def test_gram_is_that_of_the_written_out_jacobian(name, free):
     scale = np.sqrt(np.diag(both.T @ both))
     error = (found - both.T @ both) / np.outer(scale, scale)
     assert np.abs(error[np.isfinite(error)]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ["dh", "vec"])
+@pytest.mark.parametrize("free", [True, False])
+@pytest.mark.parametrize("weighted", [True, False])
+def test_gradient_is_the_last_row_of_the_gram_matrix(name, free, weighted):
+    rng = np.random.default_rng(6)
+    seen = observations(rng, robot.load("mh180"), count=30)
+    model, at = flange_models()[name]
+    anchor = Frames(random_pose(rng), random_pose(rng, 2, 1.0, 100.0))
+    system = PoseSystem(seen, model, coordinates(seen, anchor, free, free), 350.0)
+    if weighted:
+        system = system.weighted(rng.uniform(0.0, 1.0, len(seen)))
+    x = np.concatenate([0.1 * rng.normal(size=system.coordinates.size), at])
+    full = solve.gram(system, x)
+    scale = np.sqrt(np.diag(full) * full[-1, -1]) + 1e-9
+    np.testing.assert_allclose(solve.gradient(system, x) / scale, full[-1] / scale, atol=1e-12)
+    assert solve.gradient(system, x)[-1] == pytest.approx(system.cost(x), rel=1e-12)

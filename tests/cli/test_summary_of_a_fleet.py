@@ -6,12 +6,17 @@ import json
 import os
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+import yaml
 from command_line import call, small_study
 
 from kinacc.artifacts import store
+from kinacc.workflow.last_words import last_words
+from kinacc.workflow.plan import SNAKEFILE, planned
 
 COLUMNS = ("bound_mm", "confidence", "campaign", "campaign_date", "verdict")
 
@@ -188,3 +193,46 @@ def test_a_bound_on_another_model_than_the_one_selected_says_so(fleet):
     other = {"dh": "vec", "vec": "dh"}[selected]
     campaign("line_a", model=other)
     assert "which is not the model selected" in rows()["line_a"]["remarks"]
+
+
+def many(folder, count):
+    """A configuration file for each of many robots."""
+    folder.mkdir()
+    for number in range(count):
+        told = {"datasets": {f"cell_{number}": {"robot": "mh180"}}}
+        (folder / f"cell_{number}.yaml").write_text(yaml.safe_dump(told))
+    return sorted(map(str, folder.iterdir()))
+
+
+def test_at_the_end_of_a_run_of_many_robots_the_command_for_all_is_named(tmp_path):
+    plan = planned(many(tmp_path / "robots", 5))
+    made = {plan.outputs("summary", name)["summary"] for name in plan.datasets}
+    assert last_words(plan, made) == [
+        "",
+        "5 data sets: kinacc summary results says what each is worth",
+    ]
+
+
+def test_one_stage_of_one_of_many_robots_goes_by_its_short_name(tmp_path):
+    configs = many(tmp_path / "robots", 22)
+    words = ["-n", "-c1", "--workflow-profile", "none", "--snakefile", SNAKEFILE]
+    words += ["--scheduler", "greedy", "--configfile", *configs, "--", "cell_21_vec"]
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", *words],
+        cwd=tmp_path, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = done.stdout + done.stderr
+    assert "cell_21: vec is up to date" in told
+    assert "cell_20: " not in told
+
+
+def test_a_robot_described_in_two_files_is_named_with_both(tmp_path):
+    text = "datasets: {cell: {robot: ur10, measurements: {source: file, file: {path: a.csv}}}}\n"
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.yaml").write_text(text)
+    (tmp_path / "a.csv").write_text("")
+    done = call("calibrate", tmp_path / "one.yaml", tmp_path / "two.yaml")
+    assert done.exit_code == 2
+    for word in ("'cell'", "one.yaml", "two.yaml", "a name of its own"):
+        assert word in done.output

@@ -2,8 +2,21 @@
 
 # With one data set its name stands in the paths, so that `snakemake -c1 dh` says which one it means.
 whose = "{dataset}" if len(plan.datasets) > 1 else next(iter(plan.datasets))
-# Asked for later: the targets are not known yet when this file is read.
-on_request = lambda: "robustness" in workflow.dag_settings.targets
+
+
+# The targets are not known yet when this file is read.
+def with_robustness():
+    return "robustness" in workflow.dag_settings.targets
+
+
+# Files from outside are read where they stand, also where results go to a storage.
+def files_read(name, dataset, part):
+    files = {
+        role: local(paths) if role.endswith("_file") else paths
+        for role, paths in plan.inputs(name, dataset, with_robustness()).items()
+    }
+    return plan.waited_for(name, dataset, part, ancient) | files
+
 
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
@@ -14,10 +27,9 @@ for stage in STAGES.values():
             stage.name
         input:
             unpack(
-                lambda w, name=stage.name, folder=folder: plan.waited_for(
-                    name, w.get("dataset", folder), w.get("part"), ancient
+                lambda w, name=stage.name, folder=folder: files_read(
+                    name, w.get("dataset", folder), w.get("part")
                 )
-                | plan.inputs(name, w.get("dataset", folder), on_request())
             ),
         output:
             **{
@@ -57,7 +69,7 @@ for stage in STAGES.values():
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
             job=lambda w, name=stage.name, folder=folder: plan.job_text(
-                name, w.get("dataset", folder), w.get("part"), on_request()
+                name, w.get("dataset", folder), w.get("part"), with_robustness()
             ),
             contents=lambda w, name=stage.name, folder=folder: plan.contents(
                 name, w.get("dataset", folder)

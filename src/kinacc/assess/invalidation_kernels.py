@@ -22,7 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from kinacc.compiled import compiled
 
 GRID_PER_MM = 1000.0
 # Columns of the state (m, 3) of a run: how many readings there are of a point, the magnitude of
@@ -57,7 +58,7 @@ _ZERO = np.uint64(0)
 _ONE = np.uint64(1)
 
 
-@njit(cache=True)
+@compiled
 def _high_product(a, b):
     """Upper 64 bits of the 128-bit product of two uint64."""
     a_low, a_high = a & _LOW, a >> _HALF
@@ -67,7 +68,7 @@ def _high_product(a, b):
     return a_high * b_high + (middle >> _HALF) + (other >> _HALF)
 
 
-@njit(cache=True)
+@compiled
 def philox(key0, key1, counter0, counter1):
     """Four uint64 words of Philox 4x64-10 at counter (counter0, counter1, 0, 0)."""
     c0, c1, c2, c3 = counter0, counter1, _ZERO, _ZERO
@@ -80,7 +81,7 @@ def philox(key0, key1, counter0, counter1):
     return c0, c1, c2, c3
 
 
-@njit(cache=True)
+@compiled
 def normals(key0, key1, point, visit):
     """Three standard normal deviates of one reading, by Box and Muller."""
     x0, x1, x2, x3 = philox(key0, key1, np.uint64(visit), np.uint64(point))
@@ -93,7 +94,7 @@ def normals(key0, key1, point, visit):
     return r0 * math.cos(angle0), r0 * math.sin(angle0), r1 * math.cos(angle1)
 
 
-@njit(cache=True)
+@compiled
 def extend(world, i, wanted):
     """Compute the readings of row i of a world (its ``arrays``) up to number ``wanted``, from 0.
 
@@ -113,14 +114,14 @@ def extend(world, i, wanted):
     known[i] = max(known[i], wanted + 1)
 
 
-@njit(cache=True)
+@compiled
 def extend_all(world, wanted):
     """Compute the readings of every row up to number ``wanted``, from 0."""
     for i in range(world[0].shape[0]):
         extend(world, i, wanted)
 
 
-@njit(cache=True)
+@compiled
 def chi2_3(x):
     """Chi-square distribution function, three degrees of freedom (eq. 18)."""
     if x <= 0.0:
@@ -135,7 +136,7 @@ def chi2_3(x):
     return math.erf(math.sqrt(0.5 * x)) - _ROOT_2_OVER_PI * math.sqrt(x) * math.exp(-0.5 * x)
 
 
-@njit(cache=True)
+@compiled
 def _miss(size, weight, eta, squared):
     """1 - p-hat of one point: probability that a measurement comes out larger than this one."""
     excess = size - eta
@@ -145,14 +146,14 @@ def _miss(size, weight, eta, squared):
     return 1.0 - chi2_3(distance * distance if squared else distance)
 
 
-@njit(cache=True)
+@compiled
 def _roots(power, budget):
     """Weight of a point with noise 1 after each number of readings."""
     roots = np.sqrt(np.arange(budget + 1.0))
     return roots if power == 0.5 else np.sqrt(roots)
 
 
-@njit(cache=True)
+@compiled
 def _add(sizes, sigma, roots, state, i):
     """Take the next reading of row i, which is known."""
     v = int(state[i, READS])
@@ -161,56 +162,7 @@ def _add(sizes, sigma, roots, state, i):
     state[i, WEIGHT] = roots[v + 1] / sigma[i]
 
 
-@njit(cache=True)
-def run(world, eta, alpha, squared, power, budget):
-    """One sequential run: (rejected, measurements, points visited, rejection probability)."""
-    known, sigma, sizes = world[1], world[2], world[7]
-    points, roots = known.size, _roots(power, budget)
-    state = np.zeros((points, 3))
-    miss = np.ones(points)
-    visited, taken, survival, rejected = 0, 0, 1.0, False
-    while taken < budget:
-        again = rejected
-        if again:
-            i, best = 0, -np.inf
-            for row in range(visited):
-                score = (state[row, SIZE] - eta) * state[row, WEIGHT]
-                if score > best:
-                    i, best = row, score
-        elif visited < points:
-            i = visited
-            visited += 1
-        else:
-            break
-        if state[i, READS] >= known[i]:
-            extend(world, i, int(state[i, READS]))
-        _add(sizes, sigma, roots, state, i)
-        miss[i] = _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
-        if again:
-            survival = 1.0
-            for row in range(visited):
-                survival *= miss[row]
-        else:
-            survival *= miss[i]
-        taken += 1
-        rejected = 1.0 - survival > alpha
-    return rejected, taken, visited, 1.0 - survival
-
-
-@njit(cache=True)
-def bisect(world, top, tolerance, alpha, squared, power, budget):
-    """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
-    low, high = 0.0, top
-    while high - low > tolerance:
-        middle = 0.5 * (low + high)
-        if run(world, middle, alpha, squared, power, budget)[0]:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-@njit(cache=True)
+@compiled
 def _about(size, weight, eta, squared):
     """As :func:`_miss`, from a table of cubics and several times as fast."""
     excess = size - eta
@@ -229,10 +181,9 @@ def _about(size, weight, eta, squared):
     return max(1.0 - below, 0.0)
 
 
-@njit(cache=True)
-def _survival(k, state, active, squared, miss):
-    """Product of about 1 - p-hat at bound k over the active rows, each kept in ``miss``."""
-    eta = k / GRID_PER_MM
+@compiled
+def _survival(eta, state, active, squared, miss):
+    """Product of about 1 - p-hat at a bound over the active rows, each kept in ``miss``."""
     survival = 1.0
     for i in active:
         miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
@@ -240,17 +191,16 @@ def _survival(k, state, active, squared, miss):
     return survival
 
 
-@njit(cache=True)
-def _exact_survival(k, state, active, squared):
-    """Product of 1 - p-hat at bound k, bit for bit as a run has it."""
-    eta = k / GRID_PER_MM
+@compiled
+def _exact_survival(eta, state, active, squared):
+    """Product of 1 - p-hat at a bound over the active rows, in the order of their visits."""
     survival = 1.0
     for i in active:
         survival *= _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
     return survival
 
 
-@njit(cache=True)
+@compiled
 def _side(survival, alpha, guard):
     """+1 above the threshold, -1 below it, 0 where rounding or the table could decide."""
     probability = 1.0 - survival
@@ -259,10 +209,9 @@ def _side(survival, alpha, guard):
     return -1 if probability < alpha - guard else 0
 
 
-@njit(cache=True)
-def _side_at(k, state, active, squared, alpha, guard):
-    """The side at bound k, from as many rows as it takes."""
-    eta = k / GRID_PER_MM
+@compiled
+def _side_at(eta, state, active, squared, alpha, guard):
+    """The side at a bound, from as many rows as it takes."""
     survival = 1.0
     for i in active:
         survival *= _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
@@ -271,10 +220,9 @@ def _side_at(k, state, active, squared, alpha, guard):
     return _side(survival, alpha, guard)
 
 
-@njit(cache=True)
-def _winner(k, state, active):
-    """Row with the largest score at bound k, the first of equals; its score and the next one."""
-    eta = k / GRID_PER_MM
+@compiled
+def _winner(eta, state, active):
+    """Row with the largest score at a bound, the first of equals; its score and the next one."""
     row, best, second = -1, -np.inf, -np.inf
     for i in active:
         score = (state[i, SIZE] - eta) * state[i, WEIGHT]
@@ -285,26 +233,26 @@ def _winner(k, state, active):
     return row, best, second
 
 
-@njit(cache=True)
+@compiled
 def _last_on_side(side, near, far, state, active, squared, alpha, guard):
     """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
     inside, outside = near, far
     while abs(outside - inside) > 1:
         middle = (inside + outside) // 2
-        if _side_at(middle, state, active, squared, alpha, guard) == side:
+        if _side_at(middle / GRID_PER_MM, state, active, squared, alpha, guard) == side:
             inside = middle
         else:
             outside = middle
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _last_with_winner(row, near, far, state, active, margin):
     """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
     inside, outside = near, far
     while abs(outside - inside) > 1:
         middle = (inside + outside) // 2
-        other, best, rival = _winner(middle, state, active)
+        other, best, rival = _winner(middle / GRID_PER_MM, state, active)
         if other == row and best - rival > margin:
             inside = middle
         else:
@@ -312,7 +260,7 @@ def _last_with_winner(row, near, far, state, active, margin):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _resume(sizes, sigma, roots, state, path, low, rows):
     """Rebuild the state after the steps of a path; returns (points visited, active rows).
 
@@ -334,7 +282,7 @@ def _resume(sizes, sigma, roots, state, path, low, rows):
     return visited, count
 
 
-@njit(cache=True)
+@compiled
 def _insist(
     i, bounds, rivals, world, roots, state, at_near, at_far, active, path, steps, setting, guards
 ):
@@ -384,7 +332,74 @@ def _insist(
     return steps, near_others * at_near[i], far_others * at_far[i]
 
 
-@njit(cache=True)
+@compiled
+def _guards(largest_mm, points, sigma, power, budget):
+    """How near a probability is to the threshold, and scores are to each other, to be in doubt."""
+    margin = 1e-12 * largest_mm / sigma.min() * float(budget) ** power
+    return 1e-9 + points * _ABOUT + margin, margin
+
+
+@compiled
+def run(world, eta, alpha, squared, power, budget):
+    """One sequential run: (rejected, measurements, points visited, rejection probability)."""
+    sigma, sizes = world[2], world[7]
+    points, roots = sigma.size, _roots(power, budget)
+    guard, margin = _guards(sizes[:, 0].max(), points, sigma, power, budget)
+    state, miss = np.zeros((points, 3)), np.ones(points)
+    rows, path = np.empty(points, np.int64), np.empty(budget, np.int64)
+    visited, count, steps, survival = 0, 0, 0, 1.0
+    while True:
+        active = rows[:count]
+        side = _side(survival, alpha, guard)
+        if side == 0:
+            survival = _exact_survival(eta, state, active, squared)
+        rejected = 1.0 - survival > alpha
+        if steps == budget or (not rejected and visited == points):
+            break
+        if rejected:
+            i, _, rival = _winner(eta, state, active)
+            steps, survival, _ = _insist(
+                i,
+                (eta, eta),
+                (rival, rival),
+                world,
+                roots,
+                state,
+                miss,
+                miss,
+                active,
+                path,
+                steps,
+                (alpha, squared),
+                (guard, margin),
+            )
+        else:
+            i = visited
+            visited += 1
+            _add(sizes, sigma, roots, state, i)
+            steps += 1
+            if state[i, SIZE] > eta:
+                rows[count] = i
+                count += 1
+                miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
+                survival *= miss[i]
+    return rejected, steps, visited, 1.0 - _exact_survival(eta, state, rows[:count], squared)
+
+
+@compiled
+def bisect(world, top, tolerance, alpha, squared, power, budget):
+    """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
+    low, high = 0.0, top
+    while high - low > tolerance:
+        middle = 0.5 * (low + high)
+        if run(world, middle, alpha, squared, power, budget)[0]:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@compiled
 def scan(world, bottom, top, upward, alpha, squared, power, budget):
     """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
 
@@ -401,14 +416,13 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = (bottom, top, 0) if upward else (top, bottom, 0)
     depth, pieces = 1, 0
     onward = 1 if upward else -1
-    margin = 1e-12 * top / GRID_PER_MM / sigma.min() * float(budget) ** power
-    guard = 1e-9 + points * _ABOUT + margin
+    guard, margin = _guards(top / GRID_PER_MM, points, sigma, power, budget)
     while depth > 0:
         depth -= 1
         near, far, steps = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
         visited, count = _resume(sizes, sigma, roots, state, path[:steps], min(near, far), rows)
-        near_survival = _survival(near, state, rows[:count], squared, at_near)
-        far_survival = _survival(far, state, rows[:count], squared, at_far)
+        near_survival = _survival(near / GRID_PER_MM, state, rows[:count], squared, at_near)
+        far_survival = _survival(far / GRID_PER_MM, state, rows[:count], squared, at_far)
         while True:
             active = rows[:count]
             side = _side(near_survival, alpha, guard)
@@ -419,9 +433,9 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
                 waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + onward, far, steps
                 depth += 1
                 far = last
-                far_survival = _survival(far, state, active, squared, at_far)
+                far_survival = _survival(far / GRID_PER_MM, state, active, squared, at_far)
             if side == 0:
-                near_survival = _exact_survival(near, state, active, squared)
+                near_survival = _exact_survival(near / GRID_PER_MM, state, active, squared)
             rejected = 1.0 - near_survival > alpha
             if steps == budget or (not rejected and visited == points):
                 break
@@ -440,10 +454,10 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
                     near_survival *= at_near[i]
                     far_survival *= at_far[i]
             else:
-                i, best, rival = _winner(near, state, active)
+                i, best, rival = _winner(near / GRID_PER_MM, state, active)
                 far_rival = rival
                 if near != far:
-                    other, far_best, far_rival = _winner(far, state, active)
+                    other, far_best, far_rival = _winner(far / GRID_PER_MM, state, active)
                     sure = best - rival > margin
                     if not sure or other != i or far_best - far_rival <= margin:
                         last = near
@@ -453,8 +467,8 @@ def scan(world, bottom, top, upward, alpha, squared, power, budget):
                         waiting[depth, 2] = steps
                         depth += 1
                         far = last
-                        _survival(far, state, active, squared, at_far)
-                        far_rival = _winner(far, state, active)[2]
+                        _survival(far / GRID_PER_MM, state, active, squared, at_far)
+                        far_rival = _winner(far / GRID_PER_MM, state, active)[2]
                 steps, near_survival, far_survival = _insist(
                     i,
                     (near / GRID_PER_MM, far / GRID_PER_MM),

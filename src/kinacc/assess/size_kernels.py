@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from kinacc.compiled import compiled
 
 _ROOT_HALF = math.sqrt(0.5)
 _ROOT_2_PI = math.sqrt(2.0 * math.pi)
 _TINY = 1e-4  # sizes below it count as zero; the error this makes is below 1e-9
 
 
-@njit(cache=True)
+@compiled
 def reading_below(x, a):
     """Probability that a reading at a point of size ``a`` has at most size ``x``."""
     if x <= 0.0:
@@ -29,7 +30,7 @@ def reading_below(x, a):
     return max(tails - bulge, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def size_at(x, probability):
     """The size at which a reading of at most ``x`` has this probability; 0 if none is as likely.
 
@@ -51,7 +52,7 @@ def size_at(x, probability):
     return high
 
 
-@njit(cache=True)
+@compiled
 def reading_densities(x, noise, true):
     """Density (n, g) of readings of size ``x`` (n,) at true sizes (g,), up to a factor per reading.
 

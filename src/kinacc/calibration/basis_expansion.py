@@ -34,10 +34,6 @@ class Group:
         """Number of parameters."""
         return self.motions * (1 if self.basis is None else self.basis.shape[1])
 
-    def rows(self, some: slice) -> Group:
-        """The group for the observations ``some``."""
-        return self if self.basis is None else Group(self.columns, self.basis[some])
-
 
 def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     """Jacobian (n, m, P) in the parameters, from the motions ``columns`` (n, m, E)."""
@@ -60,17 +56,16 @@ def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
 
 def applied(columns: np.ndarray, groups: Sequence[Group], vectors: np.ndarray) -> np.ndarray:
     """The spread Jacobian of ``columns`` (n, m, E) times ``vectors`` (P, c): (n, m, c)."""
-    result, begin = np.zeros((*columns.shape[:2], vectors.shape[1])), 0
+    moved, begin = np.empty((len(columns), columns.shape[2], vectors.shape[1])), 0
     for group in groups:
-        part, own = columns[:, :, group.columns], vectors[begin : begin + group.size]
+        own = vectors[begin : begin + group.size]
         begin += group.size
-        if group.basis is None:
-            result += part @ own
-            continue
-        by_function = own.reshape(group.motions, -1, vectors.shape[1]).swapaxes(0, 1)
-        summed = group.basis @ by_function.reshape(group.basis.shape[1], -1)
-        result += part @ summed.reshape(len(columns), group.motions, -1)
-    return result
+        if group.basis is not None:
+            by_function = own.reshape(group.motions, -1, own.shape[1]).swapaxes(0, 1)
+            own = group.basis @ by_function.reshape(group.basis.shape[1], -1)
+            own = own.reshape(len(columns), group.motions, -1)
+        moved[:, group.columns] = own
+    return columns @ moved
 
 
 def gram(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
@@ -116,13 +111,10 @@ def spread_rows(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     return full
 
 
-def against(columns: np.ndarray, groups: Sequence[Group], values: np.ndarray) -> np.ndarray:
-    """Transposed spread Jacobian (P, m n) of ``columns`` (E, m, n) times ``values`` (m, n)."""
-    seen = np.einsum("emn,mn->en", columns, values)
+def summed(values: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
+    """Sums (P,) over observations of ``values`` (E, n) of motions, spread as these are."""
     parts = [
-        seen[group.columns].sum(axis=1)
-        if group.basis is None
-        else seen[group.columns] @ group.basis
-        for group in groups
+        part.sum(axis=1) if group.basis is None else (part @ group.basis).ravel()
+        for group, part in ((each, values[each.columns]) for each in groups)
     ]
-    return np.concatenate([part.ravel() for part in parts])
+    return np.concatenate(parts)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
+import scipy
 
 from kinacc.calibration.frames import MOTIONS, Frames
 
@@ -94,8 +94,8 @@ def _simple(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
     """The same space by directions that share no pivot ``among`` (P,), to a largest part of 1."""
     if not len(rows):
         return rows
-    left, upper, _ = qr(rows[:, among], mode="economic", pivoting=True)
-    mixed = solve_triangular(upper[:, : len(rows)], left.T @ rows)
+    left, upper, _ = scipy.linalg.qr(rows[:, among], mode="economic", pivoting=True)
+    mixed = scipy.linalg.solve_triangular(upper[:, : len(rows)], left.T @ rows)
     return mixed / np.abs(mixed).max(axis=1, keepdims=True)
 
 

@@ -99,26 +99,28 @@ class BlockSums:
         Posterior means at the residual variance that they leave. The residual's own is one.
         """
         flat, size = self.flat, self.flat + 1 + self.bent * order
-        normal = self._weighted(order, far)
-        for number in far:
-            normal += self._sums(order)[number][:size, :size]
+        sums, weighted = self._sums(order), self._weighted(order, far)
+        first, *others = (sums[number][:size, :size] for number in far)
+        normal = first - weighted
+        for each in others:
+            normal += each
         # Frames, constants and offsets have no prior worth the name: eliminated once for all.
         own = normal[:flat, :flat]
         own = own + np.diag(_GAUGE_RIDGE * np.maximum(np.diag(own), own.trace() / max(flat, 1)))
         sides = np.linalg.solve(own, normal[:flat, flat:])
-        normal[flat:, flat:] -= normal[flat:, :flat] @ sides
-        left = normal[flat:, flat:]
-        cost, right, rest = left[0, 0], left[1:, 0], left[1:, 1:]
+        left = normal[flat:, :flat] @ sides
+        np.subtract(normal[flat:, flat:], left, out=left)
+        del normal
         freedom = sum(self.components[number] for number in far) - flat
         found = np.ones((size, len(priors)))
-        for decay in dict.fromkeys(prior.decay for prior in priors if order):
+        decays = list(dict.fromkeys(prior.decay for prior in priors if order))
+        for decay in decays:
             of_shape = [i for i, prior in enumerate(priors) if prior.decay == decay]
             unit = self._falling(priors[of_shape[0]], order)
             std = np.array([priors[i].delta_mm for i in of_shape])
-            scaled = rest * unit[:, None]
+            scaled = np.multiply(left, unit[:, None], out=left if decay == decays[-1] else None)
             scaled *= unit
-            bent = ridge.steps(scaled, right * unit, cost, freedom, std)
-            found[flat + 1 :, of_shape] = unit[:, None] * bent
+            found[flat + 1 :, of_shape] = unit[1:, None] * ridge.steps(scaled, freedom, std)
         found[:flat] = -sides[:, :1] - sides[:, 1:] @ found[flat + 1 :]
         return found
 
@@ -144,8 +146,8 @@ class BlockSums:
                 self._normal[number] = self._summed(built, parts)
         return self._normal
 
-    def _weighted(self, order: int, far: Mapping[int, np.ndarray]) -> np.ndarray:
-        """Minus the Gram matrix of the rows of blocks, each times its share in ``far``."""
+    def _weighted(self, order: int, far: Mapping[int, np.ndarray]) -> np.ndarray | float:
+        """Gram matrix of the rows of blocks, each times its share in ``far``; 0 for none."""
         parts = []
         for number, share in far.items():
             begin = 0
@@ -159,10 +161,7 @@ class BlockSums:
                         for each in groups
                     ]
                     parts.append((columns[rows] * np.sqrt(own[rows])[:, None, None], some))
-        if not parts:
-            return np.zeros((self.flat + 1 + self.bent * order,) * 2)
-        found = self._summed(order, parts)
-        return np.negative(found, out=found)
+        return self._summed(order, parts) if parts else 0.0
 
     def _summed(self, order: int, parts: Sequence[Motions]) -> np.ndarray:
         """Gram matrix of ``[J | r]`` of ``parts`` up to ``order``, in the order of unknowns."""
@@ -189,9 +188,9 @@ class BlockSums:
         return np.argsort(np.concatenate(degree), kind="stable")
 
     def _falling(self, prior: Prior, order: int) -> np.ndarray:
-        """Prior standard deviations of unknowns above order 0, over that of a length."""
+        """Prior standard deviations of unknowns above order 0, over that of a length; 1 before."""
         std = prior.std(self.empty)[: self.empty.coefficients.size].reshape(self.bent, -1)
-        return std[:, 1 : order + 1].T.ravel() / prior.delta_mm
+        return np.append(1.0, std[:, 1 : order + 1].T / prior.delta_mm)
 
 
 def _in(kept: np.ndarray, total: np.ndarray) -> np.ndarray:

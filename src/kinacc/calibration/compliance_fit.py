@@ -20,8 +20,10 @@ from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.system import FlangeModel
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
+from kinacc.geometry import Pose
 from kinacc.kinematics import compliance
 from kinacc.kinematics.compliance import ComplianceModel
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 
 _NO_MOMENT = 1e-6  # N m, or mm of lever: far above rounding, far below what bends a joint
@@ -123,10 +125,14 @@ class ComplianceEstimator(Estimator):
             vector[free] = x
             return compliance.with_vector(nominal, vector)
 
+        def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
+            bent = model(x)
+            return bent.pose(at), bent.parameter_jacobian(at).transpose(2, 1, 0)[free]
+
         flange = FlangeModel(
             int(free.sum()),
             lambda x, at: model(x).pose(at),
-            lambda x, at: dh_fit.by_parameters(model(x), at, free),
+            linearised,
         )
         more = len(names) - arm.free.size
         unknowns = Unknowns(

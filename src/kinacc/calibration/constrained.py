@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates, left_jacobian, stacked
 from kinacc.calibration.observations import Observations
@@ -175,7 +175,7 @@ class ConstrainedSystem:
         return self.system.gradient(self._inner(y)) @ self._change(y)
 
     def _change(self, y: np.ndarray) -> np.ndarray:
-        return block_diag(
+        return scipy.linalg.block_diag(
             self.frames.change(y[: self.frames.size]), np.eye(self.system.model.size + 1)
         )
 

@@ -27,7 +27,6 @@ from kinacc.calibration.system import FlangeModel, require_enough
 from kinacc.calibration.truncated_svd import unseen
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
-from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 
@@ -269,18 +268,16 @@ def flange_model(nominal: DHModel, free: np.ndarray) -> FlangeModel:
         vector[mask] = x
         return dh.with_vector(nominal, vector)
 
+    def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
+        pose, jacobian = dh.pose_and_parameter_jacobian(model(x), at.q_rad)
+        return pose, jacobian.reshape(len(at), 6, -1).transpose(2, 1, 0)[chosen]
+
+    chosen = np.flatnonzero(mask)
     return FlangeModel(
         int(mask.sum()),
         lambda x, at: model(x).pose(at),
-        lambda x, at: by_parameters(model(x), at, mask),
+        linearised,
     )
-
-
-def by_parameters(
-    model: DHModel | ComplianceModel, at: JointState, free: np.ndarray
-) -> tuple[Pose, np.ndarray]:
-    """Poses (n, ...) of a model and their Jacobian (P, 6, n) in its parameters ``free``."""
-    return model.pose(at), model.parameter_jacobian(at).transpose(2, 1, 0)[free]
 
 
 def scales(free: np.ndarray) -> np.ndarray:

@@ -173,20 +173,25 @@ def fit_all(
 ) -> dict[str, Fit]:
     """Models by kind, and the nominal one, fitted to ``observations``; see ``Estimator.fit``."""
     fits: dict[str, Fit] = {}
+    nominal: dict[str, Fit] = {}
     for each in estimators:
-        fitted = each.fit(observations, fits, near[each.kind] if near else None)
+        if not nominal:
+            arm, frames = each.common.nominal, nominal_frames(observations, each.common)
+            nominal[NOMINAL] = Fit(arm, frames)
+        fitted = each.fit(observations, fits | nominal, near[each.kind] if near else None)
         fits[each.kind] = Fit(fitted.model, fitted.frames)
-        common = each.common
-    return {**fits, NOMINAL: Fit(common.nominal, nominal_frames(observations, common))}
+    return fits | nominal
 
 
 def nominal_frames(observations: Observations, common: Common) -> Frames:
     """Base and targets of the nominal arm; nothing to fit where they are known. Raises FitError."""
     frames, terms = common.frames(observations)
-    return dh_fit.fit_frames(
-        observations,
-        common.nominal,
-        rotation_weight_mm_per_rad=common.rotation_weight_mm_per_rad,
-        frames=frames,
-        frame_terms=terms,
-    ).frames
+    return (
+        frames
+        or dh_fit.fit_frames(
+            observations,
+            common.nominal,
+            rotation_weight_mm_per_rad=common.rotation_weight_mm_per_rad,
+            frame_terms=terms,
+        ).frames
+    )

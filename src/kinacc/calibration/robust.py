@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
+import scipy
 
 from kinacc.calibration.observations import Observations
 
@@ -41,8 +41,10 @@ def weights(
     length = np.sqrt(np.bincount(row, residual**2, minlength=len(observations)))
     scale = scale_mm
     if scale is None:
-        scale = float(np.median(length / np.sqrt(chdtri(components, 0.5))))
-    bend = np.sqrt(chdtri(components, _BEYOND[loss])) * max(scale, np.finfo(float).tiny)
+        scale = float(np.median(length / np.sqrt(scipy.special.chdtri(components, 0.5))))
+    bend = np.sqrt(scipy.special.chdtri(components, _BEYOND[loss])) * max(
+        scale, np.finfo(float).tiny
+    )
     share = length / bend
     if loss == HUBER:
         weight = 1.0 / np.maximum(share, 1.0)

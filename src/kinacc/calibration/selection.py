@@ -23,7 +23,7 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.vec_fit import Prior
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.vec import VECModel
-from kinacc.measurements.folds import configurations
+from kinacc.measurements.folds import configurations_among, neighbours
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)
 ALWAYS_TRIED = 12  # above it orders are tried as long as that pays
@@ -60,20 +60,21 @@ def highest_order(components: int, joints: int, frames: int) -> int:
     return (components - frames) // (6 * joints) - 1
 
 
-def distinct(held_out: Observations) -> Observations:
-    """One reading of every configuration and target.
-
-    Another one of the same tells nothing new of the arm.
-    """
-    same = np.stack([configurations(held_out.pose, held_out.q_rad), held_out.target], axis=1)
-    return held_out.select(np.unique(same, axis=0, return_index=True)[1])
-
-
 def carried(held_out: Observations) -> int:
-    """Residual components that every fit of a chosen order has, those without a fold as well."""
-    folds = np.unique(held_out.fold)
-    without = [distinct(held_out.select(held_out.fold != fold)).components for fold in folds]
-    return min(each for each in (distinct(held_out).components, *without) if each > 0)
+    """Residual components that every fit of a chosen order has, those without a fold as well.
+
+    Of one reading of every configuration and target: another one of the same tells nothing new.
+    """
+    near, folds = neighbours(held_out.q_rad), np.unique(held_out.fold)
+    seen = [np.arange(len(held_out))]
+    seen += [np.flatnonzero(held_out.fold != fold) for fold in folds]
+    found = []
+    for rows in seen:
+        same = configurations_among(rows, held_out.pose, near)
+        both = np.stack([same, held_out.target[rows]], axis=1)
+        distinct = rows[np.unique(both, axis=0, return_index=True)[1]]
+        found.append(held_out.select(distinct).components)
+    return min(each for each in found if each > 0)
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,8 @@ def choices(
     sums = BlockSums.of(observations, block, empty, frames, rotation_weight_mm_per_rad)
     # Of two blocks nothing would be left to try candidates on.
     held_out = [*numbers, None] if len(numbers) > 2 else [None]
-    searches = {out: _Search.of(observations, block, out) for out in held_out}
+    near = neighbours(observations.q_rad)
+    searches = {out: _Search.of(observations, block, out, near) for out in held_out}
     pairs = {frozenset({out, test}) for out in held_out for test in numbers if test != out}
     far = {pair: sums.far(pair) for pair in pairs}
     for order in (
@@ -189,10 +191,12 @@ class _Search:
     tried: list[tuple[int, tuple[Prior, ...], np.ndarray]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, observations: Observations, block: np.ndarray, out: int | None) -> _Search:
+    def of(
+        cls, observations: Observations, block: np.ndarray, out: int | None, near: np.ndarray
+    ) -> _Search:
         folds = np.unique(observations.fold[block == out]) if out is not None else ()
         rows = np.flatnonzero((block >= 0) & (block != (-1 if out is None else out)))
-        same = configurations(observations.pose[rows], observations.q_rad[rows])
+        same = configurations_among(rows, observations.pose, near)
         return cls(tuple(int(each) for each in folds), rows, same)
 
     def add(self, order: int, priors: tuple[Prior, ...], squared_mm2: np.ndarray) -> None:

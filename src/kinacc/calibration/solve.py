@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dpstrf, dtpqrt
+import scipy
 
 from kinacc.errors import FitError
 
@@ -22,14 +22,15 @@ STANDSTILL = 1e-9  # share of the objective
 MAX_HALVINGS = 12
 COST_RESOLUTION = 1e-9  # close to the optimum the cost no longer resolves a step
 LEAST_COST = 1e-10  # mm^2: of noise-free data
-_PANEL = 32  # columns reduced at once
-_ROWS = 512
+_PANEL = 16  # columns reduced at once
+_ROWS = 384
 
 
 class System(Protocol):
     """Residuals of a fit: P parameters, blocks of whitened residuals and their Jacobian."""
 
     size: int
+    count: int  # of residuals
 
     def cost(self, x: np.ndarray) -> float:
         """Sum of squared residuals at ``x``."""
@@ -64,14 +65,15 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Solution:
-    """Outcome of a fit of P parameters to ``count`` residuals; only converged fits are returned.
+    """Outcome of a fit of P parameters to ``count`` residuals.
 
     ``std`` (P,) and ``covariance`` (P, P) in the parameters' own units for residuals of
     ``variance``. The covariance is that of the determined directions; ``undetermined`` (m, P) are
     the others, unit displacements in units of ``scale`` that change no residual, and ``std`` is NaN
     where one of them reaches a parameter. ``cost`` is the sum of squared residuals,
     ``degrees_of_freedom`` their number less the (effective) number of fitted parameters,
-    ``last_step`` the largest last change in units of ``scale``. ``spectrum`` is None where a prior
+    ``last_step`` the largest last change in units of ``scale``; ``converged`` where it is not above
+    STEP_TOLERANCE, else the objective stood still before. ``spectrum`` is None where a prior
     made it needless; see ``spectrum``. ``scale`` (P,) are the units of ``undetermined``.
     """
 
@@ -148,7 +150,7 @@ def _reduced(factor: np.ndarray, rows: np.ndarray) -> np.ndarray:
     width = min(_PANEL, len(factor))
     for begin in range(0, len(rows), _ROWS):
         some = np.array(rows[begin : begin + _ROWS], order="F")
-        factor = dtpqrt(0, width, factor, some, overwrite_a=1, overwrite_b=1)[0]
+        factor = scipy.linalg.lapack.dtpqrt(0, width, factor, some, overwrite_a=1, overwrite_b=1)[0]
     return np.triu(factor)
 
 
@@ -159,7 +161,9 @@ def triangle_of_gram(gram: np.ndarray) -> np.ndarray:
     """
     unit = np.sqrt(np.maximum(np.diag(gram), 0.0))
     unit = np.where(unit > 0.0, unit, 1.0)
-    factor, order, rank, _ = dpstrf(gram / np.outer(unit, unit), tol=len(gram) * 2.3e-16)
+    factor, order, rank, _ = scipy.linalg.lapack.dpstrf(
+        gram / np.outer(unit, unit), tol=len(gram) * 2.3e-16
+    )
     factor = np.triu(factor)
     factor[rank:] = 0.0
     back = np.empty_like(factor)

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kinacc.calibration.basis_expansion import Group, against, gram, spread_rows
+from kinacc.calibration.basis_expansion import Group, gram, spread_rows, summed
 from kinacc.calibration.frames import FrameCoordinates, left_jacobian
 from kinacc.calibration.observations import Observations
 from kinacc.errors import InputError, Problem
@@ -22,7 +22,7 @@ from kinacc.kinematics.model import JointState
 
 BLOCK_ROWS = 1024
 WRITTEN_OUT = 350  # parameters up to which the written-out Jacobian is the shorter way to J'J
-_IN_CACHE = 192  # observations whose written-out Jacobian stays in the cache
+_KEPT = 32  # blocks up to which functions of their poses are kept
 _NEAR = 0.5  # cosine of the angle below which a rotation vector follows from the skew part alone
 _SMALL_ANGLE_RAD = 1e-3
 
@@ -38,6 +38,9 @@ def require_enough(observations: Observations, parameters: int, name: str, fix: 
         raise InputError(Problem("measurements", what, allowed, fix))
 
 
+Pull = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
 @dataclass(frozen=True)
 class FlangeModel:
     """A kinematic model with P parameters, as functions of the vector and of the observations.
@@ -45,12 +48,15 @@ class FlangeModel:
     ``pose(x, at)``: flange poses (n, ...). ``linearised(x, at)``: these and motions (E, 6, n),
     rows 0-2 mm per parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base. Motions
     are those of the parameters, E = P, or ``expansion(at)`` spreads them over these. None: P = 0.
+    ``pulled(x, at)``: poses and, of forces and moments (3, n) on the flange, their product (E, n)
+    with the motions, where that takes less than these.
     """
 
     size: int
     pose: Callable[[np.ndarray, JointState], Pose]
     linearised: Callable[[np.ndarray, JointState], tuple[Pose, np.ndarray]] | None = None
     expansion: Callable[[JointState], list[Group]] | None = None
+    pulled: Callable[[np.ndarray, JointState], tuple[Pose, Pull]] | None = None
 
     def with_motions(self, x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
         """Flange poses (n, ...) and motions (E, 6, n)."""
@@ -181,11 +187,8 @@ class PoseSystem:
             columns, groups = self._columns(x, part), self._groups(part)
             if self.size > WRITTEN_OUT:
                 total += gram(np.ascontiguousarray(columns.transpose(2, 1, 0)), groups)
-                continue
-            for begin in range(0, len(part.turned), _IN_CACHE):
-                some = slice(begin, begin + _IN_CACHE)
-                rows = spread_rows(columns[..., some], [group.rows(some) for group in groups])
-                rows = rows.reshape(len(rows), -1)
+            else:
+                rows = spread_rows(columns, groups).reshape(len(total), -1)
                 total += rows @ rows.T
         return total
 
@@ -193,8 +196,12 @@ class PoseSystem:
         """The last row (P+1,) of ``gram`` alone."""
         total = np.zeros(self.size + 1)
         for part in self._parts:
-            columns = self._columns(x, part)
-            total += against(columns, self._groups(part), columns[-1])
+            if self.model.pulled is None:
+                columns = self._columns(x, part)
+                seen = np.einsum("ecn,cn->en", columns, columns[-1])
+            else:
+                seen = self._pulled(x, part)
+            total += summed(seen, self._groups(part))
         return total
 
     def gram_blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, list[Group]]]:
@@ -215,7 +222,19 @@ class PoseSystem:
             for rows in blocks
         ]
 
+    @cached_property
+    def _kept_groups(self) -> dict[int, list[Group]]:
+        return {}
+
     def _groups(self, part: _Part) -> list[Group]:
+        if len(self._parts) > _KEPT:
+            return self._expanded(part)
+        found = self._kept_groups.get(id(part))
+        if found is None:
+            found = self._kept_groups[id(part)] = self._expanded(part)
+        return found
+
+    def _expanded(self, part: _Part) -> list[Group]:
         frames = self.coordinates.size
         if self.model.expansion is None:
             return [Group(slice(0, self.size + 1), None)]
@@ -259,6 +278,39 @@ class PoseSystem:
         if part.factor is not None:
             columns *= part.factor
         return columns
+
+    def _pulled(self, x: np.ndarray, part: _Part) -> np.ndarray:
+        """``_columns`` (E+1, c, n) times residuals, summed over c, without the motions."""
+        coordinates, frames = self.coordinates, self.coordinates.size
+        flange, pull = self.model.pulled(x[frames:], part.at)
+        seen = self._seen(x, part, flange)
+        residual = seen.residual
+        squared = residual * residual
+        if part.factor is not None:
+            residual, squared = residual * part.factor**2, squared * part.factor**2
+        force, moment = residual[:3], np.zeros_like(residual[:3])
+        turning = None
+        if part.components == 6:
+            turning = self.rotation_weight_mm_per_rad * _inverse_left_jacobian(seen.angles)
+            moment = np.einsum("ijn,in->jn", turning, residual[3:])
+        own = pull(force, moment + cross(seen.arm, force))
+        found = np.zeros((frames + len(own) + 1, len(part.turned)))
+        found[frames:-1], found[-1] = own, squared.sum(axis=0)
+        for session, rows in part.sessions if coordinates.base_free else ():
+            begin = coordinates.base_columns(session).start
+            about = cross(force[:, rows], seen.turned[:, rows])
+            if turning is not None:
+                about -= np.einsum("ijn,jn->in", turning[..., rows], residual[3:, rows])
+            found[begin : begin + 3, rows] = -force[:, rows]
+            found[begin + 3 : begin + 6, rows] = left_jacobian(x[begin + 3 : begin + 6]).T @ about
+        for target, rows in part.targets if coordinates.targets_free else ():
+            begin, rotation = coordinates.target_columns(target).start, seen.rotation[..., rows]
+            found[begin : begin + 3, rows] = np.einsum("ijn,in->jn", rotation, force[:, rows])
+            if turning is not None and coordinates.turns[target]:
+                about = np.einsum("ijn,in->jn", rotation, moment[:, rows])
+                turn = left_jacobian(x[begin + 3 : begin + 6])
+                found[begin + 3 : begin + 6, rows] = turn.T @ about
+        return found
 
     def _seen(self, x: np.ndarray, part: _Part, flange: Pose) -> _Seen:
         frame_x = x[: self.coordinates.size]

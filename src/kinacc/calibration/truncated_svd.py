@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import qr
+import scipy
 
 from kinacc.calibration import solve, variances
 from kinacc.calibration.solve import Solution, Spectrum, System
@@ -15,6 +15,7 @@ from kinacc.calibration.solve import Solution, Spectrum, System
 TRUNCATED_GROWTH = 1e-3
 FRAME_THRESHOLD = 1e-6  # frames have no nominal value to keep: only exact ambiguities are cut
 MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
+NEAR = 1e-4  # mm and mrad, of steps from which on the Jacobian itself is reduced
 GRAM_TELLS = 1e-5  # share of the largest singular value that a Gram matrix still resolves
 TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
 
@@ -72,88 +73,80 @@ def arrived(
     weight = np.zeros(system.size) if prior is None else prior
     held = _Held(nominal, scale, weight * scale, frames)
     unit = np.append(scale, 1.0)
-    units, latest = np.outer(unit, unit), np.empty(0)
-
-    def objective(at: np.ndarray) -> float:
-        nonlocal latest
-        latest = solve.gram(system, at)
-        return latest[-1, -1] + held.cost(at)
-
-    cost, ranks, last, expected = objective(x), None, np.inf, np.inf
-    normal, iterations = latest, 0
+    seen = _Seen(system, scale, np.outer(unit, unit), is_rotation, held)
+    closely = threshold < GRAM_TELLS
+    cost, ranks, last = seen.look(x, closely), None, np.inf
+    iterations = 0
     while iterations < solve.MAX_ITERATIONS:
         iterations += 1
-        closely = expected <= solve.STEP_TOLERANCE or threshold < GRAM_TELLS
-        if closely:
-            factors, counts = solve.triangles(system, x, scale, is_rotation)
-            factor = solve.joined(factors)
-        else:
-            factor = solve.triangle_of_gram(normal * units)
         # A rank that has been lost is not taken back, so the iteration cannot swing between two.
         most = ranks if iterations > 3 else None
-        split = _Split.of(held.joined(factor, x), held, threshold, most)
+        split = _Split.of(held.joined(seen.factor, x), held, threshold, most)
         ranks = split.ranks
         step = split.step(held.displacement(x))
         size = float(np.max(np.abs(step), initial=0.0))
-        if closely and size <= solve.STEP_TOLERANCE:
-            return Arrived(
-                system,
-                x + scale * step,
-                step,
-                factors,
-                counts,
-                split,
-                held,
-                threshold,
-                is_rotation,
-                iterations,
-                size,
-            )
-        before = cost, last
-        there, cost, last = solve.advance(
-            objective, x, scale * step, cost, scale, name, TRUNCATED_GROWTH
-        )
-        moved = there is not x
-        x, normal = there, latest if moved else normal
-        expected = last * min(1.0, last / before[1]) if np.isfinite(before[1]) else last
-        if iterations >= solve.PATIENCE and abs(before[0] - cost) <= solve.STANDSTILL * before[0]:
+        if seen.closely and size <= solve.STEP_TOLERANCE:
+            return Arrived(seen, x + scale * step, step, split, threshold, iterations, size)
+        # Where steps go on shortening as they did, the next one may be the last.
+        expected = size * min(1.0, size / last) if iterations > 1 else size
+        closely = closely or expected <= NEAR
+        before, at = cost, x
+        x, cost, last = solve.advance(
+            lambda at, how=closely: seen.look(at, how), x, scale * step, cost, scale, name,
+            TRUNCATED_GROWTH,
+        )  # fmt: skip
+        if x is at:
+            seen.look(x, closely)
+        if iterations >= solve.PATIENCE and abs(before - cost) <= solve.STANDSTILL * before:
             break
     else:
-        solve.require_converged(name, iterations, last, cost, sum(counts))
-    factors, counts = solve.triangles(system, x, scale, is_rotation)
-    split = _Split.of(held.joined(solve.joined(factors), x), held, threshold, ranks)
-    return Arrived(
-        system,
-        x,
-        np.zeros(system.size),
-        factors,
-        counts,
-        split,
-        held,
-        threshold,
-        is_rotation,
-        iterations,
-        last,
-    )
+        solve.require_converged(name, iterations, last, cost, system.count)
+    seen.look(x, True)
+    split = _Split.of(held.joined(seen.factor, x), held, threshold, ranks)
+    return Arrived(seen, x, np.zeros(system.size), split, threshold, iterations, last)
+
+
+class _Seen:
+    """What a fit sees of its ``system`` at the latest point it looked at.
+
+    ``factor``: triangular factor of ``[J scale | r]``, that of the Gram matrix, or ``closely`` that
+    of the Jacobian; then ``factors`` has those of positions and of rotations, and ``counts`` how
+    many residuals these are.
+    """
+
+    def __init__(self, system, scale, units, is_rotation, held) -> None:
+        self.system, self.scale, self.units = system, scale, units
+        self.is_rotation, self.held = is_rotation, held
+        self.closely, self.factor = False, np.zeros((0, 0))
+        self.factors: list[np.ndarray] = []
+        self.counts: list[int] = []
+
+    def look(self, x: np.ndarray, closely: bool) -> float:
+        """Look at ``x``: the objective there."""
+        self.closely = closely
+        if closely:
+            self.factors, self.counts = solve.triangles(
+                self.system, x, self.scale, self.is_rotation
+            )
+            self.factor = solve.joined(self.factors)
+            return float(np.sum(self.factor[:, -1] ** 2)) + self.held.cost(x)
+        gram = solve.gram(self.system, x)
+        self.factor = solve.triangle_of_gram(gram * self.units)
+        return float(gram[-1, -1]) + self.held.cost(x)
 
 
 @dataclass(frozen=True)
 class Arrived:
-    """Where the fit of a ``system`` ended, and what is to be said of it when asked.
+    """Where a fit ended, and what is to be said of it when asked.
 
-    ``factors``: triangular factors of ``[J scale | r]`` of positions and of rotations one ``step``
-    (P,), in units of scale, before ``x``; ``counts`` their residuals.
+    What was ``seen`` last was one ``step`` (P,), in units of scale, before ``x``.
     """
 
-    system: System
+    seen: _Seen
     x: np.ndarray
     step: np.ndarray
-    factors: list[np.ndarray]
-    counts: list[int]
     split: _Split
-    held: _Held
     threshold: float
-    is_rotation: np.ndarray | None
     iterations: int
     last: float
 
@@ -161,16 +154,18 @@ class Arrived:
     def cost(self) -> float:
         """Sum of squared residuals at ``x``."""
         to = np.append(self.step, 1.0)
-        return float(sum(np.sum((factor @ to) ** 2) for factor in self.factors))
+        return float(sum(np.sum((factor @ to) ** 2) for factor in self.seen.factors))
 
     @property
     def freedom(self) -> float:
         """Residuals less fitted parameters; of these only what the data, not a prior, decide."""
         fitted = float(sum(self.split.ranks))
-        if self.held.weight.any():
+        if self.seen.held.weight.any():
             root = self.split.root()
-            fitted = float(sum(np.sum((factor[:, :-1] @ root) ** 2) for factor in self.factors))
-        return sum(self.counts) - fitted
+            fitted = float(
+                sum(np.sum((factor[:, :-1] @ root) ** 2) for factor in self.seen.factors)
+            )
+        return sum(self.seen.counts) - fitted
 
     @property
     def variance(self) -> float:
@@ -179,37 +174,40 @@ class Arrived:
 
     def solution(self, shared: tuple[np.ndarray, ...]) -> Solution:
         """The fit's outcome with its standard deviations."""
-        x, scale, held, split = self.x, self.held.scale, self.held, self.split
-        factors, variance, freedom = self.factors, self.variance, self.freedom
+        x, seen, split, scale = self.x, self.seen, self.split, self.seen.scale
+        variance, freedom = self.variance, self.freedom
         root = of_fit = split.root()
         told = split
-        if self.threshold > FRAME_THRESHOLD:
+        if self.threshold > FRAME_THRESHOLD and seen.held.frames:
             # Fitted as they are, weak frames still count as undetermined.
-            joined = held.joined(solve.joined(factors), x)
-            told = _Split.of(joined, held, self.threshold, None, self.threshold)
+            joined = seen.held.joined(seen.factor, x)
+            told = _Split.of(joined, seen.held, self.threshold, None, self.threshold)
             root = told.root()
         covariance = variance * (root @ root.T) * np.outer(scale, scale)
-        if freedom > 0 and (shared or self.is_rotation is not None):
+        if freedom > 0 and (shared or seen.is_rotation is not None):
             if shared:
                 roots = scale[:, None] * of_fit, scale[:, None] * root
-                along = variances.along_root_shared(self.system, x, shared, *roots, variance)
+                along = variances.along_root_shared(seen.system, x, shared, *roots, variance)
             else:
                 to = np.append(self.step, 1.0)
-                costs = np.array([np.sum((factor @ to) ** 2) for factor in factors])
-                fitted, seen = ([f[:, :-1] @ each for f in factors] for each in (of_fit, root))
-                along = variances.along_root(costs, np.array(self.counts), fitted, seen, variance)
+                costs = np.array([np.sum((factor @ to) ** 2) for factor in seen.factors])
+                fitted, spoken = (
+                    [factor[:, :-1] @ each for factor in seen.factors] for each in (of_fit, root)
+                )
+                counts = np.array(seen.counts)
+                along = variances.along_root(costs, counts, fitted, spoken, variance)
             covariance = (root @ along @ root.T) * np.outer(scale, scale)
         return Solution(
             x=x,
             std=np.where(told.touched(), np.nan, np.sqrt(np.diag(covariance))),
             covariance=covariance,
             cost=self.cost,
-            count=sum(self.counts),
+            count=sum(seen.counts),
             degrees_of_freedom=freedom,
             variance=variance,
             iterations=self.iterations,
             last_step=self.last,
-            converged=True,
+            converged=self.last <= solve.STEP_TOLERANCE,
             spectrum=split.others.spectrum,
             undetermined=told.undetermined(),
             scale=scale,
@@ -249,7 +247,7 @@ class _Held:
         rows[np.arange(chosen.size), chosen] = self.weight[chosen]
         rows[:, -1] = (self.weight * self.displacement(x))[chosen]
         stacked = np.concatenate([factor, rows])
-        return qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
+        return scipy.linalg.qr(stacked, mode="r", check_finite=False)[0][: len(factor)]
 
     @property
     def known_frames(self) -> np.ndarray:

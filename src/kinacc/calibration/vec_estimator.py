@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import NOMINAL
 from kinacc.calibration import selection, tables, vec_fit
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.frames import Frames
@@ -83,7 +84,7 @@ class VECEstimator(Estimator):
         self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
     ) -> VECFit:
         """The VEC model on the nominal arm, base and targets starting where that has them."""
-        frames, terms = self._begin(observations)
+        frames, terms = self._begin(observations, others)
         start: VECModel | None = near.model if near else None
         # High orders are worth it; the end is the same to a few nm, which the paper's tables keep.
         worth = self.grid is not None and start is not None and start.order == self.order
@@ -111,7 +112,7 @@ class VECEstimator(Estimator):
         return {"vec_fit": tables.vec_fit_columns(fitted, gauge, known)}
 
     def _tried(self, every: Observations, progress: Callable | None) -> list[Choice]:
-        frames, terms = self._begin(every)
+        frames, terms = self._begin(every, {})
         weight = self.common.rotation_weight_mm_per_rad
         at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
         size = at.coordinates.size
@@ -128,9 +129,13 @@ class VECEstimator(Estimator):
             progress,
         )
 
-    def _begin(self, observations: Observations) -> tuple[Frames, FrameTerms | None]:
+    def _begin(
+        self, observations: Observations, others: Mapping[str, Fit]
+    ) -> tuple[Frames, FrameTerms | None]:
         """Where base and targets start, and what is taken for granted of those estimated."""
         stated, terms = self.common.frames(observations)
+        if stated is None and NOMINAL in others:
+            stated = others[NOMINAL].frames
         return stated or nominal_frames(observations, self.common), terms
 
     def _empty(self, order: int) -> VECModel:

@@ -21,7 +21,7 @@ from kinacc.calibration.map_estimate import minimise_with_prior
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.solve import Solution, Spectrum, spectrum
-from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
+from kinacc.calibration.system import FlangeModel, PoseSystem, Pull, require_enough
 from kinacc.geometry import Pose
 from kinacc.kinematics import vec
 from kinacc.kinematics.model import JointState
@@ -200,6 +200,8 @@ def _with_centred_offsets(
     joints, errors, terms = empty.coefficients.shape
     split = empty.coefficients.size
     place = frames + np.cumsum(free) - 1
+    if not free[split:].any():
+        return solution
     mapping = np.eye(solution.x.size)
     for joint in range(joints):
         offsets = split + 2 * joint + np.arange(2)
@@ -230,8 +232,13 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
     about_z = np.concatenate([np.arange(errors * empty.joints), errors * directed + errors - 1])
 
     def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
-        pose, motions = vec.linearised(model(x), at.q_rad, at.s)
-        return pose, motions[about_z] if directed.size else motions
+        moved = vec.motions(model(x), at.q_rad, at.s)
+        jacobian = moved.jacobian()
+        return moved.pose, jacobian[about_z] if directed.size else jacobian
+
+    def pulled(x: np.ndarray, at: JointState) -> tuple[Pose, Pull]:
+        moved = vec.motions(model(x), at.q_rad, at.s)
+        return moved.pose, lambda *wrench: moved.pulled(*wrench)[about_z]
 
     def expansion(at: JointState) -> list[Group]:
         basis, travelled = vec.chebyshev_basis(empty, at.q_rad), vec.direction_basis(at.s)
@@ -243,7 +250,9 @@ def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
             groups.append(Group(slice(number, number + 1), travelled[:, joint, seen[joint]]))
         return groups
 
-    return FlangeModel(int(free.sum()), lambda x, at: model(x).pose(at), linearised, expansion)
+    return FlangeModel(
+        int(free.sum()), lambda x, at: model(x).pose(at), linearised, expansion, pulled
+    )
 
 
 def _is_angle(model: VECModel) -> np.ndarray:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
+import scipy
 
 from kinacc.checks.robust_fit import HUBER, Residuals, Seen, sigma_of
 from kinacc.checks.tails import FAMILY_WISE
@@ -75,7 +75,9 @@ def _in_window(seen: Seen, left: Residuals, rows: np.ndarray) -> list[Step]:
     for target, regressors, of in kinds:
         if len(of) < 4 * _FEWEST:
             continue
-        chance = float(chdtri(regressors.shape[2], FAMILY_WISE / (len(of) * len(kinds))))
+        chance = float(
+            scipy.special.chdtri(regressors.shape[2], FAMILY_WISE / (len(of) * len(kinds)))
+        )
         gains = _gains(regressors[of], residual[of], weight[of])
         place = int(np.argmax(gains))
         rest = _without(regressors[of], residual[of], weight[of], place)

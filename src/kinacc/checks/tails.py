@@ -9,7 +9,7 @@ the limit. Never lighter tails than ten degrees of freedom: nothing measured is 
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import fdtri
+import scipy
 
 FAMILY_WISE = 0.01
 _MOST_FREEDOM, _LEAST_FREEDOM = 10.0, 4.0
@@ -57,7 +57,7 @@ def detached(lengths: np.ndarray) -> int:
 
 def _length(probability: float, dimensions: int, freedom: float) -> float:
     """Quantile of the length of a standard t vector."""
-    return float(np.sqrt(dimensions * fdtri(dimensions, freedom, probability)))
+    return float(np.sqrt(dimensions * scipy.special.fdtri(dimensions, freedom, probability)))
 
 
 def _freedom(ratio: float, dimensions: int) -> float:

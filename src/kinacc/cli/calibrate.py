@@ -7,6 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,6 @@ STUDIED = (
     *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
     "claims",
 )
-_FEW = 4  # data sets that are told of one by one
 WORDS = {"ignore_unknown_options": True}
 CORES = click.option(
     "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
@@ -52,6 +52,7 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     from kinacc.cli.fitted import summary
     from kinacc.cli.report import written
     from kinacc.workflow.answer import answer, read
+    from kinacc.workflow.fleet import FEW
 
     configs, plan = carried_out("calibration", words, cores, default=None)
     if plan is None:
@@ -61,8 +62,8 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
         answers = {name: summary(folder) for name, folder in folders.items()}
         click.echo(json.dumps(answers, indent=2))
         return
-    if len(folders) > _FEW:
-        _show_many([Path(folder) for folder in folders.values()])
+    if len(folders) > FEW:
+        show_many([*folders.values()])
         return
     more = shlex.join(["kinacc", "study", *configs])
     for folder in folders.values():
@@ -71,14 +72,15 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
         click.echo("\n".join(["", *answer(folder, tables, following=[more])]))
 
 
-def _show_many(folders: list[Path]) -> None:
+def show_many(folders: Sequence[str], more: Sequence[str] = ()) -> None:
     """The table of many data sets, for half pages of all of them would not be read."""
     from kinacc.cli.summary import show
     from kinacc.workflow.fleet import standings
 
-    one = shlex.quote(str(folders[0]))
-    more = [f"kinacc fitted {one} says half a page on one, kinacc report {one} writes its page"]
-    show(standings(folders), [None] * len(folders), "", ["", *more])
+    found = standings([Path(folder) for folder in folders])
+    one = shlex.quote(folders[0])
+    words = f"kinacc fitted {one} says half a page on one, kinacc report {one} writes its page"
+    show(found, [None] * len(found), "", ["", words, *more])
 
 
 def carried_out(
@@ -111,7 +113,9 @@ def carried_out(
         command += profile_options()  # Snakemake would say that it uses them
     command += more or ["--quiet", "all"]  # stages say how far they are, and what goes wrong
     command += ["--no-hooks"]  # what a run ends with is said by the command
-    done = subprocess.run([*command, "--", target], env=os.environ | ONE_THREAD, check=False)
+    # Words for Snakemake may change what is read.
+    known = ONE_THREAD | ({} if words[first:] else {"KINACC_FILES_READ": "1"})
+    done = subprocess.run([*command, "--", target], env=os.environ | known, check=False)
     if done.returncode:
         raise SystemExit(done.returncode)
     ran = not {"-n", "--dry-run", "--dryrun", "--unlock", "--lint"} & set(more)

@@ -57,6 +57,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
 
 def _job(folder: Path, out: str, without: Collection[str]) -> Job:
     from kinacc.artifacts.store import read_metadata
+    from kinacc.campaign.journal import of_results
     from kinacc.workflow.answer import read
     from kinacc.workflow.catalogue import STAGES
     from kinacc.workflow.plan import RESULTS, campaign_files
@@ -69,7 +70,7 @@ def _job(folder: Path, out: str, without: Collection[str]) -> Job:
     shown = [name for name in (*stage.inputs, *stage.optional) if name not in {*without, *old}]
     paths = {name: folder / f"{name}.parquet" for name in shown}
     inputs = {name: str(path) for name, path in paths.items() if path.is_file()}
-    inputs |= campaign_files(folder)
+    inputs |= campaign_files(of_results(folder))
     settings: dict[str, object] = {"dataset": folder.resolve().name}
     if folder != Path(RESULTS) / folder.resolve().name:
         settings["folder"] = str(folder)

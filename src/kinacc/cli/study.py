@@ -7,7 +7,7 @@ import shlex
 
 import click
 
-from kinacc.cli.calibrate import CORES, JSON, TARGETS, WORDS, carried_out
+from kinacc.cli.calibrate import CORES, JSON, TARGETS, WORDS, carried_out, show_many
 
 
 @click.command("study", context_settings=WORDS)
@@ -27,6 +27,7 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
     from kinacc.workflow.answer import answer, read
+    from kinacc.workflow.fleet import FEW
     from kinacc.workflow.plan import SNAKEFILE
 
     paper = SNAKEFILE.parent / "config.yaml"
@@ -38,6 +39,9 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
         return
     options = [word for name in configs for word in ("--config", name)]
     check = shlex.join(["kinacc", "check-results", plan.results, *options])
+    if len(plan.datasets) > FEW:
+        show_many([f"{plan.results}/{name}" for name in plan.datasets], [check])
+        return
     for dataset in plan.datasets:
         folder = f"{plan.results}/{dataset}"
         lines = answer(folder, read(folder), following=[check])

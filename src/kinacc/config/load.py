@@ -26,7 +26,7 @@ from kinacc.errors import InputError, Problem
 
 Contradictions = Callable[..., Iterable[Problem]]
 COMMAND_LINE = "command line"
-_MOST_DATASETS = 500
+_MOST_DATASETS = 5_000
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
 # Values that name files: in every data set, and of the top level.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc
+import scipy
 
 from kinacc.artifacts.error_models import model_name
 from kinacc.calibration.uncertainty import scale_of
@@ -257,7 +257,11 @@ def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
     along = (kept @ difference) @ vectors[:, good]
     statistic = float(np.sum(along**2 / seen[good]))
     directions = int(good.sum())
-    return statistic, directions, float(chdtrc(directions, statistic)) if directions else np.nan
+    return (
+        statistic,
+        directions,
+        float(scipy.special.chdtrc(directions, statistic)) if directions else np.nan,
+    )
 
 
 def _difference(before: Pose, after: Pose) -> np.ndarray:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bokeh
 import numpy as np
+from bokeh.core.serialization import Serializer
 from bokeh.document import Document
 from bokeh.models import ColumnDataSource, HoverTool, Plot
 from bokeh.models.renderers import GlyphRenderer
@@ -193,14 +194,14 @@ def documents(
         groups = [group for group in groups if group not in near]
         together = [each for group in near for each in group[1]]
         groups.append((own.union(*(group[0] for group in near)), [*together, plot]))
+    # A document would look for the models of all its plots again for each that joins or leaves it.
+    empty = Document().to_json(deferred=False)
     found: dict[str, object] = {}
     place: dict[str, tuple[str, str]] = {}
     for number, (_, group) in enumerate(groups, start=1):
-        document = Document()
         for plot in group:
-            document.add_root(plot)
-        text = json.dumps(document.to_json(deferred=False))
-        document.clear()  # a plot may be written again: it belongs to one document at a time
+            plot.references()  # makes models that are there by default, which are written too
+        text = json.dumps({**empty, "roots": Serializer(deferred=False).encode(group)})
         names = {name: f"k{number}-{i}" for i, name in enumerate(dict.fromkeys(_ID.findall(text)))}
         text = _ID.sub(lambda match, names=names: f'"{names[match[1]]}"', text)
         found[f"d{number}"] = json.loads(text)

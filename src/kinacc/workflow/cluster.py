@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import TYPE_CHECKING
 
 from kinacc.workflow.catalogue import STAGES, TOURNAMENT, maker_of
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
 
 ALONE_S = 60.0  # a part of scattered work that takes longer has a job of its own
 _MARGIN = 4.0  # slower nodes, a shared file system, kernels compiled at first use
-_MEMORY_MB = 600  # measured: 80 to 280 in a stage, 150 in the Snakemake of its job
-_MORE_MEMORY_MB = {"vec": 1000, "compliance": 1000, "residuals": 1000}  # they grow with the poses
+_MEMORY_MB = 600  # measured: 100 to 280 in a stage, 150 in the Snakemake of its job
+# The first three grow with the poses: 100,000 of them fit.
+_MORE_MEMORY_MB = dict.fromkeys(("vec", "compliance", "residuals", "choices_chunk"), 1000)
 _STAGE_S = 3.0
-_STUDY_S = 15.0  # fits, study and claims of one arm
 
 
 def _simulations(config: Mapping) -> float:
@@ -43,9 +44,9 @@ _SECONDS: Mapping[str, Callable[[Mapping], float]] = {
     "accuracy_map": lambda config: 2.0 + 3e-4 * _cells(config),
     "study_chunk": lambda config: 0.01 * _simulations(config),
     "report": lambda config: 5.0,
-    "robustness_chunk": lambda config: _STUDY_S * config["robustness"]["draws"],
-    "map_readings_chunk": lambda config: 60.0 * config["map_readings"]["arms"],
-    "choices_chunk": lambda config: _STUDY_S * config["choices"]["runs"],
+    "robustness_chunk": lambda config: 5.0 * config["robustness"]["draws"],
+    "map_readings_chunk": lambda config: 100.0 * config["map_readings"]["arms"],
+    "choices_chunk": lambda config: 8.0 * config["choices"]["runs"],
     "tournament_chunk": lambda section: {"default": 600.0}.get(section["size"], 86400.0),
 }
 
@@ -70,16 +71,18 @@ def memory_mb(name: str, attempt: int = 1) -> int:
 def group(plan: Plan, name: str, dataset: str) -> str | None:
     """Name of the job that a stage shares with those it is connected with; None for its own.
 
-    What is made from parts that have jobs of their own, and themselves read what the data set's job
-    makes, is a group of its own too: a job cannot wait for another one in its middle.
+    What is made from parts that have jobs of their own is a group of its own too: a job cannot wait
+    for another one in its middle.
     """
     if _is_alone(plan, name, dataset):
         return None
     if dataset == TOURNAMENT:  # it connects all data sets, which have a job each
         return TOURNAMENT
+    if STAGES[name].on_request:  # what the data set's job reads of it has to be there at its start
+        return "on_request"
     if not STAGES[name].inputs and STAGES[name].is_figure:
         return "examples"  # of no data, the same for all
-    after = any(STAGES[each].inputs and _is_alone(plan, each, dataset) for each in _below(name))
+    after = any(_is_alone(plan, each, dataset) for each in _below(name))
     return "assessment" if after else "calibration"
 
 
@@ -87,13 +90,15 @@ def _is_alone(plan: Plan, name: str, dataset: str) -> bool:
     return STAGES[name].scattered and seconds(plan, name, dataset) > ALONE_S
 
 
+@cache
 def _below(name: str) -> set[str]:
-    """Every stage of a data set whose tables a stage reads, itself or through others."""
+    """Every stage of a plain run whose tables a stage reads, itself or through others."""
     found: set[str] = set()
     waiting = [name]
     while waiting:
         stage = STAGES[waiting.pop()]
-        read = {maker_of(each).name for each in (*stage.inputs, *stage.optional)}
+        makers = {maker_of(each) for each in (*stage.inputs, *stage.optional)}
+        read = {maker.name for maker in makers if not maker.on_request}
         waiting += read - found
         found |= read
     return found

@@ -20,6 +20,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import STAGES, TOURNAMENT
 from kinacc.workflow.verification.lineage import made_of_these
 
+FEW = 4  # data sets of which each is told of at the end of a run
 BOUND, HELD_OUT = "bound", "held-out"
 _SUMMARY = STAGES["summary"]
 _DAY = 10  # characters of a time

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection
 from pathlib import Path
 
 from kinacc.workflow.answer import answer, read
+from kinacc.workflow.fleet import FEW
 from kinacc.workflow.plan import Plan
 
 
 def last_words(plan: Plan, made: Collection[str]) -> list[str]:
     """What a run says at its end, which was about the files ``made``, up to date ones included.
 
-    Of data sets whose summary was not asked for, only what the check of the data found.
+    Of data sets whose summary was not asked for, only what the check of the data found. Of many
+    nobody reads so much of each: the command is named that says what they are worth.
     """
     lines: list[str] = []
+    told = [each for each in plan.datasets if plan.outputs("summary", each)["summary"] in made]
+    if len(told) > FEW:
+        command = shlex.join(["kinacc", "summary", plan.results])
+        return ["", f"{len(told):,} data sets: {command} says what each is worth"]
     for dataset in plan.datasets:
-        if plan.outputs("summary", dataset)["summary"] in made:
+        if dataset in told:
             folder = Path(plan.results) / dataset
             tables = read(folder)
             if plan.outputs("claims", dataset)["claims"] not in made:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, wraps
+from functools import cache, cached_property, wraps
 from pathlib import Path
 
 from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
-from kinacc.campaign.journal import JOURNAL, PLAN, of_results
+from kinacc.campaign.journal import JOURNAL, PLAN, of_each
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.workflow.catalogue import (
     FIGURE_FOLDER,
@@ -444,6 +444,11 @@ class Plan:
         folder = f"{self.results}/{dataset}"
         return f"{folder}/{artefact}/{part}.parquet" if part else f"{folder}/{artefact}.parquet"
 
+    @cached_property
+    def _campaigns(self) -> dict[Path, list[Path]]:
+        """Campaigns on the calibration of every data set, by its results folder, sought once."""
+        return of_each(Path(self.results) / dataset for dataset in self.datasets)
+
     def _files(self, stage: Stage, dataset: str) -> dict[str, str]:
         """Files from outside by role; for the tournament ``<data set>/<role>``."""
         if dataset == TOURNAMENT:
@@ -454,7 +459,7 @@ class Plan:
             }
         config, found = self.datasets[dataset], {}
         if stage.leaves == PAGE:
-            found |= campaign_files(Path(self.results) / dataset)
+            found |= campaign_files(self._campaigns[Path(self.results) / dataset])
         for path in stage.files:
             value: object = config
             for key in path.split("."):
@@ -479,10 +484,10 @@ def _hash(path: str, changed_ns: int) -> str:
     return file_hash(path)
 
 
-def campaign_files(results: Path) -> dict[str, str]:
-    """Files of the campaigns on the calibration in a results folder, by role."""
+def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
+    """Files of campaigns on the calibration of a data set, by role."""
     found = {}
-    for number, campaign in enumerate(of_results(results), 1):
+    for number, campaign in enumerate(campaigns, 1):
         found[f"campaign_{number}_file"] = str(campaign / PLAN)
         if (campaign / JOURNAL).is_file():
             found[f"readings_{number}_file"] = str(campaign / JOURNAL)

@@ -25,6 +25,12 @@ def main() -> None:
     }
     study_chunk.run({"assessment_points": points}, settings)
     histories.run({"assessment_points": points}, settings)
+    many = np.zeros((dh.WORTH_NUMBA // 6 + 1, 6))  # fewer would be left to the plain code
+    arm = robot.load("mh180")
+    dh.forward(arm.dh, many)
+    dh.pose_and_joint_jacobian(arm.dh, many[:1])
+    dh.pose_and_parameter_jacobian(arm.dh, many[:1])
+    inverse.solve(arm, arm.dh, dh.forward(arm.dh, many[:1]))
     arm = robot.load("iiwa14")  # no closed form: its inverse searches
     inverse.solve(arm, arm.dh, dh.forward(arm.dh, np.full((1, 7), 0.5)))
 

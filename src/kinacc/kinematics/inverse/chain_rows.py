@@ -9,23 +9,6 @@ from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
 
 
-def rows_of(model: DHModel) -> np.ndarray:
-    """Rows (k, 8) of a model as ``kernels`` takes them."""
-    return np.stack(
-        [
-            model.theta_offset_rad,
-            model.d_mm,
-            model.a_mm,
-            np.cos(model.alpha_rad),
-            np.sin(model.alpha_rad),
-            np.cos(model.beta_rad),
-            np.sin(model.beta_rad),
-            model.prismatic.astype(float),
-        ],
-        axis=1,
-    )
-
-
 def targets_of(pose: Pose) -> np.ndarray:
     """Poses (n, ...) as (n, 3, 4): rotation and position (mm)."""
     return np.concatenate([pose.rotation, pose.position_mm[..., None]], axis=2)

@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from kinacc.compiled import compiled
 
 SLIDES = 7
 _LEVER_MM = 1000.0  # turns rotation errors into lengths
@@ -21,7 +22,7 @@ _LONGEST_TURN = 0.6
 _TWO_PI = 2.0 * math.pi
 
 
-@njit(cache=True)
+@compiled
 def end_of(rows, q, axes, origins, pose):
     """Frame behind the last row, and axis and origin of every joint, in the frame before the first.
 
@@ -50,7 +51,7 @@ def end_of(rows, q, axes, origins, pose):
             pose[i, 2] = cb * z + sb * x
 
 
-@njit(cache=True)
+@compiled
 def _error(target, pose, error):
     """Position (mm) and rotation vector times the lever (mm) from ``pose`` to ``target``; size."""
     total = 0.0
@@ -75,7 +76,7 @@ def _error(target, pose, error):
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@compiled
 def _solve(matrix, vector, count):
     """Solve a positive definite system in place (Cholesky); False where it is not definite."""
     for i in range(count):
@@ -100,7 +101,7 @@ def _solve(matrix, vector, count):
     return True
 
 
-@njit(cache=True)
+@compiled
 def _slopes_at(rows, axes, origins, pose, slopes):
     """Motion (k, 6) of the end per joint: position, then rotation times the lever."""
     for joint in range(rows.shape[0]):
@@ -120,7 +121,7 @@ def _slopes_at(rows, axes, origins, pose, slopes):
             slopes[joint, 5] = _LEVER_MM * z2
 
 
-@njit(cache=True)
+@compiled
 def newton(rows, target, q, most_steps, tolerance_mm, work):
     """Move joints ``q`` (k,) in place to the pose ``target``; the error left (mm, lever 1 m).
 
@@ -171,7 +172,7 @@ def newton(rows, target, q, most_steps, tolerance_mm, work):
     return size
 
 
-@njit(cache=True)
+@compiled
 def _weakest(slopes, by_joint, count):
     """Unit direction the slopes (k, 6) move least in: of the joints (k,) or of the end (6,)."""
     size = count if by_joint else 6
@@ -198,7 +199,7 @@ def _weakest(slopes, by_joint, count):
     return direction
 
 
-@njit(cache=True)
+@compiled
 def sibling(rows, target, q, other, work):
     """Start ``other`` (k,) for the posture that meets the posture ``q`` where the arm is singular.
 
@@ -236,7 +237,7 @@ def sibling(rows, target, q, other, work):
     return True
 
 
-@njit(cache=True)
+@compiled
 def _apart(first, second, turning, unit):
     """Largest difference of joints in their units, whole turns aside."""
     largest = 0.0
@@ -248,7 +249,7 @@ def _apart(first, second, turning, unit):
     return largest
 
 
-@njit(cache=True)
+@compiled
 def predicted(wanted, features, slopes, joints, near, unit, turning, most, farthest, out):
     """Middle joints to start from for one pose; how many.
 
@@ -301,7 +302,7 @@ def predicted(wanted, features, slopes, joints, near, unit, turning, most, farth
     return taken
 
 
-@njit(cache=True)
+@compiled
 def outer_joints(rows, target, q, work):
     """Fill the first and last joint of ``q`` (k,) so that its pose comes close to ``target``."""
     axes, origins, pose, _, _, _, _, _ = work
@@ -355,7 +356,7 @@ def outer_joints(rows, target, q, work):
         q[last] = math.atan2(sine, cosine) - row[0]
 
 
-@njit(cache=True)
+@compiled
 def scratch(count):
     """Work arrays of ``newton`` for ``count`` joints."""
     return (
@@ -370,7 +371,7 @@ def scratch(count):
     )
 
 
-@njit(cache=True)
+@compiled
 def refine(rows, targets, q, most_steps, tolerance_mm):
     """``newton`` for each of ``targets`` (m, 3, 4) from joints ``q`` (m, k), which it moves."""
     work = scratch(rows.shape[0])
@@ -378,7 +379,7 @@ def refine(rows, targets, q, most_steps, tolerance_mm):
         newton(rows, targets[i], q[i], most_steps, tolerance_mm, work)
 
 
-@njit(cache=True)
+@compiled
 def _keep(q, error, number, found, left, turning, unit):
     """Add joints to the list unless they are in it; how many it then holds.
 
@@ -400,7 +401,7 @@ def _keep(q, error, number, found, left, turning, unit):
     return max(number, place + 1)
 
 
-@njit(cache=True)
+@compiled
 def postures(
     rows,
     targets,

@@ -80,23 +80,41 @@ def take_turns(
     the one in (-pi, pi]. Joints that slide (``prismatic`` (k,)) are left alone.
     """
     boxes = [limits_rad] if preferred_rad is None else [limits_rad, preferred_rad]
-    base = q_rad - _TWO_PI * np.rint(q_rad / _TWO_PI)
-    # Half a turn is a tie that round-off must not decide: it counts as +pi.
-    base = np.where(base < -np.pi + _TIE_RAD, base + _TWO_PI, base)
-    best = base
-    # Two turns either way reach every turn a +-720 degree joint has.
-    lowest = np.full(q_rad.shape, np.inf)
-    for turns in (0, -1, 1, -2, 2):
-        angle = base + turns * _TWO_PI
-        if turns and (lowest < _OUTSIDE).all():
-            break
-        cost = np.abs(angle)
-        for weight, (lower, upper) in zip((2.0 * _OUTSIDE, _OUTSIDE), boxes, strict=False):
-            outside = (angle < lower - _ROUND_OFF_RAD) | (angle > upper + _ROUND_OFF_RAD)
-            cost = cost + weight * outside
-        better = cost < lowest
-        best, lowest = np.where(better, angle, best), np.where(better, cost, lowest)
+    rows = q_rad.reshape(-1, q_rad.shape[-1])
+    best = np.empty(rows.shape)
+    for begin in range(0, len(rows), _BLOCK):
+        block = slice(begin, begin + _BLOCK)
+        best[block] = _turned(rows[block], boxes)
+    best = best.reshape(q_rad.shape)
     return best if prismatic is None else np.where(prismatic, q_rad, best)
 
 
+def _turned(q_rad: np.ndarray, boxes: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    base = q_rad - _TWO_PI * np.rint(q_rad / _TWO_PI)
+    # Half a turn is a tie that round-off must not decide: it counts as +pi.
+    base = np.where(base < -np.pi + _TIE_RAD, base + _TWO_PI, base)
+    best, cost = base.ravel(), _cost(base, boxes).ravel()
+    left = np.flatnonzero(~(cost < _OUTSIDE))  # what another turn may serve better
+    joint = left % q_rad.shape[1]
+    near = [(lower[joint], upper[joint]) for lower, upper in boxes]
+    angle, lowest = best[left], cost[left]
+    # Two turns either way reach every turn a +-720 degree joint has.
+    for turns in (-1, 1, -2, 2) if len(left) else ():
+        turned = angle + turns * _TWO_PI
+        cost = _cost(turned, near)
+        better = cost < lowest
+        best[left[better]], lowest = turned[better], np.where(better, cost, lowest)
+    return best.reshape(q_rad.shape)
+
+
+def _cost(angle: np.ndarray, boxes: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """How far angles are from zero; outside the boxes, the first before the second, more."""
+    cost = np.abs(angle)
+    for weight, (lower, upper) in zip((2.0 * _OUTSIDE, _OUTSIDE), boxes, strict=False):
+        outside = (angle < lower - _ROUND_OFF_RAD) | (angle > upper + _ROUND_OFF_RAD)
+        cost += weight * outside
+    return cost
+
+
+_BLOCK = 1024  # rows of one block stay in the cache
 _OUTSIDE = 100.0  # more than any angle in rad that is compared

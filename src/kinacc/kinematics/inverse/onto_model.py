@@ -11,8 +11,8 @@ import numpy as np
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.inverse import newton
-from kinacc.kinematics.inverse.chain_rows import behind_first, rows_of, targets_of
+from kinacc.kinematics.inverse import newton, quick
+from kinacc.kinematics.inverse.chain_rows import behind_first, targets_of
 from kinacc.kinematics.model import ErrorModel, JointState
 
 SAME_POSTURE_RAD = 1e-6
@@ -72,7 +72,14 @@ def _in_metres(functions: Functions) -> Functions:
 
 
 def _refine(functions: Functions, goal: Pose, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (m, k) and convergence (m,): cheap slopes first, exact ones for what they leave."""
+    """Joints (m, k) and convergence (m,): quick steps, then cheap slopes, then exact ones."""
+    if functions.first is None and quick.suits(functions.dh):
+        q_rad, converged = quick.refine(functions.dh, goal, first)
+        left = np.flatnonzero(~converged)
+        if len(left):
+            part = Pose(goal.rotation[left], goal.position_mm[left])
+            q_rad[left], converged[left] = _patiently(functions, part, first[left])
+        return q_rad, converged
     if functions.prismatic.any():
         unit = np.where(functions.prismatic, 1e3, 1.0)
         q_rad, converged = _refine(_in_metres(functions), goal, first / unit)
@@ -113,7 +120,7 @@ def _compiled(functions: Functions, goal: Pose, q_rad: np.ndarray) -> np.ndarray
     """Joints (m, k) after many steps of the compiled refinement."""
     from kinacc.kinematics.inverse import kernels
 
-    rows, q_rad = rows_of(functions.dh), np.ascontiguousarray(q_rad)
+    rows, q_rad = functions.dh.rows, np.ascontiguousarray(q_rad)
     if functions.first is not None:
         rows = rows[1:]
         goal = compose(invert(behind_first(functions.dh, functions.first)), goal)
@@ -182,6 +189,10 @@ def mark_duplicates(
         for earlier in range(later):
             both = found[:, earlier] & found[:, later] & ~repeated[:, earlier]
             rows = np.flatnonzero(both & ~repeated[:, later])
-            same = same_posture(q_rad[rows, later], q_rad[rows, earlier], prismatic)
-            repeated[rows[same], later] = True
+            for joint in range(q_rad.shape[2]):  # most differ in the first
+                one = slice(joint, joint + 1)
+                slides = None if prismatic is None else prismatic[one]
+                same = same_posture(q_rad[rows, later, one], q_rad[rows, earlier, one], slides)
+                rows = rows[same]
+            repeated[rows, later] = True
     return repeated

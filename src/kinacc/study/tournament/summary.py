@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import bdtr
+import scipy
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
@@ -51,7 +51,7 @@ def judged(summary: Mapping[str, np.ndarray]) -> Columns:
         own = {name: np.asarray(column)[mine] for name, column in summary.items()}
         tried = (own["stated"] - own["broken"]).astype(int)
         held = np.rint(own["upper_holds"] * tried).astype(int)
-        chance = bdtr(held, tried, own["confidence"])
+        chance = scipy.special.bdtr(held, tried, own["confidence"])
         least = own["confidence"] - MOST_BELOW
         found.append(
             {

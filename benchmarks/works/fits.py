@@ -1,0 +1,298 @@
+"""How long does a fit take, with standard deviations and what it could not determine?
+
+Data sets are simulated: an arm that differs from its description, 0.05 mm and 0.1 mrad of noise.
+
+DH fits have 500 full poses, base and tool known, and 29 free parameters, five directions of which
+nothing shows. scipy's ``least_squares`` gets the same whitened residual, with the same compiled or
+plain kinematics, and neither truncates, finds ranks nor judges standard deviations; "2-point" is
+its default Jacobian, "analytic" that of kinacc. Its ``lm`` is taken, which is faster here than
+``trf``. pybotics fits its parameters to positions alone; to 30 of them, as 500
+take it minutes.
+Limit: three residuals with Jacobians and one triangular factor of 3,000 x 30; of these the factor
+alone takes 2 m n^2 = 5.4 million floating-point operations, and a Gram product half of that.
+
+VEC fits have 1,000 full poses and 216 coefficients beside base and tool, with the rank report. They
+are held to a product of the transposed Jacobian, 6,000 x 216, with itself, which is 0.28 billion
+multiplications and additions. Limit: three such products, and one triangular factor, which takes
+twice the operations of a product at half the speed: seven products.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from harness import Contender, Work
+
+WEIGHT = 500.0  # mm per rad
+NOISE_MM, NOISE_RAD = 0.05, 1e-4
+GRAM = "one Gram product"
+
+
+def works(smoke: bool) -> list[Work]:
+    """DH fits beside scipy and pybotics, and VEC fits beside their own Gram product."""
+    import scipy
+
+    import kinacc
+
+    poses = 60 if smoke else 500
+    own = Contender("kinacc", kinacc.__version__)
+
+    def by_scipy(name: str, plain: bool, analytic: bool) -> Contender:
+        return Contender(name, scipy.__version__, _scipy(smoke, plain, analytic))
+
+    limit = "three evaluations and a triangular factor of 3,000 x 30"
+    fitted = [
+        Work(
+            f"DH fit, {poses} full poses, {name}", "fit", 1,
+            (own, by_scipy("scipy 2-point", plain, False), by_scipy("scipy analytic", plain, True)),
+            _same_cost, {"scipy 2-point": wanted}, limit=limit, today=today,
+        )
+        for name, plain, wanted, today in (
+            ("compiled", False, 10.0, dh_compiled), ("numpy", True, 4.0, dh_plain),
+        )
+    ]  # fmt: skip
+    beside, version = _pybotics()
+    contenders = (own,) if beside is None else (own, Contender("pybotics", version, beside))
+    count, order = (120, 2) if smoke else (1000, 5)
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(6 * count, 36 * (order + 1)))
+    return [
+        *fitted,
+        Work(
+            "DH fit, 30 positions", "fit", 1, contenders, _same_rms, {"pybotics": 200.0},
+            limit=limit, today=dh_positions,
+        ),
+        Work(
+            f"VEC fit, {count} poses x {rows.shape[1]}, with rank report", "fit", 1,
+            (own, Contender(GRAM, np.__version__, lambda: rows.T @ rows)), _same_vec,
+            {GRAM: 1 / 25}, limit="three Gram products and a triangular factor, as seven products",
+            today=vec_with_rank,
+        ),
+    ]  # fmt: skip
+
+
+def dh_compiled(smoke: bool) -> Callable[[], tuple[float, int]]:
+    """A DH fit by compiled kinematics where there are such: cost and undetermined directions."""
+    return _dh(smoke, False)
+
+
+def dh_plain(smoke: bool) -> Callable[[], tuple[float, int]]:
+    """A DH fit without compiled code."""
+    return _dh(smoke, True)
+
+
+def dh_positions(smoke: bool) -> Callable[[], float]:
+    """A DH fit to positions: the rms of its residuals."""
+    from kinacc.calibration import dh_fit
+
+    _compile(False)
+    nominal, free, seen, frames = _positions()
+
+    def run() -> float:
+        found = dh_fit.fit(
+            seen, nominal, free=free, frames=frames, rotation_weight_mm_per_rad=WEIGHT,
+            threshold=1e-5,
+        )  # fmt: skip
+        return float(np.sqrt(found.solution.cost / found.solution.count))
+
+    return run
+
+
+def vec_with_rank(smoke: bool) -> Callable[[], tuple[float, int]]:
+    """A VEC fit with base and tool, and its rank report: cost and rank."""
+    from kinacc.calibration import dh_fit, vec_fit
+
+    count, order = (120, 2) if smoke else (1000, 5)
+    seen, empty = _wavy(count, order)
+    frames = dh_fit.fit_frames(seen, empty.dh, rotation_weight_mm_per_rad=WEIGHT).frames
+    prior = vec_fit.Prior(1.0, 1e-3, 1.0, 1e-3)
+
+    def run() -> tuple[float, int]:
+        found = vec_fit.fit(
+            seen, empty, prior=prior, rotation_weight_mm_per_rad=WEIGHT, frames=frames,
+            frames_free=True,
+        )  # fmt: skip
+        told = vec_fit.gauge(seen, found.model, found.frames, WEIGHT)
+        return found.solution.cost, told.rank
+
+    return run
+
+
+def _dh(smoke: bool, plain: bool) -> Callable[[], tuple[float, int]]:
+    from kinacc.calibration import dh_fit
+
+    _compile(plain)
+    nominal, free, seen, frames = _full_poses(60 if smoke else 500)
+
+    def run() -> tuple[float, int]:
+        found = dh_fit.fit(
+            seen, nominal, free=free, frames=frames, rotation_weight_mm_per_rad=WEIGHT,
+            threshold=1e-2,
+        )  # fmt: skip
+        return found.solution.cost, len(found.solution.undetermined)
+
+    return run
+
+
+def _scipy(smoke: bool, plain: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
+    from scipy.optimize import least_squares
+
+    from kinacc.calibration import dh_fit, held
+    from kinacc.kinematics import dh
+
+    nominal, free, seen, frames = _full_poses(60 if smoke else 500)
+    coordinates = held.known_frames(seen, frames).coordinates
+    system = held.pose_system(seen, dh_fit.flange_model(nominal, free), coordinates, WEIGHT)
+    start, scale = dh.to_vector(nominal)[free.ravel()], dh_fit.scales(free)
+
+    def jacobian(z: np.ndarray) -> np.ndarray:
+        return np.concatenate([each for _, each in system.blocks(start + scale * z)]) * scale
+
+    def run() -> tuple[float, None]:
+        _compile(plain)
+        found = least_squares(
+            lambda z: system.residual(start + scale * z), np.zeros(start.size), method="lm",
+            jac=jacobian if analytic else "2-point",
+        )  # fmt: skip
+        return 2.0 * float(found.cost), None
+
+    return run
+
+
+def _pybotics() -> tuple[Callable[[], float] | None, str]:
+    try:
+        from importlib.metadata import version
+
+        from pybotics.optimization import OptimizationHandler, optimize_accuracy
+        from pybotics.robot import Robot
+    except ImportError:
+        return None, ""
+    from scipy.optimize import least_squares
+
+    nominal, _, seen, _ = _positions()
+    alpha, a = np.roll(nominal.alpha_rad, 1), np.roll(nominal.a_mm, 1)
+    c, s = np.cos(alpha[0]), np.sin(alpha[0])
+    tool = np.array([[1, 0, 0, a[0]], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+    alpha[0] = a[0] = 0.0
+    table = np.stack([alpha, a, nominal.theta_offset_rad, nominal.d_mm], axis=1)
+
+    def run() -> float:
+        robot = Robot.from_parameters(table.ravel().copy())
+        robot.tool.matrix = tool
+        handler = OptimizationHandler(robot, kinematic_chain_mask=True)
+        start = handler.generate_optimization_vector()
+        given = handler, seen.q_rad, seen.position_mm
+        found = least_squares(optimize_accuracy, start, method="lm", args=given)
+        return float(np.sqrt(2.0 * found.cost / seen.position_mm.size))
+
+    return run, version("pybotics")
+
+
+def _full_poses(count: int) -> tuple:
+    """Nominal arm, free parameters, full poses, known frames."""
+    from kinacc.calibration.constraints import free_parameters
+    from kinacc.calibration.frames import known
+    from kinacc.calibration.observations import full_poses
+    from kinacc.kinematics import dh, robot
+
+    arm, rng = robot.load("mh180"), np.random.default_rng(1)
+    free = free_parameters(6, (1, 2, 3, 4, 5))
+    q_rad = _joints(arm, count, rng)
+    poses = dh.forward(_off(arm.dh, free, rng), q_rad)
+    return arm.dh, free, full_poses(q_rad, _noisy(poses, rng)), known()
+
+
+def _positions() -> tuple:
+    """Nominal arm, free parameters, positions alone, known frames."""
+    from dataclasses import replace
+
+    from kinacc.calibration.constraints import free_parameters
+    from kinacc.calibration.frames import known
+    from kinacc.calibration.observations import full_poses
+    from kinacc.kinematics import dh, robot
+
+    arm, rng = robot.load("mh180"), np.random.default_rng(2)
+    q_rad = _joints(arm, 30, rng)
+    free = free_parameters(6)
+    free[5, 2:4] = False  # of pybotics' tool, which it is told
+    poses = dh.forward(_off(arm.dh, free, rng), q_rad)
+    seen = full_poses(q_rad, _noisy(poses, rng))
+    return arm.dh, free, replace(seen, rotation=np.full_like(seen.rotation, np.nan)), known()
+
+
+def _wavy(count: int, order: int) -> tuple:
+    """Full poses of an arm with wavy joints somewhere, and its VEC model without errors."""
+    from dataclasses import replace
+
+    from kinacc.calibration.observations import full_poses
+    from kinacc.geometry import Pose, compose, exp_so3
+    from kinacc.kinematics import robot, vec
+
+    arm, rng = robot.load("mh180"), np.random.default_rng(3)
+    q_rad = _joints(arm, count, rng)
+    span = q_rad.min(axis=0) - 0.02, q_rad.max(axis=0) + 0.02
+    true = vec.without_errors(arm.dh, *span, order + 2)
+    unit = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])[:, None] / (1.0 + np.arange(order + 3))
+    true = replace(true, coefficients=0.3 * unit * rng.normal(size=true.coefficients.shape))
+    base, tool = (
+        Pose(exp_so3(rng.normal(size=3)), far * rng.normal(size=3)) for far in (1500.0, 80.0)
+    )
+    poses = compose(base, compose(vec.pose(true, q_rad), tool))
+    return full_poses(q_rad, _noisy(poses, rng)), vec.without_errors(arm.dh, *span, order)
+
+
+def _joints(arm, count: int, rng: np.random.Generator) -> np.ndarray:
+    low, high = np.maximum(arm.q_min_rad, -np.pi), np.minimum(arm.q_max_rad, np.pi)
+    return rng.uniform(low, high, (count, arm.dh.joints)) @ arm.joint_map.T
+
+
+def _off(nominal, free: np.ndarray, rng: np.random.Generator):
+    """The arm with its ``free`` parameters off as a calibration finds them."""
+    from kinacc.kinematics import dh
+
+    unit = np.array([1e-3, 0.5, 0.5, 1e-3, 1e-3])
+    off = free * unit * rng.normal(size=free.shape)
+    return dh.with_vector(nominal, dh.to_vector(nominal) + off.ravel())
+
+
+def _noisy(poses, rng: np.random.Generator):
+    from kinacc.geometry import Pose, exp_so3
+
+    count = len(poses.position_mm)
+    turn = exp_so3(NOISE_RAD * rng.normal(size=(count, 3)))
+    return Pose(turn @ poses.rotation, poses.position_mm + NOISE_MM * rng.normal(size=(count, 3)))
+
+
+def _compile(plain: bool) -> None:
+    """Settle whether kinematics are compiled, which else hangs on what a process has computed."""
+    from kinacc.kinematics import dh
+
+    if hasattr(dh, "WORTH_NUMBA"):
+        dh.WORTH_NUMBA = np.inf if plain else 0
+
+
+def _same_cost(outputs: Sequence[tuple[float, int | None]]) -> None:
+    """kinacc's cost is the least one within 1e-9 of it; scipy's within 1e-6."""
+    costs = np.array([cost for cost, _ in outputs])
+    least = costs.min()
+    if costs[0] > least * (1.0 + 1e-9) or np.any(costs > least * (1.0 + 1e-6)):
+        raise ValueError(f"costs differ: {costs}")
+    undetermined = {count for _, count in outputs if count is not None}
+    if undetermined != {5}:
+        raise ValueError(f"undetermined directions: {undetermined}")
+
+
+def _same_rms(outputs: Sequence[float]) -> None:
+    """Residuals of both are the noise: base and tool of their arms have other freedoms."""
+    if max(outputs) > 1.1 * min(outputs):
+        raise ValueError(f"rms differ: {outputs}")
+
+
+def _same_vec(outputs: Sequence) -> None:
+    """Both kinaccs reach one cost, and see one rank."""
+    fits = [each for each in outputs if isinstance(each, tuple)]
+    cost, rank = fits[0]
+    for other, seen in fits[1:]:
+        if abs(other - cost) > 1e-6 * cost or seen != rank:
+            raise ValueError(f"fits differ: {fits}")

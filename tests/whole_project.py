@@ -1,0 +1,178 @@
+"""Whole-workflow runs on a small study, in a copy of the project whose path has a space in it."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import shared_work
+
+from kinacc.workflow.catalogue import STAGES
+
+ROOT = Path(__file__).resolve().parents[1]
+STAGE_OF = {stage.message: name for name, stage in STAGES.items()}
+CONFIGS = ("config.yaml", "small.yaml")
+PARTS = ("Snakefile", "workflow", "profiles", "config.yaml", "src")
+
+SMALL = """\
+measurements: {folds: 2, synthetic: {poses: 120}}
+calibration: {vec: {order: 2}}
+evaluation: {points: 12}
+map: {slices_deg: [0, 30], grid_mm: 250}
+study: {noise_mm: [0.1, 0.3], repetitions: 4, measurements: 20}
+histories: {simulations_searched: 20}
+figures: {formats: [svg]}
+datasets:
+  own:
+    robot: mh180
+    measurements: {source: file, file: {path: own data/poses.csv, orientation: {kind: quaternion}}}
+    evaluation: {space: measured}
+"""
+
+
+@dataclass(frozen=True)
+class Project:
+    """A copy of the project; ``small.yaml`` is its small study of two data sets."""
+
+    folder: Path
+
+    def copied(self, folder: Path) -> Project:
+        """A copy of it to be changed."""
+        shutil.copytree(self.folder, folder, symlinks=True)
+        return Project(folder)
+
+    def snakemake(
+        self,
+        *targets: str,
+        options: tuple[str, ...] = (),
+        ok: bool = True,
+        cores: int = 2,
+        configs: tuple[str, ...] = CONFIGS,
+        **env: str,
+    ) -> str:
+        """What ``snakemake`` prints; fails the test unless it ends as expected."""
+        command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--nocolor", *options]
+        return self.run([*command, "--configfile", *configs, "--", *targets], ok, **env)
+
+    def kinacc(self, *words: str, ok: bool = True, configs: tuple[str, ...] = CONFIGS) -> str:
+        """What ``kinacc`` prints when given the same configuration."""
+        options = [word for name in configs for word in ("--config", name)]
+        return self.run([sys.executable, "-m", "kinacc.cli.group", *words, *options], ok)
+
+    def run(self, command: list[str], ok: bool = True, **environment: str) -> str:
+        """Output and errors of a command started in the project's folder."""
+        settings = os.environ | {"PYTHONPATH": str(self.folder / "src")} | environment
+        done = subprocess.run(
+            command, cwd=self.folder, env=settings, capture_output=True, text=True, check=False
+        )
+        text = done.stdout + done.stderr
+        assert (done.returncode == 0) == ok, text
+        return text
+
+    def to_do(self) -> dict[str, set[str]]:
+        """The stages a run would go through now, by data set."""
+        text = self.snakemake(options=("--dry-run",))
+        found: dict[str, set[str]] = {}
+        for dataset, words in re.findall(
+            r"^Job \d+: (\w+): (.*?)(?:, part [\d-]+of-\d+)?$", text, re.M
+        ):
+            found.setdefault(dataset, set()).add(STAGE_OF[words])
+        if not found:
+            assert "Nothing to be done" in text, text
+        return found
+
+    def configure(self, text: str) -> None:
+        """Add to the small study's configuration."""
+        import yaml
+
+        path = self.folder / "small.yaml"
+        path.write_text(yaml.safe_dump(_merged(yaml.safe_load(path.read_text()), text)))
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        """Replace a text that must be there once in a file."""
+        path = self.folder / name
+        text = path.read_text()
+        assert text.count(old) == 1, f"{name} has {text.count(old)} times {old!r}"
+        path.write_text(text.replace(old, new))
+
+    def append(self, name: str, line: str) -> None:
+        """Add a line to a file."""
+        with (self.folder / name).open("a") as file:
+            file.write(line + "\n")
+
+    def digests(self) -> dict[str, str]:
+        """Content of every artefact and picture, without logs and parts."""
+        results = self.folder / "results"
+        return {
+            path.relative_to(results).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in sorted(results.rglob("*"))
+            if path.is_file() and not {"logs", "study_chunk"} & set(path.parts)
+        }
+
+
+def _merged(below: dict, text: str) -> dict:
+    import yaml
+
+    from kinacc.config.validate import overlay
+
+    return overlay(below, yaml.safe_load(text))
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Copy a project with the times of its files, which Snakemake and numba's cache go by."""
+    target.mkdir(parents=True)
+    for name in PARTS:
+        if (source / name).is_dir():
+            shutil.copytree(source / name, target / name)
+        else:
+            shutil.copy2(source / name, target / name)
+
+
+def write_poses(path: Path, poses: int = 60) -> None:
+    """A file of measured poses: the nominal arm in joint space, shifted by a known small error."""
+    import numpy as np
+
+    from kinacc import geometry
+    from kinacc.kinematics import dh, robot
+
+    arm = robot.load("mh180")
+    generator = np.random.default_rng(3)
+    share = generator.uniform(0.2, 0.8, (poses, 6))
+    q_rad = arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
+    flange = dh.forward(arm.dh, arm.dh_joints(q_rad))
+    position = flange.position_mm + generator.normal(0.0, 0.2, (poses, 3))
+    turn = geometry.exp_so3(generator.normal(0.0, 2e-4, (poses, 3)))
+    quaternion = geometry.quaternion_from_rotation(turn @ flange.rotation)
+    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
+    rows = np.hstack([q_rad * 180.0 / math.pi, position, quaternion])
+    lines = [",".join(names), *(",".join(f"{value:.9f}" for value in row) for row in rows)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> Project:
+    """A project whose small study has been run; shared by all workers, never changed."""
+
+    def run(folder: Path) -> None:
+        project = Project(folder / "project")
+        _copy(ROOT, project.folder)
+        (project.folder / "small.yaml").write_text(SMALL)
+        write_poses(project.folder / "own data" / "poses.csv")
+        project.snakemake()
+
+    return Project(shared_work.once(tmp_path_factory, "finished project", run) / "project")
+
+
+@pytest.fixture
+def project(finished: Project, tmp_path: Path) -> Project:
+    """A copy of the finished project to be changed."""
+    return finished.copied(tmp_path / "a project")
