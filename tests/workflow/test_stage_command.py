@@ -7,14 +7,16 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import format as in_shell
 
 from kinacc.artifacts.provenance import PACKAGE
 from kinacc.workflow.catalogue import STAGES, TOURNAMENT
 from kinacc.workflow.plan import planned
-from kinacc.workflow.stage import COMMAND, from_words
+from kinacc.workflow.stage import COMMAND, from_words, python_of_stages
 
 WORKFLOW = Path(__file__).parents[2] / "workflow"
 MEASURED = """\
@@ -86,6 +88,22 @@ def test_another_python_than_the_one_that_planned_says_itself_what_it_runs(plan,
     assert from_words(command(plan, "fig1", dataset, None)).code == ""
 
 
+@pytest.mark.parametrize(
+    ("methods", "image", "python"),
+    [
+        ((), None, sys.executable),
+        ((DeploymentMethod.CONDA,), None, "python"),
+        ((DeploymentMethod.APPTAINER,), None, sys.executable),
+        ((DeploymentMethod.APPTAINER,), "docker://kinacc", "python"),
+    ],
+)
+def test_an_environment_of_conda_or_a_container_brings_its_own_python(methods, image, python):
+    deployment = SimpleNamespace(deployment_method=set(methods))
+    modifier = SimpleNamespace(global_container_img=image)
+    workflow = SimpleNamespace(deployment_settings=deployment, modifier=modifier)
+    assert python_of_stages(workflow) == python
+
+
 def test_the_package_that_planned_is_the_one_that_runs_and_nothing_of_the_folder(tmp_path):
     package = tmp_path / "their code" / "kinacc" / "workflow"
     package.mkdir(parents=True)
@@ -135,3 +153,30 @@ def test_a_stage_that_is_told_to_stop_leaves_nothing_half_written(tmp_path, by):
     started.send_signal(by)
     said = started.communicate(timeout=30)[1]
     assert (started.returncode, said, list(tmp_path.iterdir())) == (-by, "", [])
+
+
+LIBRARIES = """\
+import sys
+from kinacc.workflow import stage
+
+def libraries(words):
+    import scipy.linalg, scipy.special, scipy.optimize
+    print(*sorted({"numpy.f2py", "numpy.testing"} & sys.modules.keys()))
+    from numpy.testing import assert_allclose
+    import numpy.testing
+    assert_allclose(numpy.testing.assert_allclose is assert_allclose, True)
+
+stage.from_words, stage.execute = libraries, str
+stage.main([])
+"""
+
+
+def test_a_stage_that_uses_scipy_does_not_wait_for_numpys_compiler_and_test_tools():
+    done = subprocess.run(
+        [sys.executable, "-c", LIBRARIES],
+        env=os.environ | {"PYTHONPATH": str(PACKAGE.parent)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("\n", "")
