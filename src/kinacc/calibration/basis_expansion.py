@@ -34,10 +34,6 @@ class Group:
         """Number of parameters."""
         return self.motions * (1 if self.basis is None else self.basis.shape[1])
 
-    def rows(self, some: slice) -> Group:
-        """The group for the observations ``some``."""
-        return self if self.basis is None else Group(self.columns, self.basis[some])
-
 
 def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
     """Jacobian (n, m, P) in the parameters, from the motions ``columns`` (n, m, E)."""

@@ -14,7 +14,8 @@ from kinacc.errors import FitError
 MAX_ITERATIONS = 200  # weak directions are valleys, in which steps shorten slowly
 PATIENCE = 40  # steps after which standing still counts as arrived
 MAX_VARIANCE_STEPS = 20
-VARIANCE_TOLERANCE = 1e-7  # a prior that is weighed otherwise pulls weak directions elsewhere
+VARIANCE_TOLERANCE = 1e-9  # a prior that is weighed otherwise pulls weak directions elsewhere
+FIRST_TOLERANCE = 1e-3  # of the first step, which leads elsewhere
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
 CLOSE = 1e-3  # mm and mrad from the end: a Gram matrix from there has the same inverse
 MEMORY = 20  # steps that the inverse has learned from
@@ -47,21 +48,22 @@ def minimise_with_prior(
     x = np.array(start, dtype=float)
     weight_sq = (scale / prior_std) ** 2
     prior = _Prior(prior_mean, weight_sq, scale)
-    iterations, balance = 0, None
+    iterations, variance = 0, None
     while iterations < MAX_ITERATIONS:
         normal = _normal_equations(system, x, scale)
-        balance = _balanced(normal, weight_sq, prior.displacement(x), balance, name)
+        balance = _balanced(normal, weight_sq, prior.displacement(x), variance, name)
         here = _Point(x, normal.gradient, normal.cost)
         end = _descended(system, here, normal.count, balance, prior, iterations, name)
         iterations += end.steps
         moved = np.max(np.abs(end.at.x - x) / scale, initial=0.0)
-        x, last = end.at.x, end.wanted
+        x, last, variance = end.at.x, end.wanted, end.variance
         if end.stands or (moved <= CLOSE and last <= solve.STEP_TOLERANCE):
             break
     else:
         solve.require_converged(name, iterations, last, end.at.cost, normal.count)
-    cost, freedom = end.at.cost, normal.count - balance.effective
-    covariance = balance.variance * balance.inverse * np.outer(scale, scale)
+    held = _held(normal, end.variance, weight_sq, name)
+    cost, freedom = end.at.cost, normal.count - held.effective
+    covariance = end.variance * (held.half.T @ held.half) * np.outer(scale, scale)
     return Solution(
         x=x,
         std=np.sqrt(np.diag(covariance)),
@@ -69,7 +71,7 @@ def minimise_with_prior(
         cost=cost,
         count=normal.count,
         degrees_of_freedom=freedom,
-        variance=max(cost / max(freedom, 1.0), LEAST_VARIANCE),
+        variance=end.variance,
         iterations=iterations,
         last_step=last,
         converged=last <= solve.STEP_TOLERANCE,
@@ -91,12 +93,16 @@ class _Prior(NamedTuple):
 
 
 class _End(NamedTuple):
-    """Where steps have led, how many, the size of the one still wanted, and whether they stood."""
+    """Where steps have led, how many, the size of the one still wanted, and whether they stood.
+
+    ``variance``: that of the residuals there.
+    """
 
     at: _Point
     steps: int
     wanted: float
     stands: bool
+    variance: float
 
 
 class _Point(NamedTuple):
@@ -135,30 +141,30 @@ def _descended(
         before = here.cost + variance * prior.cost(here.x)
         x, after, _ = solve.advance(objective, here.x, scale * step, before, scale, name)
         if x is here.x:
-            return _End(here, taken, wanted, True)
+            return _End(here, taken, wanted, True, variance)
         moves.append(((x - here.x) / scale, latest.gradient - here.gradient))
         if after > before:
             moves.clear()  # rounding has been learned from
         here = latest
         variance = max(here.cost / max(count - balance.effective, 1.0), LEAST_VARIANCE)
-        step = _learned_step(here, balance.inverse, variance, prior, moves[-MEMORY:])
+        step = _learned_step(here, balance.half, variance, prior, moves[-MEMORY:])
         wanted = float(np.max(np.abs(step), initial=0.0))
         least = max(NO_CHANGE * variance, solve.STANDSTILL * before)
         stands = begun + taken >= PATIENCE and abs(before - after) <= least
         # A step longer than the first speaks of another Gram matrix than the one frozen.
-        if wanted <= solve.STEP_TOLERANCE or stands or wanted >= first:
+        if wanted <= solve.STEP_TOLERANCE or stands or wanted >= max(first, CLOSE):
             break
-    return _End(here, taken, wanted, stands)
+    return _End(here, taken, wanted, stands, variance)
 
 
 def _learned_step(
     here: _Point,
-    inverse: np.ndarray,
+    half: np.ndarray,
     variance: float,
     prior: _Prior,
     moves: list[tuple[np.ndarray, np.ndarray]],
 ) -> np.ndarray:
-    """The L-BFGS step, which begins with ``inverse`` (P, P) of the Hessian."""
+    """The L-BFGS step, which begins with ``half`` of the inverse Hessian."""
     rest = here.gradient + variance * prior.weight_sq * prior.displacement(here.x)
     pairs = [(step, change + variance * prior.weight_sq * step) for step, change in moves]
     pairs = [(step, change, step @ change) for step, change in pairs if step @ change > 0.0]
@@ -166,7 +172,7 @@ def _learned_step(
     for step, change, product in reversed(pairs):
         shares.append(step @ rest / product)
         rest = rest - shares[-1] * change
-    found = inverse @ rest
+    found = half.T @ (half @ rest)
     for (step, change, product), share in zip(pairs, reversed(shares), strict=True):
         found = found + (share - change @ found / product) * step
     return -found
@@ -184,12 +190,12 @@ class _Normal(NamedTuple):
 class _Balance(NamedTuple):
     """Step and residual variance that agree on the linearised residuals.
 
-    ``inverse`` (P, P) of J'J plus the prior's part, all scaled; ``effective`` parameters fitted.
+    ``half`` (P, P) and ``effective`` are those of ``_HeldGram``.
     """
 
     step: np.ndarray
     variance: float
-    inverse: np.ndarray
+    half: np.ndarray
     effective: float
 
 
@@ -197,41 +203,50 @@ def _balanced(
     normal: _Normal,
     weight_sq: np.ndarray,
     displacement: np.ndarray,
-    before: _Balance | None,
+    variance: float | None,
     name: str,
 ) -> _Balance:
     # From below: started at the variance of the whole misfit, a tight prior could pass for truth
     # and everything it forbids for noise.
-    least = FIRST_VARIANCE * normal.cost / normal.count
-    variance = max(least, LEAST_VARIANCE) if before is None else before.variance
+    tolerance = VARIANCE_TOLERANCE
+    if variance is None:
+        tolerance = FIRST_TOLERANCE
+        variance = max(FIRST_VARIANCE * normal.cost / normal.count, LEAST_VARIANCE)
     for _ in range(MAX_VARIANCE_STEPS):
-        gram = normal.gram.copy()
-        gram[np.diag_indices_from(gram)] += variance * weight_sq
-        inverse = _inverse(gram, name)
-        step = -inverse @ (normal.gradient + variance * weight_sq * displacement)
+        half, effective = _held(normal, variance, weight_sq, name)
+        step = -half.T @ (half @ (normal.gradient + variance * weight_sq * displacement))
         cost = normal.cost + step @ (2.0 * normal.gradient + normal.gram @ step)
-        effective = len(step) - variance * float(weight_sq @ np.diag(inverse))
         found = max(cost / max(normal.count - effective, 1.0), LEAST_VARIANCE)
-        if abs(found - variance) <= VARIANCE_TOLERANCE * variance:
+        if abs(found - variance) <= tolerance * variance:
             break
         variance = found
-    return _Balance(step, variance, inverse, effective)
+    return _Balance(step, variance, half, effective)
+
+
+class _HeldGram(NamedTuple):
+    """Triangular ``half`` (P, P): half' half inverts J'J plus the prior's part.
+
+    ``effective``: how many parameters the data decide.
+    """
+
+    half: np.ndarray
+    effective: float
+
+
+def _held(normal: _Normal, variance: float, weight_sq: np.ndarray, name: str) -> _HeldGram:
+    gram = normal.gram.copy()
+    gram[np.diag_indices_from(gram)] += variance * weight_sq
+    factor, failed = scipy.linalg.lapack.dpotrf(gram, lower=1)
+    if failed:
+        raise FitError(
+            f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
+            "give every undetermined direction a prior"
+        )
+    half, _ = scipy.linalg.lapack.dtrtri(factor, lower=1, overwrite_c=1)
+    return _HeldGram(half, len(gram) - variance * float(weight_sq @ np.sum(half**2, axis=0)))
 
 
 def _normal_equations(system: System, x: np.ndarray, scale: np.ndarray) -> _Normal:
     full, count = solve.gram(system, x), system.count
     gram, gradient = full[:-1, :-1] * np.outer(scale, scale), full[:-1, -1] * scale
     return _Normal(gram, gradient, float(full[-1, -1]), count)
-
-
-def _inverse(gram: np.ndarray, name: str) -> np.ndarray:
-    try:
-        factor = np.linalg.cholesky(gram)
-    except np.linalg.LinAlgError:
-        raise FitError(
-            f"{name}: the normal matrix of {len(gram)} parameters is not positive definite; "
-            "give every undetermined direction a prior"
-        ) from None
-    half, _ = scipy.linalg.lapack.dpotri(factor.T)
-    half = np.triu(half)
-    return half + np.triu(half, 1).T

@@ -22,8 +22,8 @@ STANDSTILL = 1e-9  # share of the objective
 MAX_HALVINGS = 12
 COST_RESOLUTION = 1e-9  # close to the optimum the cost no longer resolves a step
 LEAST_COST = 1e-10  # mm^2: of noise-free data
-_PANEL = 32  # columns reduced at once
-_ROWS = 512
+_PANEL = 16  # columns reduced at once
+_ROWS = 384
 
 
 class System(Protocol):

@@ -22,7 +22,7 @@ from kinacc.kinematics.model import JointState
 
 BLOCK_ROWS = 1024
 WRITTEN_OUT = 350  # parameters up to which the written-out Jacobian is the shorter way to J'J
-_IN_CACHE = 192  # observations whose written-out Jacobian stays in the cache
+_KEPT = 32  # blocks up to which functions of their poses are kept
 _NEAR = 0.5  # cosine of the angle below which a rotation vector follows from the skew part alone
 _SMALL_ANGLE_RAD = 1e-3
 
@@ -187,11 +187,8 @@ class PoseSystem:
             columns, groups = self._columns(x, part), self._groups(part)
             if self.size > WRITTEN_OUT:
                 total += gram(np.ascontiguousarray(columns.transpose(2, 1, 0)), groups)
-                continue
-            for begin in range(0, len(part.turned), _IN_CACHE):
-                some = slice(begin, begin + _IN_CACHE)
-                rows = spread_rows(columns[..., some], [group.rows(some) for group in groups])
-                rows = rows.reshape(len(rows), -1)
+            else:
+                rows = spread_rows(columns, groups).reshape(len(total), -1)
                 total += rows @ rows.T
         return total
 
@@ -225,7 +222,19 @@ class PoseSystem:
             for rows in blocks
         ]
 
+    @cached_property
+    def _kept_groups(self) -> dict[int, list[Group]]:
+        return {}
+
     def _groups(self, part: _Part) -> list[Group]:
+        if len(self._parts) > _KEPT:
+            return self._expanded(part)
+        found = self._kept_groups.get(id(part))
+        if found is None:
+            found = self._kept_groups[id(part)] = self._expanded(part)
+        return found
+
+    def _expanded(self, part: _Part) -> list[Group]:
         frames = self.coordinates.size
         if self.model.expansion is None:
             return [Group(slice(0, self.size + 1), None)]

@@ -200,6 +200,8 @@ def _with_centred_offsets(
     joints, errors, terms = empty.coefficients.shape
     split = empty.coefficients.size
     place = frames + np.cumsum(free) - 1
+    if not free[split:].any():
+        return solution
     mapping = np.eye(solution.x.size)
     for joint in range(joints):
         offsets = split + 2 * joint + np.arange(2)

@@ -10,7 +10,6 @@ Joints ``q_rad`` are in rad; those of prismatic joints, columns of the same arra
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
@@ -313,6 +312,8 @@ def _fill(
     kernel = getattr(kernels, name)
     q_rad = np.require(q_rad, requirements=["C", "W"])  # each kind of array is compiled anew
     if threads > 1 and len(q_rad) > threads:
+        from concurrent.futures import ThreadPoolExecutor
+
         edges = [len(q_rad) * part // threads for part in range(threads + 1)]
         parts = [slice(*pair) for pair in pairwise(edges)]
         with ThreadPoolExecutor(threads) as pool:

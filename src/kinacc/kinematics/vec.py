@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.geometry import Pose, project_so3, skew, vee
+from kinacc.geometry import Pose, project_so3
 from kinacc.kinematics import chain as _chain
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
@@ -198,24 +198,8 @@ def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pos
 
 def joint_jacobian(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
     """Jacobian (n, 6, k) of ``pose`` in the joints; rows as in ``dh.joint_jacobian``. Exact."""
-    split = _split(model, q_rad, s)
-    slopes = _slopes(model, q_rad)
-    jacobian = np.empty((len(split.rotation), 6, model.joints))
-    turn_z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    for joint in range(model.joints):
-        before, after = split.before[joint], split.after[joint]
-        linear, angular = slopes[:, joint, :3], slopes[:, joint, 3:]
-        tilted = np.eye(3) + skew(split.errors[:, joint, 3:])
-        spin = skew(angular)
-        if model.dh.prismatic[joint]:
-            linear = linear + tilted[..., 2]
-        else:
-            spin = spin + tilted @ turn_z
-        moved = (spin @ after.position_mm[..., None])[..., 0] + linear
-        jacobian[:, :3, joint] = (before @ moved[..., None])[..., 0]
-        twisted = split.rotation_t @ before @ spin @ after.rotation
-        jacobian[:, 3:, joint] = _angular_rate(split, 2.0 * vee(twisted))
-    return jacobian
+    moved = motions(model, q_rad, s).in_joints(_slopes(model, q_rad))
+    return np.ascontiguousarray(moved.transpose(2, 1, 0))
 
 
 def motions(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Motions:
@@ -247,60 +231,6 @@ def parameter_jacobian(
 def direction_basis(s: np.ndarray) -> np.ndarray:
     """Indicators (n, k, 2) of the travel directions -1 and +1 in ``s`` (n, k)."""
     return (np.asarray(s)[..., None] == _DIRECTIONS).astype(float)
-
-
-@dataclass(frozen=True)
-class _Split:
-    """The chain cut at every error matrix: what stands before it and what follows it."""
-
-    errors: np.ndarray  # (n, k, 6)
-    before: list[np.ndarray]  # k of (n, 3, 3): rotation from the base up to the error matrix
-    after: list[Pose]  # k of n poses: flange seen from behind the error matrix
-    rotation: np.ndarray  # (n, 3, 3): projected flange rotation Q, raw rotation = Q S
-    rotation_t: np.ndarray
-    rate_matrix: np.ndarray  # (n, 3, 3): inverse of tr(S) I - S
-
-
-def _split(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None) -> _Split:
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    basis = chebyshev_basis(model, q_rad)
-    joint_errors = _errors(model, basis, s)
-    frames = _chain.start(len(q_rad))
-    before, links = [], []
-    for joint in range(model.joints):
-        before.append(_chain.to_pose(frames).rotation)
-        link = _dh.across_joint(model.dh, joint, _chain.start(len(q_rad)), q_rad[:, joint])
-        links.append(_chain.to_pose(link))
-        frames = _chain.disturb(frames, joint_errors[:, joint].T)
-        frames = _dh.across_joint(model.dh, joint, frames, q_rad[:, joint])
-    after: list[Pose] = [links[-1]]
-    for joint in range(model.joints - 2, -1, -1):
-        following = after[0]
-        error = joint_errors[:, joint + 1]
-        tilt = np.eye(3) + skew(error[:, 3:])
-        tilted = tilt @ following.rotation
-        moved = (tilt @ following.position_mm[..., None])[..., 0] + error[:, :3]
-        link = links[joint]
-        after.insert(
-            0,
-            Pose(
-                link.rotation @ tilted,
-                (link.rotation @ moved[..., None])[..., 0] + link.position_mm,
-            ),
-        )
-    raw = _chain.to_pose(frames).rotation
-    rotation = project_so3(raw)
-    rotation_t = np.swapaxes(rotation, 1, 2)
-    stretch = rotation_t @ raw
-    trace = np.trace(stretch, axis1=1, axis2=2)
-    rate_matrix = np.linalg.inv(trace[:, None, None] * np.eye(3) - stretch)
-    return _Split(joint_errors, before, after, rotation, rotation_t, rate_matrix)
-
-
-def _angular_rate(split: _Split, twist: np.ndarray) -> np.ndarray:
-    """Rate of the polar factor Q in the base, from vee(X - X') with X = Q' dM, M = Q S."""
-    body = (split.rate_matrix @ twist[..., None])[..., 0]
-    return (split.rotation @ body[..., None])[..., 0]
 
 
 def _basis(x: np.ndarray, order: int) -> np.ndarray:

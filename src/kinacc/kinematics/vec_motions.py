@@ -64,6 +64,32 @@ class Motions:
                     into[3 + axis, 3:] += self.rate[:, row] * twist
         return jacobian.reshape(6 * joints, 6, count)
 
+    def in_joints(self, slopes: np.ndarray) -> np.ndarray:
+        """Motions (k, 6, n) by the joints, whose errors change by ``slopes`` (n, k, 6). Exact."""
+        moved = np.empty((len(self.rows), 6, len(slopes)))
+        for joint, after in self._after():
+            stands, into = self.before[joint], moved[joint]
+            (dx, dy, dz), (wx, wy, wz) = slopes[:, joint].T.reshape(2, 3, -1)
+            ex, ey, ez = self.errors[joint, 3:]
+            none, one = np.zeros_like(ex), np.ones_like(ex)
+            # What the error matrix changes by, and then the joint's own motion along or about z.
+            if self.rows[joint, 7] > 0.0:
+                spin = np.array([[none, -wz, wy], [wz, none, -wx], [-wy, wx, none]])
+                shift = np.stack([dx + ey, dy - ex, dz + one])
+            else:
+                spin = np.array(
+                    [[-ez, -one - wz, wy], [one + wz, -ez, -wx], [ex - wy, ey + wx, none]]
+                )
+                shift = np.stack([dx, dy, dz])
+            spun = spin[:, 0, None] * after[0] + spin[:, 1, None] * after[1]
+            spun += spin[:, 2, None] * after[2]
+            into[:3] = np.sum(stands * (spun[:, 3] + shift), axis=1)
+            twist = _product(_product(self.rotation, stands).transpose(1, 0, 2), spun[:, :3])
+            into[3:] = self.rate[:, 0] * (twist[2, 1] - twist[1, 2])
+            into[3:] += self.rate[:, 1] * (twist[0, 2] - twist[2, 0])
+            into[3:] += self.rate[:, 2] * (twist[1, 0] - twist[0, 1])
+        return moved
+
     def pulled(self, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
         """``jacobian`` (6k, n) times a force and a moment (3, n) on every flange, without it."""
         found = np.empty((len(self.rows), 6, force.shape[1]))
