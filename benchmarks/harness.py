@@ -218,7 +218,8 @@ def measure(work: Work, processes: Sequence[Elsewhere], smoke: bool) -> list[Res
     known = {LIMIT, TODAY, *(side.name for side in sides)}
     absent = [_absent(work, name, "not installed") for name in work.wanted if name not in known]
     if work.today is not None and not processes:
-        absent.append(_absent(work, TODAY, "that commit is not in this repository"))
+        why = "not run in smoke size" if smoke else "that commit is not in this repository"
+        absent.append(_absent(work, TODAY, why))
     return [*_rows(work, sides, smoke), *absent]
 
 

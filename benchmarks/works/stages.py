@@ -95,8 +95,8 @@ def works(smoke: bool) -> list[Work]:
         )
         for name, unit, count, agree, wanted, make in (
             ("ablation, all readings", "simulation", many, _same_numbers, 5.0, ablation),
-            ("residual tables", "stage", 1, _same_numbers, 3.0, residual_tables),
-            ("map of Fig. 3", "stage", 1, _same_numbers, 3.0, accuracy_map),
+            ("residual tables", "stage", 1, _same_errors, 3.0, residual_tables),
+            ("map of Fig. 3", "stage", 1, _same_errors, 3.0, accuracy_map),
             ("Fig. 1 as SVG", "picture", 1, _same_bytes, None, svg),
             ("Fig. 1 as PNG", "picture", 1, _same_bytes, None, png),
             ("Fig. 1 as PDF", "picture", 1, _pages, None, pdf),
@@ -136,6 +136,13 @@ def _same_numbers(outputs: Sequence[list[np.ndarray]]) -> None:
     for other in outputs[1:]:
         for one, two in zip(outputs[0], other, strict=True):
             np.testing.assert_allclose(one, two, rtol=1e-5, atol=1e-8)
+
+
+def _same_errors(outputs: Sequence[list[np.ndarray]]) -> None:
+    """To 1e-5 mm and mrad: each kinacc has ended its own fits, to a share of their noise."""
+    for other in outputs[1:]:
+        for one, two in zip(outputs[0], other, strict=True):
+            np.testing.assert_allclose(one, two, rtol=1e-5, atol=1e-5)
 
 
 def _same_bytes(outputs: Sequence[bytes]) -> None:
