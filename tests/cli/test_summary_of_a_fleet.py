@@ -236,3 +236,19 @@ def test_a_robot_described_in_two_files_is_named_with_both(tmp_path):
     assert done.exit_code == 2
     for word in ("'cell'", "one.yaml", "two.yaml", "a name of its own"):
         assert word in done.output
+
+
+def test_a_folder_stands_for_the_configuration_files_in_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = "datasets: {same: {robot: ur10, measurements: {source: file, file: {path: a.csv}}}}\n"
+    many(tmp_path / "robots", 1)
+    for name in ("robots/one.yaml", "robots/two.yaml"):
+        Path(name).write_text(text)
+    Path("robots/one.robot.yaml").write_text("name: an arm of ours, which is no configuration\n")
+    told = call("calibrate", "robots").output
+    assert "robots/two.yaml" in told
+    assert "one.robot.yaml" not in told
+    Path("bare").mkdir()
+    done = call("calibrate", "bare")
+    assert done.exit_code == 2
+    assert "bare: is a folder without configuration files" in done.output

@@ -8,7 +8,7 @@ if len(plan.datasets) > 20:
 for dataset in plan.datasets:
     for name, stage in plan.stages(dataset).items():
         short = f"{dataset}_{name}"
-        if stage.scattered or asked and not any(word.endswith(short) for word in asked):
+        if stage.scattered or asked is not None and not any(word.endswith(short) for word in asked):
             continue
 
         rule:

@@ -12,8 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.assess.size_kernels import reading_densities
-
 _FREEDOM = 10  # a bump is a chi density with so many degrees: 23 % standard deviation
 _STEP = 0.2  # distance of bumps in the logarithm of their scale
 _SMALLEST, _LARGEST = 0.03, 0.8  # scales of the first and last bump over the largest reading
@@ -41,6 +39,9 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
     unmeasured: number of points without a reading, taken as drawn from the same population.
     Sizes go with the largest reading: where every reading is 0, so is every size.
     """
+    # Compiled code, which only statements need: a reading is recorded without.
+    from kinacc.assess.size_kernels import reading_densities
+
     top = float(sizes_mm.max())
     if top == 0.0:
         return LargestSize(np.zeros(1), np.ones(1), np.ones(1))

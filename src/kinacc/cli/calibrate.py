@@ -28,7 +28,7 @@ CORES = click.option(
     "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
-TARGETS = click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml]...")
+TARGETS = click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml|FOLDER]...")
 
 
 @click.command("calibrate", context_settings=WORDS)
@@ -40,13 +40,13 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
 
     Checks the measurements, fits the VEC and the DH model, holds poses out to judge them, and
     leaves all tables in results/, in the folder it is called in. What is up to date is not made
-    again. Several files are merged in order. Of many data sets a table is shown, that of `kinacc
-    summary`, and no pages are written. Words after -- go to Snakemake.
+    again. Several files, or all of a FOLDER, are merged in order. Of many data sets a table is
+    shown, that of `kinacc summary`, and no pages are written. Words after -- go to Snakemake.
 
     \b
     Example:
       kinacc calibrate tracker.yaml
-      kinacc calibrate robots/*.yaml
+      kinacc calibrate robots
       kinacc calibrate tracker.yaml -- --dry-run
     """
     from kinacc.cli.fitted import summary
@@ -105,6 +105,7 @@ def carried_out(
         what = f"no configuration file is given, and there is no {CONFIG} here"
         fix = "kinacc init MEASUREMENTS writes one; then: kinacc calibrate NAME.yaml"
         raise InputError(Problem("FILE.yaml", what, fix=fix))
+    configs = tuple(each for word in configs for each in _files(word))
     plan = planned(configs)
     plan.check_files()
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
@@ -120,6 +121,23 @@ def carried_out(
         raise SystemExit(done.returncode)
     ran = not {"-n", "--dry-run", "--dryrun", "--unlock", "--lint"} & set(more)
     return configs, plan if ran else None
+
+
+def _files(word: str) -> list[str]:
+    """The configuration files of a word: itself, or those in a folder, without robot files.
+
+    Raises InputError for a folder without any.
+    """
+    from kinacc.errors import InputError, Problem
+
+    if not Path(word).is_dir():
+        return [word]
+    found = sorted(str(each) for each in Path(word).glob("*.yaml"))
+    found = [each for each in found if not each.endswith(".robot.yaml")]
+    if not found:
+        fix = "kinacc init MEASUREMENTS --out FOLDER writes one"
+        raise InputError(Problem(word, "is a folder without configuration files", "*.yaml", fix))
+    return found
 
 
 def profile_options() -> list[str]:
