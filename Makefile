@@ -29,6 +29,7 @@ key = $(shell { cat $(1); pwd; } | cksum | tr -d ' ')
 PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
 KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
+CLUSTER := .venv/.cluster-$(call key,requirements/cluster.txt)
 PEERS := .venv-bench/.peers-$(call key,requirements/run.txt requirements/bench.txt pyproject.toml)
 
 reproduce: $(KINACC)
@@ -51,7 +52,7 @@ lint: $(KINACC) $(TOOLS)
 check: lint
 	$(PYTEST) -m "not slow"
 
-test: lint
+test: lint $(CLUSTER)
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PYTEST)
@@ -104,6 +105,12 @@ $(PEERS):
 	@.venv-bench/bin/python -m kinacc.workflow.warm_up
 	@touch $@
 
+# Apart from the environment: Snakemake imports every plugin it finds, at every start.
+$(CLUSTER): $(PACKAGES)
+	@rm -rf .venv/cluster
+	@$(PIP) --require-hashes --no-deps --target .venv/cluster -r requirements/cluster.txt
+	@touch $@
+
 # One lock for every supported Python and platform: names, versions and hashes, nothing else.
 LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
   --no-header --no-emit-index-url --no-emit-find-links
@@ -111,6 +118,9 @@ lock:
 	$(LOCK) requirements/test.in --output-file requirements/test.txt
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
 	$(LOCK) requirements/bench.in --constraints requirements/test.txt --output-file requirements/bench.txt
+	$(LOCK) requirements/cluster.in --constraints requirements/run.txt \
+	  $$(sed -n 's/^\([a-z0-9-]*\)==.*/--no-emit-package \1/p' requirements/run.txt) \
+	  --output-file requirements/cluster.txt
 
 clean:
 	rm -rf results public-robots .snakemake docs/_build
