@@ -49,6 +49,8 @@ for stage in STAGES.values():
         log:
             plan.log(stage.name, folder, part),
         cache: stage.shared and workflow.enable_cache
+        # What most waits for goes first, figures last: fewer cores are idle at the end.
+        priority: stages_below(stage.name)
         # On a cluster stages of a data set share a job, and inside it start without further ado.
         group:
             (

@@ -515,3 +515,13 @@ CHOICES = ("choices_chunk", "choices_table", "choices_reasons", "claims_over_cho
 def maker_of(artefact: str) -> Stage:
     """The stage that leaves an artefact."""
     return next(stage for stage in STAGES.values() if artefact in stage.outputs)
+
+
+@cache
+def stages_below(name: str) -> int:
+    """How many stages wait for one, in the longest chain of them."""
+    made = set(STAGES[name].outputs)
+    below = [
+        each.name for each in STAGES.values() if made.intersection((*each.inputs, *each.optional))
+    ]
+    return max((1 + stages_below(each) for each in below), default=0)
