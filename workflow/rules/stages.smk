@@ -3,21 +3,6 @@
 # With one data set its name stands in the paths, so that `snakemake -c1 dh` says which one it means.
 whose = "{dataset}" if len(plan.datasets) > 1 else next(iter(plan.datasets))
 
-
-# The targets are not known yet when this file is read.
-def with_robustness():
-    return "robustness" in workflow.dag_settings.targets
-
-
-# Files from outside are read where they stand, also where results go to a storage.
-def files_read(name, dataset, part):
-    files = {
-        role: local(paths) if role.endswith("_file") else paths
-        for role, paths in plan.inputs(name, dataset, with_robustness()).items()
-    }
-    return plan.waited_for(name, dataset, part, ancient) | files
-
-
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
     folder = TOURNAMENT if stage.joint else whose
