@@ -6,6 +6,7 @@ screen and in the log.
 
 from __future__ import annotations
 
+import gc
 import inspect
 import sys
 import traceback
@@ -74,6 +75,10 @@ def perform(job: Job, progress: object = None) -> None:
     """Run a stage and let its errors through."""
     tables = read_inputs(job.inputs)
     stage = import_module(job.module)
+    if not gc.isenabled():
+        # What is imported stays; a collection need not look at it each time.
+        gc.freeze()
+        gc.enable()
     settings = dict(job.settings)
     if job.part is not None:
         number, _, count = job.part.partition("-of-")
