@@ -84,6 +84,19 @@ def test_help_loads_no_numerical_library():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_a_command_loads_no_tools_of_numpy_and_no_compiler(tmp_path):
+    code = (
+        "import sys; from kinacc.cli.group import main\n"
+        f"try: main(['fitted', {str(tmp_path)!r}])\n"
+        "except SystemExit: pass\n"
+        "import scipy.linalg, scipy.special, numpy as np\n"
+        "print(sorted({'unittest', 'numba', 'numpy.f2py.crackfortran'} & set(sys.modules)))\n"
+        "np.testing.assert_allclose(1.0, 1.0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 def test_a_figure_that_needs_no_table_is_drawn(tmp_path):
     done = call("run", "fig1", "--config", CONFIG, "--results", tmp_path)
     assert done.exit_code == 0, done.output

@@ -140,3 +140,15 @@ def test_rows_chosen_are_told_apart_as_if_there_were_no_others():
     for rows in (np.arange(80), np.arange(0, 80, 2), np.flatnonzero(rng.random(80) < 0.3)):
         wanted = folds.configurations(pose[rows], q[rows], 0.02)
         np.testing.assert_array_equal(folds.configurations_among(rows, pose, pairs), wanted)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_poses_joined_by_a_long_chain_of_revisits_are_one_configuration(seed):
+    order = np.random.default_rng(seed).permutation(3000)
+    chain = np.stack([order[:-1], order[1:]], axis=1)
+    apart = np.delete(chain, 1500, axis=0)
+    pose = np.arange(3000)
+    assert not folds.configurations_among(pose, pose, chain).any()
+    found = folds.configurations_among(pose, pose, apart)
+    assert np.array_equal(found == found[order[0]], np.isin(pose, order[:1501]))
+    assert found.max() == 1

@@ -161,7 +161,7 @@ from kinacc.workflow import stage
 
 def libraries(words):
     import scipy.linalg, scipy.special, scipy.optimize
-    print(*sorted({"numpy.f2py", "numpy.testing"} & sys.modules.keys()))
+    print(*sorted({"unittest", "numpy.f2py.crackfortran"} & sys.modules.keys()))
     from numpy.testing import assert_allclose
     import numpy.testing
     assert_allclose(numpy.testing.assert_allclose is assert_allclose, True)

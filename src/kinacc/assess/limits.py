@@ -6,6 +6,11 @@ import math
 
 import numpy as np
 
+from kinacc.assess import plain_sizes
+
+_FEW = 5000  # sizes of one process that take less than loading the compiler does
+_asked = 0
+
 
 def upper_limit_mm(mean_mm: np.ndarray, noise: float | np.ndarray, error: float) -> float:
     """Size that the true error exceeds with probability at most ``error``, whatever it is.
@@ -15,9 +20,7 @@ def upper_limit_mm(mean_mm: np.ndarray, noise: float | np.ndarray, error: float)
     point of an ellipsoid, a little wider.
     """
     if isinstance(noise, float):
-        from kinacc.assess.size_kernels import size_at
-
-        return noise * size_at(_size(mean_mm) / noise, error)
+        return noise * _size_at(_size(mean_mm) / noise, error)
     from scipy.special import ndtri
 
     from kinacc.assess.ellipsoid import largest_size
@@ -28,9 +31,7 @@ def upper_limit_mm(mean_mm: np.ndarray, noise: float | np.ndarray, error: float)
 def lower_limit_mm(mean_mm: np.ndarray, noise: float | np.ndarray, error: float) -> float:
     """Size that the true error falls below with probability at most ``error``, whatever it is."""
     if isinstance(noise, float):
-        from kinacc.assess.size_kernels import size_at
-
-        return noise * size_at(_size(mean_mm) / noise, 1.0 - error)
+        return noise * _size_at(_size(mean_mm) / noise, 1.0 - error)
     from scipy.special import chdtri
 
     from kinacc.assess.ellipsoid import mahalanobis_beyond
@@ -52,3 +53,14 @@ def lower_limit_mm(mean_mm: np.ndarray, noise: float | np.ndarray, error: float)
 
 def _size(vector: np.ndarray) -> float:
     return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+def _size_at(x: float, probability: float) -> float:
+    """As :func:`plain_sizes.size_at`, by the same digits, compiled where many are asked for."""
+    global _asked
+    _asked += 1
+    if _asked <= _FEW:
+        return plain_sizes.size_at(x, probability)
+    from kinacc.assess.size_kernels import size_at
+
+    return size_at(x, probability)

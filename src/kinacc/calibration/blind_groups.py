@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from kinacc.calibration.frames import MOTIONS, Frames
 
@@ -94,6 +93,8 @@ def _simple(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
     """The same space by directions that share no pivot ``among`` (P,), to a largest part of 1."""
     if not len(rows):
         return rows
+    import scipy
+
     left, upper, _ = scipy.linalg.qr(rows[:, among], mode="economic", pivoting=True)
     mixed = scipy.linalg.solve_triangular(upper[:, : len(rows)], left.T @ rows)
     return mixed / np.abs(mixed).max(axis=1, keepdims=True)

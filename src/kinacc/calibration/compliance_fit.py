@@ -12,8 +12,8 @@ from kinacc.artifacts.columns import Columns
 from kinacc.calibration import dh_fit, tables
 from kinacc.calibration.constrained import ConstrainedFrames
 from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD, Unknowns
-from kinacc.calibration.frames import FrameCoordinates, Frames
+from kinacc.calibration.dh_fit import Unknowns
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameCoordinates, Frames
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.robust import Weights

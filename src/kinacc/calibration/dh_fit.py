@@ -9,10 +9,9 @@ import numpy as np
 from kinacc.calibration import reweighted, robust, variances
 from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
 from kinacc.calibration.constraints import free_parameters  # noqa: F401 (the usual mask of a fit)
-from kinacc.calibration.frames import FrameCoordinates, Frames
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameCoordinates, Frames
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.held import (
-    ANGLE_UNIT_RAD,
     Kept,
     Placed,
     known_frames,

@@ -17,6 +17,7 @@ from kinacc.geometry import IDENTITY, Pose, exp_so3, invert, skew
 
 MOTIONS = ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")
 BASE = "base"
+ANGLE_UNIT_RAD = 1e-3  # one mrad counts as much displacement as one mm
 _SMALL_ANGLE_RAD = 1e-3
 
 

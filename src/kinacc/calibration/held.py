@@ -14,7 +14,7 @@ from kinacc.calibration.constrained import (
     FrameTerms,
     constrained,
 )
-from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameCoordinates, Frames, coordinates
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.system import FlangeModel, PoseSystem
@@ -27,7 +27,6 @@ Coordinates = FrameCoordinates | ConstrainedFrames
 # Of the best-seen motion. Axes tilted by a mrad, as those of every arm are, show as much of a
 # motion that the described arm does not: a fit would follow them, each model another way.
 SHOWN = 1e-3
-ANGLE_UNIT_RAD = 1e-3  # one mrad counts as much displacement as one mm
 _PART = 0.1  # of a unit motion that a target must have to be what is held
 _SAME = 6  # digits to which parts are equal
 

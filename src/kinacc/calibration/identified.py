@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinacc.calibration.blind_groups import LeftOpen, groups, of_arm
-from kinacc.calibration.constrained import ConstrainedFrames
-from kinacc.calibration.dh_fit import DHFit, unseen_anywhere
-from kinacc.calibration.observations import Observations
-from kinacc.calibration.truncated_svd import MOVES_SQUARED, TOUCH_SQUARED
 from kinacc.calibration.uncertainty import Uncertainty, named_directions
+
+if TYPE_CHECKING:
+    from kinacc.calibration.dh_fit import DHFit
+    from kinacc.calibration.observations import Observations
 
 IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
 STRUCTURAL = 1e-6  # share of the largest singular value over poses all over the joints
@@ -40,6 +41,8 @@ def parameters(fit: DHFit, known: Uncertainty) -> list[Parameter]:
     value (base and targets projected out) hold more than 1 % (``truncated.TOUCH_SQUARED``), or half
     of them where it has a prior (``truncated.MOVES_SQUARED``).
     """
+    from kinacc.calibration.truncated_svd import MOVES_SQUARED, TOUCH_SQUARED
+
     priors, fixed = _priors(fit), _fixed(fit)
     found = []
     for name, share in zip(
@@ -57,6 +60,8 @@ def parameters(fit: DHFit, known: Uncertainty) -> list[Parameter]:
 
 def left_open(fit: DHFit, known: Uncertainty, seen: Observations) -> LeftOpen:
     """What the data cannot tell apart. ``seen``: what was fitted."""
+    from kinacc.calibration.dh_fit import unseen_anywhere
+
     hidden = named_directions(fit, seen.target_names, unseen_anywhere(fit, seen, STRUCTURAL))
     found = groups(hidden, known.undetermined, of_arm(known.names))
     return LeftOpen(found, known.names, fit.frames)
@@ -65,6 +70,8 @@ def left_open(fit: DHFit, known: Uncertainty, seen: Observations) -> LeftOpen:
 def _priors(fit: DHFit) -> dict[str, float]:
     """Standard deviations of the priors by parameter, mm and rad."""
     found = _finite(fit.model.parameter_names, fit.prior_std.ravel())
+    from kinacc.calibration.constrained import ConstrainedFrames
+
     if isinstance(fit.coordinates, ConstrainedFrames):
         terms = fit.coordinates.terms
         found |= _finite(terms.names, terms.std)
@@ -77,6 +84,8 @@ def _finite(names: Sequence[str], std: np.ndarray) -> dict[str, float]:
 
 def _fixed(fit: DHFit) -> set[str]:
     """Components of frames that were not estimated."""
+    from kinacc.calibration.constrained import ConstrainedFrames
+
     if not isinstance(fit.coordinates, ConstrainedFrames):
         return set()
     terms = fit.coordinates.terms

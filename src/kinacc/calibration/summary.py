@@ -11,9 +11,6 @@ import numpy as np
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSETS
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
-from kinacc.calibration import blind_words, frames
-from kinacc.calibration.observations import from_columns
-from kinacc.calibration.selection import ORDERS, carried, highest_order
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations
@@ -51,6 +48,8 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
     ``robot``: the one the tables were made with; ``like_measured``: share of the box of the ranges
     of the joints where the selected model was measured, NaN where it is not known.
     """
+    from kinacc.calibration import blind_words
+
     return [
         *_data(tables["measurements"], robot),
         *_frames(tables["frames"]),
@@ -233,6 +232,8 @@ def _orders(name: str, tables: Mapping[str, Columns], robot: Robot) -> Iterator[
         yield Fact("selection", name, "low_order_held_out", float(order[folds].min()), "1")
         yield Fact("selection", name, "high_order_held_out", float(order[folds].max()), "1")
     if len(np.unique(order)) > 1:
+        from kinacc.calibration.selection import ORDERS
+
         yield Fact("selection", name, "highest_order_tried", float(order.max()), "1")
         count, most = _carried(tables["measurements"], robot, _frames_fitted(tables["frames"]))
         higher = next((each for each in ORDERS if each > order.max()), most)
@@ -243,6 +244,10 @@ def _orders(name: str, tables: Mapping[str, Columns], robot: Robot) -> Iterator[
 
 def _carried(measurements: Mapping, robot: Robot, frames_fitted: bool) -> tuple[int, int]:
     """Number of configurations that folds hold out, and the highest order they carry."""
+    from kinacc.calibration import frames
+    from kinacc.calibration.observations import from_columns
+    from kinacc.calibration.selection import carried, highest_order
+
     every = from_columns(measurements, robot)
     anywhere = frames.known(sessions=len(every.session_names), targets=len(every.target_names))
     estimated = frames.coordinates(every, anywhere, frames_fitted, frames_fitted).size

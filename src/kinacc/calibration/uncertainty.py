@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.calibration.dh_fit import ANGLE_UNIT_RAD
-from kinacc.calibration.truncated_svd import TOUCH_SQUARED
+from kinacc.calibration.frames import ANGLE_UNIT_RAD
 
 if TYPE_CHECKING:
     from kinacc.calibration.models import Fitted
@@ -38,6 +37,8 @@ class Uncertainty:
     @property
     def determined(self) -> np.ndarray:
         """True (P,) where no undetermined direction reaches a parameter."""
+        from kinacc.calibration.truncated_svd import TOUCH_SQUARED
+
         return np.sum(self.undetermined**2, axis=0) <= TOUCH_SQUARED
 
 

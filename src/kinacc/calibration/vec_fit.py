@@ -8,9 +8,8 @@ import numpy as np
 
 from kinacc.calibration.basis_expansion import Group
 from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
-from kinacc.calibration.frames import FrameCoordinates, Frames, coordinates
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameCoordinates, Frames, coordinates
 from kinacc.calibration.held import (
-    ANGLE_UNIT_RAD,
     Kept,
     Placed,
     known_frames,

@@ -8,20 +8,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.artifacts import store
 from kinacc.artifacts.allowed import ESTIMATES
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison
 from kinacc.campaign import words
 from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
-from kinacc.checks.noise import Revisits, per_axis_mm, revisits
 from kinacc.errors import Problem
-from kinacc.kinematics.tables import frame
-from kinacc.measurements import folds
+
+if TYPE_CHECKING:
+    from kinacc.checks.noise import Revisits
 
 _NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads to nothing
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
@@ -96,6 +96,8 @@ def scatter_in_brief(measured: Columns, errors: Columns, frames: Columns) -> str
 
 def _read(calibration: Path, names: Sequence[str]) -> list[Columns]:
     """Tables of a results folder, none where one is not there."""
+    from kinacc.artifacts import store
+
     paths = [calibration / f"{name}.parquet" for name in names]
     return [store.read(path) for path in paths] if all(p.is_file() for p in paths) else []
 
@@ -107,6 +109,8 @@ def of_little_noise(
 
     ``measured`` and ``errors``: ``measurements`` and ``pose_errors`` of the calibration.
     """
+    from kinacc.checks.noise import per_axis_mm
+
     again = scatter(measured, errors)
     scatter_mm = per_axis_mm(again.std_mm)
     problems = []
@@ -132,6 +136,10 @@ def scatter(measured: Columns, errors: Columns, frames: Columns | None = None) -
     Held-out errors where there are: readings of a configuration are held out together. Per axis of
     the robot's base, with ``frames`` per axis of the instrument.
     """
+    from kinacc.checks.noise import revisits
+    from kinacc.kinematics.tables import frame
+    from kinacc.measurements import folds
+
     own = np.asarray(errors["comparison"]) == Comparison(MEASURED, PLAINEST).name
     held_out = own & (np.asarray(errors["estimate"]) == ESTIMATES[1])
     used = held_out if held_out.any() else own

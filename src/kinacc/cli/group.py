@@ -15,8 +15,10 @@ import click
 
 from kinacc import __version__
 from kinacc.errors import InputError, Problem
+from kinacc.starting import without_tools_of_numpy
 
-_AS_JSON = f"{__name__}.as_json"
+_AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
+_HELP = ("-h", "--help")
 
 
 class Named(Mapping[str, click.Command]):
@@ -144,6 +146,7 @@ class Commands(Lazy):
         """Words of the command line, with options under the names they have now."""
         own = args[: args.index("--")] if "--" in args else args
         context.meta[_AS_JSON] = "--json" in own
+        context.meta[_ASKS_HELP] = not {*own}.isdisjoint(_HELP)
         for i, word in enumerate(own):
             name, mark, value = word.partition("=")
             new = _FORMERLY.get(own[0], {}).get(name)
@@ -160,6 +163,8 @@ class Commands(Lazy):
         """
         try:
             with _ended_in_order():
+                if not context.meta[_ASKS_HELP]:
+                    without_tools_of_numpy()
                 return super().invoke(context)
         except click.UsageError as error:
             if not context.meta[_AS_JSON]:
@@ -244,7 +249,7 @@ SECTIONS = {
     cls=Commands,
     sections=SECTIONS,
     make=imported("kinacc.cli"),
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": list(_HELP)},
 )
 @click.version_option(__version__, prog_name="kinacc")
 def main() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -10,12 +11,14 @@ import numpy as np
 from kinacc.cli import rows
 from kinacc.cli.rows import Rows
 from kinacc.cli.sheet import Field, Sheet
-from kinacc.deployment.predict import Prediction, open_movement
-from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
+
+if TYPE_CHECKING:
+    from kinacc.deployment.predict import Prediction
+    from kinacc.deployment.record import Calibration
 
 _MRAD = 1e3
 _MOST_SAID = 2  # sentences of a warning
@@ -156,6 +159,8 @@ def say_convention(calibration: Calibration, at: JointState, frame: str, point: 
     """
     if frame != "base" or calibration.known is None or not len(at):
         return
+    from kinacc.deployment.predict import open_movement
+
     in_base, seen = (
         open_movement(calibration, at, each, point)[:, 0] for each in (frame, "instrument")
     )

@@ -81,13 +81,22 @@ def configurations_among(rows: np.ndarray, pose: np.ndarray, pairs: np.ndarray) 
     first_of_pose = np.unique(pose, return_index=True)[1]
     if not len(pairs) and len(first_of_pose) == len(pose):
         return np.arange(len(pose))
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     same_pose = np.stack([np.arange(len(pose)), first_of_pose[_ranks(pose)]], axis=1)
-    links = np.concatenate([pairs.reshape(-1, 2), same_pose])
-    graph = coo_matrix((np.ones(len(links)), links.T), shape=(len(pose), len(pose)))
-    return _by_appearance(connected_components(graph, directed=False)[1])
+    return _by_appearance(_joined(np.concatenate([pairs.reshape(-1, 2), same_pose]), len(pose)))
+
+
+def _joined(links: np.ndarray, count: int) -> np.ndarray:
+    """First (count,) of all that are joined with each, directly or by others; ``links`` (m, 2)."""
+    first = np.arange(count)
+    while True:
+        ends = first[links]
+        least = ends.min(axis=1)
+        if np.array_equal(ends[:, 0], ends[:, 1]):
+            return first
+        for side in ends.T:
+            np.minimum.at(first, side, least)
+        while not np.array_equal(first, above := first[first]):
+            first = above
 
 
 def assign(configuration: np.ndarray, folds: int, seed: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from kinacc.starting import without_tools_of_numpy
 from kinacc.workflow.catalogue import STAGES, TABLES
 from kinacc.workflow.runner import Job, Paths, execute
 
@@ -132,24 +133,13 @@ def main(words: Sequence[str]) -> None:
     """
     gc.disable()
     os.environ.update(_ONE_THREAD)
-    _without_tools_of_numpy()
+    without_tools_of_numpy()
     signal.signal(signal.SIGTERM, _stop)
     try:
         execute(from_words(words))
         gc.freeze()
     except (KeyboardInterrupt, _Stopped) as stop:
         _end(signal.SIGTERM if isinstance(stop, _Stopped) else signal.SIGINT)
-
-
-def _without_tools_of_numpy() -> None:
-    """Keep SciPy from importing numpy's Fortran compiler and test tools, 0.1 s of a job.
-
-    It copies every name of numpy, which imports what is behind it. `import numpy.testing` finds it.
-    """
-    import numpy
-
-    for name in ("f2py", "testing"):
-        vars(numpy).setdefault(name, None)
 
 
 def python_of_stages(workflow: Any) -> str:
