@@ -45,7 +45,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "ea9a47cd4976503f",
         "8dfb42ad2f1fa880",
         "b1cf89dd11ffcffe",
-        "3c4cd5c8683ef8fe",
         "92c21a4bb3ec2a38",
     },
     "invalidation_calibrated": _BEFORE_ROOMS
@@ -53,7 +52,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "342f7d8eb92a4336",
         "2359c6c565f88431",
         "b295789925e904fc",
-        "0d8274e91de90558",
         "136d34131906ef05",
     },
     "kinematic": _BEFORE_ROOMS
@@ -61,7 +59,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "013c4e27f85dfbe6",
         "5d46601c6b4a848f",
         "ec5bc9a390f5ab84",
-        "d6289da9a4a4e551",
         "8e1bb6d080eeda6f",
     },
     "model_invalidation_full": _BEFORE_ROOMS
@@ -69,7 +66,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "9c378ac63b7a94d6",
         "ba028a354b6609f4",
         "f922bfe981ed1abf",
-        "01a397d3b7593d05",
         "6c3f88d9087efb73",
     },
     "region_share": _BEFORE_ROOMS
@@ -77,7 +73,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "f78096dfad5397d1",
         "26e6f3ceebbbcf39",
         "02b91a8e49c3da8c",
-        "54ac28960523703f",
         "9e5efc1a7d7755e5",
     },
     "search_and_confirm": _BEFORE_ROOMS
@@ -86,7 +81,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "0e1ed1ef42570ea4",
         "7d799bcacdd9b633",
         "e6b1d5ee9f4f4ddb",
-        "886f9510ddd25685",
         "8b22e7a5c8c0731b",
     },
     "sequential": _BEFORE_ROOMS
@@ -94,7 +88,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "94960c384a0a8485",
         "803268b7890760fe",
         "c98c882b0f01018a",
-        "5207a7e33b1ef279",
         "a0f441f47bd0567b",
     },
     "single_shot": _BEFORE_ROOMS
@@ -102,7 +95,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "79f6c4e7bcbed712",
         "9bc00b590c848797",
         "99bc95063c5154d9",
-        "e3fe4be61665e5db",
         "0fd8bee355f51b05",
     },
     "two_stage": _BEFORE_ROOMS
@@ -110,7 +102,6 @@ _ALIKE: dict[str, frozenset[str]] = {
         "aa386e4d4cbe4d9c",
         "63218d533e28078f",
         "42c20fc02fe70a7a",
-        "ecbaa5d7bd6af89d",
         "6de38d1bb0294859",
     },
 }
