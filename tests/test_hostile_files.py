@@ -107,10 +107,10 @@ def test_a_whole_number_beyond_all_floats_is_out_of_range(tmp_path):
         load([path], {"study": {"alpha": 10**5000}})
 
 
-def test_hundreds_of_data_sets_are_refused_before_they_are_completed(tmp_path):
-    text = "datasets:\n" + "".join(f"  a{i}: {{robot: ur10}}\n" for i in range(4000))
+def test_thousands_of_data_sets_are_refused_before_they_are_completed(tmp_path):
+    text = "datasets:\n" + "".join(f"  a{i}:\n" for i in range(6000))
     (tmp_path / "own.yaml").write_text(text)
-    assert "4000 data sets" in refused(tmp_path, "check-data", "own.yaml")
+    assert "6000 data sets" in refused(tmp_path, "check-data", "own.yaml")
 
 
 def repeated(path: Path, columns: dict[str, pa.Array], times: int) -> None:

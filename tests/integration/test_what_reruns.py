@@ -118,14 +118,27 @@ def test_the_cli_and_the_check_are_no_part_of_any_result(project):
     assert project.to_do() == {}
 
 
-def test_one_row_of_a_file_of_measurements(project):
+AFTER_ROWS = (ALL | {"data_check"}) - NOT_OWN - {"fig1"}
+
+
+def change_one_row(project):
     path = project.folder / "own data" / "poses.csv"
     lines = path.read_text().splitlines()
     fields = lines[7].split(",")
     fields[6] = f"{float(fields[6]) + 0.01:.9f}"
     lines[7] = ",".join(fields)
     path.write_text("\n".join(lines) + "\n")
-    assert project.to_do() == {"own": (ALL | {"data_check"}) - NOT_OWN - {"fig1"}}
+
+
+def test_one_row_of_a_file_of_measurements(project):
+    change_one_row(project)
+    assert project.to_do() == {"own": AFTER_ROWS}
+
+
+def test_a_run_that_ended_before_the_check_of_changed_rows_leaves_no_old_fit(project):
+    change_one_row(project)
+    project.snakemake(options=("--until", "measurements"))
+    assert project.to_do() == {"own": AFTER_ROWS - {"measurements"}}
 
 
 def test_a_file_of_measurements_saved_again_unchanged(project):

@@ -28,7 +28,7 @@ from kinacc.workflow.catalogue import (
     maker_of,
 )
 from kinacc.workflow.configured import in_use, words_read
-from kinacc.workflow.runner import Job
+from kinacc.workflow.runner import Job, inputs_hash
 from kinacc.workflow.stage import job_of, to_text
 
 RESULTS = "results"
@@ -259,7 +259,7 @@ class Plan:
         return {"gates": gates}
 
     def _is_made(self, name: str, dataset: str, part: str | None = None) -> bool:
-        """Whether tables are there by these settings and code; of pictures nothing is known."""
+        """Whether tables are there, of what they are now made of; of pictures nothing is known."""
         if STAGES[name].leaves != TABLES:
             return False
         known = ("made", name, dataset, part)
@@ -270,8 +270,17 @@ class Plan:
                 "seed": str(self.seed(dataset)),
             }
             paths = self.outputs(name, dataset, part).values()
-            self.known[known] = all(_marks(path).items() >= wanted.items() for path in paths)
+            made = all(_marks(path).items() >= wanted.items() for path in paths)
+            self.known[known] = made and self._is_of_these(name, dataset, paths)
         return self.known[known]
+
+    def _is_of_these(self, name: str, dataset: str, paths: Collection[str]) -> bool:
+        """Whether tables were made from the inputs now there: a run may have ended in between."""
+        try:
+            wanted = inputs_hash(self.inputs(name, dataset))
+        except (InputError, OSError):
+            return False
+        return all(_marks(path)["inputs_hash"] == wanted for path in paths)
 
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""

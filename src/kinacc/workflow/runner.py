@@ -108,11 +108,17 @@ def stage_provenance(job: Job) -> dict[str, object]:
         "kinacc_version": __version__,
         "config_hash": provenance.config_hash(job.settings),
         "code_hash": job.code or provenance.stage_code_hash(job.module, job.uses),
-        "inputs_hash": provenance.inputs_hash(
-            {name: _content(name, paths) for name, paths in job.inputs.items()}
-        ),
+        "inputs_hash": inputs_hash(job.inputs),
         "seed": job.seed,
     }
+
+
+def inputs_hash(inputs: Paths) -> str:
+    """Hash of what stands in the inputs of a stage.
+
+    Raises InputError where parts of one artefact come from different states.
+    """
+    return provenance.inputs_hash({name: _content(name, paths) for name, paths in inputs.items()})
 
 
 def is_done(job: Job) -> bool:
