@@ -118,6 +118,10 @@ def carried_out(
     known = ONE_THREAD | ({} if words[first:] else {"KINACC_FILES_READ": "1"})
     done = subprocess.run([*command, "--", target], env=os.environ | known, check=False)
     if done.returncode:
+        if not more and any(Path(".snakemake/locks").glob("*.lock")):  # which --quiet leaves unsaid
+            what = "is locked: another run is at work in it, or one was killed"
+            fix = f"where none is: kinacc calibrate {shlex.join(words)} -- --unlock, and once more"
+            raise InputError(Problem(str(Path.cwd()), what, fix=fix))
         raise SystemExit(done.returncode)
     ran = not {"-n", "--dry-run", "--dryrun", "--unlock", "--lint"} & set(more)
     return configs, plan if ran else None
