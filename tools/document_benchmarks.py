@@ -36,10 +36,10 @@ TITLES = {
 PAGE = """\
 # Benchmarks
 
-What kinacc takes beside what one would have used otherwise, and beside its own commit {today};
-what was wanted, what was measured, and what no program can go below. `make bench` measures all
-of it anew, with the other libraries in an environment of their own; what models reach on
-measured arms is [another page](../benchmarks/README.md).
+What kinacc takes beside what one would have used otherwise, and beside an earlier kinacc,
+commit {today}; what was wanted, what was measured, and what no program can go below.
+`make bench` measures all of it anew, with the other libraries in an environment of their own;
+what models reach on measured arms is [another page](../benchmarks/README.md).
 
 {machine}
 
@@ -53,7 +53,7 @@ measured arms is [another page](../benchmarks/README.md).
   topic.
 - Before anything is timed all outputs are compared, to the tolerance the file of the topic
   states. That run, and some until a sample lasts 20 ms, are the warm-up: nothing is compiled
-  later.
+  later. A ratio is not that of the medians shown where the machine had other work in between.
 - Times are CPU time of the process and of those it has waited for; where threads are the
   question, wall-clock time. BLAS has one thread, Python's garbage collector is off.
 - The other commit runs in a process of its own, like the kinacc beside it, from its own sources.
@@ -104,7 +104,7 @@ def _machine(tables: Mapping[str, Sequence[Mapping]]) -> str:
 
 
 def _summary(tables: Mapping[str, Sequence[Mapping]]) -> str:
-    """How many wishes were met, and which were not, each once."""
+    """How many targets were met, and which were not, each once."""
     asked = {
         (topic, _what(row)): row["met"]
         for topic, rows in tables.items()
@@ -114,8 +114,8 @@ def _summary(tables: Mapping[str, Sequence[Mapping]]) -> str:
     missed = [
         f"{what} ({TITLES.get(topic, topic)})" for (topic, what), met in asked.items() if not met
     ]
-    counts = f"Of {len(asked)} wishes {len(asked) - len(missed)} are met."
-    return counts if not missed else f"{counts} Out of reach: {'; '.join(missed)}."
+    counts = f"Of {len(asked)} targets {len(asked) - len(missed)} are met."
+    return counts if not missed else f"{counts} Not met: {'; '.join(missed)}."
 
 
 def _what(row: Mapping) -> str:
@@ -234,7 +234,7 @@ def _cells(row: Mapping, own: Mapping) -> list[str]:
     spread = ""
     if row["ratio_low"] is not None:
         turned = [x if row["ratio"] >= 1 else 1 / x for x in (row["ratio_low"], row["ratio_high"])]
-        spread = " ({:.3g} to {:.3g})".format(*sorted(turned))
+        spread = " ({} to {})".format(*map(_number, sorted(turned)))
     a_unit = f" a {row['unit']}"
     if row["contender"] == "limit":
         reached, wanted = (
@@ -256,7 +256,12 @@ def _wish(wanted: str, met: bool) -> str:
 
 def _factor(ratio: float) -> str:
     """How the time of another compares with kinacc's."""
-    return f"{_size(ratio):.3g} x {'faster' if ratio >= 1 else 'slower'}"
+    return f"{_number(_size(ratio))} x {'faster' if ratio >= 1 else 'slower'}"
+
+
+def _number(value: float) -> str:
+    """Three digits, and no powers of ten."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _size(ratio: float) -> float:
@@ -285,7 +290,7 @@ def picture(topic: str, rows: Sequence[Mapping]) -> Figure:
             for row in rows
             if row is not own[row["work"]] and row["ratio"] is not None
         ]
-        return _bars(bars, 1.0, "time over kinacc's (logarithmic); mark: wanted")
+        return _bars(bars, 1.0, "time over kinacc's (logarithmic); mark: wanted; orange: not met")
 
 
 def _bars(

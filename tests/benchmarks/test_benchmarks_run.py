@@ -81,7 +81,7 @@ def test_a_wish_that_is_not_met_stands_out_on_the_page(tmp_path):
     rows = harness.measure(work(other, wanted={"other": 1e9}), [], True)
     measured.write(measured.table(rows, FACTS), "fits", tmp_path)
     written = page.text(page.read(tmp_path))
-    assert "Of 1 wishes 0 are met. Out of reach: one beside other (Fits)." in written
+    assert "Of 1 targets 0 are met. Not met: one beside other (Fits)." in written
     assert "**1e+09 x faster: not met**" in written
 
 
