@@ -9,47 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba.extending import register_jitable
 
+from kinacc.assess import plain_sizes
 from kinacc.compiled import compiled
 
-_ROOT_HALF = math.sqrt(0.5)
-_ROOT_2_PI = math.sqrt(2.0 * math.pi)
-_TINY = 1e-4  # sizes below it count as zero; the error this makes is below 1e-9
-
-
-@compiled
-def reading_below(x, a):
-    """Probability that a reading at a point of size ``a`` has at most size ``x``."""
-    if x <= 0.0:
-        return 0.0
-    if a < _TINY:
-        return math.erf(x * _ROOT_HALF) - 2.0 / _ROOT_2_PI * x * math.exp(-0.5 * x * x)
-    near, far = x - a, x + a
-    tails = 0.5 * (math.erfc(-near * _ROOT_HALF) - math.erfc(far * _ROOT_HALF))
-    bulge = (math.exp(-0.5 * near * near) - math.exp(-0.5 * far * far)) / (a * _ROOT_2_PI)
-    return max(tails - bulge, 0.0)
-
-
-@compiled
-def size_at(x, probability):
-    """The size at which a reading of at most ``x`` has this probability; 0 if none is as likely.
-
-    With 0.05 an upper limit on the size, with 0.95 a lower limit, each at 95 % confidence.
-    """
-    if reading_below(x, 0.0) <= probability:
-        return 0.0
-    low, high = 0.0, x + 1.0
-    while reading_below(x, high) > probability:
-        high += 1.0
-    while high - low > 1e-12 * high:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if reading_below(x, middle) > probability:
-            low = middle
-        else:
-            high = middle
-    return high
+# Compiled from the very functions that serve where little is asked.
+reading_below = register_jitable(plain_sizes.reading_below)
+size_at = compiled(plain_sizes.size_at)
 
 
 @compiled
