@@ -12,6 +12,7 @@ from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import LEAVE_OUT, READINGS, STRIKE, State
+from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
 
 
@@ -59,7 +60,7 @@ def open_(folder: Path | str) -> Opened:
     if not path.is_file():
         fix = "begin one: kinacc campaign start"
         raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
-    text = path.read_bytes()
+    text = json_files.bytes_of(path)
     digest = plan.digest(text)
     return Opened(
         folder,
