@@ -231,7 +231,7 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
     return DatasetReport(
         folder.name,
         tuple(checked),
-        tuple(problem for problem, _ in found),
+        tuple(dict.fromkeys(problem for problem, _ in found)),
         (*notes, *said, *leftovers),
         frozenset(doubt for _, doubts in found for doubt in doubts),
         marks,
