@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from kinacc.starting import without_tools_of_numpy
 from kinacc.workflow.catalogue import STAGES, TABLES
 from kinacc.workflow.inputs import Paths
+from kinacc.workflow.results_lock import InUse, joined
 from kinacc.workflow.runner import Job, execute
 
 if TYPE_CHECKING:
@@ -142,8 +143,11 @@ def main(words: Sequence[str]) -> None:
     without_tools_of_numpy()
     signal.signal(signal.SIGTERM, _stop)
     try:
-        execute(from_words(words))
+        with joined():
+            execute(from_words(words))
         gc.freeze()
+    except InUse as error:
+        raise SystemExit(str(error)) from None
     except (KeyboardInterrupt, _Stopped) as stop:
         _end(signal.SIGTERM if isinstance(stop, _Stopped) else signal.SIGINT)
 
