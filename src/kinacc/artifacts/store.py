@@ -209,6 +209,12 @@ def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
     if rows * columns > _MOST_VALUES:
         allowed = f"at most {_MOST_VALUES} values"
         raise InputError(Problem(str(path), f"{rows} rows of {columns} columns", allowed))
+    refuse(
+        Problem(f"{path}, column {field.name}", f"is of type {field.type}", "numbers, text")
+        for field in file.schema_arrow
+        if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
+        and field.type not in (pa.string(), pa.large_string(), pa.null())
+    )
     return file.read(use_threads=False)
 
 
