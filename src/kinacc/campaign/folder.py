@@ -12,6 +12,7 @@ from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import LEAVE_OUT, READINGS, STRIKE, State
+from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
 
 _CLOCKS_DIFFER = timedelta(minutes=10)  # of two computers that write to one campaign
@@ -74,7 +75,7 @@ def open_(folder: Path | str) -> Opened:
     if not path.is_file():
         fix = "begin one: kinacc campaign start"
         raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
-    text = path.read_bytes()
+    text = json_files.bytes_of(path)
     digest = plan.digest(text)
     begun, journal_at = plan.from_json(text, str(path)), folder / journal.JOURNAL
     known = journal.read(journal_at, digest)

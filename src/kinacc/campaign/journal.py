@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kinacc.artifacts.atomic import synchronise, write_whole
+from kinacc.config import json_files
 from kinacc.errors import InputError, Problem
 
 PLAN, JOURNAL, LOCK, HEAD = "campaign.json", "readings.jsonl", "lock", "head.json"
@@ -223,8 +224,9 @@ def _by_calibration(place: Path) -> dict[str, list[Path]]:
     found: dict[str, list[Path]] = {}
     for plan in sorted(place.glob(f"*/{PLAN}")):
         try:
-            name = json.loads(plan.read_bytes())["about"]["calibration"]
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            content = json_files.values_of(json_files.bytes_of(plan), str(plan))
+            name = content["about"]["calibration"]
+        except (InputError, OSError, ValueError, LookupError, TypeError, RecursionError):
             continue  # no campaign, or one that cannot say whose it is
         if isinstance(name, str):
             found.setdefault(name, []).append(plan.parent)

@@ -15,7 +15,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import Instrument
-from kinacc.config import schema
+from kinacc.config import json_files, schema
 from kinacc.config.values import check
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
@@ -219,7 +219,7 @@ def to_json(plan: Plan) -> bytes:
 def from_json(text: bytes, where: str) -> Plan:
     """The plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
-        content = json.loads(text)
+        content = json_files.values_of(text, where)
         if content["format"] != FORMAT:
             what = f"format {content['format']!r}"
             raise InputError(Problem(where, what, f"format {FORMAT}", "use a later kinacc"))
