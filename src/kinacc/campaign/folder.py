@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from kinacc.artifacts.atomic import write_whole
 from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
@@ -65,7 +66,7 @@ def in_the_way(folder: Path | str) -> list[Problem]:
 def start(folder: Path | str, begun: Plan) -> None:
     """Put a new campaign on disk. Raises InputError where the folder holds one already."""
     refuse(in_the_way(folder), "The campaign was not begun")
-    journal.create(Path(folder) / journal.PLAN, plan.to_json(begun))
+    write_whole(Path(folder) / journal.PLAN, plan.to_json(begun), on_disk=True)
 
 
 def open_(folder: Path | str) -> Opened:

@@ -17,12 +17,12 @@ import stat
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kinacc.artifacts.atomic import synchronise, write_whole
 from kinacc.config import json_files
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, MachineError, Problem, refused
 
 PLAN, JOURNAL, LOCK, HEAD = "campaign.json", "readings.jsonl", "lock", "head.json"
 _PATIENCE_S = 5.0
@@ -129,18 +129,7 @@ def append(path: Path, known: Journal, entry: Mapping) -> None:
         if fresh:
             synchronise(path.parent)
         write_whole(path.with_name(HEAD), head, on_disk=True)
-    except OSError as error:
-        raise _not_written(path, error) from None
-
-
-def create(path: Path, content: bytes) -> None:
-    """Write a new file so that it appears whole and on disk, or not at all.
-
-    Raises InputError where the disk does not take it.
-    """
-    try:
-        write_whole(path, content, on_disk=True)
-    except OSError as error:
+    except (OSError, MachineError) as error:
         raise _not_written(path, error) from None
 
 
@@ -189,9 +178,10 @@ def _damaged(where: str, what: str) -> InputError:
     return InputError(Problem(where, what, fix=fix))
 
 
-def _not_written(path: Path, error: OSError) -> InputError:
+def _not_written(path: Path, error: OSError | MachineError) -> MachineError:
+    told = refused(error, path, "cannot be written") if isinstance(error, OSError) else error
     fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
-    return InputError(Problem(str(path), f"cannot be written: {error.strerror}", fix=fix))
+    return MachineError([replace(each, fix=fix) for each in told.problems])
 
 
 def of_results(results: Path) -> list[Path]:
