@@ -120,6 +120,11 @@ def to_table(
     return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance, columns))
 
 
+def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:
+    """Columns as :func:`read` gives them once they are written; see :func:`to_table` for errors."""
+    return _columns(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
+
+
 def write(
     path: Path | str,
     artefact: str,
