@@ -217,7 +217,7 @@ def test_a_disk_that_does_not_take_a_line_is_told_and_nothing_before_is_lost(tmp
 
     with monkeypatch.context() as patched:
         patched.setattr(journal.os, "fsync", full)
-        with pytest.raises(InputError, match="No space left"):
+        with pytest.raises(InputError, match="no space left"):
             journal.append(path, known, {"kind": "test", "number": 2})
     assert [each["number"] for each in journal.read(path, SEED).entries][:2] == [0, 1]
     journal.append(path, journal.read(path, SEED), {"kind": "test", "number": 3})

@@ -133,6 +133,11 @@ def to_table(
     return table.replace_schema_metadata({**schema.metadata, **digest})
 
 
+def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:
+    """Columns as :func:`read` gives them once they are written; see :func:`to_table` for errors."""
+    return _columns(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
+
+
 def write(
     path: Path | str,
     artefact: str,
