@@ -135,7 +135,7 @@ def to_table(
 
 def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:
     """Columns as :func:`read` gives them once they are written; see :func:`to_table` for errors."""
-    return _columns(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
+    return columns_in(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
 
 
 def write(
