@@ -15,13 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.artifacts import store
-<<<<<<< HEAD
-from kinacc.artifacts.atomic import remove_unfinished, replacing, unfinished
+from kinacc.artifacts.atomic import replacing, sweep, unfinished
 from kinacc.artifacts.contract import METADATA_KEYS, columns_of
-=======
-from kinacc.artifacts.atomic import replacing, sweep
-from kinacc.artifacts.contract import PROVENANCE_KEYS, columns_of
->>>>>>> kills
 from kinacc.errors import InputError
 
 PROVENANCE = {
