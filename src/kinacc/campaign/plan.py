@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
@@ -40,8 +41,12 @@ class Points:
         return len(self.label)
 
     def number(self, label: str) -> int | None:
-        """The point of a name; None where there is none."""
-        return self.label.index(label) if label in self.label else None
+        """The point of a name, with or without spaces about it; None where there is none."""
+        return self._numbers.get(label.strip())
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {label.strip(): number for number, label in enumerate(self.label)}
 
     def position_mm(self, point: int, joints: np.ndarray | None) -> np.ndarray:
         """Modelled position (3,) at the joints reported on the spot, near those of the point."""

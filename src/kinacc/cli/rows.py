@@ -342,7 +342,7 @@ def _with_units(table: RawTable) -> RawTable:
     schema = pq.read_schema(table.path)
 
     def called(name: str) -> str:
-        unit = ((schema.field(name).metadata or {}).get(b"unit") or b"").decode()
+        unit = ((schema.field(name).metadata or {}).get(b"unit") or b"").decode(errors="replace")
         whole = f"{name}_{unit}"
         is_joint = re.fullmatch(r"q\d+", name) and unit in (*ANGLE, *LENGTH)
         return whole if is_joint and whole not in table.columns else name
