@@ -337,6 +337,28 @@ def test_a_damaged_results_table_is_no_traceback(tmp_path):
     assert set(read_metadata(path)) >= {"seed"}
 
 
+def test_long_texts_repeated_in_a_results_table_are_refused_before_they_are_unpacked(tmp_path):
+    from kinacc.artifacts.store import read
+    from kinacc.errors import InputError
+
+    text = pa.DictionaryArray.from_arrays(
+        pa.array(np.zeros(10_000, np.int32)), pa.array(["x" * 100_000])
+    )
+    repeated(tmp_path / "texts.parquet", {"name": text}, 1)
+    assert (tmp_path / "texts.parquet").stat().st_size < 1_000_000
+    with pytest.raises(InputError, match="column name: texts of more than 500 MB"):
+        read(tmp_path / "texts.parquet")
+
+
+def test_a_pipe_in_place_of_a_results_table_is_not_waited_for(tmp_path):
+    from kinacc.artifacts.store import read
+    from kinacc.errors import InputError
+
+    os.mkfifo(tmp_path / "robot.parquet")
+    with pytest.raises(InputError):
+        read(tmp_path / "robot.parquet")
+
+
 def test_a_results_table_of_a_billion_values_is_refused_before_it_is_unpacked(tmp_path):
     from kinacc.artifacts.store import read
     from kinacc.errors import InputError
