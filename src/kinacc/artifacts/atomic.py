@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from kinacc.errors import and_more, refused
+
 _ENDING = ".partial"
 
 
@@ -64,12 +66,13 @@ def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[li
     """Temporary paths beside ``paths``; renamed to them on success, removed on any failure.
 
     ``on_disk``: the files have reached the disk when this returns, and not only the system.
+    Raises MachineError, which names the file, where the system does not take one.
     """
     targets = [Path(path) for path in paths]
     temporary = [unfinished(path) for path in targets]
-    for path in targets:
-        path.parent.mkdir(parents=True, exist_ok=True)
     try:
+        for path in targets:
+            path.parent.mkdir(parents=True, exist_ok=True)
         with ExitStack() as writing:
             for source in temporary:
                 writing.enter_context(held(source))
@@ -80,10 +83,23 @@ def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[li
                 os.replace(source, target)
         for folder in {target.parent for target in targets} if on_disk else ():
             synchronise(folder)
+    except OSError as error:
+        raise refused(error, _refused(error, targets, temporary), "cannot be written") from None
     finally:
         for source in temporary:
             with suppress(OSError):
                 source.unlink(missing_ok=True)
+
+
+def _refused(error: OSError, targets: Sequence[Path], temporary: Sequence[Path]) -> str:
+    """Which file the system did not take: what it names, else what was begun last."""
+    by_name = dict(zip(map(str, temporary), map(str, targets), strict=True))
+    if error.filename is not None:
+        return by_name.get(str(error.filename), str(error.filename))
+    begun = [
+        name for part, name in by_name.items() if os.path.exists(part) and os.path.getsize(part)
+    ]
+    return begun[-1] if begun else str(targets[0]) + and_more(len(targets) - 1)
 
 
 def write_whole(path: Path | str, content: bytes, on_disk: bool = False) -> None:
