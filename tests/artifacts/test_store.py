@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.artifacts import store
-from kinacc.artifacts.atomic import replacing, sweep, unfinished
+from kinacc.artifacts.atomic import replacing, sweep
 from kinacc.artifacts.contract import METADATA_KEYS, columns_of
 from kinacc.errors import InputError
 
