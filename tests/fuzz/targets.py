@@ -323,6 +323,10 @@ def _chained(case: Case, rng: Random) -> Case:
             lines.append(json.dumps({"chain": last, "entry": entry}, sort_keys=True).encode())
         except (ValueError, KeyError, TypeError, RecursionError):
             lines.append(line)
+    if rng.random() < 0.02:
+        lines.append(
+            rng.choice((b"[" * 100_000, b'{"entry": {"a": ' + b"9" * 100_000 + b"}}", b"[]"))
+        )
     return case.but(journal.JOURNAL, b"\n".join(lines))
 
 
@@ -514,45 +518,45 @@ def _first(
 _LOADED = "kinacc.measurements.reader.convert"
 TARGETS: dict[str, Target] = {
     "measured file": Target(
-        seeds.as_they_come, guessed, "kinacc.measurements.intake.guess.name_of", 0.20, _asked
+        seeds.as_they_come, guessed, "kinacc.measurements.intake.guess.name_of", 0.07, _asked
     ),
-    "described text or workbook": Target(_all_described, described, _LOADED, 0.16, _section),
-    "described Parquet": Target(seeds.parquet_files, described, _LOADED, 0.08, _section),
-    "described workbook": Target(seeds.workbooks, described, _LOADED, 0.03, _section),
-    "check-data": Target(_all_described, examined, _LOADED, 0.004, _section),
+    "described text or workbook": Target(_all_described, described, _LOADED, 0.15, _section),
+    "described Parquet": Target(seeds.parquet_files, described, _LOADED, 0.06, _section),
+    "described workbook": Target(seeds.workbooks, described, _LOADED, 0.012, _section),
+    "check-data": Target(_all_described, examined, _LOADED, 0.001, _section),
     "init": Target(
-        seeds.as_they_come, init, "kinacc.measurements.intake.guess.name_of", 0.004, _asked, writes="out"
+        seeds.as_they_come, init, "kinacc.measurements.intake.guess.name_of", 0.001, _asked, writes="out"
     ),
     "robot": Target(
-        _first(seeds.robots, "arm.yaml"), robot_file, "kinacc.kinematics.robot.description.Reader", 0.12,
+        _first(seeds.robots, "arm.yaml"), robot_file, "kinacc.kinematics.robot.description.Reader", 0.20,
     ),
-    "URDF": Target(_first(seeds.urdfs), robot_file, "kinacc.kinematics.robot.urdf._joints_alone", 0.10),
+    "URDF": Target(_first(seeds.urdfs), robot_file, "kinacc.kinematics.robot.urdf._joints_alone", 0.18),
     "configuration": Target(
-        seeds.configurations, configuration, "kinacc.config.load._resolve", 0.08,
+        seeds.configurations, configuration, "kinacc.config.load._resolve", 0.15,
         lambda options, rng: {**options, "overrides": rng.choice(_OVERRIDES) if rng.random() < 0.1 else None},
         only=(".yaml",),
     ),
-    "campaign": Target(seeds.campaign, campaign, "kinacc.campaign.state.restore", 0.05, also=_chained),
-    "joints": Target(_joint_seeds, joints_given, "kinacc.cli.rows.numbers kinacc.measurements.intake.joint_files.name_of", 0.07, _rows_options),
+    "campaign": Target(seeds.campaign, campaign, "kinacc.campaign.state.restore", 0.04, also=_chained),
+    "joints": Target(_joint_seeds, joints_given, "kinacc.cli.rows.numbers kinacc.measurements.intake.joint_files.name_of", 0.05, _rows_options),
     "poses": Target(_pose_seeds, poses_given, "kinacc.cli.rows.numbers", 0.04, _rows_options),
     "numbers on the command line": Target(
-        lambda: [Case({"none.txt": b""})], words_given, "kinacc.cli.rows.numbers_of", 0.03, _arguments
+        lambda: [Case({"none.txt": b""})], words_given, "kinacc.cli.rows.numbers_of", 0.04, _arguments
     ),
     "compare": Target(
-        _pairs, compared, "kinacc.cli.comparison_report.require_alike", 0.003,
+        _pairs, compared, "kinacc.cli.comparison_report.require_alike", 0.001,
         lambda options, rng: {"joints": rng.choice((None, "rows.csv"))},
     ),
     "table": Target(_first(_tables), table_read, "kinacc.artifacts.store._columns", 0.04),
     "show": Target(
-        _first(_tables), table_shown, "kinacc.cli.show_table.words", 0.004,
+        _first(_tables), table_shown, "kinacc.cli.show_table.words", 0.001,
         lambda options, rng: {**options, "form": rng.choice(_FORMS)},
     ),
     "results used": Target(
-        _results, results_used, "kinacc.deployment.folder.calibration", 0.015,
+        _results, results_used, "kinacc.deployment.folder.calibration", 0.005,
         lambda options, rng: {**options, "model": rng.choice((None, "dh", "vec", "nominal"))},
     ),
     "results checked": Target(
-        _results, results_checked, "kinacc.workflow.verification.check.check_dataset", 0.004,
+        _results, results_checked, "kinacc.workflow.verification.check.check_dataset", 0.001,
         lambda options, rng: {**options, "command": rng.choice(("check-results", "check-results", "fitted", "summary"))},
     ),
 }  # fmt: skip
