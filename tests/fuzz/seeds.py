@@ -274,7 +274,8 @@ def campaign() -> tuple[Case, ...]:
 
     from kinacc.assess.random_numbers import key_of
     from kinacc.assess.world import drawn_world
-    from kinacc.campaign import begin, folder as folders
+    from kinacc.campaign import begin
+    from kinacc.campaign import folder as folders
     from kinacc.campaign.instrument import instruments
     from kinacc.campaign.plan import Limits, assessor_of
     from kinacc.campaign.reading import Reading

@@ -476,10 +476,10 @@ def _results() -> Sequence[Case]:
 
 def results_used(folder: Path, options: dict) -> None:
     """The results of a data set as predictions take them."""
+    import numpy as np
+
     from kinacc.cli import choice
     from kinacc.deployment.predict import predict
-
-    import numpy as np
 
     held = choice.calibration_of("mh180", options["model"], None, ())
     predict(

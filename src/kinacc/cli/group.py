@@ -14,7 +14,7 @@ from importlib import import_module
 import click
 
 from kinacc import __version__
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, KinaccError, Problem
 from kinacc.starting import without_tools_of_numpy
 
 _AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
@@ -177,6 +177,8 @@ class Commands(Lazy):
             if context.meta[_AS_JSON]:
                 facts = [asdict(each) for each in error.problems]
                 click.echo(json.dumps({"problems": facts}, indent=1))
+        except KinaccError as error:
+            code, said = 1, str(error)
         except Terminated:
             code, said = 143, "stopped by the system; what was finished is kept"
         except KeyboardInterrupt:
