@@ -38,7 +38,7 @@ SMOKE_FAULTS = (
 )
 # What they draw or simulate takes seconds.
 SLOW = ("check-data", "plan-poses", "report", "plan-campaign", "verify", "campaign report", "init")
-_NOT_SAID = ("Traceback", "Exception ignored", "Error in sys.", "Fatal Python error", "Errno")
+NOT_SAID = ("Traceback", "Exception ignored", "Error in sys.", "Fatal Python error", "Errno")
 _MOST_LINES = 8
 
 
@@ -54,15 +54,15 @@ class Ended:
 def complaints(name: str, fault: machine.Fault, here: Path, disk: Path) -> list[str]:
     """What is not as promised of one command under one fault, in words."""
     words, leaves = world.COMMANDS[name]
-    before = _digests(here)
+    before = digests(here)
     fault.before(disk if here == disk else here)
     try:
         ended = _forked(words, fault, here) if not fault.anew else _started(words, fault, here)
     finally:
         fault.after(here)
-    after = _digests(here)
+    after = digests(here)
     said = ended.stdout + ended.stderr
-    found = [f"says {mark!r}" for mark in _NOT_SAID if mark in said]
+    found = [f"says {mark!r}" for mark in NOT_SAID if mark in said]
     odd = sorted(path for path in after if path.endswith(".partial") or not after[path])
     found += [f"leaves {path}" for path in odd]
     found += [f"lost {path}" for path in before if path not in after]
@@ -169,7 +169,7 @@ def _started(words: tuple[str, ...], fault: machine.Fault, here: Path) -> Ended:
     )
 
 
-def _digests(here: Path) -> dict[str, str]:
+def digests(here: Path) -> dict[str, str]:
     """Digest of every file by its name; empty for a file that is empty and no log."""
     found = {}
     for path in sorted(here.rglob("*")):
