@@ -14,6 +14,7 @@ from command_line import call
 from small_results import SmallResults
 
 from kinacc.artifacts import provenance, store
+from kinacc.artifacts.contract import METADATA_KEYS
 from kinacc.artifacts.error_models import ALWAYS
 from kinacc.workflow.catalogue import CALIBRATION, STAGES
 from kinacc.workflow.plan import planned
@@ -217,9 +218,7 @@ def test_a_wrong_or_absent_unit(results, metadata, words):
     the_one(problems(results), "readings.parquet, column noise_mm", words)
 
 
-@pytest.mark.parametrize(
-    "key", ["kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed"]
-)
+@pytest.mark.parametrize("key", METADATA_KEYS)
 def test_a_missing_provenance_key(results, key):
     def change(table):
         kept = {name: each for name, each in table.schema.metadata.items() if name != key.encode()}

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import Instrument
-from kinacc.config import schema
+from kinacc.config import json_files, schema
 from kinacc.config.values import check
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
@@ -40,8 +41,12 @@ class Points:
         return len(self.label)
 
     def number(self, label: str) -> int | None:
-        """The point of a name; None where there is none."""
-        return self.label.index(label) if label in self.label else None
+        """The point of a name, with or without spaces about it; None where there is none."""
+        return self._numbers.get(label.strip())
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {label.strip(): number for number, label in enumerate(self.label)}
 
     def position_mm(self, point: int, joints: np.ndarray | None) -> np.ndarray:
         """Modelled position (3,) at the joints reported on the spot, near those of the point."""
@@ -214,7 +219,7 @@ def to_json(plan: Plan) -> bytes:
 def from_json(text: bytes, where: str) -> Plan:
     """The plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
-        content = json.loads(text)
+        content = json_files.values_of(text, where)
         if content["format"] != FORMAT:
             what = f"format {content['format']!r}"
             raise InputError(Problem(where, what, f"format {FORMAT}", "use a later kinacc"))

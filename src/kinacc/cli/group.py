@@ -16,7 +16,7 @@ import click
 
 from kinacc import __version__
 from kinacc.cli.process import NOBODY_READS, STOPPED
-from kinacc.errors import InputError, MachineError, Problem, refused
+from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
 from kinacc.starting import without_tools_of_numpy
 
 _AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
@@ -137,6 +137,10 @@ def imported(package: str) -> Callable[[str], click.Command]:
     return command
 
 
+class Terminated(KeyboardInterrupt):
+    """The system asked the command to end (SIGTERM)."""
+
+
 class Commands(Lazy):
     """A group whose commands report bad input as a list of problems, without a traceback."""
 
@@ -200,6 +204,8 @@ def _ending(error: BaseException, came: Sequence[int]) -> tuple[int, str, Sequen
         return 2, "", (Problem(place, error.format_message()),)
     if isinstance(error, InputError):
         return 1 if isinstance(error, MachineError) else 2, str(error), error.problems
+    if isinstance(error, KinaccError):
+        return 1, str(error), ()
     raise error
 
 
@@ -209,7 +215,7 @@ def _listening(came: list[int]) -> Iterator[None]:
 
     def end(signum: int, _: object) -> NoReturn:
         came.append(signum)
-        raise KeyboardInterrupt
+        raise Terminated if signum == signal.SIGTERM else KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
         yield  # only the first thread of a program may say what signals do

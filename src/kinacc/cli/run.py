@@ -75,6 +75,7 @@ def _run(
     # Here and not above: a stage says what it reads and leaves without a numerical library.
     from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.plan import planned
+    from kinacc.workflow.results_lock import running, sharing
 
     plan = planned(config, results=results)
     names = list(plan.datasets)
@@ -96,4 +97,5 @@ def _run(
         absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
     refuse(absent, f"{stage.name} cannot be run")
     jobs = [plan.job(stage.name, dataset, each) for each in (parts if part is None else [part])]
-    return [path for job in execute_all(jobs) for path in job.outputs.values()]
+    with running(results) if part is None else sharing(results):
+        return [path for job in execute_all(jobs) for path in job.outputs.values()]

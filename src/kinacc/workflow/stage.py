@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from kinacc.starting import without_tools_of_numpy
 from kinacc.workflow.catalogue import STAGES, TABLES
-from kinacc.workflow.runner import Job, Paths, execute
+from kinacc.workflow.inputs import Paths
+from kinacc.workflow.results_lock import InUse, joined
+from kinacc.workflow.runner import Job, execute
 
 if TYPE_CHECKING:
     from logging import LogRecord
@@ -41,6 +43,7 @@ def job_of(
     settings: Mapping[str, object],
     seed: int,
     log: str,
+    record: str,
     code: str = "",
 ) -> Job:
     """One run of a stage, with what the catalogue says of it; see :class:`Job`."""
@@ -58,6 +61,8 @@ def job_of(
         uses=stage.used(settings, inputs),
         kind=stage.fits,
         code=code,
+        stage=name,
+        record=record,
     )
 
 
@@ -91,6 +96,7 @@ def from_words(words: Sequence[str]) -> Job:
     """The job of the command's options.
 
     Files stand in the order of their roles; inputs before them have to be there and are not read.
+    The last output is the record.
     """
     given = {option: list(values) for option, values in _by_option(words)}
     (text,), (log,) = given["--job"], given["--log"]
@@ -102,7 +108,7 @@ def from_words(words: Sequence[str]) -> Job:
         role: [next(read) for _ in range(count)] if count else next(read)
         for role, count in reads.items()
     }
-    outputs = given["--output"]
+    *outputs, record = given["--output"]
     roles = stage.outputs if stage.leaves == TABLES else [Path(each).suffix[1:] for each in outputs]
     # Another Python, as of a conda environment, has other versions of libraries: it hashes anew.
     planned_here = os.environ.get("KINACC_PYTHON") == sys.executable
@@ -115,6 +121,7 @@ def from_words(words: Sequence[str]) -> Job:
         told["settings"],
         told["seed"],
         log,
+        record,
         told["code"] if planned_here else "",
     )
 
@@ -136,8 +143,11 @@ def main(words: Sequence[str]) -> None:
     without_tools_of_numpy()
     signal.signal(signal.SIGTERM, _stop)
     try:
-        execute(from_words(words))
+        with joined():
+            execute(from_words(words))
         gc.freeze()
+    except InUse as error:
+        raise SystemExit(str(error)) from None
     except (KeyboardInterrupt, _Stopped) as stop:
         _end(signal.SIGTERM if isinstance(stop, _Stopped) else signal.SIGINT)
 

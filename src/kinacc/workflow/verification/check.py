@@ -13,6 +13,7 @@ import numpy as np
 
 from kinacc.artifacts import campaign_tables, store, tournament_tables
 from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
+from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
@@ -32,6 +33,7 @@ from kinacc.workflow.verification.conformity import check_file
 from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts
 from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_command
 from kinacc.workflow.verification.pictures import check_page, check_picture
+from kinacc.workflow.verification.recomputation import computed_again
 from kinacc.workflow.verification.rules import contradictions
 
 FORMATS = schema.key("figures.formats").choices
@@ -181,9 +183,9 @@ def _is_dataset(folder: Path) -> bool:
     return any((folder / artefact.file_name).is_file() for artefact in ARTEFACTS.values())
 
 
-def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
+def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -> DatasetReport:
     """Check the folder of one data set; see :func:`check_results`."""
-    checked, found, tables, marks = [], [], {}, {}
+    checked, found, tables, marks, of_parts = [], [], {}, {}, {}
     behind = _left_behind(folder, plan)
     for name, path in _tables_there(folder):
         if name in behind:
@@ -194,6 +196,7 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         columns, wrong = check_file(path, ARTEFACTS[name])
         found += [(problem, (doubt,)) for problem in wrong]
         if is_part:
+            of_parts[str(path)] = columns
             continue  # parts of a table are held to its schema; the whole is held to the rules
         if columns is not None:
             tables[name] = columns
@@ -227,15 +230,41 @@ def check_dataset(folder: Path, plan: Plan | None = None) -> DatasetReport:
         found.append((_placed(folder, problem), doubts))
     of_lineage, said = check_lineage(folder, marks, plan)
     found += of_lineage
+    again = computed_again(
+        folder,
+        tables | _joined(folder, of_parts),
+        marks | _marks_of_parts(of_parts),
+        {doubt.stage for _, doubts in found for doubt in doubts},
+        plan,
+        every,
+    )
+    found += again.found
     leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
     return DatasetReport(
         folder.name,
         tuple(checked),
-        tuple(problem for problem, _ in found),
-        (*notes, *said, *leftovers),
+        tuple(dict.fromkeys(problem for problem, _ in found)),
+        (*notes, *said, *again.notes, *leftovers),
         frozenset(doubt for _, doubts in found for doubt in doubts),
         marks,
     )
+
+
+def _joined(folder: Path, of_parts: Mapping[str, Columns | None]) -> dict[str, Columns]:
+    """Scattered tables that are there in all their parts, each as one."""
+    joined = {}
+    for name in dict.fromkeys(Path(path).parent.name for path in of_parts):
+        for own in parts(folder, name):
+            held = [columns for columns in map(of_parts.get, own) if columns is not None]
+            if len(held) == len(own) and len({frozenset(each) for each in held}) == 1:
+                joined[name] = {c: np.concatenate([p[c] for p in held]) for c in held[0]}
+    return joined
+
+
+def _marks_of_parts(of_parts: Mapping[str, Columns | None]) -> dict[str, dict[str, str]]:
+    """Provenance of scattered tables."""
+    whole = (path for path, columns in of_parts.items() if columns is not None)
+    return {Path(path).parent.name: store.read_metadata(path) for path in whole}
 
 
 def not_there(folder: Path) -> tuple[str, ...]:

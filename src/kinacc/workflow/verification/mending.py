@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Collection, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -88,8 +89,8 @@ def _by_hand(
     for dataset, own in doubts.items():
         wanted = {doubt.stage for doubt in own if _is_made(doubt, dataset, plan)}
         stages = plan.stages(dataset)
-        for name in sorted(stages, key=lambda each: len(_above(each))):
-            if name in wanted or (wanted & _above(name) and not stages[name].on_request):
+        for name in sorted(stages, key=lambda each: len(above(each))):
+            if name in wanted or (wanted & above(name) and not stages[name].on_request):
                 words = ["kinacc", "run", name, "--dataset", dataset, *options]
                 commands.append(shlex.join([*words, "--results", str(folder)]))
     return commands
@@ -111,7 +112,7 @@ def _files(
             unmade += [os.path.relpath(path) for path in here if path.exists()]
         wanted = {doubt.stage for doubt in set(own) - foreign}
         for doubt in sorted(set(own) - foreign, key=_order):
-            if wanted & _above(doubt.stage):
+            if wanted & above(doubt.stage):
                 continue
             parts = [doubt.part] if doubt.part else plan.part_names(doubt.stage, dataset)
             made += [next(iter(plan.outputs(doubt.stage, dataset, p).values())) for p in parts]
@@ -128,11 +129,12 @@ def _order(doubt: Doubt) -> tuple[int, str]:
     return list(STAGES).index(doubt.stage), doubt.part or ""
 
 
-def _above(name: str) -> set[str]:
+@cache
+def above(name: str) -> frozenset[str]:
     """Names of all stages that a stage follows from."""
     stage = STAGES[name]
     direct = {maker_of(each).name for each in (*stage.inputs, *stage.optional)}
-    return direct.union(*map(_above, direct))
+    return frozenset(direct.union(*map(above, direct)))
 
 
 def _beside(

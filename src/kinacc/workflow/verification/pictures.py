@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
-from kinacc.artifacts.provenance import file_hash
-from kinacc.errors import Problem
+from kinacc.artifacts.pictures import inputs_digests
+from kinacc.errors import Problem, gathered
+from kinacc.workflow.inputs import digests
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_END = b"IEND\xaeB`\x82"
-_READ = re.compile(rb'<meta name="kinacc:read:(\w+)" content="([0-9a-f]+)">')
 
 
 def check_picture(path: Path) -> list[Problem]:
@@ -38,15 +37,16 @@ def check_page(path: Path) -> list[Problem]:
     problems = check_picture(path)
     if problems:
         return problems
-    read = {name.decode(): digest.decode() for name, digest in _READ.findall(path.read_bytes())}
+    read = inputs_digests("html", path.read_bytes()) or {}
     tables = {name: path.parent / f"{name}.parquet" for name in read}
-    other = [
-        name
-        for name, table in tables.items()
-        if table.is_file() and not file_hash(table).startswith(read[name])
-    ]
-    if not other:
-        return []
+    with gathered(problems):
+        other = [
+            name
+            for name, table in tables.items()
+            if table.is_file() and digests({name: str(table)})[name] != read[name]
+        ]
+    if problems or not other:
+        return problems
     return [Problem(str(path), f"was made from another {', '.join(other)}", "made from these")]
 
 

@@ -1,0 +1,258 @@
+"""Hold tables to what their stages make of the tables beside them, computed again in memory.
+
+One mechanism for every number: the function of the stage is run, and columns are compared. What it
+costs decides what is run: a check of a data set of the paper's size stays under 2 s.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from importlib import import_module
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from kinacc.artifacts import store
+from kinacc.artifacts.allowed import COVARIANCES, DISTANCES, OUTLIER_RULES, SEARCHES
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.provenance import config_hash
+from kinacc.config.schema import defaults, without_execution_keys
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics import robot
+from kinacc.study import monte_carlo
+from kinacc.workflow.catalogue import STAGES, TABLES, Stage
+from kinacc.workflow.configured import in_use
+from kinacc.workflow.plan import Plan, planned
+from kinacc.workflow.verification.lineage import Found
+from kinacc.workflow.verification.mending import CONFIG, Doubt, Marks, above
+
+# A number may differ from the one computed by this share of itself, and by this share of the
+# largest one of its column: other processors and libraries move last digits, and fits amplify it.
+RELATIVE, OF_LARGEST = 1e-6, 1e-9
+REPETITIONS, CELLS, ROWS = 5, 500, 5000  # computed again without --all
+NOT_AGAIN = {
+    "robustness_chunk": "every draw is a calibration and a study of its own",
+    "map_readings_chunk": "every arm is a calibration of its own",
+    "choices_chunk": "every run is a calibration and a study of its own",
+    "tournament_chunk": "every cell is hundreds of campaigns",
+    "tournament_tables": "is about all data sets",
+}
+_FITTED_ROWS = ("vec", "dh", "compliance", "residuals", "data_check", "summary")
+
+
+class Again(NamedTuple):
+    """What was computed again: the tables that were, what differs, and what was left and why."""
+
+    tables: tuple[str, ...]
+    found: list[Found]
+    notes: list[str]
+
+
+def computed_again(
+    folder: Path,
+    tables: Mapping[str, Columns],
+    marks: Marks,
+    in_doubt: Collection[str],
+    plan: Plan | None = None,
+    every: bool = False,
+) -> Again:
+    """Compute again what the stages of a data set make of the ``tables`` in its folder.
+
+    ``tables`` hold the joined parts of scattered ones too. ``in_doubt``: stages of which something
+    else is wrong; what follows from them is not computed. Settings are those whose hash a table
+    carries, of the ``plan``, of config.yaml beside the folder or of the defaults. ``every``:
+    all simulations, cells and rows in place of a sample of them.
+    """
+    plans = [plan] if plan else [*_beside(folder.parent), *_assumed(folder.name, tables, marks)]
+    doubted, found, done, unknown = set(in_doubt), [], [], []
+    large: list[str] = []
+    for stage in sorted(STAGES.values(), key=lambda each: len(above(each.name))):
+        name = stage.name
+        made = [each for each in stage.outputs if each in tables and each in marks]
+        if not made or stage.leaves != TABLES or name in NOT_AGAIN:
+            continue
+        if name in doubted or above(name) & doubted:
+            continue
+        inputs = {each: tables[each] for each in _read(stage, marks[made[0]], tables)}
+        if not set(stage.inputs) <= set(inputs):
+            continue
+        settings = _settings(stage, folder.name, marks[made[0]].get("config_hash"), plans)
+        if settings is None:
+            unknown += made
+            continue
+        if not every and name in _FITTED_ROWS and _rows(inputs) > ROWS:
+            large += made
+            continue
+        problems = list(_differing(folder, stage, tables, inputs, settings, every))
+        found += [(problem, (Doubt(name),)) for problem in problems]
+        doubted |= {name} if problems else set()
+        done += made
+    notes = []
+    if unknown:
+        words = "without their settings (--config)" if plan is None else "by other settings"
+        notes.append(f"{folder}: not computed again {words}: {', '.join(unknown)}")
+    if large:
+        words = f"of more than {ROWS} rows without --all"
+        notes.append(f"{folder}: not computed again {words}: {', '.join(large)}")
+    return Again(tuple(done), found, notes)
+
+
+def _differing(
+    folder: Path,
+    stage: Stage,
+    tables: Mapping[str, Columns],
+    inputs: Mapping[str, Columns],
+    settings: Mapping[str, object],
+    every: bool,
+) -> Iterator[Problem]:
+    run = import_module(stage.module).run
+    more = {"kind": stage.fits} if stage.fits else {}
+    chosen, only = None, {}
+    if not every and stage.name in _SAMPLES:
+        chosen, only = _SAMPLES[stage.name](settings, tables)
+    try:
+        with warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
+            made = run(inputs, {**settings, **only}, **more)
+        right = {name: store.as_read(name, columns) for name, columns in made.items()}
+    except MemoryError:
+        raise
+    except Exception as error:  # whatever a table that is not what it should be may lead to
+        said = error.problems[0] if isinstance(error, InputError) else error
+        names = ", ".join(inputs) or "its settings"
+        what = f"cannot be computed again from {names}: {said}"
+        yield Problem(str(folder / f"{stage.outputs[0]}.parquet"), what)
+        return
+    for name, columns in right.items():
+        if name in tables:
+            own = _in_order(stage, tables[name])
+            if chosen is not None:
+                own = {column: values[chosen(own)] for column, values in own.items()}
+            place = folder / name if stage.scattered else folder / f"{name}.parquet"
+            yield from _held(place, own, columns)
+
+
+def _in_order(stage: Stage, columns: Columns) -> Columns:
+    """Rows of a scattered table as one part of all would have them."""
+    return monte_carlo.ordered(columns) if stage.name == "study_chunk" else columns
+
+
+def _held(path: Path, own: Columns, right: Columns) -> Iterator[Problem]:
+    """What of a table is not what was computed; numbers within the stated share of themselves."""
+    counts = [len(next(iter(each.values()), ())) for each in (own, right)]
+    if counts[0] != counts[1]:
+        yield Problem(str(path), f"{counts[0]} rows", f"{counts[1]}, computed again")
+        return
+    if set(own) != set(right):
+        names = ", ".join(sorted(set(own) ^ set(right)))
+        yield Problem(str(path), f"columns {names}", "those computed again")
+    for name in [each for each in right if each in own]:
+        wrong = _unlike(own[name], right[name])
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            is_, should = (_said(values[row]) for values in (own[name], right[name]))
+            where, what = f"{path}, column {name}", f"{is_} in {store.rows(wrong)}"
+            yield Problem(where, what, f"{should}, computed again")
+
+
+def _unlike(own: np.ndarray, right: np.ndarray) -> np.ndarray:
+    if own.dtype == object or right.dtype == object:
+        pairs = zip(own, right, strict=True)
+        return np.array([a != b for a, b in pairs], dtype=bool)
+    own, right = own.astype(float), right.astype(float)
+    largest = float(np.nanmax(np.abs(right), initial=0.0))
+    return ~np.isclose(own, right, rtol=RELATIVE, atol=OF_LARGEST * largest, equal_nan=True)
+
+
+def _said(value: object) -> str:
+    return repr(value) if value is None or isinstance(value, str) else f"{value:.9g}"
+
+
+Chosen = Callable[[Columns], np.ndarray]
+
+
+def _repetitions(settings: Mapping, tables: Mapping[str, Columns]) -> tuple[Chosen, dict]:
+    """Which rows are of some repetitions, and what makes the stage simulate these alone.
+
+    Chosen anew in every check: who rewrites a simulation cannot know which will be computed.
+    """
+    count = int(settings["study"]["repetitions"])
+    some = np.random.default_rng().permutation(count)[:REPETITIONS]
+    return lambda rows: np.isin(rows["repetition"], some), {"only": sorted(some.tolist())}
+
+
+def _cells(settings: Mapping, tables: Mapping[str, Columns]) -> tuple[Chosen, dict]:
+    """Which rows are some cells of the map, and what makes the stage compute these alone."""
+    count = len(tables["accuracy_map"]["slice_deg"])
+    some = np.sort(np.random.default_rng().permutation(count)[:CELLS])
+    return lambda rows: some, {"cells": some}
+
+
+_SAMPLES = {"study_chunk": _repetitions, "accuracy_map": _cells}
+
+
+def _read(stage: Stage, own: Mapping[str, str], tables: Collection[str]) -> list[str]:
+    """Artefacts that a stage read."""
+    return [each for each in (*stage.inputs, *stage.optional) if each in tables]
+
+
+def _rows(inputs: Mapping[str, Columns]) -> int:
+    return len(inputs.get("measurements", {}).get("pose", ()))
+
+
+def _settings(
+    stage: Stage, dataset: str, wanted: str | None, plans: Sequence[Plan]
+) -> Mapping[str, object] | None:
+    """The settings that have the hash a table carries; None where nobody knows them."""
+    for plan in plans:
+        if dataset not in plan.datasets or stage.name not in plan.stages(dataset):
+            continue
+        found = plan.settings(stage.name, dataset)
+        if config_hash(found) == wanted and all(map(os.path.isfile, _files(plan, stage, dataset))):
+            return found
+    if stage.name == "study":  # few enough to be tried
+        return _readings().get(wanted or "")
+    return None
+
+
+def _files(plan: Plan, stage: Stage, dataset: str) -> list[str]:
+    given = plan.inputs(stage.name, dataset)
+    return [str(path) for role, path in given.items() if role.endswith("_file")]
+
+
+def _beside(results: Path) -> Iterator[Plan]:
+    """The plan of config.yaml, where it lies beside the folder of all results."""
+    path = results / ".." / CONFIG
+    if path.is_file():
+        with suppress(InputError):
+            yield _planned(str(path), path.stat().st_mtime_ns)
+
+
+@cache
+def _planned(path: str, changed_ns: int) -> Plan:
+    return planned([path])
+
+
+def _assumed(dataset: str, tables: Mapping[str, Columns], marks: Marks) -> Iterator[Plan]:
+    """The plan of a data set with the robot and the seed of its tables, all else as usual."""
+    if "robot" not in tables or "robot" not in marks:
+        return
+    name, seed = str(tables["robot"]["name"][0]), marks["robot"].get("seed", "")
+    if name in robot.shipped() and seed.isdecimal():
+        usual = without_execution_keys({**defaults(), "robot": name, "seed": int(seed)})
+        parts = {section: usual[section].get("chunks", 1) for section in ("study", "choices")}
+        yield Plan({dataset: in_use(usual)}, {dataset: parts}, ())
+
+
+@cache
+def _readings() -> dict[str, dict]:
+    """Settings of the stage ``study`` by their hash: every reading there is."""
+    names = ("outlier_rule", "distance", "covariance", "search")
+    every = product(OUTLIER_RULES, DISTANCES, COVARIANCES, SEARCHES)
+    found = [{"study": dict(zip(names, each, strict=True))} for each in every]
+    return {config_hash(each): each for each in found}
