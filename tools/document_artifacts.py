@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from inspect import cleandoc
 from pathlib import Path
 
 from kinacc.artifacts.columns import Artefact, Column
-from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
+from kinacc.artifacts.contract import ARTEFACTS, METADATA_KEYS
+from kinacc.artifacts.digests import columns_digest
 from kinacc.workflow.catalogue import STAGES
 
 _HEAD = """\
@@ -18,8 +20,10 @@ the standard deviation per axis. A value that does not apply is null, never zero
 Unit and meaning of a column stand in its field metadata. The schema metadata holds exactly
 {keys}:
 the version of the package, hashes of the configuration values the stage depends on, of the code it
-runs and of the artefacts it read, and the seed. There is no time stamp: equal inputs and versions
-give equal bytes. A table appears under its name only when it is whole.
+runs and of the artefacts it read, the seed, the digest of each input (JSON, by role, which
+`inputs_hash` folds) and that of the table's own columns. There is no time stamp: equal inputs and
+versions give equal bytes. A table appears under its name only when it is whole, and its pages have
+checksums.
 
 `q*` stands for `q1`, `q2`, ... for every joint of the arm, `s*` likewise. Rows are unique in the
 columns named as key. `figures/fig*` are pictures (.svg, .png, .pdf).
@@ -33,13 +37,28 @@ made on request by `kinacc tournament` or `snakemake tournament`.
 ([looking at results](workflow.md#looking-at-results)).
 
 Written from the contract by `python tools/document_artifacts.py`.
+
+## Digests
+
+`columns_digest`: {digest}
+
+`inputs_digests` are that digest for every table read, of a table in parts for the whole of them in
+the order of its key (ascending, null last), so that their number does not count; of other files
+SHA-256 of their bytes. Pictures and pages state them too: metadata of SVG (`dc:source`), a `tEXt`
+chunk of PNG, `Keywords` in the Info of PDF, `kinacc:read:` in HTML.
+
+`records/<stage>.json` (`<stage>.<part>.json` of a stage in parts) is what a run of a stage leaves
+last: its name and part, the five marks, its `inputs_digests`, and for every file that it wrote the
+SHA-256 of its bytes and, of a table, its `columns_digest`. Files without a record that fits are
+those of a run that did not come to its end, or were changed since: no stage reads them.
 """
 
 
 def artifacts_markdown() -> str:
     """The text of docs/artifacts.md: one table per artefact."""
-    keys = ", ".join(f"`{key}`" for key in PROVENANCE_KEYS)
-    return "\n".join([_HEAD.format(keys=keys), *map(_section, ARTEFACTS.values())])
+    keys = ", ".join(f"`{key}`" for key in METADATA_KEYS)
+    digest = cleandoc(columns_digest.__doc__ or "").partition("\n\nRaises")[0].replace("``", "`")
+    return "\n".join([_HEAD.format(keys=keys, digest=digest), *map(_section, ARTEFACTS.values())])
 
 
 def _section(artefact: Artefact) -> str:

@@ -14,10 +14,12 @@ from command_line import call
 from small_results import SmallResults
 
 from kinacc.artifacts import provenance, store
+from kinacc.artifacts.contract import METADATA_KEYS
 from kinacc.artifacts.error_models import ALWAYS
 from kinacc.workflow.catalogue import CALIBRATION, STAGES
 from kinacc.workflow.plan import planned
 from kinacc.workflow.verification import check, rules
+from kinacc.workflow.verification.recomputation import Again
 
 ROOT = Path(__file__).parents[2]
 ON_EVERY_RUN = [
@@ -63,7 +65,8 @@ def put(results, artefact, column, row, value):
 def test_a_good_folder_has_no_problem(results):
     report = check.check_results(results.root)
     assert report.ok, str(report)
-    assert report.datasets[0].notes == ()
+    (note,) = report.datasets[0].notes
+    assert "not computed again without their settings (--config)" in note
     paths = [Path(path) for path in report.datasets[0].checked if path.endswith(".parquet")]
     tables = {path.stem for path in paths if path.parent == results.folder}
     assert tables == set(ON_EVERY_RUN)
@@ -217,9 +220,7 @@ def test_a_wrong_or_absent_unit(results, metadata, words):
     the_one(problems(results), "readings.parquet, column noise_mm", words)
 
 
-@pytest.mark.parametrize(
-    "key", ["kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed"]
-)
+@pytest.mark.parametrize("key", METADATA_KEYS)
 def test_a_missing_provenance_key(results, key):
     def change(table):
         kept = {name: each for name, each in table.schema.metadata.items() if name != key.encode()}
@@ -465,7 +466,9 @@ def plan():
 
 @pytest.fixture
 def planned_results(tmp_path, monkeypatch, plan):
+    """The small folder under the settings of a configuration, which made none of its numbers."""
     monkeypatch.setattr(provenance, "stage_code_hash", lambda *_: "code")
+    monkeypatch.setattr(check, "computed_again", lambda *_: Again((), [], []))
     return SmallResults(tmp_path / "results", plan)
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from kinacc.artifacts import store
 from kinacc.artifacts.atomic import remove_unfinished, replacing, unfinished
-from kinacc.artifacts.contract import PROVENANCE_KEYS, columns_of
+from kinacc.artifacts.contract import METADATA_KEYS, columns_of
 from kinacc.errors import InputError
 
 PROVENANCE = {
@@ -80,11 +80,11 @@ def test_null_is_nan_for_numbers_and_none_for_text(tmp_path):
     assert list(back["unit"]) == ["mm", "mrad"]
 
 
-def test_metadata_is_exactly_the_provenance_and_fields_carry_units(tmp_path):
+def test_metadata_is_exactly_the_provenance_and_digests_and_fields_carry_units(tmp_path):
     path = tmp_path / "residuals.parquet"
     store.write(path, "residuals", residuals(), PROVENANCE)
     schema = pq.read_schema(path)
-    assert sorted(schema.metadata) == sorted(key.encode() for key in PROVENANCE_KEYS)
+    assert sorted(schema.metadata) == sorted(key.encode() for key in METADATA_KEYS)
     assert store.read_metadata(path)["seed"] == "7"
     for field in schema:
         assert set(field.metadata) == {b"unit", b"meaning"}

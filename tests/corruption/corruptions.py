@@ -14,10 +14,11 @@ import time
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from itertools import cycle, product
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pyarrow as pa
@@ -29,6 +30,7 @@ from kinacc.artifacts.contract import COLUMNS_DIGEST, INPUTS_DIGESTS
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.runner import perform
 from kinacc.workflow.verification import check
+from kinacc.workflow.verification.recomputation import Again
 
 ROOT = Path(__file__).resolve().parents[2]
 LEVELS = ("nothing", "file", "all")  # what of digests is renewed
@@ -281,7 +283,11 @@ class Study:
         try:
             for each, new in changed.items():
                 (self.folder / each).write_bytes(new)
-            report = check.check_results(self.folder / case.dataset, self.plan)
+            with ExitStack() as stack:
+                if case.level != "all":  # found before anything is computed again
+                    nothing = lambda *_: Again((), [], [])  # noqa: E731
+                    stack.enter_context(patch.object(check, "computed_again", nothing))
+                report = check.check_results(self.folder / case.dataset, self.plan)
             return [str(each) for one in report.datasets for each in one.problems]
         finally:
             for each in changed:

@@ -59,7 +59,10 @@ def command(plan, name, dataset, part, gates=()) -> list[str]:
         COMMAND,
         params=params,
         input=[*gates, *files(plan.inputs(name, dataset).values())],
-        output=list(plan.outputs(name, dataset, part).values()),
+        output=[
+            *plan.outputs(name, dataset, part).values(),
+            plan.record(name, dataset, part),
+        ],
         log=[plan.log(name, dataset, part)],
     )
     done = subprocess.run(

@@ -31,6 +31,7 @@ for stage in STAGES.values():
                 )
                 for role, path in plan.outputs(stage.name, folder, part).items()
             },
+            record=plan.record(stage.name, folder, part),
         log:
             plan.log(stage.name, folder, part),
         cache: stage.shared and workflow.enable_cache

@@ -77,7 +77,8 @@ def stage_code_hash(module: str, uses: tuple[str, ...] = ()) -> str:
     writers = ["kinacc.artifacts.store"]
     if "kinacc.figures" in closure(module)[0]:
         writers.append("kinacc.figures.save")
-    return code_hash(module, *writers, uses=uses, alone=("kinacc.workflow.runner",))
+    around = ("kinacc.workflow.runner", "kinacc.workflow.inputs", "kinacc.artifacts.records")
+    return code_hash(module, *writers, uses=uses, alone=around)
 
 
 @cache
@@ -163,7 +164,7 @@ def file_hash(path: Path | str) -> str:
 
 
 def inputs_hash(contents: Mapping[str, str]) -> str:
-    """Hash of a stage's inputs, given as artefact or file role -> content hash."""
+    """Hash of a stage's inputs, given as artefact or file role -> digest."""
     text = "".join(f"{name} {contents[name]}\n" for name in sorted(contents))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

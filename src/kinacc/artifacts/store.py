@@ -23,7 +23,14 @@ from kinacc.artifacts.columns import (
     joint_count,
     texts,
 )
-from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
+from kinacc.artifacts.contract import (
+    ARTEFACTS,
+    COLUMNS_DIGEST,
+    INPUTS_DIGESTS,
+    METADATA_KEYS,
+    PROVENANCE_KEYS,
+)
+from kinacc.artifacts.digests import columns_digest
 from kinacc.errors import InputError, Problem, first_few, refuse
 
 _ARROW_TYPES = {
@@ -73,8 +80,10 @@ def arrow_schema(
         )
         for column in columns
     ]
-    metadata = None if provenance is None else {k: str(provenance[k]) for k in PROVENANCE_KEYS}
-    return pa.schema(fields, metadata)
+    if provenance is None:
+        return pa.schema(fields)
+    metadata = {key: str(provenance[key]) for key in PROVENANCE_KEYS}
+    return pa.schema(fields, metadata | {INPUTS_DIGESTS: provenance.get(INPUTS_DIGESTS, "{}")})
 
 
 def to_table(
@@ -82,9 +91,10 @@ def to_table(
 ) -> pa.Table:
     """Cast columns (each of shape (rows,)) to the artefact's Arrow table.
 
-    NaN and None become null where the contract allows null; so do optional columns not given.
-    Raises InputError naming every missing or unknown column, null where none may be, number that is
-    not finite, and value of a wrong type.
+    NaN and None become null where the contract allows null; so do optional columns not given. Its
+    metadata are the provenance, the digests of the inputs (none unless given) and that of its own
+    columns. Raises InputError naming every missing or unknown column, null where none may be,
+    number that is not finite, and value of a wrong type.
     """
     contract = artefact_named(artefact)
     where = f"table {artefact}"
@@ -117,12 +127,15 @@ def to_table(
     if not problems and len(set(lengths.values())) > 1:
         problems.append(Problem(where, f"columns of different lengths: {lengths}"))
     refuse(problems, f"{artefact} does not fit its contract")
-    return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance, columns))
+    schema = arrow_schema(artefact, joints, provenance, columns)
+    table = pa.Table.from_arrays(arrays, schema=schema)
+    digest = {COLUMNS_DIGEST.encode(): columns_digest(table).encode()}
+    return table.replace_schema_metadata({**schema.metadata, **digest})
 
 
 def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:
     """Columns as :func:`read` gives them once they are written; see :func:`to_table` for errors."""
-    return _columns(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
+    return columns_in(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
 
 
 def write(
@@ -140,22 +153,59 @@ def write_all(tables: Sequence[TableToWrite]) -> None:
 
     Every table is cast and written under a temporary name before the first one is renamed.
     """
-    cast = [to_table(table.artefact, table.columns, table.provenance) for table in tables]
+    contents = [
+        content_of(to_table(table.artefact, table.columns, table.provenance)) for table in tables
+    ]
     with replacing([Path(table.path) for table in tables]) as temporary:
-        for each, place in zip(cast, temporary, strict=True):
-            pq.write_table(each, place, compression="zstd", version="2.6")
+        for content, place in zip(contents, temporary, strict=True):
+            place.write_bytes(content)
+
+
+def content_of(table: pa.Table) -> bytes:
+    """Bytes of a table's file, which has a checksum for each of its pages."""
+    written = pa.BufferOutputStream()
+    pq.write_table(table, written, compression="zstd", version="2.6", write_page_checksum=True)
+    return written.getvalue().to_pybytes()
 
 
 def read(path: Path | str) -> Columns:
     """Columns of a table: float64 and whole numbers as numpy, text as object arrays.
 
     Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
-    Raises InputError if the file is absent or not Parquet.
+    Raises InputError if the file is absent or not Parquet, or if its columns are not those that it
+    was written with.
     """
     try:
-        return _open(path, lambda file: _columns(_unpacked(file, path)))
+        table = read_table(path)
+        if COLUMNS_DIGEST.encode() in (table.schema.metadata or {}):
+            verified_digest(table, path)
+        return columns_in(table)
     except InputError as error:
         raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
+
+
+def read_table(path: Path | str, content: bytes | None = None) -> pa.Table:
+    """The table in a file, or in its ``content`` where that has been read already.
+
+    Checksums of pages are held to the pages. Raises InputError as :func:`read`.
+    """
+    return _open(path, lambda file: _unpacked(file, path), content)
+
+
+def verified_digest(table: pa.Table, path: Path | str) -> str:
+    """The digest of a table's columns; InputError where its metadata state another one.
+
+    A table of an earlier version states none.
+    """
+    stated = (table.schema.metadata or {}).get(COLUMNS_DIGEST.encode())
+    try:
+        found = columns_digest(table)
+    except InputError as error:
+        raise InputError([replace(e, where=f"{path}, {e.where}") for e in error.problems]) from None
+    if stated is not None and stated != found.encode():
+        what = f"its columns are not those it was written with: {COLUMNS_DIGEST} is {found}"
+        raise InputError(Problem(str(path), what, stated.decode(errors="replace")))
+    return found
 
 
 def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
@@ -182,14 +232,34 @@ def read_schema(path: Path | str) -> pa.Schema:
 
 
 def read_metadata(path: Path | str) -> dict[str, str]:
-    """Provenance of a table's file as text; InputError if absent or not Parquet."""
+    """Provenance of a table's file as text, the same for all tables of a stage.
+
+    Raises InputError if the file is absent or not Parquet.
+    """
+    metadata = _metadata(path)
+    metadata.pop(COLUMNS_DIGEST, None)
+    return metadata
+
+
+def stated_digest(path: Path | str) -> str | None:
+    """The digest that a table's file states of its columns; None where it is of an older version.
+
+    Raises InputError as :func:`read_metadata`.
+    """
+    return _metadata(path).get(COLUMNS_DIGEST)
+
+
+def _metadata(path: Path | str) -> dict[str, str]:
     raw = read_schema(path).metadata or {}
     return {key.decode(errors="replace"): raw[key].decode(errors="replace") for key in raw}
 
 
-def _open(path: Path | str, opening: Callable[[pq.ParquetFile], Read]) -> Read:
+def _open(
+    path: Path | str, opening: Callable[[pq.ParquetFile], Read], content: bytes | None = None
+) -> Read:
     try:
-        with pq.ParquetFile(path) as file:
+        source = path if content is None else pa.BufferReader(content)
+        with pq.ParquetFile(source, page_checksum_verification=True) as file:
             return opening(file)
     except FileNotFoundError:
         raise InputError(Problem(str(path), "no such file")) from None
@@ -198,7 +268,8 @@ def _open(path: Path | str, opening: Callable[[pq.ParquetFile], Read]) -> Read:
         raise InputError(Problem(str(path), f"not a readable Parquet file: {reason}")) from None
 
 
-def _columns(table: pa.Table) -> Columns:
+def columns_in(table: pa.Table) -> Columns:
+    """The columns of a table as :func:`read` gives them."""
     names = zip(table.schema, table.columns, strict=True)
     return {field.name: _to_numpy(field, column) for field, column in names}
 
@@ -228,8 +299,8 @@ def _numbers(chunk: pa.Array, nullable: bool) -> np.ndarray:
 
 def _provenance_problems(where: str, provenance: Mapping[str, object]) -> list[Problem]:
     missing = [key for key in PROVENANCE_KEYS if key not in provenance]
-    unknown = [key for key in provenance if key not in PROVENANCE_KEYS]
-    allowed = "exactly " + ", ".join(PROVENANCE_KEYS)
+    unknown = [key for key in provenance if key not in METADATA_KEYS]
+    allowed = ", ".join(PROVENANCE_KEYS)
     return [Problem(where, f"provenance lacks {key}", allowed) for key in missing] + [
         Problem(where, f"provenance has an unknown key {key!r}", allowed) for key in unknown
     ]

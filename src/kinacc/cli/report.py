@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,6 +57,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
 
 
 def _job(folder: Path, out: str, without: Collection[str]) -> Job:
+    from kinacc.artifacts import records
     from kinacc.artifacts.store import read_metadata
     from kinacc.campaign.journal import of_results
     from kinacc.workflow.answer import read
@@ -78,4 +80,15 @@ def _job(folder: Path, out: str, without: Collection[str]) -> Job:
         settings["outdated"] = sorted(old)
     seed = int(read_metadata(paths["summary"])["seed"])
     uses = stage.used(settings, inputs)
-    return Job(stage.module, inputs, {"html": out}, settings, seed, label="report", uses=uses)
+    own = os.path.abspath(out) == os.path.abspath(folder / _PAGE)
+    return Job(
+        stage.module,
+        inputs,
+        {"html": out},
+        settings,
+        seed,
+        label="report",
+        uses=uses,
+        stage=stage.name,
+        record=records.place(folder, stage.name) if own else "",
+    )

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from kinacc.artifacts import pictures
 from kinacc.artifacts.atomic import replacing
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
@@ -28,10 +29,13 @@ _METADATA = {
 }
 
 
-def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
+def render(
+    figure: Figure, formats: Iterable[str], read: Mapping[str, str] | None = None
+) -> dict[str, bytes]:
     """Return the file content for each format.
 
-    Raises InputError for formats other than svg, png and pdf.
+    ``read``: digests of what it was drawn from, by role; the files state them. Raises InputError
+    for formats other than svg, png and pdf.
     """
     formats = tuple(formats)
     unknown = [name for name in formats if name not in FORMATS]
@@ -41,7 +45,7 @@ def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
         )
     with style.house():
         settle(figure)
-        return {name: _bytes(figure, name) for name in formats}
+        return {name: _bytes(figure, name, read) for name in formats}
 
 
 def settle(figure: Figure) -> None:
@@ -61,11 +65,14 @@ def write(figure: Figure, paths: Mapping[str, Path]) -> None:
             part.write_bytes(contents[name])
 
 
-def _bytes(figure: Figure, name: str) -> bytes:
+def _bytes(figure: Figure, name: str, read: Mapping[str, str] | None) -> bytes:
     buffer = BytesIO()
+    metadata: dict[str, str | None] = {**_METADATA[name]}
+    if read is not None:
+        metadata |= pictures.metadata(name, read)
     dpi = PNG_DPI if name == "png" else RASTER_DPI
     with _lean_pdf() if name == "pdf" else nullcontext():
-        figure.savefig(buffer, format=name, dpi=dpi, metadata=_METADATA[name])
+        figure.savefig(buffer, format=name, dpi=dpi, metadata=metadata)
     return buffer.getvalue()
 
 

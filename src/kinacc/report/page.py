@@ -22,7 +22,6 @@ ROBOT_ITSELF = (
     "the robot itself improves only once the calibration is loaded into its controller, or its "
     "programs are compensated"
 )
-_DIGITS = 16  # of a digest, as shown
 
 
 @dataclass(frozen=True)
@@ -173,7 +172,7 @@ def html(
     return _template().render(
         page=page,
         marks={k: str(v) for k, v in {**_MADE_BY, **page.marks, **(marks or {})}.items()},
-        read={name: digest[:_DIGITS] for name, digest in (read or {}).items()},
+        read=read or {},
         style=_text("page.css"),
         script=_text("page.js"),
         library=library() if pictures else "",

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, wraps
 from pathlib import Path
 
+from kinacc.artifacts import records
 from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.campaign.journal import JOURNAL, PLAN, of_each
@@ -22,13 +23,13 @@ from kinacc.workflow.catalogue import (
     MAP_READINGS,
     PAGE,
     STAGES,
-    TABLES,
     TOURNAMENT,
     Stage,
     maker_of,
 )
 from kinacc.workflow.configured import in_use, words_read
-from kinacc.workflow.runner import Job, inputs_hash
+from kinacc.workflow.inputs import digests
+from kinacc.workflow.runner import Job
 from kinacc.workflow.stage import job_of, to_text
 
 RESULTS = "results"
@@ -190,7 +191,7 @@ class Plan:
             path
             for name, stage in self.stages(dataset).items()
             if not stage.scattered and (name in also or (name in only and not stage.on_request))
-            for path in self.outputs(name, dataset).values()
+            for path in (*self.outputs(name, dataset).values(), self.record(name, dataset))
         ]
 
     def inputs(
@@ -259,28 +260,29 @@ class Plan:
         return {"gates": gates}
 
     def _is_made(self, name: str, dataset: str, part: str | None = None) -> bool:
-        """Whether tables are there, of what they are now made of; of pictures nothing is known."""
-        if STAGES[name].leaves != TABLES:
-            return False
+        """Whether the files of a run are there, of what they are now made of, by its record."""
         known = ("made", name, dataset, part)
         if known not in self.known:
-            wanted = {
-                "config_hash": config_hash(self.settings(name, dataset)),
-                "code_hash": self.code(name, dataset),
-                "seed": str(self.seed(dataset)),
-            }
-            paths = self.outputs(name, dataset, part).values()
-            made = all(_marks(path).items() >= wanted.items() for path in paths)
-            self.known[known] = made and self._is_of_these(name, dataset, paths)
+            self.known[known] = self._is_recorded(name, dataset, part)
         return self.known[known]
 
-    def _is_of_these(self, name: str, dataset: str, paths: Collection[str]) -> bool:
-        """Whether tables were made from the inputs now there: a run may have ended in between."""
+    def _is_recorded(self, name: str, dataset: str, part: str | None) -> bool:
+        wanted = {
+            "config_hash": config_hash(self.settings(name, dataset)),
+            "code_hash": self.code(name, dataset),
+            "seed": str(self.seed(dataset)),
+        }
         try:
-            wanted = inputs_hash(self.inputs(name, dataset))
+            record = records.read(self.record(name, dataset, part))
+            if not record.marks.items() >= wanted.items():
+                return False
+            # A run may have ended after what it reads was made anew.
+            made_of_these = record.inputs_digests == digests(self.inputs(name, dataset))
         except (InputError, OSError):
             return False
-        return all(_marks(path)["inputs_hash"] == wanted for path in paths)
+        return made_of_these and all(
+            os.path.isfile(path) for path in self.outputs(name, dataset, part).values()
+        )
 
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""
@@ -338,6 +340,10 @@ class Plan:
             return {"html": f"{self.results}/{dataset}/{name}.html"}
         return {artefact: self._table(artefact, dataset, part) for artefact in stage.outputs}
 
+    def record(self, name: str, dataset: str, part: str | None = None) -> str:
+        """File that a run of a stage leaves last: what it wrote, and from what."""
+        return records.place(f"{self.results}/{dataset}", name, part)
+
     def part_names(self, name: str, dataset: str) -> list[str | None]:
         """Names of the parts a stage is computed in: 1-of-2, 2-of-2; None where it is whole."""
         if not STAGES[name].scattered:
@@ -388,6 +394,7 @@ class Plan:
             self.settings(name, dataset),
             self.seed(dataset),
             self.log(name, dataset, part),
+            self.record(name, dataset, part),
         )
 
     def job_text(

@@ -11,19 +11,20 @@ import inspect
 import sys
 import traceback
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import TextIO
 
 from kinacc import __version__
-from kinacc.artifacts import provenance
-from kinacc.errors import InputError, KinaccError, Problem
+from kinacc.artifacts import pictures, provenance, records
+from kinacc.artifacts.contract import INPUTS_DIGESTS, PROVENANCE_KEYS
+from kinacc.errors import InputError, KinaccError
 from kinacc.progress import reporting
-
-Paths = Mapping[str, str | Sequence[str]]
+from kinacc.workflow.inputs import Paths, digests, read_inputs
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class Job:
     of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2"), ``uses``
     what its results depend on beside what its module imports, ``kind`` the error model it fits.
     ``label`` begins what is said of faults, ``doing`` what is said of progress. ``code``: hash of
-    the code, where that is known already.
+    the code, where that is known already. ``record``: the file that the run of ``stage`` leaves
+    last; empty where its files stand in no folder of a data set.
     """
 
     module: str
@@ -50,6 +52,8 @@ class Job:
     uses: tuple[str, ...] = ()
     kind: str = ""
     code: str = ""
+    stage: str = ""
+    record: str = ""
 
 
 def execute(job: Job, bar: bool = False) -> None:
@@ -73,7 +77,7 @@ def execute(job: Job, bar: bool = False) -> None:
 
 def perform(job: Job, progress: object = None) -> None:
     """Run a stage and let its errors through."""
-    tables = read_inputs(job.inputs)
+    tables, read = read_inputs(job.inputs)
     stage = import_module(job.module)
     if not gc.isenabled():
         # What is imported stays; a collection need not look at it each time.
@@ -87,107 +91,78 @@ def perform(job: Job, progress: object = None) -> None:
     if "progress" in inspect.signature(stage.run).parameters:
         more["progress"] = progress
     result = stage.run(tables, settings, **more)
-    if isinstance(result, Mapping):
-        _write_tables(job, result)
-    elif "html" in job.outputs:
-        from kinacc.artifacts.atomic import write_whole
-        from kinacc.report.page import html
-
-        read = {name: _content(name, paths) for name, paths in job.inputs.items()}
-        content = html(result, stage_provenance(job), read)
-        write_whole(job.outputs["html"], content.encode())
-    else:
-        from kinacc.figures.save import write
-
-        write(result, {name: Path(path) for name, path in job.outputs.items()})
+    records.leave(
+        job.record, _record(job, read), _written(job, result, stage_provenance(job, read), read)
+    )
 
 
-def stage_provenance(job: Job) -> dict[str, object]:
-    """What the artefacts of a run are marked with; see the artefact contract."""
+def stage_provenance(
+    job: Job, inputs_digests: Mapping[str, str] | None = None
+) -> dict[str, object]:
+    """What the artefacts of a run are marked with; see the artefact contract.
+
+    ``inputs_digests``: of its inputs by role, where they are known already. Raises InputError where
+    parts of one artefact come from different states.
+    """
+    found = digests(job.inputs) if inputs_digests is None else inputs_digests
     return {
         "kinacc_version": __version__,
         "config_hash": provenance.config_hash(job.settings),
         "code_hash": job.code or provenance.stage_code_hash(job.module, job.uses),
-        "inputs_hash": inputs_hash(job.inputs),
+        "inputs_hash": provenance.inputs_hash(found),
         "seed": job.seed,
+        INPUTS_DIGESTS: pictures.as_text(found),
     }
-
-
-def inputs_hash(inputs: Paths) -> str:
-    """Hash of what stands in the inputs of a stage.
-
-    Raises InputError where parts of one artefact come from different states.
-    """
-    return provenance.inputs_hash({name: _content(name, paths) for name, paths in inputs.items()})
 
 
 def is_done(job: Job) -> bool:
     """Whether the files of a job are there, whole, made from the same inputs, settings and code."""
-    from kinacc.artifacts.contract import ARTEFACTS
-    from kinacc.artifacts.store import read_metadata
-    from kinacc.workflow.verification.conformity import check_file
-
-    wanted = {name: str(value) for name, value in stage_provenance(job).items()}
     try:
-        return all(
-            read_metadata(path) == wanted and not check_file(Path(path), ARTEFACTS[name])[1]
-            for name, path in job.outputs.items()
+        record = records.read(job.record)
+        return record == _record(job, digests(job.inputs), record.files) and not records.misfits(
+            job.record, record
         )
-    except InputError:
+    except (InputError, OSError):
         return False
 
 
-def read_inputs(inputs: Paths) -> dict[str, object]:
-    """Columns of every Parquet input; scattered ones joined in order; other files as paths."""
-    from kinacc.artifacts.store import read
-
-    tables: dict[str, object] = {}
-    for name, paths in inputs.items():
-        if not isinstance(paths, str):
-            tables[name] = _joined([read(path) for path in paths])
-        elif name.endswith("_file"):
-            tables[name] = Path(paths)
-        else:
-            tables[name] = read(paths)
-    return tables
+def _record(
+    job: Job,
+    inputs_digests: Mapping[str, str],
+    files: Mapping[str, records.Written] = MappingProxyType({}),
+) -> records.Record:
+    marks = stage_provenance(job, inputs_digests)
+    told = {key: str(marks[key]) for key in PROVENANCE_KEYS}
+    return records.Record(job.stage, job.part, told, dict(inputs_digests), files)
 
 
-def _joined(parts: Sequence[Mapping[str, object]]) -> dict[str, object]:
-    import numpy as np
+def _written(
+    job: Job, result: object, marks: Mapping[str, object], read: Mapping[str, str]
+) -> dict[str, tuple[bytes, str | None]]:
+    """By path the content of every file a stage leaves and, of a table, its columns' digest."""
+    if isinstance(result, Mapping):
+        from kinacc.artifacts.store import COLUMNS_DIGEST, content_of, to_table
 
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _content(name: str, paths: str | Sequence[str]) -> str:
-    """Content hash of an input; parts of one scattered artefact count as where they came from.
-
-    The bytes of parts depend on how many there are, what they were made from does not.
-    """
-    if isinstance(paths, str):
-        return provenance.file_hash(paths)
-    from kinacc.artifacts.store import read_metadata, remake
-
-    origins = {tuple(sorted(read_metadata(path).items())) for path in paths}
-    if len(origins) != 1:
-        raise InputError(
-            Problem(
-                ", ".join(paths),
-                f"parts of {name} made from {len(origins)} different states",
-                "parts of one run",
-                remake(paths[0]),
+        if set(result) != set(job.outputs):
+            made, wanted = ", ".join(sorted(result)), ", ".join(sorted(job.outputs))
+            raise RuntimeError(f"{job.module} made {made}; the catalogue says {wanted}")
+        tables = {name: to_table(name, columns, marks) for name, columns in result.items()}
+        return {
+            job.outputs[name]: (
+                content_of(table),
+                table.schema.metadata[COLUMNS_DIGEST.encode()].decode(),
             )
-        )
-    return provenance.inputs_hash({"origin": repr(origins.pop())})
+            for name, table in tables.items()
+        }
+    if "html" in job.outputs:
+        from kinacc.report.page import html
 
+        own = {key: marks[key] for key in PROVENANCE_KEYS}
+        return {job.outputs["html"]: (html(result, own, read).encode(), None)}
+    from kinacc.figures.save import render
 
-def _write_tables(job: Job, tables: Mapping[str, Mapping[str, object]]) -> None:
-    from kinacc.artifacts.store import TableToWrite, write_all
-
-    if set(tables) != set(job.outputs):
-        made, wanted = ", ".join(sorted(tables)), ", ".join(sorted(job.outputs))
-        raise RuntimeError(f"{job.module} made {made}; the catalogue says {wanted}")
-    marks = stage_provenance(job)
-    write_all([TableToWrite(job.outputs[name], name, tables[name], marks) for name in tables])
+    drawn = render(result, job.outputs, read)
+    return {job.outputs[kind]: (content, None) for kind, content in drawn.items()}
 
 
 @contextmanager

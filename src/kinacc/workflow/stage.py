@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from kinacc.starting import without_tools_of_numpy
 from kinacc.workflow.catalogue import STAGES, TABLES
-from kinacc.workflow.runner import Job, Paths, execute
+from kinacc.workflow.inputs import Paths
+from kinacc.workflow.runner import Job, execute
 
 if TYPE_CHECKING:
     from logging import LogRecord
@@ -41,6 +42,7 @@ def job_of(
     settings: Mapping[str, object],
     seed: int,
     log: str,
+    record: str,
     code: str = "",
 ) -> Job:
     """One run of a stage, with what the catalogue says of it; see :class:`Job`."""
@@ -58,6 +60,8 @@ def job_of(
         uses=stage.used(settings, inputs),
         kind=stage.fits,
         code=code,
+        stage=name,
+        record=record,
     )
 
 
@@ -91,6 +95,7 @@ def from_words(words: Sequence[str]) -> Job:
     """The job of the command's options.
 
     Files stand in the order of their roles; inputs before them have to be there and are not read.
+    The last output is the record.
     """
     given = {option: list(values) for option, values in _by_option(words)}
     (text,), (log,) = given["--job"], given["--log"]
@@ -102,7 +107,7 @@ def from_words(words: Sequence[str]) -> Job:
         role: [next(read) for _ in range(count)] if count else next(read)
         for role, count in reads.items()
     }
-    outputs = given["--output"]
+    *outputs, record = given["--output"]
     roles = stage.outputs if stage.leaves == TABLES else [Path(each).suffix[1:] for each in outputs]
     # Another Python, as of a conda environment, has other versions of libraries: it hashes anew.
     planned_here = os.environ.get("KINACC_PYTHON") == sys.executable
@@ -115,6 +120,7 @@ def from_words(words: Sequence[str]) -> Job:
         told["settings"],
         told["seed"],
         log,
+        record,
         told["code"] if planned_here else "",
     )
 

@@ -276,7 +276,7 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
     return DatasetReport(
         folder.name,
         tuple(checked),
-        tuple(problem for problem, _ in found),
+        tuple(dict.fromkeys(problem for problem, _ in found)),
         (*notes, *said, *again.notes, *leftovers),
         frozenset(doubt for _, doubts in found for doubt in doubts),
         marks,

@@ -11,19 +11,22 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, Columns, joint_count
-from kinacc.artifacts.contract import PROVENANCE_KEYS
-from kinacc.errors import InputError, Problem
+from kinacc.artifacts.contract import METADATA_KEYS
+from kinacc.errors import InputError, Problem, gathered
 
 
 def check_file(path: Path, artefact: Artefact) -> tuple[Columns | None, list[Problem]]:
     """Columns of a file and what is wrong with it; None for columns no rule could be held to."""
     try:
-        schema = store.read_schema(path)
-        columns = store.read(path)
+        table = store.read_table(path)
+        columns, schema = store.columns_in(table), table.schema
     except InputError as error:
         return None, [replace(problem, fix="") for problem in error.problems]
     structure = _structure(path, artefact, schema)
     problems = [*structure, *_provenance(path, schema.metadata or {})]
+    with gathered(problems):
+        if not structure:
+            store.verified_digest(table, path)
     known = {column.name: column for column in artefact.for_joints(joint_count(artefact, columns))}
     for name, column in known.items():
         if name in columns and _kind_fits(column, columns[name]):
@@ -62,9 +65,9 @@ def _structure(path: Path, artefact: Artefact, schema) -> list[Problem]:
 
 def _provenance(path: Path, metadata: Mapping[bytes, bytes]) -> list[Problem]:
     keys = {key.decode(errors="replace"): value for key, value in metadata.items()}
-    allowed = "exactly " + ", ".join(PROVENANCE_KEYS)
-    missing = [key for key in PROVENANCE_KEYS if not keys.get(key)]
-    extra = sorted(set(keys) - set(PROVENANCE_KEYS))
+    allowed = "exactly " + ", ".join(METADATA_KEYS)
+    missing = [key for key in METADATA_KEYS if not keys.get(key)]
+    extra = sorted(set(keys) - set(METADATA_KEYS))
     return [Problem(str(path), f"schema metadata lacks {key}", allowed) for key in missing] + [
         Problem(str(path), f"schema metadata has {key!r}", allowed) for key in extra
     ]

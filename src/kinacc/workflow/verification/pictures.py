@@ -1,16 +1,13 @@
-"""Tell a whole picture or page from an empty, cut or foreign file, and whose page it is."""
+"""Tell a whole picture or page from an empty, cut or foreign file."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
-from kinacc.artifacts.provenance import file_hash
 from kinacc.errors import Problem
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_END = b"IEND\xaeB`\x82"
-_READ = re.compile(rb'<meta name="kinacc:read:(\w+)" content="([0-9a-f]+)">')
 
 
 def check_picture(path: Path) -> list[Problem]:
@@ -31,23 +28,6 @@ def check_picture(path: Path) -> list[Problem]:
     if not ends:
         return [Problem(str(path), "is cut off", is_a.replace(" ", " whole ", 1))]
     return []
-
-
-def check_page(path: Path) -> list[Problem]:
-    """What is wrong with the page of a results folder: not whole, or about other tables."""
-    problems = check_picture(path)
-    if problems:
-        return problems
-    read = {name.decode(): digest.decode() for name, digest in _READ.findall(path.read_bytes())}
-    tables = {name: path.parent / f"{name}.parquet" for name in read}
-    other = [
-        name
-        for name, table in tables.items()
-        if table.is_file() and not file_hash(table).startswith(read[name])
-    ]
-    if not other:
-        return []
-    return [Problem(str(path), f"was made from another {', '.join(other)}", "made from these")]
 
 
 def _svg(content: bytes) -> tuple[bool, bool]:
