@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -100,6 +102,12 @@ def _run(
     ahead = {(dataset, stage.name): cost.of_stage(stage.name, plan.datasets[dataset])}
     for line in cost.expected(ahead):
         click.echo(line, err=True)
-    jobs = [plan.job(stage.name, dataset, each) for each in (parts if part is None else [part])]
+    given = [word for name in config for word in ("--config", name)]
+    words = shlex.join([*given, "--results", results])
+    remake = f"kinacc run {{stage}} --dataset {{dataset}} {words}"
+    jobs = [
+        replace(plan.job(stage.name, dataset, each), remake=remake)
+        for each in (parts if part is None else [part])
+    ]
     with running(results) if part is None else sharing(results):
         return [path for job in execute_all(jobs) for path in job.outputs.values()]
