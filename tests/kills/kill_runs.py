@@ -54,7 +54,7 @@ def _tables_of_data_sets(project: Path) -> None:
 
 WORKS: Mapping[str, Work] = {
     "study": Work((*SNAKEMAKE, "-c2", *_CONFIGS)),
-    "cached": Work((*SNAKEMAKE, "-c2", "--cache", *_CONFIGS, "--", "calibration")),
+    "cached": Work((*SNAKEMAKE, "-c2", "--cache", *_CONFIGS, "--", "own_dh")),
     "calibrate": Work((*KINACC, "calibrate", "-c", "2", *_CONFIGS[1:])),
     "tournament": Work(
         (*KINACC, "tournament", *_EACH_CONFIG, "--parts", "3", "--cores", "2", "--json"),
