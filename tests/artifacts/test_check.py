@@ -19,6 +19,7 @@ from kinacc.artifacts.error_models import ALWAYS
 from kinacc.workflow.catalogue import CALIBRATION, STAGES
 from kinacc.workflow.plan import planned
 from kinacc.workflow.verification import check, rules
+from kinacc.workflow.verification.recomputation import Again
 
 ROOT = Path(__file__).parents[2]
 ON_EVERY_RUN = [
@@ -64,7 +65,8 @@ def put(results, artefact, column, row, value):
 def test_a_good_folder_has_no_problem(results):
     report = check.check_results(results.root)
     assert report.ok, str(report)
-    assert report.datasets[0].notes == ()
+    (note,) = report.datasets[0].notes
+    assert "not computed again without their settings (--config)" in note
     paths = [Path(path) for path in report.datasets[0].checked if path.endswith(".parquet")]
     tables = {path.stem for path in paths if path.parent == results.folder}
     assert tables == set(ON_EVERY_RUN)
@@ -464,7 +466,9 @@ def plan():
 
 @pytest.fixture
 def planned_results(tmp_path, monkeypatch, plan):
+    """The small folder under the settings of a configuration, which made none of its numbers."""
     monkeypatch.setattr(provenance, "stage_code_hash", lambda *_: "code")
+    monkeypatch.setattr(check, "computed_again", lambda *_: Again((), [], []))
     return SmallResults(tmp_path / "results", plan)
 
 

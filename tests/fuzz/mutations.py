@@ -84,6 +84,7 @@ HEADERS = (
         "TCP_x",
         "actual_q_0",
         "target_q_0",
+        *("J\u00b2", "x\u00b2", "J\u0661", "q\u00b9_deg", "\u2460"),
     ),
 )
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "latin-1", "cp932", "utf-32", "cp1252")
@@ -448,26 +449,33 @@ def yaml_text(data: bytes, rng: Random) -> bytes:
     import yaml
 
     whole, _ = _decoded(data)
-    if rng.random() < 0.25:
+    if rng.random() < 0.25 or "[" * 1000 in whole:  # nested without end: no tree is made of it
         return _yaml_marks(whole, rng).encode("utf-8", "replace")
     try:
-        changed = tree(yaml.safe_load(whole), rng)
-        return yaml.safe_dump(
-            changed, default_flow_style=rng.choice((None, True, False)), sort_keys=False
+        changed = tree(yaml.load(whole, Loader=yaml.CSafeLoader), rng)
+        return yaml.dump(
+            changed,
+            Dumper=yaml.CSafeDumper,
+            default_flow_style=rng.choice((None, True, False)),
+            sort_keys=False,
         ).encode("utf-8", "replace")
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise _Unfit from error
 
 
+_TAGS = (
+    *("!!int", "!!float", "!!binary", "!!set", "&a", "!x", "!!timestamp", "!!bool", "!!null"),
+    *("!!omap", "!!str", "!!python/object:os.system", "!!float x", "!!timestamp 2021-13-45"),
+)
+
+
 def _yaml_marks(whole: str, rng: Random) -> str:
     lines = whole.split("\n")
     at = rng.randrange(len(lines))
-    kind = rng.randrange(9)
+    kind = rng.randrange(10)
     if kind == 0:
         key, colon, value = lines[at].partition(":")
-        lines[at] = (
-            f"{key}{colon} {rng.choice(('!!int', '!!float', '!!binary', '!!set', '&a', '!x'))}{value}"
-        )
+        lines[at] = f"{key}{colon} {rng.choice(_TAGS)}{value}"
     elif kind == 1:
         lines[at:at] = [lines[at]]
     elif kind == 2:
@@ -479,12 +487,16 @@ def _yaml_marks(whole: str, rng: Random) -> str:
             rng.choice(("<<: *a", "? [a, b]", "---", "...", "%YAML 1.1", "&a a: *a", "- - -"))
         ]
     elif kind == 5:
-        lines[at] = lines[at].split(":")[0] + ": " + "[" * rng.choice((3, 11, 13, 2000))
+        lines[at] = lines[at].split(":")[0] + ": " + "[" * rng.choice((3, 11, 13, 100_000))
     elif kind == 6:
         lines[at] = lines[at].split(":")[0] + ": " + odd(rng).replace("\n", " ")
     elif kind == 7:
         depth = rng.choice((2, 6, 12, 40))
         lines[at:at] = [" " * i + "a:" for i in range(depth)]
+    elif kind == 8:
+        words = [f"a0: &a0 [{'1, ' * 9}1]"]
+        words += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
+        lines[at:at] = rng.choice((words, words[:3], ["seed: &a [*a, *a]"]))
     else:
         return "\n".join(_lines(lines, rng))
     return "\n".join(lines)
@@ -498,6 +510,10 @@ def json_text(data: bytes, rng: Random) -> bytes:
         raise _Unfit from error
     if rng.random() < 0.05:
         whole = whole.replace("{", '{"a": 1, "a": [], ', 1)
+    if rng.random() < 0.02:
+        whole = rng.choice(
+            ("[" * 100_000, '{"format": 1, "seed": ' + "9" * 100_000 + "}", whole * 2)
+        )
     return whole.encode()
 
 
@@ -690,6 +706,8 @@ def workbook(data: bytes, rng: Random) -> bytes:
 
     if rng.random() < 0.25:
         return _within_archive(data, rng)
+    if _FAR_ROW.search(_sheets(data)):
+        raise _Unfit  # what to read would take for ever
     import openpyxl
     from openpyxl.utils.exceptions import IllegalCharacterError
 
@@ -699,7 +717,7 @@ def workbook(data: bytes, rng: Random) -> bytes:
             book = openpyxl.load_workbook(io.BytesIO(data))
     except Exception as error:
         raise _Unfit from error
-    if not book.worksheets:
+    if not book.worksheets or any(each.max_row > 10_000 for each in book.worksheets):
         raise _Unfit
     sheet = rng.choice(book.worksheets)
     rows = [list(row) for row in sheet.iter_rows(values_only=True)]
@@ -762,6 +780,20 @@ def workbook(data: bytes, rng: Random) -> bytes:
     except (ValueError, TypeError, IndexError, AttributeError, zipfile.BadZipFile) as error:
         raise _Unfit from error
     return written.getvalue()
+
+
+_FAR_ROW = re.compile(rb' r="[A-Z]*\d{6,}|r="[A-Z]{3,}')
+
+
+def _sheets(data: bytes) -> bytes:
+    """The text of all sheets of a workbook."""
+    import zipfile
+
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as held:
+            return b"".join(held.read(name) for name in held.namelist() if "sheet" in name)
+    except Exception as error:  # damaged
+        raise _Unfit from error
 
 
 def _within_archive(data: bytes, rng: Random) -> bytes:

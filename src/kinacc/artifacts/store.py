@@ -180,6 +180,9 @@ def read(path: Path | str) -> Columns:
         if COLUMNS_DIGEST.encode() in (table.schema.metadata or {}):
             verified_digest(table, path)
         return columns_in(table)
+    except UnicodeDecodeError as error:
+        what = f"not a readable Parquet file: {error}"
+        raise InputError(Problem(str(path), what, fix=remake(path))) from None
     except InputError as error:
         raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
 

@@ -110,6 +110,13 @@ def carried_out(
     configs = tuple(each for word in configs for each in _files(word))
     plan = planned(configs)
     plan.check_files()
+    from kinacc.workflow import cost
+    from kinacc.workflow.catalogue import CALIBRATION, STAGES
+
+    only = CALIBRATION if target == "calibration" else STAGES
+    ahead = [] if more else cost.expected(cost.foreseen(plan, only))  # else Snakemake says it
+    for line in ahead:
+        click.echo(line, err=True)
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores or os.cpu_count() or 1), "--configfile", *configs]
     if "--workflow-profile" not in more:
