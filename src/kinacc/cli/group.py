@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -15,7 +16,7 @@ import click
 
 from kinacc import __version__
 from kinacc.errors import InputError, Problem
-from kinacc.starting import without_tools_of_numpy
+from kinacc.starting import ONE_THREAD, without_tools_of_numpy
 
 _AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
 _HELP = ("-h", "--help")
@@ -164,6 +165,7 @@ class Commands(Lazy):
         try:
             with _ended_in_order():
                 if not context.meta[_ASKS_HELP]:
+                    os.environ.update(ONE_THREAD)
                     without_tools_of_numpy()
                 return super().invoke(context)
         except click.UsageError as error:
