@@ -66,7 +66,8 @@ def changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     elif isinstance(node, ast.BoolOp):
         yield "boolean", _with(node, op=ast.Or() if isinstance(node.op, ast.And) else ast.And())
     elif isinstance(node, ast.If | ast.IfExp | ast.While):
-        if not isinstance(node.test, ast.Compare | ast.BoolOp | ast.UnaryOp | ast.Constant):
+        told_apart = ast.Compare | ast.BoolOp | ast.UnaryOp | ast.Constant
+        if not (isinstance(node.test, told_apart) or "TYPE_CHECKING" in ast.dump(node.test)):
             negated = ast.UnaryOp(op=ast.Not(), operand=node.test)
             yield "boolean", _with(node, test=negated)
     elif isinstance(node, ast.Constant):
