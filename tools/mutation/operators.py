@@ -57,7 +57,7 @@ def changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     elif isinstance(node, ast.BinOp | ast.AugAssign):
         if type(node.op) in ARITHMETIC:
             yield "arithmetic", _with(node, op=ARITHMETIC[type(node.op)]())
-        elif isinstance(node.op, ast.MatMult) and isinstance(node, ast.BinOp):
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult) and _differ(node):
             yield "transpose", _with(node, left=node.right, right=node.left)
     elif isinstance(node, ast.UnaryOp):
         if isinstance(node.op, ast.USub):
@@ -140,6 +140,10 @@ def left_alone(node: ast.AST) -> list[ast.AST]:
     if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
         alone += [node.test, *node.body]
     return alone
+
+
+def _differ(node: ast.BinOp) -> bool:
+    return ast.dump(node.left) != ast.dump(node.right)
 
 
 def _is_none(node: ast.AST) -> bool:

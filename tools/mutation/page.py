@@ -15,8 +15,8 @@ EQUIVALENT = ROOT / "tests" / "mutation" / "equivalent.csv"
 TARGET = ROOT / "docs" / "mutants.md"
 NAMED = ("module", "function", "text", "nth", "at", "operator", "before", "after")
 WANTED = 1000
-BEGUN = """ So far {count} of {wanted} were tried; lines of modules with compiled kernels, which take
-longest, come last."""
+BEGUN = """ So far {count} of {wanted} were tried; lines of modules with compiled kernels,
+which take longest, come last."""
 COLUMNS = (*NAMED, "verdict", "by")
 Rows = Mapping[tuple, Mapping[str, str]]
 PAGE = """\
