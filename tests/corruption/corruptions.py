@@ -11,6 +11,7 @@ import argparse
 import json
 import tempfile
 import time
+import traceback
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -153,8 +154,9 @@ def _word(table: pa.Table, draw: np.random.Generator) -> pa.Table | None:
 
 
 def _dropped(table: pa.Table, draw: np.random.Generator) -> pa.Table | None:
-    rows = np.delete(np.arange(table.num_rows), draw.integers(max(1, table.num_rows)))
-    return table.take(rows) if table.num_rows else None
+    if not table.num_rows:
+        return None
+    return table.take(np.delete(np.arange(table.num_rows), draw.integers(table.num_rows)))
 
 
 def _doubled(table: pa.Table, draw: np.random.Generator) -> pa.Table | None:
@@ -289,6 +291,9 @@ class Study:
                     stack.enter_context(patch.object(check, "computed_again", nothing))
                 report = check.check_results(self.folder / case.dataset, self.plan)
             return [str(each) for one in report.datasets for each in one.problems]
+        except Exception:
+            traceback.print_exc()  # no way to tell of a corruption
+            return []
         finally:
             for each in changed:
                 (self.folder / each).write_bytes(self.files[each])

@@ -248,9 +248,9 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         checked += [str(picture)] if picture.exists() else []
         found += [(problem, (Doubt(name),)) for problem in check_picture(picture)]
     known, wrong_records = records_there(folder)
-    kept = [
-        stage for stage in STAGES.values() if not stage.joint and not {*stage.outputs} & {*behind}
-    ]
+    kept = [s for s in STAGES.values() if not (s.joint or {*s.outputs} & {*behind})]
+    names = {stage.name for stage in kept} - set(left_out)
+    known = {unit: record for unit, record in known.items() if unit[0] in names}
     wrong_files = {problem.where.partition(", column")[0] for problem, _ in found}
     found += [*wrong_records, *check_records(folder, kept, known, wrong_files)]
     marks |= {
@@ -435,7 +435,12 @@ def _not_studied(folder: Path) -> set[str]:
         for stage in STAGES.values()
         if not (stage.name in CALIBRATION or stage.fits or stage.joint)
     ]
-    there = {stage.name: stage.leaves for stage in beyond if _has_left(folder, stage)}
+    recorded = {stage for stage, _ in records_there(folder)[0]}
+    there = {
+        stage.name: stage.leaves
+        for stage in beyond
+        if stage.name in recorded or _has_left(folder, stage)
+    }
     if set(there.values()) - {PAGE}:
         return set()
     return {stage.name for stage in beyond} - set(there)
