@@ -56,14 +56,15 @@ YAML = {
     "nested brackets": (f"seed: {BRACKETS}", ":1: is nested without end"),
     "nested blocks": ("".join(" " * i + "a:\n" for i in range(900)), "is nested without end"),
     "aliases of aliases": (LAUGHS, "aliases"),
+    "two aliases of itself": ("seed: &a [*a, *a]\n", "or for themselves"),
     "an alias of itself": ("seed: &a [*a, *a, *a, *a, *a, *a, *a, *a, *a, *a]\n", "aliases"),
     "long digits": (f"name: x\nseed: {'9' * 500_000}", ":2: a number of 500000 characters"),
     "long digits to base 60": (f"seed: {'1:' * 100_000}1", "number of 200001 characters"),
     "long hexadecimal digits": (f"seed: 0x{'f' * 100_000}", "number of 100002 characters"),
     "long digits under a tag": (f'seed: !!int "{"1:" * 4000}1"', "seed"),
     "a long text": (f"seed: {'x' * 50_000}", "text of 50000 characters"),
-    "a large file": ("# nothing\n" * 150_000, "at most 1000 kB"),
-    "many values": ("seed: [" + "1," * 100_000 + "1]", "too many values"),
+    "a large file": ("# nothing\n" * 500_000, "at most 4000 kB"),
+    "many values": ("seed: [" + "1," * 300_000 + "1]", "too many values"),
     "tags that do not fit": ("seed: !!timestamp x\n!!set y: !!bool z\n? !!int ''\n: 1\n", "seed"),
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,7 +28,19 @@ class Problem:
             parts.append(f"allowed: {self.allowed}")
         if self.fix:
             parts.append(self.fix)
-        return "; ".join(parts)
+        return as_seen("; ".join(parts))
+
+
+_STEERING = {
+    code: f"\\u{code:04x}"
+    for code in (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+    if chr(code) not in "\n\t"
+}
+
+
+def as_seen(text: str) -> str:
+    """A text whose characters that would steer a terminal, or turn its lines, are written out."""
+    return text.translate(_STEERING)
 
 
 def and_more(count: int) -> str:
@@ -61,6 +75,39 @@ class InputError(KinaccError):
         if count > _MOST_SHOWN:
             lines.append(f"  -{and_more(count - _MOST_SHOWN)}")
         return "\n".join([head, *lines])
+
+
+class MachineError(InputError):
+    """The machine did not do what was asked of it: a disk that is full, a file that is closed."""
+
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.problems))
+
+
+_REMEDIES = {
+    errno.ENOSPC: "make room, then give the same command again",
+    errno.EDQUOT: "make room, then give the same command again",
+    errno.EMFILE: "`ulimit -n` says how many files a process may open",
+    errno.ENFILE: "other programs of this machine hold too many files open",
+    errno.ENAMETOOLONG: "give a shorter name",
+}
+
+
+def refused(error: OSError, where: object = None, what: str = "") -> MachineError:
+    """What a system refuses, as an error for people: ``where``, ``what`` and why, in its words.
+
+    ``where`` is the file the system names where that is not given.
+    """
+    where = error.filename if where is None else where
+    reason = error.strerror or str(error) or type(error).__name__
+    if error.errno and (known := os.strerror(error.errno)).lower() in reason.lower():
+        reason = known  # a library may say more, in words for programmers
+    reason = reason[:1].lower() + reason[1:]
+    if isinstance(where, bytes):
+        where = os.fsdecode(where)
+    told = ": ".join(filter(None, [what, reason]))
+    place = "this machine" if where is None else str(where)
+    return MachineError(Problem(place, told, fix=_REMEDIES.get(error.errno or 0, "")))
 
 
 def refuse(problems: Iterable[Problem], title: str = "") -> None:

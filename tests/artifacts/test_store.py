@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.artifacts import store
-from kinacc.artifacts.atomic import remove_unfinished, replacing, unfinished
+from kinacc.artifacts.atomic import replacing, sweep
 from kinacc.artifacts.contract import METADATA_KEYS, columns_of
 from kinacc.errors import InputError
 
@@ -170,20 +170,27 @@ def test_writers_of_one_number_on_two_machines_do_not_meet(tmp_path):
     assert path.read_text() == "slow"
 
 
-def test_what_an_ended_process_began_is_removed_and_no_one_elses(tmp_path):
-    path = tmp_path / "fig1.svg"
-    begun = unfinished(path)
-    begun.write_text("half")
-    other_file, other_machine = (
-        unfinished(tmp_path / "fig2.svg"),
-        tmp_path / begun.name.replace(os.uname().nodename[:40], "another-machine"),
-    )
-    for kept in (other_file, other_machine):
-        kept.write_text("still written")
-    remove_unfinished(path, os.getpid() + 1)
-    assert begun.exists()
-    remove_unfinished(path, os.getpid())
-    assert set(tmp_path.iterdir()) == {other_file, other_machine}
+def test_what_a_killed_process_began_is_removed_and_what_is_being_written_is_not(tmp_path):
+    path = tmp_path / "results" / "fig1.svg"
+    path.parent.mkdir()
+    begun = f"""
+import os, signal
+from kinacc.artifacts.atomic import replacing
+with replacing([{str(path)!r}]) as (part,):
+    part.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    subprocess.run([sys.executable, "-c", begun], env=environment, check=False)
+    (half,) = path.parent.iterdir()
+    older = path.with_name(".fig2.svg.4711.partial")  # of versions that named no machine
+    older.write_text("half")
+    with replacing([path]) as (part,):
+        part.write_text("whole")
+        sweep(tmp_path)
+        assert [*path.parent.iterdir()] == [part]
+    assert not half.exists()
+    assert path.read_text() == "whole"
 
 
 def test_unreadable_files_are_named(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -339,9 +340,10 @@ def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
     first, second = (arm.plan.points.label[point] for point in arm.plan.route[:2])
     call("campaign", "record", folder, "--position-mm", arm.position(first))
     journal = folder / "readings.jsonl"
-    whole = journal.read_bytes()
+    whole, confirmed = journal.read_bytes(), (folder / "head.json").read_bytes()
     call("campaign", "record", folder, "--position-mm", arm.position(second))
     journal.write_bytes(journal.read_bytes()[:-9])
+    (folder / "head.json").write_bytes(confirmed)  # the command ended while it wrote
     shown = call("campaign", "status", folder)
     assert "was cut off" in shown.output
     assert "1 of 20 readings taken" in shown.output
@@ -502,6 +504,75 @@ def test_a_report_holds_its_contract_and_says_what_status_says(begun):
     before = {path.name: path.read_bytes() for path in made.iterdir()}
     assert call("campaign", "report", folder).exit_code == 0
     assert {path.name: path.read_bytes() for path in made.iterdir()} == before
+
+
+def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    recorded(folder, arm := Arm(folder), 5)
+    earlier = {each.name: each.read_bytes() for each in folder.iterdir() if each.is_file()}
+    recorded(folder, arm, 2)
+    call("campaign", "report", folder)
+    text = (folder / "report" / "report.md").read_text()
+    head = re.search(r"7 readings, head (\w{16})\.", text)[1]
+    known = ("verify", folder, "--head", head, "--readings", 7)
+    assert "it holds what was reported" in call("campaign", *known).output
+    recorded(folder, arm, 1)
+    assert call("campaign", *known).exit_code == 0
+    for name, content in earlier.items():  # the folder as it was before the two readings
+        (folder / name).write_bytes(content)
+    assert call("campaign", "verify", folder).exit_code == 0
+    done = call("campaign", *known)
+    assert done.exit_code == 1
+    assert f"holds no entry {head}: it was shortened or rewritten" in done.output
+    done = call("campaign", "verify", folder, "--readings", 7)
+    assert done.exit_code == 1
+    assert "5 readings; allowed: 7 as reported" in done.output
+
+
+def test_a_clock_that_went_back_is_asked_about_before_a_reading_is_taken(begun, monkeypatch):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    recorded(folder, arm := Arm(folder), 2)
+    label = standing(folder)["next"]
+    reading = ("--point", label, "--position-mm", arm.position(label))
+    with monkeypatch.context() as patched:
+        patched.setattr(campaigns, "_stamp", _in_1999(campaigns._stamp))
+        said = refused(folder, "record", folder, *reading)
+        assert "the clock of this computer: says 1999-12-31" in said
+        assert call("campaign", "record", folder, *reading, "--accept-implausible").exit_code == 0
+    recorded(folder, arm, 1)
+    call("campaign", "report", folder)
+    assert "clock was set in between" in (folder / "report" / "report.md").read_text()
+
+
+def _in_1999(stamp):
+    return lambda time=None: stamp(time) if time else "1999-12-31T23:59:59+00:00"
+
+
+def test_a_reading_from_beyond_all_rooms_is_never_taken(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    label = standing(folder)["next"]
+    file = tmp_path / "far.csv"
+    file.write_text(f"pose,x_mm,y_mm,z_mm\n{label},1e308,0,0\n")
+    said = refused(folder, "record", folder, file, "--accept-implausible")
+    assert "three numbers within 1e+06 mm" in said
+
+
+def test_a_candidate_with_spaces_about_its_name_can_be_recorded(calibration, tmp_path):
+    joints = tmp_path / "candidates.csv"
+    names = [f"q{joint}_deg" for joint in range(1, 7)]
+    rows = [f"  sp{n} ,{n},{10 + n},{n},{n},{20 + n},{n}" for n in range(4)]
+    joints.write_text("\n".join(["pose," + ",".join(names), *rows]) + "\n")
+    folder = tmp_path / "spaced"
+    done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+                "--model", "dh", "--candidates", joints, "--budget", 4, "--noise-mm", SIGMA_MM,
+                "--frame", "base", "--sure")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    label = standing(folder)["next"]
+    assert label == label.strip()
+    plan = campaigns.open_(folder).plan
+    seen = ",".join(map(repr, map(float, plan.points.modelled_mm[plan.points.number(label)])))
+    done = call("campaign", "record", folder, "--point", f" {label} ", "--position-mm", seen)
+    assert done.exit_code == 0, done.output
 
 
 def left_to_visit(folder):

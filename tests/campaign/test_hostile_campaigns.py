@@ -7,7 +7,7 @@ import json
 import pytest
 from command_line import call
 
-from kinacc.campaign import folder
+from kinacc.campaign import folder, journal
 from kinacc.errors import InputError
 
 
@@ -64,6 +64,74 @@ def test_a_plan_made_to_do_harm_is_refused(begun, text):
 def test_a_journal_made_to_do_harm_is_refused_with_its_line(begun, line):
     (begun / "readings.jsonl").write_text(line + "\n")
     assert "readings.jsonl, line 1: cannot be read" in refusal(begun)
+
+
+def said_of(begun, *entries) -> str:
+    """What is said of a journal whose lines follow from one another, made by a stranger."""
+    opened = folder.open_(begun)
+    for entry in entries:
+        known = journal.read(begun / journal.JOURNAL, opened.digest)
+        journal.append(begun / journal.JOURNAL, known, entry)
+    return refusal(begun)
+
+
+GOOD = {"point": 0, "position_mm": [0.0, 0.0, 0.0], "instrument": "instrument"}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"point": 99}, {"point": "x"}, {"position_mm": [1.0, 2.0]}, {"position_mm": "x"},
+        {"position_mm": [1e308, 0.0, 0.0]}, {"position_mm": None}, {"instrument": "other"},
+        {"instrument": []}, {"joints": [1]}, {"joints": {}}, {"std": "x"}, {"std": 5},
+        {"point": 10**400},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_reading_that_is_none_of_this_campaign_is_refused_with_its_line(begun, wrong):
+    said = said_of(begun, {"kind": "readings", "readings": [{**GOOD, **wrong}]})
+    assert "readings.jsonl, line 1: is no entry of this campaign" in said
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        [], "x", 5, {}, {"kind": "other"}, {"kind": []}, {"kind": "readings"},
+        {"kind": "readings", "readings": [5]}, {"kind": "readings", "readings": [], "at": "noon"},
+        {"kind": "readings", "readings": [], "at": "2026-01-01T00:00:00"},
+        {"kind": "readings", "readings": [], "file": "a", "path": 5},
+        {"kind": "readings", "readings": [], "file": "a", "was": [1]},
+        {"kind": "readings", "readings": [], "was": 5},
+        {"kind": "strike", "reading": 1, "reason": "x"}, {"kind": "leave_out", "point": 8,
+        "reason": "x"}, {"kind": "leave_out", "point": 0}, {"kind": "leave_out", "point": [],
+        "reason": "x"}, {"kind": "leave_out", "point": 0.5, "reason": "x"},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_an_entry_that_says_nothing_is_refused_with_its_line(begun, entry):
+    assert "readings.jsonl, line 1: is no entry of this campaign" in said_of(begun, entry)
+
+
+def test_all_entries_that_say_nothing_are_named(begun):
+    said = said_of(begun, {"kind": "other"}, {"kind": "strike", "reading": 5, "reason": "x"})
+    assert "line 1" in said
+    assert "line 2" in said
+
+
+def test_an_entry_nested_deeply_is_a_message(begun):
+    line = '{"chain": "x", "entry": {"a": ' + "[" * 900 + "]" * 900 + "}}\n"
+    (begun / journal.JOURNAL).write_text(line)
+    assert "readings.jsonl, line 1" in refusal(begun)
+
+
+@pytest.mark.parametrize("digits", ["１.５", "1_0", "٣"])
+def test_digits_of_other_alphabets_are_no_numbers_of_options(digits):
+    done = call("plan-campaign", "--noise-mm", digits, "--poses", 20, "--budget", 20)
+    assert done.exit_code == 2, done.output
+    assert f"noise of instrument: {digits!r}" in done.output
+    done = call("plan-campaign", "--noise-mm", "0.05", "--poses", 20, "--budget", digits)
+    assert done.exit_code == 2, done.output
+    assert f"{digits!r} is not a valid number" in done.output
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,9 @@ SEED = "0123456789abcdef"
 
 
 def written(path: Path, count: int) -> journal.Journal:
-    for number in range(count):
-        journal.append(path, journal.read(path, SEED), {"kind": "test", "number": number})
+    for _ in range(count):
+        known = journal.read(path, SEED)
+        journal.append(path, known, {"kind": "test", "number": len(known.entries)})
     return journal.read(path, SEED)
 
 
@@ -31,17 +32,82 @@ def test_entries_come_back_in_order(tmp_path):
 
 
 def test_a_last_line_cut_anywhere_loses_only_itself(tmp_path):
-    path = tmp_path / "j"
-    written(path, 3)
+    path, head = tmp_path / "j", tmp_path / journal.HEAD
+    written(path, 2)
+    before = head.read_bytes()
+    written(path, 1)
     whole = path.read_bytes()
     end = len(b"\n".join(whole.split(b"\n")[:2])) + 1
     for size in range(end + 1, len(whole)):
         path.write_bytes(whole[:size])
+        head.write_bytes(before)  # the writer died before it confirmed the line
         known = journal.read(path, SEED)
         assert len(known.entries) == 2
         assert known.cut_off == size - end
         journal.append(path, known, {"kind": "test", "number": 2})
         assert path.read_bytes() == whole
+
+
+@pytest.mark.parametrize("kept", [0, 1, 2])
+def test_confirmed_lines_missing_at_the_end_are_noticed(tmp_path, kept):
+    path = tmp_path / "j"
+    written(path, 3)
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:kept]))
+    with pytest.raises(InputError, match=f"ends after entry {kept}, and entry 3 was confirmed"):
+        journal.read(path, SEED)
+
+
+def test_a_journal_that_was_deleted_is_noticed(tmp_path):
+    path = tmp_path / "j"
+    written(path, 3)
+    path.unlink()
+    with pytest.raises(InputError, match="ends after entry 0, and entry 3 was confirmed"):
+        journal.read(path, SEED)
+
+
+def test_a_reading_that_another_took_the_place_of_is_noticed(tmp_path):
+    path = tmp_path / "j"
+    known = written(path, 2)
+    head = (tmp_path / journal.HEAD).read_bytes()
+    journal.append(path, known, {"kind": "test", "number": 2})
+    confirmed = (tmp_path / journal.HEAD).read_bytes()
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:2]))
+    (tmp_path / journal.HEAD).write_bytes(head)
+    journal.append(path, journal.read(path, SEED), {"kind": "test", "number": 7})
+    (tmp_path / journal.HEAD).write_bytes(confirmed)
+    with pytest.raises(InputError, match="entry 3 is not the one that was confirmed"):
+        journal.read(path, SEED)
+
+
+def test_a_line_on_disk_that_was_not_confirmed_yet_counts(tmp_path):
+    path = tmp_path / "j"
+    written(path, 2)
+    head = (tmp_path / journal.HEAD).read_bytes()
+    written(path, 1)
+    (tmp_path / journal.HEAD).write_bytes(head)
+    assert len(journal.read(path, SEED).entries) == 3
+
+
+@pytest.mark.parametrize("made", ["pipe", "folder"])
+def test_a_journal_that_is_no_file_is_told_at_once(tmp_path, made):
+    path = tmp_path / "j"
+    os.mkfifo(path) if made == "pipe" else path.mkdir()
+    with pytest.raises(InputError, match="is not a file"):
+        journal.read(path, SEED)
+
+
+def test_a_file_system_without_locks_is_told_as_that(tmp_path, monkeypatch):
+    import fcntl
+
+    def none(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", none)
+    with (
+        pytest.raises(InputError, match=r"holds no locks: No locks available.*local disk"),
+        journal.writing(tmp_path),
+    ):
+        pass
 
 
 def test_zeros_left_by_a_power_cut_are_no_line(tmp_path):
@@ -151,7 +217,7 @@ def test_a_disk_that_does_not_take_a_line_is_told_and_nothing_before_is_lost(tmp
 
     with monkeypatch.context() as patched:
         patched.setattr(journal.os, "fsync", full)
-        with pytest.raises(InputError, match="No space left"):
+        with pytest.raises(InputError, match="no space left"):
             journal.append(path, known, {"kind": "test", "number": 2})
     assert [each["number"] for each in journal.read(path, SEED).entries][:2] == [0, 1]
     journal.append(path, journal.read(path, SEED), {"kind": "test", "number": 3})

@@ -373,7 +373,7 @@ def test_a_data_set_measured_in_two_files_is_named(config):
         (b"seed: [1\n", "is not YAML"),
         (b"study:\n\talpha: 0.5\n", "is not YAML"),
         (b"seed: \xff\xfe\n", "not text in UTF-8"),
-        (b"seed: &a [*a]\n", "without end"),
+        (b"seed: &a [*a]\n", "for themselves"),
         (b"{a: 1}: 2\n", "unknown key"),
     ],
 )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+
+from kinacc.errors import and_more, refused
 
 _ENDING = ".partial"
 
@@ -15,20 +18,47 @@ def unfinished(path: Path | str) -> Path:
 
     Two machines may write to one folder, and containers number their processes alike.
     """
-    begun = _begun(Path(path), os.getpid())
-    return Path(path).with_name(f"{begun}{os.urandom(4).hex()}{_ENDING}")
+    by = f"{os.uname().nodename[:40]}.{os.getpid()}.{os.urandom(4).hex()}"
+    return Path(path).with_name(f".{Path(path).name}.{by}{_ENDING}")
 
 
-def remove_unfinished(path: Path | str, process: int) -> None:
-    """Remove what a process of this machine, since ended, had begun to write to a file."""
-    begun = _begun(Path(path), process)
-    for each in Path(path).parent.glob(f".*{_ENDING}"):
-        if each.name.startswith(begun):
-            each.unlink(missing_ok=True)
+@contextmanager
+def held(path: Path) -> Iterator[int]:
+    """Make a file, and hold it until the block or this process ends; yields its descriptor.
+
+    That it is held tells ``sweep`` that somebody is writing it.
+    """
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield handle
+    finally:
+        os.close(handle)
 
 
-def _begun(path: Path, process: int) -> str:
-    return f".{path.name}.{os.uname().nodename[:40]}.{process}."
+def abandoned(path: Path) -> bool:
+    """Whether nobody holds a file that was ``held``; not known on a file system without locks."""
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(handle)
+    return True
+
+
+def sweep(folder: Path | str) -> None:
+    """Remove what processes that have ended had begun to write in a folder and those below."""
+    for within, _, names in os.walk(folder):
+        for name in names:
+            path = Path(within, name)
+            if name.startswith(".") and name.endswith(_ENDING) and abandoned(path):
+                path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -36,23 +66,40 @@ def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[li
     """Temporary paths beside ``paths``; renamed to them on success, removed on any failure.
 
     ``on_disk``: the files have reached the disk when this returns, and not only the system.
+    Raises MachineError, which names the file, where the system does not take one.
     """
     targets = [Path(path) for path in paths]
     temporary = [unfinished(path) for path in targets]
-    for path in targets:
-        path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        yield temporary
-        for source in temporary if on_disk else ():
-            synchronise(source)
-        for source, target in zip(temporary, targets, strict=True):
-            os.replace(source, target)
+        for path in targets:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        with ExitStack() as writing:
+            for source in temporary:
+                writing.enter_context(held(source))
+            yield temporary
+            for source in temporary if on_disk else ():
+                synchronise(source)
+            for source, target in zip(temporary, targets, strict=True):
+                os.replace(source, target)
         for folder in {target.parent for target in targets} if on_disk else ():
             synchronise(folder)
+    except OSError as error:
+        raise refused(error, _refused(error, targets, temporary), "cannot be written") from None
     finally:
         for source in temporary:
             with suppress(OSError):
                 source.unlink(missing_ok=True)
+
+
+def _refused(error: OSError, targets: Sequence[Path], temporary: Sequence[Path]) -> str:
+    """Which file the system did not take: what it names, else what was begun last."""
+    by_name = dict(zip(map(str, temporary), map(str, targets), strict=True))
+    if error.filename is not None:
+        return by_name.get(str(error.filename), str(error.filename))
+    begun = [
+        name for part, name in by_name.items() if os.path.exists(part) and os.path.getsize(part)
+    ]
+    return begun[-1] if begun else str(targets[0]) + and_more(len(targets) - 1)
 
 
 def write_whole(path: Path | str, content: bytes, on_disk: bool = False) -> None:

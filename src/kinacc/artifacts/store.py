@@ -180,6 +180,9 @@ def read(path: Path | str) -> Columns:
         if COLUMNS_DIGEST.encode() in (table.schema.metadata or {}):
             verified_digest(table, path)
         return columns_in(table)
+    except UnicodeDecodeError as error:
+        what = f"not a readable Parquet file: {error}"
+        raise InputError(Problem(str(path), what, fix=remake(path))) from None
     except InputError as error:
         raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
 
@@ -214,6 +217,12 @@ def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
     if rows * columns > _MOST_VALUES:
         allowed = f"at most {_MOST_VALUES} values"
         raise InputError(Problem(str(path), f"{rows} rows of {columns} columns", allowed))
+    refuse(
+        Problem(f"{path}, column {field.name}", f"is of type {field.type}", "numbers, text")
+        for field in file.schema_arrow
+        if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
+        and field.type not in (pa.string(), pa.large_string(), pa.null())
+    )
     return file.read(use_threads=False)
 
 

@@ -52,6 +52,15 @@ class Arm:
     @classmethod
     def of_entry(cls, entry: Mapping) -> Arm:
         """The arm that ``as_entry`` wrote."""
-        parameters = {name: np.array(entry[name]) for name in (*PARAMETERS, "prismatic")}
+        parameters = {name: numbers(entry[name]) for name in PARAMETERS}
+        prismatic = np.array(entry["prismatic"], dtype=bool)
         names = ("joint_map", "turn", "point_mm")
-        return cls(DHModel(**parameters), *(np.array(entry[name]) for name in names))
+        return cls(DHModel(**parameters, prismatic=prismatic), *(numbers(entry[n]) for n in names))
+
+
+def numbers(value: object) -> np.ndarray:
+    """Nested lists of numbers as an array; ValueError where they hold anything else."""
+    found = np.array(value)
+    if found.dtype.kind not in "iuf":
+        raise ValueError("text or nothing in place of numbers")
+    return found.astype(float)

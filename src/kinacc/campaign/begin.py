@@ -40,7 +40,7 @@ def points_of(
     if len(kept) < 2:
         what = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
         raise InputError(Problem("candidates", what, "at least 2 different points"))
-    joints, label = joints[kept], [str(label[i]) for i in kept]
+    joints, label = joints[kept], [str(label[i]).strip() for i in kept]
     directions = None if directions is None else directions[kept]
     problems = _outside(arm, joints, label)
     problems += [fault for each in label for fault in not_in_a_line("candidates, pose", each)]

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from kinacc.artifacts.atomic import write_whole
 from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import LEAVE_OUT, READINGS, STRIKE, State
+from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
+
+_CLOCKS_DIFFER = timedelta(minutes=10)  # of two computers that write to one campaign
 
 
 @dataclass(frozen=True)
@@ -33,10 +37,23 @@ class Opened:
         """When its entries were made, as the journal has it."""
         return tuple(str(each["at"]) for each in self.journal.entries if "at" in each)
 
+    def clock_went_back(self) -> list[Problem]:
+        """What is wrong with the time of this computer, if it lies before the last entry's."""
+        last, now = max(self.recorded, default=""), _stamp()
+        if not last or now >= _stamp(datetime.fromisoformat(last) - _CLOCKS_DIFFER):
+            return []
+        what = f"says {now}, and the campaign has an entry of {last}"
+        fix = "set the clock; where that entry's was wrong, give --accept-implausible"
+        return [Problem("the clock of this computer", what, fix=fix)]
+
     def write(self, entry: Mapping) -> None:
         """Append an entry, with the time; on disk when this returns. Only while ``writing``."""
-        stamped = {**entry, "at": datetime.now(UTC).isoformat(timespec="seconds")}
+        stamped = {**entry, "at": _stamp()}
         journal.append(self.folder / journal.JOURNAL, self.journal, stamped)
+
+
+def _stamp(time: datetime | None = None) -> str:
+    return (time or datetime.now(UTC)).isoformat(timespec="seconds")
 
 
 def in_the_way(folder: Path | str) -> list[Problem]:
@@ -49,7 +66,7 @@ def in_the_way(folder: Path | str) -> list[Problem]:
 def start(folder: Path | str, begun: Plan) -> None:
     """Put a new campaign on disk. Raises InputError where the folder holds one already."""
     refuse(in_the_way(folder), "The campaign was not begun")
-    journal.create(Path(folder) / journal.PLAN, plan.to_json(begun))
+    write_whole(Path(folder) / journal.PLAN, plan.to_json(begun), on_disk=True)
 
 
 def open_(folder: Path | str) -> Opened:
@@ -59,14 +76,12 @@ def open_(folder: Path | str) -> Opened:
     if not path.is_file():
         fix = "begin one: kinacc campaign start"
         raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
-    text = path.read_bytes()
+    text = json_files.bytes_of(path)
     digest = plan.digest(text)
-    return Opened(
-        folder,
-        plan.from_json(text, str(path)),
-        journal.read(folder / journal.JOURNAL, digest),
-        digest,
-    )
+    begun, journal_at = plan.from_json(text, str(path)), folder / journal.JOURNAL
+    known = journal.read(journal_at, digest)
+    state.require_readable(begun, known.entries, str(journal_at))
+    return Opened(folder, begun, known, digest)
 
 
 @contextmanager
@@ -75,6 +90,24 @@ def writing(folder: Path | str) -> Iterator[Opened]:
     open_(folder)  # no lock file where there is no campaign
     with journal.writing(Path(folder)):
         yield open_(folder)
+
+
+def held_to(opened: Opened, head: str | None, readings: int | None) -> list[Problem]:
+    """What speaks against a journal being the one of which a report gave ``head``, or later.
+
+    ``readings``: how many the report says there were.
+    """
+    path = str(opened.folder / journal.JOURNAL)
+    chain = opened.journal.chain
+    if head is not None and head not in chain:
+        what = f"holds no entry {head}: it was shortened or rewritten, or is of another campaign"
+        return [Problem(path, what, f"ends at {opened.journal.last}")]
+    upto = len(chain) if head is None else chain.index(head) + 1
+    count = state.readings_in(opened.journal.entries[:upto])
+    if readings is None or count == readings or (head is None and count > readings):
+        return []
+    where = path if head is None else f"{path}, up to {head}"
+    return [Problem(where, f"{count} readings", f"{readings} as reported")]
 
 
 def readings_entry(

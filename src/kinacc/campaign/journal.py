@@ -3,62 +3,111 @@
 A line that was confirmed is on disk. A last line that was cut off, because the process or the
 machine died while writing it, was never confirmed and is left out; the next line takes its place.
 Each line carries a hash of itself and the line before, the first of the plan: a file that was
-edited, or belongs to another plan, is noticed.
+edited, or belongs to another plan, is noticed. What was confirmed last stands in a file beside it:
+a journal that has lost whole lines at its end is noticed too.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
+import stat
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kinacc.artifacts.atomic import synchronise, write_whole
-from kinacc.errors import InputError, Problem
+from kinacc.config import json_files
+from kinacc.errors import InputError, MachineError, Problem, refused
 
-PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
+PLAN, JOURNAL, LOCK, HEAD = "campaign.json", "readings.jsonl", "lock", "head.json"
 _PATIENCE_S = 5.0
 _HASH = 16
 
 
 @dataclass(frozen=True)
 class Journal:
-    """What a journal holds: its entries, the hash of its last line, and where that line ends.
+    """What a journal holds: its entries, the hash of every line, and where the last one ends.
 
-    ``cut_off``: bytes after it, of a line that was not written to its end.
+    ``seed`` is what the hash of the first line hangs on. ``cut_off``: bytes after the last line, of
+    one that was not written to its end.
     """
 
     entries: tuple[Mapping, ...]
-    last: str
+    seed: str
+    chain: tuple[str, ...]
     end: int
     cut_off: int
+
+    @property
+    def last(self) -> str:
+        """Hash of the last line, which all lines before it go into."""
+        return self.chain[-1] if self.chain else self.seed
 
 
 def read(path: Path, seed: str) -> Journal:
     """The journal at ``path``, empty where there is no file; ``seed`` is the digest of the plan.
 
-    Raises InputError where a line does not follow from the one before.
+    Raises InputError where a line does not follow from the one before, and where lines are missing
+    at the end that were confirmed.
     """
-    content = path.read_bytes() if path.exists() else b""
-    entries, last, end = [], seed, 0
+    content = _content(path)
+    entries: list[Mapping] = []
+    chain, end = [seed], 0
     whole = content.split(b"\n")[:-1]
     for number, line in enumerate(whole, start=1):
         try:
             parsed = json.loads(line)
-            entry, chain = parsed["entry"], parsed["chain"]
+            entry, said = parsed["entry"], parsed["chain"]
+            follows = _chained(chain[-1], entry)
         except (ValueError, KeyError, TypeError, RecursionError):
             if number == len(whole) and b"\0" in line:
                 break  # a machine that lost power may leave zeros where nothing was written yet
-            raise _damaged(path, number, "cannot be read") from None
-        if chain != _chained(last, entry):
-            raise _damaged(path, number, "was changed, or belongs to another campaign") from None
+            raise _damaged(f"{path}, line {number}", "cannot be read") from None
+        if said != follows:
+            what = "was changed, or belongs to another campaign"
+            raise _damaged(f"{path}, line {number}", what)
         entries.append(entry)
-        last, end = chain, end + len(line) + 1
-    return Journal(tuple(entries), last, end, len(content) - end)
+        chain.append(follows)
+        end += len(line) + 1
+    _require_confirmed(path, chain)
+    return Journal(tuple(entries), seed, tuple(chain[1:]), end, len(content) - end)
+
+
+def _content(path: Path) -> bytes:
+    """Bytes of a file; none where there is no file. InputError where it is no plain file."""
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):  # a pipe would be waited for
+            raise _damaged(str(path), "is not a file but a folder, a pipe or a device")
+        return path.read_bytes()
+    except FileNotFoundError:
+        return b""
+    except OSError as error:
+        raise _damaged(str(path), f"cannot be read: {error.strerror}") from None
+
+
+def _require_confirmed(path: Path, chain: list[str]) -> None:
+    """Raise InputError where a journal does not go as far as was confirmed."""
+    beside = path.with_name(HEAD)
+    if not beside.exists():
+        return  # begun by an earlier version, or nothing was confirmed yet
+    try:
+        head = json.loads(_content(beside))
+        count, last = head["entries"], head["chain"]
+        known = isinstance(count, int) and count > 0
+    except (ValueError, KeyError, TypeError, RecursionError):
+        known = False
+    if not known:
+        raise _damaged(str(beside), "cannot be read")
+    if count >= len(chain):
+        what = f"ends after entry {len(chain) - 1}, and entry {count} was confirmed"
+        raise _damaged(str(path), what)
+    if chain[count] != last:
+        raise _damaged(str(path), f"entry {count} is not the one that was confirmed")
 
 
 def append(path: Path, known: Journal, entry: Mapping) -> None:
@@ -68,6 +117,7 @@ def append(path: Path, known: Journal, entry: Mapping) -> None:
     """
     chain = _chained(known.last, entry)
     line = json.dumps({"chain": chain, "entry": entry}, sort_keys=True).encode() + b"\n"
+    head = json.dumps({"chain": chain, "entries": len(known.entries) + 1}).encode() + b"\n"
     fresh = not path.exists()
     try:
         with open(path, "ab") as file:
@@ -78,18 +128,8 @@ def append(path: Path, known: Journal, entry: Mapping) -> None:
             os.fsync(file.fileno())
         if fresh:
             synchronise(path.parent)
-    except OSError as error:
-        raise _not_written(path, error) from None
-
-
-def create(path: Path, content: bytes) -> None:
-    """Write a new file so that it appears whole and on disk, or not at all.
-
-    Raises InputError where the disk does not take it.
-    """
-    try:
-        write_whole(path, content, on_disk=True)
-    except OSError as error:
+        write_whole(path.with_name(HEAD), head, on_disk=True)
+    except (OSError, MachineError) as error:
         raise _not_written(path, error) from None
 
 
@@ -113,7 +153,11 @@ def writing(
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
-            except OSError:
+            except OSError as error:
+                if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
+                    what = f"the file system of this folder holds no locks: {error.strerror}"
+                    fix = "two writers could spoil the campaign: move its folder to a local disk"
+                    raise InputError(Problem(str(folder), what, fix=fix)) from None
                 if waited >= patience_s:
                     what = "another process is writing to this campaign"
                     raise InputError(
@@ -129,14 +173,15 @@ def _chained(before: str, entry: Mapping) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:_HASH]
 
 
-def _damaged(path: Path, number: int, what: str) -> InputError:
+def _damaged(where: str, what: str) -> InputError:
     fix = "nothing was done; bring the file back from a copy"
-    return InputError(Problem(f"{path}, line {number}", what, fix=fix))
+    return InputError(Problem(where, what, fix=fix))
 
 
-def _not_written(path: Path, error: OSError) -> InputError:
+def _not_written(path: Path, error: OSError | MachineError) -> MachineError:
+    told = refused(error, path, "cannot be written") if isinstance(error, OSError) else error
     fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
-    return InputError(Problem(str(path), f"cannot be written: {error.strerror}", fix=fix))
+    return MachineError([replace(each, fix=fix) for each in told.problems])
 
 
 def of_results(results: Path) -> list[Path]:
@@ -169,8 +214,9 @@ def _by_calibration(place: Path) -> dict[str, list[Path]]:
     found: dict[str, list[Path]] = {}
     for plan in sorted(place.glob(f"*/{PLAN}")):
         try:
-            name = json.loads(plan.read_bytes())["about"]["calibration"]
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            content = json_files.values_of(json_files.bytes_of(plan), str(plan))
+            name = content["about"]["calibration"]
+        except (InputError, OSError, ValueError, LookupError, TypeError, RecursionError):
             continue  # no campaign, or one that cannot say whose it is
         if isinstance(name, str):
             found.setdefault(name, []).append(plan.parent)

@@ -6,20 +6,23 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
-from kinacc.assess.statement import CANDIDATES
-from kinacc.campaign.arm import Arm
-from kinacc.campaign.instrument import Instrument
-from kinacc.config import schema
+from kinacc.assess.statement import CANDIDATES, TARGETS
+from kinacc.campaign.arm import Arm, numbers
+from kinacc.campaign.instrument import BASE, INSTRUMENT, Instrument
+from kinacc.config import json_files, schema
 from kinacc.config.values import check
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
+from kinacc.kinematics.dh import PARAMETERS
 
 FORMAT = 1
+_ABOUT = ("robot", "calibration", "model", "point")
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,12 @@ class Points:
         return len(self.label)
 
     def number(self, label: str) -> int | None:
-        """The point of a name; None where there is none."""
-        return self.label.index(label) if label in self.label else None
+        """The point of a name, with or without spaces about it; None where there is none."""
+        return self._numbers.get(label.strip())
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {label.strip(): number for number, label in enumerate(self.label)}
 
     def position_mm(self, point: int, joints: np.ndarray | None) -> np.ndarray:
         """Modelled position (3,) at the joints reported on the spot, near those of the point."""
@@ -214,7 +221,7 @@ def to_json(plan: Plan) -> bytes:
 def from_json(text: bytes, where: str) -> Plan:
     """The plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
-        content = json.loads(text)
+        content = json_files.values_of(text, where)
         if content["format"] != FORMAT:
             what = f"format {content['format']!r}"
             raise InputError(Problem(where, what, f"format {FORMAT}", "use a later kinacc"))
@@ -237,19 +244,19 @@ def _plan(content: Mapping) -> Plan:
     return Plan(
         Points(
             tuple(each["label"] for each in points),
-            np.array([each["joints"] for each in points]),
+            numbers([each["joints"] for each in points]),
             np.array([each["directions"] for each in points], np.int8) if directed else None,
-            np.array([each["modelled_mm"] for each in points]),
-            np.array([each["slope"] for each in points]),
+            numbers([each["modelled_mm"] for each in points]),
+            numbers([each["slope"] for each in points]),
         ),
         np.array(content["order"], dtype=int),
         np.array(content["route"], dtype=int),
         assessor_of(content["assessor"]["name"], content["assessor"]["settings"]),
         tuple(
-            Instrument(each["name"], np.array(each["covariance_mm2"]), each["frame"])
+            Instrument(each["name"], numbers(each["covariance_mm2"]), each["frame"])
             for each in content["instruments"]
         ),
-        Pose(np.array(content["to_base"]["rotation"]), np.array(content["to_base"]["position_mm"])),
+        Pose(*(numbers(content["to_base"][each]) for each in ("rotation", "position_mm"))),
         Arm.of_entry(content["arm"]),
         Limits(**content["limits"]),
         content["seed"],
@@ -264,6 +271,7 @@ def _checked(plan: Plan) -> Plan:
     fits = {
         "points": joints == plan.arm.dh.joints
         and points.modelled_mm.shape == (count, 3)
+        and all(isinstance(each, str) for each in points.label)
         and points.slope.shape == (count, 3, joints)
         and (points.directions is None or points.directions.shape == (count, joints))
         and all(np.isfinite(each).all() for each in (points.joints, points.slope)),
@@ -271,16 +279,27 @@ def _checked(plan: Plan) -> Plan:
         "route": np.isin(plan.route, plan.order).all(),
         "instruments": bool(plan.instruments)
         and all(
-            each.covariance_mm2.shape == (3, 3) and np.isfinite(each.covariance_mm2).all()
+            each.covariance_mm2.shape == (3, 3)
+            and np.isfinite(each.covariance_mm2).all()
+            and isinstance(each.name, str)
+            and each.frame in (BASE, INSTRUMENT)
             for each in plan.instruments
         ),
         "to_base": plan.to_base.rotation.shape == (3, 3) and plan.to_base.position_mm.shape == (3,),
         "arm": plan.arm.joint_map.shape == (joints, joints)
         and plan.arm.turn.shape == (3, 3)
-        and plan.arm.point_mm.shape == (3,),
+        and plan.arm.point_mm.shape == (3,)
+        and all(
+            getattr(plan.arm.dh, each).shape == (joints,) for each in (*PARAMETERS, "prismatic")
+        ),
+        "about": isinstance(plan.about, Mapping)
+        and all(isinstance(plan.about.get(each), str) for each in _ABOUT),
     }
     fits["seed"] = isinstance(plan.seed, int) and plan.seed >= 0
-    fits["limits"] = _is_number(plan.limits.joint_rad) and _is_number(plan.limits.implausible_mm)
+    aims = [each for each in (plan.limits.tolerance_mm, plan.limits.width_mm) if each is not None]
+    fits["limits"] = plan.limits.target in TARGETS and all(
+        map(_is_number, (plan.limits.joint_rad, plan.limits.implausible_mm, *aims))
+    )
     for name, fit in fits.items():
         if not fit:
             raise ValueError(f"{name} does not fit the rest")

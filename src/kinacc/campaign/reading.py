@@ -11,6 +11,8 @@ from kinacc.campaign.instrument import INSTRUMENT, covariance_of
 from kinacc.campaign.plan import Plan
 from kinacc.errors import Problem
 
+_FARTHEST_MM = 1e6  # no instrument measures an arm from a kilometre away
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -78,6 +80,28 @@ def unplanned_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
     return instrument.in_base(plan.to_base.rotation)
 
 
+def entry_faults(plan: Plan, reading: Reading) -> list[str]:
+    """What keeps an entry of a journal from being a reading of this campaign."""
+    known = {each.name for each in plan.instruments}
+    joints, std = reading.joints, reading.std
+    wrong: list[Problem] = []
+    if std is not None:
+        covariance_of(std, "standard deviation", wrong)
+    faults = {
+        f"point {reading.point}": 0 <= reading.point < len(plan.points),
+        f"instrument {reading.instrument!r}": reading.instrument in known,
+        f"position {reading.position_mm}": _is_place(reading.position_mm, 3),
+        f"joints {joints}": joints is None or _is_place(joints, len(plan.slides)),
+        f"standard deviation {std!r}": not wrong,
+    }
+    return [what for what, fits in faults.items() if not fits]
+
+
+def _is_place(values: np.ndarray, count: int) -> bool:
+    """Whether these are ``count`` numbers within all lengths and angles."""
+    return values.shape == (count,) and bool((np.abs(values) <= _FARTHEST_MM).all())
+
+
 def point_at(plan: Plan, joints: np.ndarray) -> int | None:
     """The candidate whose joints all lie within the tolerance of these (k,); None for none."""
     apart = np.abs(_in_tolerances(plan, joints)).max(axis=1)
@@ -101,9 +125,10 @@ def problems_of(
     label = plan.points.label[reading.point]
     if reading.point in left_out:
         problems.append(Problem(where, f"point {label} was left out of the campaign"))
-    if not np.all(np.isfinite(reading.position_mm)):
+    if not _is_place(reading.position_mm, 3):
         said = ", ".join(f"{each:g}" for each in reading.position_mm)
-        problems.append(Problem(where, f"measured position ({said})", "three numbers, in mm"))
+        allowed = f"three numbers within {_FARTHEST_MM:g} mm"
+        problems.append(Problem(where, f"measured position ({said})", allowed))
     if reading.joints is not None:
         problems += _wrong_joints(plan, reading, where)
     if reading.std is not None:

@@ -160,7 +160,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     lines += ["## Largest errors", "", *_largest(points, shown), ""]
     lines += beyond_limits(points, shown)
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
-    lines += [f"Campaign {opened.digest}, readings {opened.journal.last}."]
+    lines += [f"{head(opened, state)}."]
     return "\n".join(lines) + "\n"
 
 
@@ -185,6 +185,13 @@ def _conformity(state: State) -> list[str]:
     return lines
 
 
+def head(opened: Opened, state: State) -> str:
+    """By what a journal is known: ``kinacc campaign verify`` holds a later one to it."""
+    count = state.numbered
+    readings = f"{count} reading{'' if count == 1 else 's'}"
+    return f"campaign {opened.digest}, {readings}, head {opened.journal.last}"
+
+
 def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markdown) -> list[str]:
     """What was measured, with what and when, a line each; ``written``: as names are shown."""
     plan = state.plan
@@ -203,6 +210,8 @@ def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markd
     ]
     if times := opened.recorded:
         lines.append(f"recorded from {min(times)} to {max(times)}")
+        if sorted(times) != list(times):
+            lines.append("the times of its entries are not in order: a clock was set in between")
     if state.in_hand:
         lines.append(f"{len(state.in_hand)} readings were taken and not asked for: not used")
     large = sum(np.linalg.norm(each.error_mm) > plan.limits.implausible_mm for each in state.told)

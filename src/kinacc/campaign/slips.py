@@ -149,7 +149,7 @@ def scatter(measured: Columns, errors: Columns, frames: Columns | None = None) -
         sessions = np.asarray(measured["session"])[row]
         for each in {*sessions}:
             base = frame(frames, PLAINEST, "base", each)
-            left_mm[sessions == each] @= base.rotation.T
+            left_mm[sessions == each] = left_mm[sessions == each] @ base.rotation.T
     session, target = (
         np.unique(np.asarray(measured[name]).astype(str), return_inverse=True)[1].ravel()
         for name in ("session", "target")

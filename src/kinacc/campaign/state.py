@@ -10,13 +10,18 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 
 import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.reading import Reading, error_mm, unplanned_mm2
+from kinacc.campaign.reading import Reading, entry_faults, error_mm, unplanned_mm2
+from kinacc.errors import Problem, refuse
+
+_UNREADABLE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+_UNKNOWN = "0001-01-01T00:00:00+00:00"  # of entries of earlier versions
 
 READINGS, LEAVE_OUT, STRIKE = "readings", "leave_out", "strike"
 
@@ -149,6 +154,48 @@ def restore(
             watch(campaign, known)
     in_hand = sorted((each for queue in waiting.values() for each in queue), key=_number)
     return State(plan, campaign, rows, told, in_hand, asked, left_out, struck, tuple(imports))
+
+
+def readings_in(entries: Iterable[Mapping]) -> int:
+    """How many readings were taken in entries of a journal."""
+    return sum(len(each["readings"]) for each in entries if each["kind"] == READINGS)
+
+
+def require_readable(plan: Plan, entries: Iterable[Mapping], where: str) -> None:
+    """Raise InputError naming every entry of a journal that says nothing about this campaign."""
+    problems, readings = [], 0
+    for number, entry in enumerate(entries, start=1):
+        try:
+            readings = _read_on(plan, entry, readings)
+        except _UNREADABLE as error:
+            what = f"is no entry of this campaign: {type(error).__name__}: {error}"
+            fix = "bring the file back from a copy"
+            problems.append(Problem(f"{where}, line {number}", what, fix=fix))
+    refuse(problems)
+
+
+def _read_on(plan: Plan, entry: Mapping, readings: int) -> int:
+    """Number of readings after an entry; an error of Python where it cannot be read."""
+    if datetime.fromisoformat(entry.get("at", _UNKNOWN)).tzinfo is None:
+        raise ValueError(f"time {entry['at']} without a time zone")
+    points, kind = range(len(plan.points)), entry["kind"]
+    if kind == READINGS:
+        for each in map(Reading.of_entry, entry["readings"]):
+            faults = entry_faults(plan, each)
+            if faults:
+                raise ValueError("; ".join(faults))
+        taken = readings + len(entry["readings"])
+        known, path = range(1, taken + 1), entry.get("path")
+        if not (path is None or isinstance(path, str)) or set(entry.get("was", ())) - set(known):
+            raise ValueError("its file is no path, or its rows are no readings")
+        return taken
+    place, allowed = {
+        LEAVE_OUT: ("point", points),
+        STRIKE: ("reading", range(1, readings + 1)),
+    }[kind]
+    if entry[place] not in allowed or not isinstance(entry["reason"], str):
+        raise ValueError(f"{place} {entry[place]!r}")
+    return readings
 
 
 def _number(each: Told) -> int:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -108,6 +110,13 @@ def carried_out(
     configs = tuple(each for word in configs for each in _files(word))
     plan = planned(configs)
     plan.check_files()
+    from kinacc.workflow import cost
+    from kinacc.workflow.catalogue import CALIBRATION, STAGES
+
+    only = CALIBRATION if target == "calibration" else STAGES
+    ahead = [] if more else cost.expected(cost.foreseen(plan, only))  # else Snakemake says it
+    for line in ahead:
+        click.echo(line, err=True)
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores or os.cpu_count() or 1), "--configfile", *configs]
     if "--workflow-profile" not in more:
@@ -116,15 +125,33 @@ def carried_out(
     command += ["--no-hooks"]  # what a run ends with is said by the command
     # Words for Snakemake may change what is read.
     known = ONE_THREAD | ({} if words[first:] else {"KINACC_FILES_READ": "1"})
-    done = subprocess.run([*command, "--", target], env=os.environ | known, check=False)
-    if done.returncode:
-        if not more and any(Path(".snakemake/locks").glob("*.lock")):  # which --quiet leaves unsaid
-            what = "is locked: another run is at work in it, or one was killed"
-            fix = f"where none is: kinacc calibrate {shlex.join(words)} -- --unlock, and once more"
-            raise InputError(Problem(str(Path.cwd()), what, fix=fix))
-        raise SystemExit(done.returncode)
-    ran = not {"-n", "--dry-run", "--dryrun", "--unlock", "--lint"} & set(more)
+    code = _carried_out([*command, "--", target], os.environ | known)
+    if code:
+        raise SystemExit(code)
+    ran = not {"-n", "--dry-run", "--dryrun", "--lint"} & set(more)
     return configs, plan if ran else None
+
+
+def _carried_out(command: Sequence[str], environment: Mapping[str, str]) -> int:
+    """The exit code of a command that ends in order where this one is told to stop.
+
+    All processes of a terminal hear Ctrl-C; it does from when it can say so in a line, and until
+    then from this process alone.
+    """
+    from kinacc.cli.group import Terminated
+
+    def deaf() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    with subprocess.Popen(command, env=environment, preexec_fn=deaf) as started:
+        try:
+            return started.wait()
+        except KeyboardInterrupt as stop:
+            with suppress(KeyboardInterrupt):
+                started.terminate()
+                if started.wait() > 0:  # and it has said so
+                    raise SystemExit(143 if isinstance(stop, Terminated) else 130) from None
+            raise
 
 
 def _files(word: str) -> list[str]:

@@ -21,6 +21,7 @@ def campaign() -> None:
     record   take a reading, or a file of readings
     status   what may be said so far, and what is still needed
     report   tables, picture and text
+    verify   whether the journal still holds what a report said
 
     \b
     Example:
@@ -229,3 +230,26 @@ def report(folder, to, formats, out) -> None:
     from kinacc.cli import campaigns
 
     campaigns.write_report(folder, to, formats, out)
+
+
+@campaign.command("verify")
+@click.argument("folder", type=click.Path())
+@option("--head", help="Head of the journal, as a report gives it.")
+@option("--readings", type=click.IntRange(0), help="Number of readings, as a report gives it.")
+@answers("Print what was found as JSON.")
+def verify(folder, head, readings, out) -> None:
+    """Say whether the journal in FOLDER is whole, and still holds what a report was made of.
+
+    Every line follows from the one before, so that a line cannot be changed or taken out without a
+    trace; lines at the end can, if all files of the folder are rewritten. A report states the head
+    of the journal and the number of readings: kept elsewhere, they tell a shortened journal, with
+    exit code 1. Readings that were taken since do no harm.
+
+    \b
+    Example:
+      kinacc campaign verify check
+      kinacc campaign verify check --head 5bd24b8a6c2fd9b1 --readings 57
+    """
+    from kinacc.cli import campaigns
+
+    campaigns.verify(folder, head, readings, out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import click
@@ -16,6 +16,7 @@ from kinacc.campaign import folder as folders
 from kinacc.campaign import marks, words
 from kinacc.campaign.folder import open_
 from kinacc.campaign.plan import Limits
+from kinacc.campaign.state import readings_in
 from kinacc.cli import campaigns_answers as answers
 from kinacc.cli import choice
 from kinacc.cli.output import Output
@@ -207,6 +208,31 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     lines.append(f"{into}: {', '.join(written)}")
     lines += [out.page] if out.page is not None else []
     out.say({**facts, "folder": str(into), "files": written, "page": out.page}, "\n".join(lines))
+
+
+def verify(path: str, head: str | None, readings: int | None, out: Output) -> None:
+    """Say what the journal holds, and whether it goes on from the one a report was made of."""
+    opened = open_(path)
+    problems = folders.held_to(opened, head, readings)
+    count = readings_in(opened.journal.entries)
+    entries = len(opened.journal.entries)
+    said = f"{count} reading{'' if count == 1 else 's'}, head {opened.journal.last}"
+    lines = [f"{opened.folder}: each of {entries} entries follows from the one before; {said}"]
+    lines += map(str, problems)
+    if not problems and (head, readings) != (None, None):
+        lines.append("it holds what was reported")
+    if not out.as_json:
+        say_doubts(opened)
+    facts = {
+        "campaign": opened.digest,
+        "head": opened.journal.last,
+        "entries": entries,
+        "readings": count,
+        "problems": [asdict(each) for each in problems],
+    }
+    out.say(facts, "\n".join(lines))
+    if problems:
+        raise SystemExit(1)
 
 
 def say_doubts(opened: folders.Opened) -> None:

@@ -50,6 +50,7 @@ def record(given: Asked, out: Output) -> None:
         what = "is given twice" if one else "is not given"
         raise InputError(Problem("the reading", what, "--position-mm, or a FILE"))
     with folder.writing(given.folder) as opened:
+        refuse([] if given.accept_implausible else opened.clock_went_back(), "Nothing was recorded")
         before = opened.state()
         say_doubts(opened)
         made = _Made([_single(given, before)]) if one else _of_file(given, before)
@@ -135,7 +136,7 @@ def _single(given: Asked, before: State) -> Reading:
         problems.append(Problem("--instrument", f"{instrument!r}", known))
     point = before.asked
     if given.point is not None:
-        point = plan.points.label.index(given.point) if given.point in plan.points.label else None
+        point = plan.points.number(given.point)
         if point is None:
             problems.append(Problem("--point", f"{given.point!r} is no candidate"))
     elif point is None:
@@ -155,7 +156,8 @@ def _single(given: Asked, before: State) -> Reading:
 def _unusual_mm(before: State, more: Iterable[Reading] = ()) -> float:
     """Size of an error that is unlike those of the readings taken, and of ``more`` of a file."""
     sizes = [float(np.linalg.norm(each.error_mm)) for each in (*before.told, *before.in_hand)]
-    sizes += [float(np.linalg.norm(reading.error_mm(before.plan, each))) for each in more]
+    with np.errstate(over="ignore"):  # what lies that far away is refused on its own
+        sizes += [float(np.linalg.norm(reading.error_mm(before.plan, each))) for each in more]
     usable = [size for size in sizes if np.isfinite(size)]
     return slips.unusual_mm(usable, float(np.sqrt(np.trace(before.plan.covariance_mm2))))
 
@@ -291,14 +293,13 @@ def _rows(table: RawTable, instrument: str | None, before: State):
     if instrument is not None and instrument not in known:
         problems.append(Problem("--instrument", f"{instrument!r}", ", ".join(known)))
     refuse(problems, "Nothing was recorded")
-    place = {name.strip(): number for number, name in enumerate(plan.points.label)}
     rows: list[Reading | Problem] = []
     for i in range(len(table)):
         where = f"{table.path}, line {table.line[i]}"
         at = None if joints is None or not np.isfinite(joints[i]).all() else joints[i]
         if "pose" in table.columns:
             name = str(table.columns["pose"][i]).strip()
-            point = place.get(name)
+            point = plan.points.number(name)
             wrong = f"{name!r} is no candidate"
         else:
             point = None if at is None else reading.point_at(plan, at)
@@ -316,12 +317,12 @@ def _rows(table: RawTable, instrument: str | None, before: State):
 
 
 def _point_named(opened: Opened, name: str) -> int:
-    label = opened.plan.points.label
-    if name not in label:
-        raise InputError(
-            Problem("point", f"{name!r} is no candidate", f"{label[0]} .. {label[-1]}")
-        )
-    return label.index(name)
+    points = opened.plan.points
+    point = points.number(name)
+    if point is None:
+        allowed = f"{points.label[0]} .. {points.label[-1]}"
+        raise InputError(Problem("point", f"{name!r} is no candidate", allowed))
+    return point
 
 
 def _three(text: str, problems: list[Problem]) -> np.ndarray:

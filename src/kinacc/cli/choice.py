@@ -21,7 +21,20 @@ if TYPE_CHECKING:
 
 Record = TypeVar("Record")
 CONFIG = "config.yaml"
-option = partial(click.option, show_default=True)
+
+
+class _Option(click.Option):
+    """An option whose numbers are written in plain digits: Python would take 1_000 and １ too."""
+
+    def type_cast_value(self, ctx: click.Context, value: object) -> object:
+        if isinstance(self.type, (click.types.FloatParamType, click.types.IntParamType)):
+            for each in value if isinstance(value, (list, tuple)) else [value]:
+                if isinstance(each, str) and not (each.isascii() and "_" not in each):
+                    self.type.fail(f"{each!r} is not a valid number.", self, ctx)
+        return super().type_cast_value(ctx, value)
+
+
+option = partial(click.option, show_default=True, cls=_Option)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,16 +43,11 @@ def first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> list[dict[str, 
 
 def poses_without_robot(guess: Guess) -> list[dict[str, object]]:
     """The same where no robot is known: joints need none to be read."""
-    from tempfile import TemporaryDirectory
-
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import template_text
     from kinacc.measurements.reader import read
 
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "any.yaml"
-        file.write_text(template_text("any", guess.joints), encoding="utf-8")
-        arm = robots.load(str(file))
+    arm = robots.of_text(template_text("any", guess.joints), "any.yaml")
     return first_poses(read(guess.section, arm, strict=False), arm.dh.prismatic)
 
 

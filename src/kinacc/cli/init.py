@@ -180,12 +180,15 @@ def _stated(guess: Guess, options: dict) -> Guess:
 
 def _refuse(paths, name: str, force: bool) -> None:
     """Raise where the name is no name, or a file is there that must not be replaced."""
+    from kinacc.config.names import LONGEST
     from kinacc.errors import Problem, refuse
     from kinacc.measurements.intake.write import plain_name
 
     problems = []
     if name != plain_name(f"{name}.csv"):
-        problems.append(Problem("--name", repr(name), "letters, digits, _ and -"))
+        problems.append(
+            Problem("--name", repr(name), f"at most {LONGEST} letters, digits, _ and -")
+        )
     if not force:
         problems += [
             Problem(str(path), "is there already", fix="give --force to replace it, or --name")

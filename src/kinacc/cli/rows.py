@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
+from kinacc.config import json_files
 from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
@@ -320,7 +320,8 @@ def open_table(path: str | Path) -> RawTable:
 def _of_json(path: Path) -> RawTable:
     """The rows of an answer that a command gave as JSON."""
     try:
-        rows = json.loads(path.read_bytes(), parse_int=_whole)["rows"]
+        content = json_files.bytes_of(path)
+        rows = json_files.values_of(content, str(path), parse_int=_whole)["rows"]
         names = list(rows[0])
         columns = {name: [row.get(name) for row in rows] for name in names}
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
@@ -341,7 +342,7 @@ def _with_units(table: RawTable) -> RawTable:
     schema = pq.read_schema(table.path)
 
     def called(name: str) -> str:
-        unit = ((schema.field(name).metadata or {}).get(b"unit") or b"").decode()
+        unit = ((schema.field(name).metadata or {}).get(b"unit") or b"").decode(errors="replace")
         whole = f"{name}_{unit}"
         is_joint = re.fullmatch(r"q\d+", name) and unit in (*ANGLE, *LENGTH)
         return whole if is_joint and whole not in table.columns else name

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import click
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
+
+if TYPE_CHECKING:
+    from kinacc.workflow.cost import Cost
 
 
 @click.command("tournament")
@@ -43,9 +47,9 @@ def tournament(config, results, size, parts, part, assessor, noise_mm, cores, ti
     """
     from kinacc.errors import InputError, Problem, refuse
     from kinacc.workflow.catalogue import TOURNAMENT
-    from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.plan import planned
-    from kinacc.workflow.runner import execute, is_done
+    from kinacc.workflow.results_lock import running, sharing
+    from kinacc.workflow.runner import execute
 
     plan = planned(config or ("config.yaml",), results=results)
     plan = plan.contest(size, parts, assessor, noise_mm)
@@ -56,19 +60,32 @@ def tournament(config, results, size, parts, part, assessor, noise_mm, cores, ti
         raise InputError(Problem("--part", repr(part), f"{names[0]} to {names[-1]}"))
     wanted = [part] if part else names
     waiting = [plan.job("tournament_chunk", TOURNAMENT, name) for name in wanted]
+    with running(results) if part is None else sharing(results):
+        _play(waiting, cores)
+        if part is not None:
+            return
+        gathering = plan.job("tournament_tables", TOURNAMENT)
+        execute(gathering, bar=True)
+    _tell(gathering.outputs, _times(waiting[0]) if times else {}, out)
+
+
+def _play(waiting: Sequence, cores: int) -> None:
+    """Compute the parts that are not there yet."""
+    from kinacc.workflow import cost
+    from kinacc.workflow.local_executor import execute_all
+    from kinacc.workflow.runner import is_done
+
     left = [job for job in waiting if not is_done(job)]
-    if len(left) < len(waiting):
-        click.echo(f"{len(waiting) - len(left)} of {len(waiting)} parts are there", err=True)
+    for line in cost.expected({("", "tournament"): _cost(left)} if left else {}):
+        click.echo(line, err=True)
     finished = len(waiting) - len(left)
+    if finished:
+        click.echo(f"{finished} of {len(waiting)} parts are there", err=True)
     try:
         for job in execute_all(left, cores):
             finished += 1
             if len(left) > 1 and cores > 1:
                 click.echo(f"{job.label}: done, {finished} of {len(waiting)}", err=True)
-        if part is not None:
-            return
-        gathering = plan.job("tournament_tables", TOURNAMENT)
-        execute(gathering, bar=True)
     except KeyboardInterrupt:
         click.echo(
             f"tournament: {finished} of {len(waiting)} parts are done and kept; the same command "
@@ -76,7 +93,20 @@ def tournament(config, results, size, parts, part, assessor, noise_mm, cores, ti
             err=True,
         )
         raise
-    _tell(gathering.outputs, _times(waiting[0]) if times else {}, out)
+
+
+def _cost(left: Sequence) -> Cost:
+    """What the parts that are left cost, by the share of the tournament that they are."""
+    from kinacc.study.tournament.contest import CONTESTANTS, Contest
+    from kinacc.workflow.cost import of_tournament
+
+    settings = left[0].settings
+    contest, whole = Contest.of(settings), Contest.of({**settings, "noise_mm": ()})
+    share = len(contest.assessors) / len(CONTESTANTS)
+    share *= len(contest.size.noise_mm) / len(whole.size.noise_mm)
+    share *= len(left) / int(left[0].part.rpartition("-")[2])
+    found = of_tournament(settings["size"])
+    return found._replace(seconds=share * found.seconds)
 
 
 def _times(job) -> dict[str, float]:

@@ -27,6 +27,7 @@ from kinacc.errors import InputError, Problem
 Contradictions = Callable[..., Iterable[Problem]]
 COMMAND_LINE = "command line"
 _MOST_DATASETS = 5_000
+_MOST_PROBLEMS = 1_000  # more are not sought: each takes a search for what was meant
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"))
 # Values that name files: in every data set, and of the top level.
@@ -170,6 +171,10 @@ def _resolve(
         return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
     resolved = {}
     for name, content in datasets.items():
+        if len(problems) > _MOST_PROBLEMS:
+            what = "this data set and those after it were not looked at"
+            problems.append(Problem(place(("datasets", name)), what, fix="mend the others first"))
+            break
         problems += check_dataset_name(name, place)
         resolved[name], found = _dataset(name, content, shared, place, folder, contradictions)
         problems += found
@@ -216,7 +221,7 @@ def _place(documents: Sequence[Document], path: KeyPath) -> str:
         for document in reversed(documents):
             if document.gives(path[:length]):
                 return document.place(path)
-    return f"default, {dotted(path)}"
+    return f"default, {dotted(path)}" if path else documents[-1].name
 
 
 def _defined_twice(documents: Sequence[Document]) -> list[Problem]:

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from kinacc.config.names import LONGEST
 from kinacc.config.reading import KeyPath
 from kinacc.config.schema import DATASET_NAME, Key, Section, defaults, settings
 from kinacc.config.values import INVALID, Place, check, nearest, shown, unknown_key
-from kinacc.errors import Problem
+from kinacc.errors import Problem, first_few
 
 ROBOTS = Path(__file__).parents[1] / "kinematics" / "robots"
 _MAPPINGS = (
@@ -20,6 +21,7 @@ _MAPPINGS = (
     ("calibration", "frames"),
     ("data_check", "accept"),
 )
+_MOST_UNKNOWN = 100  # in one section: nobody misspells more, and each is held against all names
 ROBOT = Key("robot", "text", None, "name of a shipped robot, or path of a robot file")
 
 
@@ -34,6 +36,10 @@ def check_section(
         return {}, [Problem(place(path), what, f"keys: {', '.join(section.names)}")]
     usable: dict[str, Any] = {}
     problems: list[Problem] = []
+    unknown = [name for name in content if section.entry(name) is None]
+    if len(unknown) > _MOST_UNKNOWN:
+        what = f"has {len(unknown)} unknown keys, such as {first_few([*map(shown, unknown)], 3)}"
+        return {}, [Problem(place(path), what, ", ".join(section.names))]
     for name, value in content.items():
         here, entry = (*path, name), section.entry(name)
         if entry is None:
@@ -52,7 +58,7 @@ def check_section(
 
 def check_dataset_name(name: Any, place: Place) -> list[Problem]:
     """A name becomes a folder below results/, so it may not lead anywhere else."""
-    allowed = "letters, digits, _ and -, the first not -"
+    allowed = f"at most {LONGEST} letters, digits, _ and -, the first not -"
     where = place(("datasets", name))
     if not isinstance(name, str):
         fix = "put the name in quotes"
@@ -60,7 +66,7 @@ def check_dataset_name(name: Any, place: Place) -> list[Problem]:
     if name == "tournament":
         what = "'tournament' is the folder of the tournament of all data sets"
         return [Problem(where, what, f"another name of {allowed}")]
-    if not re.fullmatch(DATASET_NAME, name):
+    if not re.fullmatch(DATASET_NAME, name) or len(name) > LONGEST:
         return [Problem(where, f"{shown(name)} cannot be the name of a data set", allowed)]
     return []
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from kinacc.config.reading import KeyPath
 from kinacc.config.schema import NUMERIC, Key, Section, walk
-from kinacc.errors import Problem
+from kinacc.errors import Problem, first_few
 
 Place = Callable[[KeyPath], str]
 Checked = tuple[Any, list[Problem]]  # the value in its canonical type, what is wrong with it
@@ -59,8 +61,12 @@ def shown(value: Any) -> str:
 def nearest(word: object, known: tuple[str, ...]) -> str:
     """The known word most like ``word``; empty if none is."""
     text = str(word)
-    if len(text) > _LONGEST_WORD:
-        return ""
+    return _nearest(text, known) if len(text) <= _LONGEST_WORD else ""
+
+
+@lru_cache(1000)
+def _nearest(text: str, known: tuple[str, ...]) -> str:
+    """Thousands of data sets may have the same mistake."""
     stem = _stem(text)
     same = [each for each in known if _stem(each) == stem]
     found = same or difflib.get_close_matches(text, known, n=1, cutoff=0.6)
@@ -198,6 +204,11 @@ def _list(key: Key, value: Any, path: KeyPath, place: Place, item: Check) -> Che
     return (INVALID if problems else items), problems
 
 
+def _repeated(items: list[Any]) -> list[Any]:
+    """What stands in a list more than once, each of it once."""
+    return [item for item, count in Counter(items).items() if count > 1]
+
+
 def _pair(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     if not isinstance(value, list) or len(value) != 2:
         return _refuse(key, path, place, f"{shown(value)} is not two numbers")
@@ -216,9 +227,9 @@ def _pair(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
 def _distinct(item: Check) -> Check:
     def check_list(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
         items, problems = _list(key, value, path, place, item)
-        repeated = [] if problems else sorted({str(e) for e in items if items.count(e) > 1})
+        repeated = [] if problems else sorted(map(str, _repeated(items)))
         if repeated:
-            return _refuse(key, path, place, f"names {', '.join(repeated)} more than once")
+            return _refuse(key, path, place, f"names {first_few(repeated)} more than once")
         return items, problems
 
     return check_list
@@ -270,9 +281,9 @@ def _rows(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     if problems:
         return INVALID, problems
     every = [line for item in items for line in item["lines"]]
-    twice = sorted({line for line in every if every.count(line) > 1})
+    twice = sorted(_repeated(every))
     if twice:
-        what = f"names line {', '.join(map(str, twice))} more than once"
+        what = f"names line {first_few(twice)} more than once"
         return _refuse(key, path, place, what, "give every line one reason")
     return items, []
 

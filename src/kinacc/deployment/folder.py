@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
+from kinacc.artifacts.columns import joint_count
 from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.calibration import blind_words
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.record import MODELS, Calibration, Residual
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, first_few, gathered, refuse
 from kinacc.geometry import Pose
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
@@ -37,8 +38,6 @@ def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarra
     ``more`` are read where they are there, beside those that every use needs. Units stand in the
     names (_mm, _rad). Raises InputError naming all tables that are missing.
     """
-    from kinacc.artifacts import store
-
     folder = Path(folder)
     missing = [
         Problem(str(folder / f"{name}.parquet"), "no such file", fix="run the workflow first")
@@ -48,7 +47,47 @@ def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarra
     refuse(missing, f"{folder} holds no calibration")
     names = dict.fromkeys((*_NEEDED, *_WANTED, *more))
     present = [name for name in names if (folder / f"{name}.parquet").is_file()]
-    return {name: store.read(folder / f"{name}.parquet") for name in present}
+    problems: list[Problem] = []
+    tables = {}
+    for name in present:
+        with gathered(problems):
+            tables[name] = _Table.of(name, folder / f"{name}.parquet")
+    refuse(problems, f"{folder} cannot be used")
+    return tables
+
+
+class _Table(dict[str, np.ndarray]):
+    """Columns of a table of results; one that is asked for and is not there is a problem."""
+
+    path: Path
+
+    @classmethod
+    def of(cls, name: str, path: Path) -> _Table:
+        """The table of a file. InputError where it has no rows, or words in place of numbers."""
+        from kinacc.artifacts import store
+
+        table = cls(store.read(path))
+        table.path = path
+        contract = store.artefact_named(name)
+        rows = len(next(iter(table.values()), ()))
+        problems = [Problem(str(path), "has no rows", fix=store.remake(path))]
+        problems = problems if not rows and not contract.may_be_empty else []
+        for column in contract.for_joints(joint_count(contract, table)):
+            values = table.get(column.name)
+            if values is None or (column.kind == "text") == (values.dtype == object):
+                continue
+            kind, other = ("text", "numbers") if column.kind == "text" else ("numbers", "text")
+            where = f"{path}, column {column.name}"
+            problems.append(Problem(where, f"holds {other}", kind, store.remake(path)))
+        refuse(problems)
+        return table
+
+    def __missing__(self, name: str) -> np.ndarray:
+        from kinacc.artifacts import store
+
+        raise InputError(
+            Problem(str(self.path), f"has no column {name}", fix=store.remake(self.path))
+        )
 
 
 def recorded_robot(folder: Path | str) -> Robot | None:
@@ -56,13 +95,12 @@ def recorded_robot(folder: Path | str) -> Robot | None:
 
     Raises InputError where what it says cannot be read.
     """
-    from kinacc.artifacts import store
     from kinacc.kinematics import robot
 
     path = Path(folder) / "robot.parquet"
     if not path.is_file():
         return None
-    return robot.of_text(str(store.read(path)["description"][0]), str(path))
+    return robot.of_text(str(_Table.of("robot", path)["description"][0]), str(path))
 
 
 def calibration(
@@ -187,8 +225,10 @@ def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
         return None
     names = list(dict.fromkeys(str(each) for each in columns["parameter"]))
     place = {name: number for number, name in enumerate(names)}
-    row = np.array([place[each] for each in columns["parameter"]])
-    column = np.array([place[each] for each in columns["other"]])
+    row, column = (
+        _places(columns[each], place, f"table {choice}_covariance")
+        for each in ("parameter", "other")
+    )
     covariance = np.zeros((len(names), len(names)))
     covariance[row, column] = covariance[column, row] = columns["covariance"]
     return Uncertainty(tuple(names), covariance, _undetermined(tables, choice, place))
@@ -198,11 +238,20 @@ def _undetermined(tables: Tables, choice: str, place: Mapping[str, int]) -> np.n
     fit = tables.get(f"{choice}_fit")
     if fit is None:
         return np.zeros((0, len(place)))
-    rows = np.flatnonzero(np.asarray(fit["quantity"]) == "undetermined_direction")
-    directions = np.zeros((int(max(fit["number"][rows], default=0)), len(place)))
-    for row in rows:
-        directions[int(fit["number"][row]) - 1, place[fit["parameter"][row]]] = fit["value"][row]
+    rows = np.asarray(fit["quantity"]) == "undetermined_direction"
+    numbers, direction = np.unique(fit["number"][rows], return_inverse=True)
+    directions = np.zeros((len(numbers), len(place)))
+    column = _places(fit["parameter"][rows], place, f"table {choice}_fit")
+    directions[direction, column] = fit["value"][rows]
     return directions
+
+
+def _places(names: np.ndarray, place: Mapping[str, int], table: str) -> np.ndarray:
+    """Places (n,) of parameters; InputError where the covariance has none of a name."""
+    unknown = sorted({str(each) for each in names if each not in place})
+    what = f"has parameters without a variance: {first_few(unknown)}"
+    refuse([Problem(table, what)] if unknown else [])
+    return np.array([place[each] for each in names], dtype=int)
 
 
 def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:

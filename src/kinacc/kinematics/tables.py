@@ -17,12 +17,19 @@ _ROUNDING = 1e-9
 
 
 def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorModel]:
-    """Every model of an arm by name: those of tables ``<kind>_model``, and its ``nominal`` one."""
-    made = {
-        kind: of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)
-        for kind in MODELS
-        if f"{kind}_model" in tables
-    }
+    """Every model of an arm by name: those of tables ``<kind>_model``, and its ``nominal`` one.
+
+    Raises InputError where a table lacks rows of a model, or has some twice.
+    """
+    made: dict[str, ErrorModel] = {}
+    for kind in MODELS:
+        if f"{kind}_model" not in tables:
+            continue
+        try:
+            made[kind] = of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)
+        except (LookupError, TypeError, ValueError) as error:
+            what = f"holds no whole model: {error}"
+            raise InputError(Problem(f"table {kind}_model", what)) from None
     return {**made, NOMINAL: nominal}
 
 

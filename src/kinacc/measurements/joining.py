@@ -16,7 +16,7 @@ from kinacc.measurements.times import seconds
 
 NAME, TIME, ORDER = "name", "time", "order"
 STILL_RAD = np.deg2rad(0.02)  # joints that move less stand still
-_NUMBER = re.compile(r"\d+")
+_NUMBER = re.compile(r"(?<!\d)\d{1,100}(?!\d)")  # longer ones number nothing
 _AGAIN = re.compile(r"(?<=\d)[_-]\d+$")  # P12_1, P12-2: the readings of P12
 _BESIDE = re.compile(r"[\s\[\](){}\"']+")
 _OTHER = "joints file "  # before columns of the joints' file whose name the points' file has too

@@ -166,7 +166,9 @@ def numbers_of(text: str) -> np.ndarray:
     None where a word is no number, or one beyond all lengths and angles.
     """
     try:
-        values = np.array([float(word) for word in text.replace(",", " ").split()])
+        # Of other alphabets' digits, and of 1_000, Python would make numbers.
+        plain = text if text.isascii() and "_" not in text else "none"
+        values = np.array([float(word) for word in plain.replace(",", " ").split()])
     except ValueError:
         return np.zeros(0)
     return values if (np.abs(values) <= _LARGEST).all() else np.zeros(0)

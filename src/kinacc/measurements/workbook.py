@@ -18,6 +18,7 @@ from kinacc.measurements.table import (
 )
 from kinacc.measurements.written import Written
 
+_LAST_ROW = 1_048_576  # that a workbook can have
 _MOST_BYTES = 150_000_000  # unpacked; a sheet of a million cells has some 40 MB
 
 
@@ -75,11 +76,17 @@ class Workbook:
 
     def rows(self, sheet: str, most: int = MOST_ROWS) -> Iterator[Row]:
         """Rows of a sheet that are not blank, each with its number, blank cells at its end cut."""
-        count = seen = 0
+        count = seen = held = 0
         worksheet = self._book[sheet]
         worksheet.reset_dimensions()  # what a workbook says of its size may be wrong
         try:
             for number, values in enumerate(worksheet.iter_rows(values_only=True), 1):
+                held += len(values)
+                if number > _LAST_ROW or held > 3 * MOST_CELLS:  # blank ones, by their places
+                    what = f"more than {number - 1} rows in sheet {sheet!r}"
+                    raise InputError(Problem(self.path, what, ALLOWED, SMALLER))
+                if values.count(None) == len(values):
+                    continue
                 cells = [_cell(value) for value in values]
                 while cells and cells[-1] is None:
                     cells.pop()

@@ -13,7 +13,7 @@ from kinacc.assess.conformity import ACCEPT, REJECT, decide
 from kinacc.assess.statement import REGION, Statement
 from kinacc.campaign import consistency, marks, words
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.report import facts, grounds, read_above
+from kinacc.campaign.report import facts, grounds, head, read_above
 from kinacc.campaign.state import State
 from kinacc.report.campaign_course import course, mm, scatter
 from kinacc.report.campaign_points import points, readings
@@ -292,7 +292,7 @@ def _grounds(opened: Opened, state: State) -> Section:
     return Section(
         "grounds",
         "What the bounds rest on",
-        f"campaign {opened.digest}, readings {opened.journal.last}",
+        head(opened, state),
         "The conditions of every statement on this page, and how the campaign was fixed before its "
         "first reading.",
         "Good: each of them holds in your cell. Bad: one that does not; the bounds then say "

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 
+from kinacc.artifacts.atomic import write_whole
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.config.schema import defaults
@@ -139,7 +139,7 @@ def write(path: str, wanted: int) -> int:
     """Search under the default configuration and write the table; returns the seeds tried."""
     with reporting("draw-robots", bar=True) as progress:
         found = search(bench_of({"robot": "mh180", **defaults()}), wanted, progress)
-    Path(path).write_text(as_csv(found), encoding="utf-8")
+    write_whole(path, as_csv(found).encode())
     return found[-1].draw.seed + 1
 
 

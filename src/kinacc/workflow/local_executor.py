@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import Process, connection
+from pathlib import Path
 
 from kinacc.workflow.runner import Job, execute
 
@@ -51,21 +52,24 @@ def execute_all(jobs: Sequence[Job], cores: int = 1) -> Iterator[Job]:
 
 def _alone(job: Job) -> None:
     """One job in its process. Ctrl-C reaches all processes of a terminal; the first one decides."""
+    from kinacc.workflow.results_lock import joined
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
-    execute(job)
+    with joined():
+        execute(job)
 
 
 def _end(running: Iterable[tuple[Process, Job]]) -> None:
-    from kinacc.artifacts.atomic import remove_unfinished
+    from kinacc.artifacts.atomic import sweep
 
     for process, _ in running:
         process.kill()  # a compiled kernel would keep a politer signal waiting
     for process, job in running:
         process.join()
-        for path in job.outputs.values():
-            remove_unfinished(path, process.pid)
+        for folder in {Path(path).parent for path in job.outputs.values()}:
+            sweep(folder)
 
 
 @contextmanager

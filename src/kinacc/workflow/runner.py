@@ -12,9 +12,10 @@ import sys
 import traceback
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from importlib import import_module
+from io import FileIO, TextIOWrapper
 from pathlib import Path
 from types import MappingProxyType
 from typing import TextIO
@@ -22,7 +23,7 @@ from typing import TextIO
 from kinacc import __version__
 from kinacc.artifacts import pictures, provenance, records
 from kinacc.artifacts.contract import INPUTS_DIGESTS, PROVENANCE_KEYS
-from kinacc.errors import InputError, KinaccError
+from kinacc.errors import InputError, KinaccError, refused
 from kinacc.progress import reporting
 from kinacc.workflow.inputs import Paths, digests, read_inputs
 
@@ -37,7 +38,8 @@ class Job:
     what its results depend on beside what its module imports, ``kind`` the error model it fits.
     ``label`` begins what is said of faults, ``doing`` what is said of progress. ``code``: hash of
     the code, where that is known already. ``record``: the file that the run of ``stage`` leaves
-    last; empty where its files stand in no folder of a data set.
+    last; empty where its files stand in no folder of a data set. ``remake``: the command that makes
+    an input again, see :func:`kinacc.workflow.inputs.read_inputs`.
     """
 
     module: str
@@ -54,6 +56,7 @@ class Job:
     code: str = ""
     stage: str = ""
     record: str = ""
+    remake: str = ""
 
 
 def execute(job: Job, bar: bool = False) -> None:
@@ -65,19 +68,27 @@ def execute(job: Job, bar: bool = False) -> None:
             return
         except KinaccError as error:
             reason = f"{label}: {error}\n"
+        except OSError as error:
+            reason = f"{label}: {refused(error)}\n"
         except MemoryError as error:
             reason = f"{label}: there is not enough memory: {error or 'ask for less'}\n"
         except Exception:
             reason = f"{label} failed:\n{traceback.format_exc()}"
-        for stream in filter(None, (sys.stderr, log)):
-            stream.write(reason)
-            stream.flush()
+        _tell(reason, log)
     raise SystemExit(1)
+
+
+def _tell(text: str, log: TextIO | None) -> None:
+    """Write to the screen and the log, as far as they take it."""
+    for stream in filter(None, (sys.stderr, log)):
+        with suppress(OSError):
+            stream.write(text)
+            stream.flush()
 
 
 def perform(job: Job, progress: object = None) -> None:
     """Run a stage and let its errors through."""
-    tables, read = read_inputs(job.inputs)
+    tables, read = read_inputs(job.inputs, job.remake)
     stage = import_module(job.module)
     if not gc.isenabled():
         # What is imported stays; a collection need not look at it each time.
@@ -171,8 +182,7 @@ def _recording(path: str | None, label: str) -> Iterator[TextIO | None]:
     if path is None:
         yield None
         return
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    with open(path, "w", encoding="utf-8") as log, warnings.catch_warnings():
+    with _log(path, label) as log, warnings.catch_warnings():
         warnings.simplefilter("default")
 
         def show(message, category, filename, lineno, file=None, line=None) -> None:
@@ -180,9 +190,18 @@ def _recording(path: str | None, label: str) -> Iterator[TextIO | None]:
             text = f"{label}: {message}\n"
             if category is not UserWarning:
                 text = f"{label}: " + warnings.formatwarning(message, category, filename, lineno)
-            for stream in (sys.stderr, log):
-                stream.write(text)
-                stream.flush()
+            _tell(text, log)
 
         warnings.showwarning = show
         yield log
+
+
+def _log(path: str, label: str) -> AbstractContextManager[TextIO | None]:
+    """A log's file, or none where the machine refuses it: a stage can do its work without."""
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        # Nothing is kept back, so that closing a log on a full disk has nothing left to write.
+        return TextIOWrapper(FileIO(path, "w"), "utf-8", write_through=True)
+    except OSError as error:
+        _tell(f"{label}: {refused(error, path, 'no log is written')}\n", None)
+        return nullcontext()

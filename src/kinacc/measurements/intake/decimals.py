@@ -136,7 +136,7 @@ def _by_angles(texts: Mapping[str, str]) -> str:
     for mark in _ENDS:
         for name, text in texts.items():
             cells = _pattern("open", mark).findall(text) if name_of(name).unit == "deg" else ()
-            if any(int(re.sub(r"\D", "", cell)) > _MOST_DEG for cell in cells):
+            if any(float(re.sub(r"\D", "", cell)) > _MOST_DEG for cell in cells):
                 return mark
     return ""
 

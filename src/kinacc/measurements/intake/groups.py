@@ -137,7 +137,7 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
         (name, place, str(int(word)), "")
         for name in names
         for place, word in enumerate(name.words)
-        if word.isdigit() and len(word) <= 2
+        if word.isdecimal() and len(word) <= 2
     ]
     for words, _, columns in _alike(labels):
         numbers = sorted(columns, key=int)

@@ -256,7 +256,7 @@ def _counts_rows(how: Join, joints: _File, points: _File) -> bool:
     for file, key in ((joints, how.key), (points, how.key_of_points)):
         told = joining.labels(file.table.columns[key])
         words = set(name_of(key or "").words)
-        counts = [each for each in told if each.isdigit()]
+        counts = [each for each in told if each.isdecimal() and len(each) <= 100]
         steps = {int(b) - int(a) for a, b in pairwise(counts)}
         if len(counts) < len(told) or steps != {1} or (same and words & _OF_POSES):
             return False

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from kinacc.config.names import LONGEST
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake.guess import Guess
@@ -150,6 +151,6 @@ def scalar(value: Any) -> str:
 
 
 def plain_name(path: str | Path) -> str:
-    """Name of a data set after a file: letters, digits, _ and -."""
+    """Name of a data set after a file: letters, digits, _ and -, not too many."""
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", Path(path).stem).strip("_-")
-    return stem or "measured"
+    return stem[:LONGEST].rstrip("_-") or "measured"

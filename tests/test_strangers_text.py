@@ -1,0 +1,102 @@
+"""Descriptions from strangers: many data sets are taken, what would eat memory is refused soon."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from command_line import call
+
+from kinacc.config.reading import read
+from kinacc.errors import InputError
+from kinacc.measurements.intake.write import plain_name
+from kinacc.workflow.contradictions import load
+
+ONE = """  arm_{0}:
+    robot: ur10
+    measurements:
+      source: file
+      folds: 5
+      file:
+        path: points.csv
+        joint_unit: rad
+        length_unit: m
+        orientation: {{kind: none}}
+        columns: {{q1: j1, q2: j2, q3: j3, q4: j4, q5: j5, q6: j6, x: X, y: Y, z: Z}}
+    calibration: {{base_and_tool: estimated, dh: {{fit_to: measurements, hayati_joints: [2, 3]}}}}
+    evaluation: {{space: measured}}
+"""
+
+
+def problems_of(folder, text):
+    """What is wrong with a configuration."""
+    (folder / "own.yaml").write_text(text)
+    with pytest.raises(InputError) as caught:
+        load([folder / "own.yaml"])
+    return [str(each) for each in caught.value.problems]
+
+
+def test_a_thousand_data_sets_stand_in_one_file(tmp_path):
+    (tmp_path / "own.yaml").write_text("datasets:\n" + "".join(map(ONE.format, range(1000))))
+    document, problems = read(tmp_path / "own.yaml")
+    assert not problems
+    assert len(document.data["datasets"]) == 1000
+
+
+def test_two_aliases_of_themselves_are_one_problem(tmp_path):
+    said = problems_of(tmp_path, "datasets: {own: {robot: mh180}}\nseed: &a [*a, *a]\n")
+    assert len([each for each in said if "aliases" in each]) == 1
+    assert len(said) < 3
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "datasets: {own: {robot: mh180}}\nstudy:\n"
+            + "".join(f"  key_{i}: 0\n" for i in range(9_000)),
+            "9000 unknown keys, such as 'key_0', 'key_1', 'key_2' and 8997 more",
+        ),
+        (
+            "datasets:\n"
+            + "".join(
+                f"  a{i}: {{{', '.join(f'n{i}_{j}: 0' for j in range(90))}}}\n" for i in range(100)
+            ),
+            "this data set and those after it were not looked at",
+        ),
+        (
+            "datasets: {own: {robot: mh180, measurements: {source: file, file: {path: x.csv,"
+            " exclude: [" + "{lines: [7], reason: a}," * 2_000 + "]}}}}\n",
+            "names line 7 more than once",
+        ),
+    ],
+    ids=["one section", "every data set", "rows excluded"],
+)
+def test_thousands_of_faults_are_not_all_looked_into(tmp_path, text, words):
+    said = problems_of(tmp_path, text)
+    assert any(words in each for each in said)
+    assert len(said) < 2000
+
+
+@pytest.mark.parametrize("length", [101, 300])
+def test_a_data_set_of_a_long_name_is_refused_where_it_is_named(tmp_path, length):
+    (said,) = problems_of(tmp_path, f"datasets: {{{'a' * length}: {{robot: mh180}}}}\n")
+    assert "cannot be the name of a data set; allowed: at most 100 letters" in said
+
+
+def test_a_file_of_a_long_name_is_described_under_a_shorter_one():
+    assert plain_name(f"{'a' * 200}.csv") == "a" * 100
+
+
+def test_a_campaign_of_too_many_values_is_refused_before_they_are_made(tmp_path):
+    (tmp_path / "campaign.json").write_text('{"format": [' + "[]," * 6_000_000 + "[]]}")
+    done = call("campaign", "status", tmp_path)
+    assert done.exit_code == 2, done.output
+    assert "campaign.json: holds too many values; allowed: at most 5,000,000" in done.output
+
+
+def test_rows_in_a_file_of_json_without_end_are_refused(tmp_path):
+    (tmp_path / "errors.json").write_text(json.dumps({"rows": []}) + " " * 100_000_000)
+    done = call("plan-campaign", "--noise-mm", 0.1, "--errors", tmp_path / "errors.json")
+    assert done.exit_code == 2, done.output
+    assert "errors.json: is too large; allowed: at most 100 MB" in done.output
