@@ -40,6 +40,14 @@ def test_a_study_of_hours_is_said_with_its_keys(config, tmp_path):
     assert "own study_chunk, by study.repetitions, study.measurements, evaluation.points" in said
 
 
+def test_of_many_data_sets_the_stage_is_said_that_takes_most(tmp_path):
+    (tmp_path / "own.yaml").write_text(
+        "datasets:\n" + "".join(f"  arm{i}: {{robot: mh180}}\n" for i in range(60))
+    )
+    (said,) = cost.expected(cost.foreseen(planned([tmp_path / "own.yaml"])))
+    assert "most for study_chunk of 60 data sets, by study.repetitions" in said
+
+
 @pytest.mark.parametrize("here", [True, False])
 def test_a_study_beyond_the_memory_of_the_machine_is_refused_where_it_would_run(
     config, tmp_path, monkeypatch, here

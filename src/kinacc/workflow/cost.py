@@ -263,15 +263,22 @@ def expected(found: Mapping[tuple[str, str], Cost], here: bool = True) -> list[s
     if here:
         refuse(_beyond(found), "There is not enough memory")
     seconds = sum(each.seconds for each in found.values())
-    by_memory = max(found, key=lambda key: found[key].bytes)
-    by_time = max(found, key=lambda key: found[key].seconds)
-    memory = found[by_memory].bytes
-    most = by_time if seconds > LONG_S else by_memory
-    whose = " ".join(filter(None, most))
-    keys = first_few(found[most].keys)
+    by_stage: dict[str, list[tuple[str, Cost]]] = {}
+    for (dataset, name), each in found.items():
+        by_stage.setdefault(name, []).append((dataset, each))
+    long, large = seconds > LONG_S, max(each.bytes for each in found.values())
+
+    def weight(name: str) -> float:
+        costs = [each for _, each in by_stage[name]]
+        return sum(e.seconds for e in costs) if long else max(e.bytes for e in costs)
+
+    name = max(by_stage, key=weight)
+    most = by_stage[name]
+    several = f"{name} of {len(most):,} data sets"
+    whose = several if len(most) > 1 else " ".join(filter(None, (most[0][0], name)))
     return [
-        f"about {in_time(seconds)} of work on one core and {in_bytes(memory)} of memory are ahead; "
-        f"most for {whose}, by {keys}"
+        f"about {in_time(seconds)} of work on one core and {in_bytes(large)} of memory are ahead; "
+        f"most for {whose}, by {first_few(most[0][1].keys)}"
     ]
 
 
