@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinacc.artifacts.atomic import abandoned, held, sweep, unfinished
 from kinacc.errors import KinaccError
-from kinacc.workflow.results_lock import joined, running
+from kinacc.workflow.results_lock import forget, joined, running
 
 if TYPE_CHECKING:
     from kinacc.workflow.plan import Plan
@@ -222,7 +222,7 @@ def _remove_scripts() -> None:
 
 
 def _doubt_what_snakemake_does_not_know(plan: Plan) -> None:
-    """Remove records of files made by other settings, code or inputs that nobody compares."""
+    """Forget runs of other settings, code or inputs, which Snakemake would not compare."""
     try:
         names = set(os.listdir(_OWN / "metadata"))
     except OSError:
@@ -232,7 +232,7 @@ def _doubt_what_snakemake_does_not_know(plan: Plan) -> None:
         return base64.urlsafe_b64encode(path.encode()).decode() in names
 
     for path in plan.others(known):
-        os.unlink(path)
+        forget(Path(path))
 
 
 def _remove(path: Path) -> None:
