@@ -108,7 +108,7 @@ def test_a_second_run_and_a_dry_run_beside_the_first(place):
         assert second.returncode == 1
         assert "another run is at work in it" in said[-1]
         assert len(said) == 1
-    dry = subprocess.run([*_RUN, "--dry-run"], **options, check=False)
+    dry = subprocess.run([*_RUN[:-2], "--dry-run", *_RUN[-2:]], **options, check=False)
     assert dry.returncode == 0, dry.stderr
     assert not [*Path(here.project, "results").glob("*/*.parquet")]
     first.communicate(b"\n")
