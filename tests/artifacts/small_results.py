@@ -30,12 +30,13 @@ class SmallResults:
 
     def __init__(self, folder: Path, plan: Plan | None = None):
         self.plan = plan
+        self.files: dict[str, str] = {}
         self.root, self.folder = folder, folder / "mh180"
         self.tables = small_tables()
         for name, stage in STAGES.items():
             if stage.leaves != "tables":
                 if not stage.on_request:
-                    self._leave(name)
+                    self.leave(name)
             elif not stage.on_request and all(each in self.tables for each in stage.outputs):
                 self.save(name)
 
@@ -53,6 +54,7 @@ class SmallResults:
                 inputs[name] = [str(path) for path in self.parts()]
             elif name not in without and self.path(name).exists():
                 inputs[name] = str(self.path(name))
+        inputs |= self.files if STAGES[stage_name].files else {}
         if self.plan is None:
             return stage_provenance(Job(stage.module, inputs, {}, {}, SEED))
         settings = self.plan.settings(stage_name, "mh180")
@@ -75,7 +77,7 @@ class SmallResults:
         }
         self._record(stage_name, None, marks, tables)
 
-    def _leave(self, name: str) -> None:
+    def leave(self, name: str) -> None:
         """Pictures or a page with what they were made from."""
         files = {self.folder / f"{name}.html": ("html", PAGE)}
         if STAGES[name].is_figure:
@@ -107,7 +109,7 @@ class SmallResults:
             if STAGES[name].on_request or STAGES[name].measured:
                 continue
             if STAGES[name].leaves != "tables":
-                self._leave(name)
+                self.leave(name)
             elif set(STAGES[name].outputs) <= set(self.tables):
                 self.save(name)
 

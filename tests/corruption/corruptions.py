@@ -11,6 +11,7 @@ import argparse
 import json
 import tempfile
 import time
+import traceback
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +28,7 @@ from whole_project import write_poses
 
 from kinacc.artifacts import pictures, provenance, records, store
 from kinacc.artifacts.contract import COLUMNS_DIGEST, INPUTS_DIGESTS
+from kinacc.workflow.catalogue import TABLES
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.runner import perform
 from kinacc.workflow.verification import check
@@ -57,15 +59,21 @@ datasets:
 """
 
 
-def study(folder: Path, seed: int, formats: str = "svg, png, pdf") -> Plan:
-    """A finished study of a synthetic and of a measured arm, in ``folder``/results."""
+def study(
+    folder: Path, seed: int, formats: str = "svg, png, pdf", drawn: Sequence[str] = ("mh180", "own")
+) -> Plan:
+    """A finished study of a synthetic and of a measured arm, in ``folder``/results.
+
+    ``drawn``: the data sets that have pictures and a page.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     write_poses(folder / "poses.csv", 80 + seed % 7)
     (folder / "small.yaml").write_text(SMALL.format(seed=seed, formats=formats))
     plan = planned([ROOT / "config.yaml", folder / "small.yaml"], results=str(folder / "results"))
     for dataset in plan.datasets:
         for name, stage in plan.stages(dataset).items():
-            for part in () if stage.on_request else plan.part_names(name, dataset):
+            wanted = not stage.on_request and (dataset in drawn or stage.leaves == TABLES)
+            for part in plan.part_names(name, dataset) if wanted else ():
                 perform(plan.job(name, dataset, part))
     return plan
 
@@ -153,8 +161,9 @@ def _word(table: pa.Table, draw: np.random.Generator) -> pa.Table | None:
 
 
 def _dropped(table: pa.Table, draw: np.random.Generator) -> pa.Table | None:
-    rows = np.delete(np.arange(table.num_rows), draw.integers(max(1, table.num_rows)))
-    return table.take(rows) if table.num_rows else None
+    if not table.num_rows:
+        return None
+    return table.take(np.delete(np.arange(table.num_rows), draw.integers(table.num_rows)))
 
 
 def _doubled(table: pa.Table, draw: np.random.Generator) -> pa.Table | None:
@@ -289,6 +298,9 @@ class Study:
                     stack.enter_context(patch.object(check, "computed_again", nothing))
                 report = check.check_results(self.folder / case.dataset, self.plan)
             return [str(each) for one in report.datasets for each in one.problems]
+        except Exception:
+            traceback.print_exc()  # no way to tell of a corruption
+            return []
         finally:
             for each in changed:
                 (self.folder / each).write_bytes(self.files[each])

@@ -150,6 +150,13 @@ def _joined(role: str, paths: Sequence[str], parts: Sequence[pa.Table]) -> pa.Ta
                 store.remake(paths[0]),
             )
         )
+    key = store.artefact_named(role.rpartition("/")[2]).key
+    lacking = [name for name in key for part in parts if name not in part.schema.names]
+    if lacking or any(not part.schema.equals(parts[0].schema) for part in parts):
+        what = f"parts of {role} with different columns"
+        raise InputError(
+            Problem(", ".join(paths), what, "parts of one run", store.remake(paths[0]))
+        )
     return pa.concat_tables(parts)
 
 

@@ -18,6 +18,7 @@ from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.campaign.journal import JOURNAL, PLAN, of_each
 from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.workflow.boundary import leading_out
 from kinacc.workflow.catalogue import (
     FIGURE_FOLDER,
     MAP_READINGS,
@@ -67,7 +68,7 @@ def planned(
         for name, config in full.items()
         if config["tournament"] != tournament
     ]
-    refuse(problems)
+    refuse([*problems, *leading_out(results, (*full, TOURNAMENT))])
     return Plan(
         {name: in_use(without_execution_keys(config)) for name, config in full.items()},
         {

@@ -88,6 +88,31 @@ def sharing(results: Path | str, tell: Callable[[str], object] = _tell) -> Itera
 
 
 @contextmanager
+def undisturbed(results: Path | str) -> Iterator[None]:
+    """Look at a results folder that nobody writes to; holds nobody up.
+
+    Raises InUse where a run is seen to be at work when it begins, ends or fails.
+    """
+    _refuse_if_at_work(results)
+    try:
+        yield
+    except (KinaccError, OSError):
+        _refuse_if_at_work(results)
+        raise
+    _refuse_if_at_work(results)
+
+
+def _refuse_if_at_work(results: Path | str) -> None:
+    try:
+        lock = open(Path(results, LOCK), encoding="utf-8")  # noqa: SIM115 closed by the next block
+    except OSError:
+        return
+    with lock:
+        if not _taken(lock, fcntl.LOCK_SH, 0.0):
+            raise InUse(f"{results}: {_whose(lock)}; look at it when that has ended")
+
+
+@contextmanager
 def joined() -> Iterator[None]:
     """Be a job of the run that the environment names, if it names one that is seen from here.
 

@@ -17,6 +17,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import ARTEFACTS, INPUTS_DIGESTS
 from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.pictures import as_text
+from kinacc.artifacts.records import Record
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
@@ -30,12 +31,13 @@ from kinacc.workflow.catalogue import (
     maker_of,
 )
 from kinacc.workflow.plan import RESULTS, Plan
+from kinacc.workflow.results_lock import undisturbed
 from kinacc.workflow.verification.conformity import check_file
 from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts, strays
 from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_command
 from kinacc.workflow.verification.pictures import check_picture
 from kinacc.workflow.verification.recomputation import computed_again
-from kinacc.workflow.verification.recorded import check_records, folded, records_there
+from kinacc.workflow.verification.recorded import Unit, check_records, folded, records_there
 from kinacc.workflow.verification.rules import contradictions
 
 FORMATS = schema.key("figures.formats").choices
@@ -134,9 +136,11 @@ def check_results(
     pictures whole. With a ``plan`` (the configuration, read from the files ``configs``) also that
     its data sets are all there and that the artefacts were made with these settings and files.
     Numbers are computed again (see :mod:`recomputation`), with ``every`` in place of a sample.
-    ``expect``: the digest of all records as it was told before.
+    ``expect``: the digest of all records as it was told before. Raises InUse while a run writes.
     """
-    report = _checked(Path(results), plan, configs, every)
+    folder = Path(results)
+    with undisturbed(folder.parent if _is_dataset(folder) else folder):
+        report = _checked(folder, plan, configs, every)
     if expect is not None and report.digest != expect:
         what = f"digest of all records is {report.digest or 'none: there are no records'}"
         fix = "the records were written anew since that digest was told, or are of another run"
@@ -244,13 +248,13 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         notes.append(f"{folder}: no study was made: kinacc study FILE.yaml makes one")
     absent = {*left_out, *unmade}
     found += _missing(folder, absent)
-    for name, picture in _pictures(folder, plan, absent):
+    known, wrong_records = records_there(folder)
+    for name, picture in _pictures(folder, plan, absent, known):
         checked += [str(picture)] if picture.exists() else []
         found += [(problem, (Doubt(name),)) for problem in check_picture(picture)]
-    known, wrong_records = records_there(folder)
-    kept = [
-        stage for stage in STAGES.values() if not stage.joint and not {*stage.outputs} & {*behind}
-    ]
+    kept = [s for s in STAGES.values() if not (s.joint or {*s.outputs} & {*behind})]
+    names = {stage.name for stage in kept} - set(left_out)
+    known = {unit: record for unit, record in known.items() if unit[0] in names}
     wrong_files = {problem.where.partition(", column")[0] for problem, _ in found}
     found += [*wrong_records, *check_records(folder, kept, known, wrong_files)]
     marks |= {
@@ -435,7 +439,12 @@ def _not_studied(folder: Path) -> set[str]:
         for stage in STAGES.values()
         if not (stage.name in CALIBRATION or stage.fits or stage.joint)
     ]
-    there = {stage.name: stage.leaves for stage in beyond if _has_left(folder, stage)}
+    recorded = {stage for stage, _ in records_there(folder)[0]}
+    there = {
+        stage.name: stage.leaves
+        for stage in beyond
+        if stage.name in recorded or _has_left(folder, stage)
+    }
     if set(there.values()) - {PAGE}:
         return set()
     return {stage.name for stage in beyond} - set(there)
@@ -471,11 +480,14 @@ def _missing(folder: Path, left_out: Collection[str]) -> list[Found]:
 
 
 def _pictures(
-    folder: Path, plan: Plan | None, left_out: Collection[str]
+    folder: Path, plan: Plan | None, left_out: Collection[str], known: Mapping[Unit, Record]
 ) -> Iterator[tuple[str, Path]]:
-    formats = FORMATS if plan is None else plan.formats
+    """Pictures and pages that have to be there: without a plan in the formats that are recorded."""
     for name, stage in STAGES.items():
         if not (stage.leaves == TABLES or stage.on_request or name in left_out):
+            record = known.get((name, None))
+            told = [Path(file).suffix[1:] for file in record.files] if record else FORMATS
+            formats = told if plan is None else plan.formats
             yield from ((name, path) for path in _files(folder, stage, formats))
 
 

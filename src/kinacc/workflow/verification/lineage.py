@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ from kinacc.artifacts import provenance
 from kinacc.artifacts.contract import ARTEFACTS, INPUTS_DIGESTS
 from kinacc.artifacts.store import read_metadata
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import PAGE, STAGES, TABLES, Stage, maker_of
+from kinacc.workflow.catalogue import FIGURE_FOLDER, PAGE, STAGES, TABLES, Stage, maker_of
 from kinacc.workflow.inputs import digests
 from kinacc.workflow.plan import Plan
 from kinacc.workflow.verification.mending import Doubt, Marks
@@ -185,7 +184,10 @@ def _one_version(folder: Path, marks: Marks) -> Iterator[Found]:
         problem = Problem(str(folder), f"{key} {said}", "the same in all artefacts")
         right = __version__ if __version__ in groups else max(groups, key=lambda v: len(groups[v]))
         stages = {
-            maker_of(name).name for value in groups if value != right for name in groups[value]
+            maker_of(name.partition("/")[0]).name
+            for value in groups
+            if value != right
+            for name in groups[value]
         }
         yield problem, tuple(map(Doubt, sorted(stages)))
 
@@ -223,7 +225,8 @@ def _held_to_inputs(
     now: _Now,
     plan: Plan | None,
 ) -> _Held:
-    where = str(folder / f"{name}.parquet" if stage.leaves == TABLES else folder / name)
+    ending = {TABLES: f"{name}.parquet", PAGE: f"{name}.html"}
+    where = str(folder / ending.get(stage.leaves, f"{FIGURE_FOLDER}/{name}"))
     if INPUTS_DIGESTS not in own:
         return _Held([], set(), set(), True, set())  # of an earlier version; said elsewhere
     read, problems = digests_read(own), []
@@ -284,13 +287,8 @@ def _codes(stage: Stage, settings: Mapping | None, read: Collection[str]) -> fro
 
     if settings is not None:
         return frozenset({provenance.stage_code_hash(stage.module, stage.used(settings, read))})
-    return _codes_of(stage.name, tuple(read), ("", *robot.shipped()))
-
-
-@cache
-def _codes_of(name: str, read: tuple[str, ...], robots: tuple[str, ...]) -> frozenset[str]:
-    stage = STAGES[name]
+    known = ("", *robot.shipped())
     return frozenset(
         provenance.stage_code_hash(stage.module, stage.used({"robot": each}, read))
-        for each in robots
+        for each in known
     )
