@@ -26,6 +26,7 @@ SLOW = (
     "integration",
     "integration_oracle",
     "slurm",
+    "kills",
     "measurements/test_files_as_they_come.py",
     "checks/test_planted_faults.py",
     "assess/test_adaptive.py",
