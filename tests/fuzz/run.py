@@ -260,11 +260,12 @@ def main() -> None:
         action="store_true",
         help="put faults of the past back, one by one, and look for them",
     )
+    parser.add_argument("--bug", action="append", default=[], help="only this one of --bugs")
     given = parser.parse_args()
     if given.replay:
         replay(Path(given.replay))
         return
-    if given.bugs:
+    if given.bugs or given.bug:
         from fuzz import bugs
 
         raise SystemExit(bugs.hunt(given.inputs or 3000, given.seed, given.bug))
