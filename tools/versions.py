@@ -21,6 +21,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import yaml
 
@@ -37,6 +40,10 @@ OLD_PROCESSOR = {  # what came before 2013: other kernels of BLAS and numpy, no 
     "NUMBA_CPU_NAME": "nehalem",
     "NUMBA_CPU_FEATURES": "",
 }
+
+
+class Failed(Exception):
+    """A command that ended badly, with what it said."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +86,13 @@ TOLERANCES = {
     "mm^2": Tolerance(1e-9, 1e-9),
 }
 OTHERWISE = Tolerance(1e-12, 1e-9)
-# Singular values that are zero but for rounding are so on the scale of the largest, which is some 100
-# at most. A gap above GAPS is bounded by rounding alone: all such gaps count as one.
-SINGULAR = "singular_value"
-SINGULAR_VALUES = Tolerance(1e-9, 1e-9)
-LAST_STEP = Tolerance(1e-7)
-GAPS = 1e6
+# Singular values that are zero but for rounding are so on the scale of the largest, some 100.
+# A gap is the ratio of two of them. Undetermined directions may be any basis of what they span, so
+# that the projection on it is compared.
+SINGULAR, LAST_STEP = "singular_value", "last_step"
+GAP, DIRECTION = "gap", "undetermined_direction"
+OF_QUANTITIES = {SINGULAR: Tolerance(1e-9, 1e-9), LAST_STEP: Tolerance(1e-7)}
+PROJECTION = Tolerance(1e-8)
 
 
 @dataclass(frozen=True)
@@ -134,6 +142,23 @@ def table_differences(name: str, first: Path, second: Path) -> Iterator[Differen
             unit = (about.metadata or {}).get(b"unit", b"").decode()
             units = rows.get("unit", []) if unit == "see unit" else [unit] * one.num_rows
             yield from _of_numbers(place, *values, units, rows.get("quantity", []))
+    if DIRECTION in rows.get("quantity", []):
+        sizes = abs(_projection(one) - _projection(other))
+        allowed = PROJECTION.holds(0.0, float(sizes.max()))
+        words = "" if allowed else f"{DIRECTION}: other ones by {sizes.max():.3g}"
+        yield Difference(f"{name}: {DIRECTION}", "1", float(sizes.max()), allowed, words)
+
+
+def _projection(table: pa.Table) -> np.ndarray:
+    """On what the undetermined directions of a fit span, in mm and mrad."""
+    found = table.filter(pc.equal(table["quantity"], DIRECTION)).to_pydict()
+    names = {name: place for place, name in enumerate(dict.fromkeys(found["parameter"]))}
+    rows = np.zeros((max(found["number"]), len(names)))
+    for number, name, value in zip(
+        found["number"], found["parameter"], found["value"], strict=True
+    ):
+        rows[number - 1, names[name]] = value
+    return rows.T @ rows
 
 
 def _of_exact(place: str, one: Sequence, other: Sequence) -> Iterator[Difference]:
@@ -155,14 +180,13 @@ def _of_numbers(
             yield _contradiction(place, f"row {row}: {a} and {b}")
             continue
         quantity = quantities[row] if quantities else ""
-        if quantity == "gap" and min(a, b) > GAPS:
+        if quantity in (GAP, DIRECTION):
             continue
-        tolerance = {SINGULAR: SINGULAR_VALUES, "last_step": LAST_STEP}.get(
-            quantity, TOLERANCES.get(units[row], OTHERWISE)
-        )
+        of_unit = TOLERANCES.get(units[row], OTHERWISE)
+        tolerance = OF_QUANTITIES.get(quantity, of_unit)
         if not tolerance.holds(a, b):
             yield Difference(place, units[row], abs(a - b), False, f"row {row}: {a!r} and {b!r}")
-        elif units[row] in TOLERANCES and quantity not in (SINGULAR, "last_step"):
+        elif units[row] in TOLERANCES and quantity not in OF_QUANTITIES:
             largest[units[row]] = max(largest.get(units[row], 0.0), abs(a - b))
         else:
             share = abs(a - b) / max(abs(a), tolerance.absolute / OTHERWISE.relative)
@@ -248,13 +272,13 @@ def measured(path: Path) -> Path:
 
 
 def run(command: list[str], text: str = "", **variables: str) -> str:
-    """What a command prints; ends the tool where it fails."""
+    """What a command prints. Raises Failed."""
     print(" ".join(command[:6]), "..", file=sys.stderr)
     done = subprocess.run(
         command, input=text, env=os.environ | variables, capture_output=True, text=True, check=False
     )
     if done.returncode:
-        raise SystemExit(f"{' '.join(command)}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
+        raise Failed(f"{' '.join(command)}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
     return done.stdout
 
 
@@ -317,9 +341,13 @@ def main(arguments: list[str]) -> int:
     reference = results_of(folder, REFERENCE) / "results"
     worst = 0
     for name in arguments[1:] or names:
-        if name != REFERENCE.name:
+        try:
             other = results_of(folder, names[name]) / "results"
-            worst = max(worst, compared(reference, other, name))
+        except Failed as failed:  # the others are told all the same
+            print(f"{name}: {failed}")
+            worst = 1
+        else:
+            worst = max(worst, compared(reference, other, name) if name != REFERENCE.name else 0)
     if not worst:
         written(folder)
     return worst

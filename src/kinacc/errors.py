@@ -28,7 +28,19 @@ class Problem:
             parts.append(f"allowed: {self.allowed}")
         if self.fix:
             parts.append(self.fix)
-        return "; ".join(parts)
+        return as_seen("; ".join(parts))
+
+
+_STEERING = {
+    code: f"\\u{code:04x}"
+    for code in (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+    if chr(code) not in "\n\t"
+}
+
+
+def as_seen(text: str) -> str:
+    """A text whose characters that would steer a terminal, or turn its lines, are written out."""
+    return text.translate(_STEERING)
 
 
 def and_more(count: int) -> str:

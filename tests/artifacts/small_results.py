@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts import allowed, store
+from kinacc.artifacts import allowed, records, store
+from kinacc.artifacts.contract import PROVENANCE_KEYS
 from kinacc.workflow.catalogue import STAGES
 from kinacc.workflow.plan import Plan
 from kinacc.workflow.runner import Job, stage_provenance
@@ -16,11 +18,11 @@ SEED = 7
 NOISE_MM = (0.05, 0.3)
 REPETITIONS = 3
 PICTURES = {
-    "svg": b"<?xml version='1.0'?>\n<svg></svg>\n",
-    "png": b"\x89PNG\r\n\x1a\n" + b"\x00" * 8 + b"IEND\xaeB`\x82",
-    "pdf": b"%PDF-1.4\n%%EOF\n",
+    "svg": b"<?xml version='1.0'?>\n<svg><!--IN\0--></svg>\n",
+    "png": b"\x89PNG\r\n\x1a\n" + b"\x00" * 8 + b"IN\0" + b"IEND\xaeB`\x82",
+    "pdf": b"%PDF-1.4\nIN\0\n%%EOF\n",
 }
-PAGE = b"<!DOCTYPE html>\n<html></html>\n"
+PAGE = b"<!DOCTYPE html>\n<html>IN\0</html>\n"
 
 
 class SmallResults:
@@ -28,16 +30,13 @@ class SmallResults:
 
     def __init__(self, folder: Path, plan: Plan | None = None):
         self.plan = plan
+        self.files: dict[str, str] = {}
         self.root, self.folder = folder, folder / "mh180"
         self.tables = small_tables()
         for name, stage in STAGES.items():
-            if stage.is_figure:
-                for kind, content in PICTURES.items():
-                    path = self.folder / "figures" / f"{name}.{kind}"
-                    path.parent.mkdir(parents=True, exist_ok=True)
-                    path.write_bytes(content)
-            elif stage.leaves == "page":
-                (self.folder / f"{name}.html").write_bytes(PAGE)
+            if stage.leaves != "tables":
+                if not stage.on_request:
+                    self.leave(name)
             elif not stage.on_request and all(each in self.tables for each in stage.outputs):
                 self.save(name)
 
@@ -55,30 +54,69 @@ class SmallResults:
                 inputs[name] = [str(path) for path in self.parts()]
             elif name not in without and self.path(name).exists():
                 inputs[name] = str(self.path(name))
+        inputs |= self.files if STAGES[stage_name].files else {}
         if self.plan is None:
             return stage_provenance(Job(stage.module, inputs, {}, {}, SEED))
         settings = self.plan.settings(stage_name, "mh180")
         return stage_provenance(Job(stage.module, inputs, {}, settings, self.plan.seed("mh180")))
 
     def save(self, stage_name: str, without: tuple[str, ...] = ()) -> None:
-        """Write the tables of a stage, made from what is there now."""
+        """Write the tables of a stage and its record, made from what is there now."""
         marks = self.marks(stage_name, without)
-        for name in STAGES[stage_name].outputs:
-            if name == "study_chunk":
-                for path in self.parts():
-                    store.write(path, name, self.tables[name], marks)
-            else:
-                store.write(self.path(name), name, self.tables[name], marks)
+        if stage_name == "study_chunk":
+            for number, path in enumerate(self.parts()):
+                rows = np.asarray(self.tables[stage_name]["repetition"]) % 2 == number
+                part = {k: np.asarray(v)[rows] for k, v in self.tables[stage_name].items()}
+                self._record(
+                    stage_name, path.stem, marks, {path: _content(stage_name, part, marks)}
+                )
+            return
+        tables = {
+            self.path(name): _content(name, self.tables[name], marks)
+            for name in STAGES[stage_name].outputs
+        }
+        self._record(stage_name, None, marks, tables)
+
+    def leave(self, name: str) -> None:
+        """Pictures or a page with what they were made from."""
+        files = {self.folder / f"{name}.html": ("html", PAGE)}
+        if STAGES[name].is_figure:
+            paths = {kind: self.folder / "figures" / f"{name}.{kind}" for kind in PICTURES}
+            files = {path: (kind, PICTURES[kind]) for kind, path in paths.items()}
+        marks = self.marks(name)
+        told = f"inputs_digests {marks['inputs_digests']}".encode()
+        read = "".join(
+            f'<meta name="kinacc:read:{role}" content="{digest}">'
+            for role, digest in json.loads(marks["inputs_digests"]).items()
+        )
+        contents = {
+            path: (content.replace(b"IN\0", read.encode() if kind == "html" else told), None)
+            for path, (kind, content) in files.items()
+        }
+        self._record(name, None, marks, contents)
+
+    def _record(self, name: str, part: str | None, marks: dict, files: dict) -> None:
+        kept = {key: str(marks[key]) for key in PROVENANCE_KEYS}
+        record = records.Record(name, part, kept, json.loads(marks["inputs_digests"]), {})
+        place = records.place(self.folder, name, part)
+        records.leave(place, record, {str(path): told for path, told in files.items()})
 
     def change(self, stage_name: str, artefact: str, **columns) -> None:
         """Change columns of one table and make everything that follows from it again."""
         self.tables[artefact] = self.tables[artefact] | columns
-        names = [name for name, stage in STAGES.items() if stage.leaves == "tables"]
+        names = list(STAGES)
         for name in names[names.index(stage_name) :]:
             if STAGES[name].on_request or STAGES[name].measured:
                 continue
-            if set(STAGES[name].outputs) <= set(self.tables):
+            if STAGES[name].leaves != "tables":
+                self.leave(name)
+            elif set(STAGES[name].outputs) <= set(self.tables):
                 self.save(name)
+
+
+def _content(artefact: str, columns: dict, marks: dict) -> tuple[bytes, str]:
+    table = store.to_table(artefact, columns, marks)
+    return store.content_of(table), store.columns_digest(table)
 
 
 def small_tables() -> dict[str, dict]:

@@ -19,6 +19,7 @@ from kinacc.artifacts.error_models import ALWAYS
 from kinacc.workflow.catalogue import CALIBRATION, STAGES
 from kinacc.workflow.plan import planned
 from kinacc.workflow.verification import check, rules
+from kinacc.workflow.verification.recomputation import Again
 
 ROOT = Path(__file__).parents[2]
 ON_EVERY_RUN = [
@@ -64,7 +65,8 @@ def put(results, artefact, column, row, value):
 def test_a_good_folder_has_no_problem(results):
     report = check.check_results(results.root)
     assert report.ok, str(report)
-    assert report.datasets[0].notes == ()
+    (note,) = report.datasets[0].notes
+    assert "not computed again without their settings (--config)" in note
     paths = [Path(path) for path in report.datasets[0].checked if path.endswith(".parquet")]
     tables = {path.stem for path in paths if path.parent == results.folder}
     assert tables == set(ON_EVERY_RUN)
@@ -110,6 +112,7 @@ def test_a_map_may_be_left_out_where_the_claims_were_made_without_it(results):
     results.save("claims")
     for kind in check.FORMATS:
         (results.folder / "figures" / f"fig3.{kind}").unlink()
+    results.leave("report")
     report = check.check_results(results.root)
     assert report.ok, str(report)
     assert any("accuracy_map, fig3 left out" in note for note in report.datasets[0].notes)
@@ -119,6 +122,10 @@ def without_a_study(results) -> None:
     """Leave what `kinacc calibrate` leaves: the tables of the calibration and the page."""
     shutil.rmtree(results.folder / "figures")
     shutil.rmtree(results.folder / "study_chunk")
+    for path in (results.folder / "records").iterdir():
+        if path.stem not in (*CALIBRATION, "report"):
+            path.unlink()
+    results.leave("report")
     of_calibration = {name for stage in CALIBRATION for name in STAGES[stage].outputs}
     for path in results.folder.glob("*.parquet"):
         if path.stem not in of_calibration:
@@ -131,6 +138,7 @@ def test_a_calibration_without_a_study_is_well_and_told_once(planned_results, co
     without_a_study(planned_results)
     if not page:
         (planned_results.folder / "report.html").unlink()
+        (planned_results.folder / "records" / "report.json").unlink()
     done = call("check-results", planned_results.root, *configs)
     assert done.exit_code == 0, done.stdout
     assert "all is well" in done.stdout
@@ -372,8 +380,9 @@ def test_an_input_changed_after_it_was_used(results):
     results.save("measurements")
     found = problems(results)
     for name in ("vec_model", "dh_model", "residuals", "summary", "assessment_points"):
-        the_one(found, f"{name}.parquet: inputs_hash")
-    assert len(found) == 5, found
+        the_one(found, f"{name}.parquet: was made from another measurements")
+    the_one(found, "report.html: was made from another measurements")
+    assert len(found) == 6, found
 
 
 def test_parts_of_the_study_of_another_run(results):
@@ -381,8 +390,9 @@ def test_parts_of_the_study_of_another_run(results):
     results.save("assessment_points")
     results.save("study_chunk")
     found = problems(results)
-    the_one(found, "study.parquet: inputs_hash")
-    the_one(found, "histories.parquet: inputs_hash")
+    the_one(found, "study.parquet: was made from another assessment_points")
+    the_one(found, "histories.parquet: was made from another assessment_points")
+    the_one(found, "figures/fig5: was made from another assessment_points")
 
 
 def test_tables_of_one_stage_from_two_runs(results):
@@ -409,30 +419,23 @@ def test_other_code_than_that_installed_is_a_note(results, monkeypatch):
     assert any("made with other code" in note for note in report.datasets[0].notes)
 
 
-def with_other_inputs(results, names):
-    for name in names:
-        rewrite(
-            results.path(name),
-            lambda table: table.replace_schema_metadata(
-                table.schema.metadata | {b"inputs_hash": b"with a robot file"}
-            ),
-        )
-
-
-def test_a_robot_file_nobody_named_is_a_note_but_one_stale_stage_is_a_problem(results):
-    read_it = [
-        name
-        for stage in STAGES.values()
-        if stage.files and stage.leaves == "tables" and not stage.scattered
-        for name in stage.outputs
-        if results.path(name).exists()
-    ]
-    with_other_inputs(results, [name for name in read_it if name.startswith("dh_")])
-    the_one(problems(results), "dh_model.parquet: inputs_hash")
-    with_other_inputs(results, read_it)
+def test_a_robot_file_nobody_named_is_a_note_and_an_input_unlike_what_is_stated_a_problem(
+    results, tmp_path
+):
+    (tmp_path / "own.yaml").write_text("a robot")
+    results.files = {"robot_file": str(tmp_path / "own.yaml")}
+    results.change("measurements", "measurements")
     report = check.check_results(results.root)
-    assert not [text for text in problems(results) if "inputs_hash with a robot" in text]
-    assert any("robot file is not checked" in note for note in report.datasets[0].notes)
+    assert report.ok, str(report)
+    assert any("not checked without --config: robot_file" in n for n in report.datasets[0].notes)
+    rewrite(
+        results.path("dh_model"),
+        lambda table: table.replace_schema_metadata(
+            table.schema.metadata | {b"inputs_hash": b"0123456789abcdef"}
+        ),
+    )
+    found = problems(results)
+    the_one(found, "dh_model.parquet: inputs_hash is not that of its inputs_digests")
 
 
 def test_what_a_stopped_run_left_is_a_note(results):
@@ -464,7 +467,9 @@ def plan():
 
 @pytest.fixture
 def planned_results(tmp_path, monkeypatch, plan):
+    """The small folder under the settings of a configuration, which made none of its numbers."""
     monkeypatch.setattr(provenance, "stage_code_hash", lambda *_: "code")
+    monkeypatch.setattr(check, "computed_again", lambda *_: Again((), [], []))
     return SmallResults(tmp_path / "results", plan)
 
 

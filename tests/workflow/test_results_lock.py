@@ -10,9 +10,11 @@ import subprocess
 import sys
 import threading
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
+from kinacc.artifacts import records
 from kinacc.workflow import results_lock
 from kinacc.workflow.results_lock import RUN, InUse, joined, running, sharing
 
@@ -133,3 +135,28 @@ def test_a_folder_that_cannot_be_written_is_told_of_in_a_line(tmp_path):
     ):
         pass
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("how", ["zeros", "cut off", "empty record"])
+def test_a_file_that_a_loss_of_power_tore_is_made_anew(tmp_path, how):
+    folder, marks = tmp_path / "mh180", {"seed": "1"}
+    for stage in ("robot", "vec"):
+        record = records.Record(stage, None, marks, {}, {})
+        path = folder / f"{stage}.parquet"
+        records.leave(records.place(folder, stage), record, {str(path): (b"whole", None)})
+    torn, place = folder / "vec.parquet", Path(records.place(folder, "vec"))
+    before = torn.stat()
+    if how == "empty record":
+        place.write_bytes(b"")
+    else:
+        torn.write_bytes(bytes(5) if how == "zeros" else b"who")
+    os.utime(torn, ns=(before.st_atime_ns, before.st_mtime_ns))  # Snakemake goes by times
+    told = []
+    with running(tmp_path, told.append):  # the last one came to its end: nothing is looked at
+        assert place.exists()
+    (tmp_path / ".lock").write_text("{}")
+    with running(tmp_path, told.append):
+        assert not place.exists()
+    assert Path(records.place(folder, "robot")).exists()
+    assert len(told) == 1
+    assert "made anew" in told[0]

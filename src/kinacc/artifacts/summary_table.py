@@ -21,6 +21,7 @@ TOPICS = (
     "like_measured",
     "one_way",
     "undetermined",
+    "bending",
 )
 SUMMARY = Artefact(
     "summary",

@@ -1,5 +1,5 @@
 """``python -m kinacc.cli``, as ``kinacc``."""
 
-from kinacc.cli.group import main
+from kinacc.cli.process import main
 
-main(prog_name="kinacc")
+main()

@@ -110,6 +110,13 @@ def carried_out(
     configs = tuple(each for word in configs for each in _files(word))
     plan = planned(configs)
     plan.check_files()
+    from kinacc.workflow import cost
+    from kinacc.workflow.catalogue import CALIBRATION, STAGES
+
+    only = CALIBRATION if target == "calibration" else STAGES
+    ahead = [] if more else cost.expected(cost.foreseen(plan, only))  # else Snakemake says it
+    for line in ahead:
+        click.echo(line, err=True)
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores or os.cpu_count() or 1), "--configfile", *configs]
     if "--workflow-profile" not in more:
@@ -117,7 +124,7 @@ def carried_out(
     command += more or ["--quiet", "all"]  # stages say how far they are, and what goes wrong
     command += ["--no-hooks"]  # what a run ends with is said by the command
     # Words for Snakemake may change what is read.
-    known = ONE_THREAD | ({} if words[first:] else {"KINACC_FILES_READ": "1"})
+    known = {} if words[first:] else {"KINACC_FILES_READ": "1"}
     code = _carried_out([*command, "--", target], os.environ | known)
     if code:
         raise SystemExit(code)
@@ -176,7 +183,3 @@ def profile_options() -> list[str]:
         values = value if isinstance(value, list) else [value]
         options += [f"--{name}", *(str(each) for each in values if each is not True)]
     return options
-
-
-# More BLAS threads change the last bits of a sum, and jobs share the cores as they are.
-ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
-_SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
+SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 _DRAW = 0
 _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be the one that is read again and again
 
@@ -65,7 +65,7 @@ def question(given: Mapping) -> Simulation:
     lengths = ("width_mm", "tolerance_mm", "largest_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     points = given["poses"]
-    budgets = given["budget"] or [max(round(share * points), 2) for share in _SHARES]
+    budgets = given["budget"] or [max(round(share * points), 2) for share in SHARES]
     if points * max(budgets) > _MOST_READINGS:
         what = f"{points} poses with up to {max(budgets)} readings each"
         allowed = f"at most {_MOST_READINGS:g}, poses times the largest budget"

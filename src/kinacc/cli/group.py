@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from difflib import get_close_matches
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
 from kinacc import __version__
-from kinacc.errors import InputError, KinaccError, Problem
-from kinacc.starting import without_tools_of_numpy
+from kinacc.cli.process import NOBODY_READS, STOPPED
+from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
+from kinacc.starting import ONE_THREAD, without_tools_of_numpy
 
 _AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
 _HELP = ("-h", "--help")
@@ -158,61 +161,76 @@ class Commands(Lazy):
     def invoke(self, context: click.Context) -> object:
         """Run the command; exit code 2 on bad input, 130 and 143 where it was stopped.
 
-        What the machine refuses (memory, a disk that is full) is 1, in one sentence as well. With
-        --json problems are printed as JSON.
+        What the machine refuses (memory, a disk that is full) is 1, in one sentence as well, and
+        141 where nobody reads the output any more, as of other tools. With --json problems are
+        printed as JSON.
         """
+        came: list[int] = []
         try:
-            with _ended_in_order():
+            with _listening(came):
                 if not context.meta[_ASKS_HELP]:
+                    os.environ.update(ONE_THREAD)
                     without_tools_of_numpy()
                 return super().invoke(context)
-        except click.UsageError as error:
-            if not context.meta[_AS_JSON]:
+        except (Exception, KeyboardInterrupt) as error:
+            usage = isinstance(error, click.UsageError) and not context.meta[_AS_JSON]
+            if usage or isinstance(error, (click.exceptions.Exit, click.Abort)):
                 raise
-            code, said = 2, ""
-            problem = Problem(error.ctx.command_path if error.ctx else "", error.format_message())
-            click.echo(json.dumps({"problems": [asdict(problem)]}, indent=1))
-        except InputError as error:
-            code, said = 2, str(error)
-            if context.meta[_AS_JSON]:
-                facts = [asdict(each) for each in error.problems]
-                click.echo(json.dumps({"problems": facts}, indent=1))
-        except KinaccError as error:
-            code, said = 1, str(error)
-        except Terminated:
-            code, said = 143, "stopped by the system; what was finished is kept"
-        except KeyboardInterrupt:
-            code, said = 130, "stopped"
-        except MemoryError as error:
-            code, said = 1, f"there is not enough memory for this: {error or 'ask for less'}"
-        except RecursionError:
-            code, said = 1, "something given to this command is nested too deeply to be read"
-        except BrokenPipeError:
-            raise  # whoever reads our output has seen enough: click ends quietly
-        except OSError as error:
-            if error.filename is None or error.strerror is None:
-                raise
-            code, said = 1, f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
+            code, said, problems = _ending(error, came)
+        if problems and context.meta[_AS_JSON]:
+            click.echo(json.dumps({"problems": [asdict(each) for each in problems]}, indent=1))
         if said:
             click.echo(said, err=True)
         context.exit(code)
 
 
-@contextmanager
-def _ended_in_order() -> Iterator[None]:
-    """SIGTERM ends the block as Ctrl-C does, so that what it began is tidied up."""
+def _ending(error: BaseException, came: Sequence[int]) -> tuple[int, str, Sequence[Problem]]:
+    """Exit code, words and problems of what ended a command; a fault of its own is raised again.
 
-    def end(*_: object) -> None:
-        raise Terminated
+    ``came``: signals to stop. A library that one finds at work may raise an error of its own.
+    """
+    if signal.SIGTERM in came:
+        return 143, "stopped by the system; what was finished is kept", ()
+    if came or isinstance(error, KeyboardInterrupt):
+        return STOPPED, "stopped", ()
+    if isinstance(error, MemoryError):
+        return 1, f"there is not enough memory for this: {error or 'ask for less'}", ()
+    if isinstance(error, RecursionError):
+        return 1, "something given to this command is nested too deeply to be read", ()
+    if isinstance(error, BrokenPipeError):
+        return NOBODY_READS, "", ()
+    if isinstance(error, OSError):
+        error = refused(error)
+    if isinstance(error, click.UsageError):
+        place = error.ctx.command_path if error.ctx else ""
+        return 2, "", (Problem(place, error.format_message()),)
+    if isinstance(error, InputError):
+        return 1 if isinstance(error, MachineError) else 2, str(error), error.problems
+    if isinstance(error, KinaccError):
+        return 1, str(error), ()
+    raise error
+
+
+@contextmanager
+def _listening(came: list[int]) -> Iterator[None]:
+    """Ctrl-C, and SIGTERM as it, end the block so that what it began is tidied up."""
+
+    def end(signum: int, _: object) -> NoReturn:
+        came.append(signum)
+        raise Terminated if signum == signal.SIGTERM else KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
         yield  # only the first thread of a program may say what signals do
         return
-    before = signal.signal(signal.SIGTERM, end)
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
+        for each, how in before.items():
+            if how != signal.SIG_IGN:  # as of SIGINT for a command in the background
+                signal.signal(each, end)
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for each, how in before.items():
+            signal.signal(each, how)
 
 
 SECTIONS = {

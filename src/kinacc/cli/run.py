@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -73,6 +75,7 @@ def _run(
 ) -> list[str]:
     """Run one stage of one data set and say what it wrote; InputError if it cannot be run."""
     # Here and not above: a stage says what it reads and leaves without a numerical library.
+    from kinacc.workflow import cost
     from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.plan import planned
     from kinacc.workflow.results_lock import running, sharing
@@ -96,6 +99,15 @@ def _run(
     if part is not None and part not in parts:
         absent.append(Problem("--part", repr(part), ", ".join(map(str, parts))))
     refuse(absent, f"{stage.name} cannot be run")
-    jobs = [plan.job(stage.name, dataset, each) for each in (parts if part is None else [part])]
+    ahead = {(dataset, stage.name): cost.of_stage(stage.name, plan.datasets[dataset])}
+    for line in cost.expected(ahead):
+        click.echo(line, err=True)
+    given = [word for name in config for word in ("--config", name)]
+    words = shlex.join([*given, "--results", results])
+    remake = f"kinacc run {{stage}} --dataset {{dataset}} {words}"
+    jobs = [
+        replace(plan.job(stage.name, dataset, each), remake=remake)
+        for each in (parts if part is None else [part])
+    ]
     with running(results) if part is None else sharing(results):
         return [path for job in execute_all(jobs) for path in job.outputs.values()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import re
@@ -15,7 +14,8 @@ import numpy as np
 
 from kinacc.artifacts.atomic import write_whole
 from kinacc.cli.output import plain
-from kinacc.config.names import in_csv
+from kinacc.config.names import csv_text, in_csv
+from kinacc.errors import as_seen
 
 _SHOWN_ROWS = 24
 _PLAIN_UNITS = ("mm", "mrad", "rad", "deg", "kg")
@@ -73,24 +73,20 @@ class Sheet:
 
     def as_csv(self) -> str:
         """Column names, then one line per row; empty cells for none."""
-        out = io.StringIO()
-        writer = csv.writer(out, lineterminator="\n")
         names = [field.heading if self.with_units else field.name for field in self.fields]
-        writer.writerow([in_csv(name) for name in names])
-        for i in range(len(self)):
-            writer.writerow([_cell(field.values[i]) for field in self.fields])
-        return out.getvalue()
+        rows = ([_cell(field.values[i]) for field in self.fields] for i in range(len(self)))
+        return csv_text([map(in_csv, names), *rows])
 
     def as_text(self) -> str:
         """Aligned columns of the first rows for a screen."""
         count = min(len(self), self.shown_rows)
         columns = [
-            [field.name, *(_short(field.values[i]) for i in range(count))]
+            [as_seen(field.name), *(_short(field.values[i]) for i in range(count))]
             for field in self.fields
             if field.on_screen
         ]
         widths = [max(map(len, column)) for column in columns]
-        lines = [self.title] if self.title else []
+        lines = [as_seen(self.title)] if self.title else []
         for i in range(count + 1):
             cells = (column[i].rjust(width) for column, width in zip(columns, widths, strict=True))
             lines.append("  ".join(cells).rstrip())
@@ -119,8 +115,8 @@ class Sheet:
 
         book = Workbook()
         page = book.active
-        page.append([field.name for field in self.fields])
-        page.append([field.unit for field in self.fields])
+        page.append([_in_excel(field.name) for field in self.fields])
+        page.append([_in_excel(field.unit) for field in self.fields])
         columns = [[_in_excel(value) for value in field.values] for field in self.fields]
         for row in zip(*columns, strict=True):
             page.append(row)
@@ -168,7 +164,7 @@ def _cell(value: object) -> str:
 def _in_excel(value: object) -> object:
     """A value as a cell takes it: a text is a text, and never a formula."""
     value = plain(value)
-    return in_csv(value) if isinstance(value, str) else value
+    return in_csv(as_seen(value)) if isinstance(value, str) else value
 
 
 def _short(value: object) -> str:
@@ -179,4 +175,4 @@ def _short(value: object) -> str:
         if abs(value) < _NOTHING:
             return f"{0.0:.4f}"
         return f"{value:.4f}" if abs(value) >= 0.01 else f"{value:.3g}"
-    return str(value)
+    return as_seen(str(value))

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import click
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
+
+if TYPE_CHECKING:
+    from kinacc.workflow.cost import Cost
 
 
 @click.command("tournament")
@@ -67,10 +71,13 @@ def tournament(config, results, size, parts, part, assessor, noise_mm, cores, ti
 
 def _play(waiting: Sequence, cores: int) -> None:
     """Compute the parts that are not there yet."""
+    from kinacc.workflow import cost
     from kinacc.workflow.local_executor import execute_all
     from kinacc.workflow.runner import is_done
 
     left = [job for job in waiting if not is_done(job)]
+    for line in cost.expected({("", "tournament"): _cost(left)} if left else {}):
+        click.echo(line, err=True)
     finished = len(waiting) - len(left)
     if finished:
         click.echo(f"{finished} of {len(waiting)} parts are there", err=True)
@@ -88,13 +95,27 @@ def _play(waiting: Sequence, cores: int) -> None:
         raise
 
 
+def _cost(left: Sequence) -> Cost:
+    """What the parts that are left cost, by the share of the tournament that they are."""
+    from kinacc.study.tournament.contest import CONTESTANTS, Contest
+    from kinacc.workflow.cost import of_tournament
+
+    settings = left[0].settings
+    contest, whole = Contest.of(settings), Contest.of({**settings, "noise_mm": ()})
+    share = len(contest.assessors) / len(CONTESTANTS)
+    share *= len(contest.size.noise_mm) / len(whole.size.noise_mm)
+    share *= len(left) / int(left[0].part.rpartition("-")[2])
+    found = of_tournament(settings["size"])
+    return found._replace(seconds=share * found.seconds)
+
+
 def _times(job) -> dict[str, float]:
     """Milliseconds of a campaign by assessor; no table holds them, for they differ by the hour."""
     from kinacc.study.tournament.contest import Contest, jobs, times_ms
     from kinacc.study.tournament.fields import of_tables
-    from kinacc.workflow.runner import read_inputs
+    from kinacc.workflow.inputs import read_inputs
 
-    fields = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
+    fields = of_tables(read_inputs(job.inputs).tables, job.settings["robots"], ())
     contest = Contest.of(job.settings)
     work = jobs(fields, contest.size)
     cell = next((each for each in work if each.budget == 200), work[-1])

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import unicodedata
+from collections.abc import Iterable
+from types import SimpleNamespace
 
 from kinacc.errors import Problem
 
@@ -12,7 +15,7 @@ LONGEST = 100  # a file name has at most 255 bytes, and others are made of it
 # An underscore inside a word, as in ur10_b, is no mark of Markdown.
 _MARKS = re.compile(r"[\\`*\[\]<>|~$]|(?<![^\W_])_|_(?![^\W_])|&(?=#?\w+;)")
 # A spreadsheet takes a cell that begins so for a formula; a number may begin with its sign.
-_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
+_FORMULA = re.compile(r"'*[=+\-@＝＋－＠\t\r\n]")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -40,6 +43,17 @@ def in_markdown(text: str) -> str:
 def in_csv(text: str) -> str:
     """Text that no spreadsheet takes for a formula: an apostrophe before what would be one."""
     return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Rows of cells as CSV; a text that holds the end of a line, of whatever kind, in quotes.
+
+    Python's writer leaves a carriage return bare where lines do not end in it, and a spreadsheet
+    begins a row there.
+    """
+    lines: list[str] = []
+    csv.writer(SimpleNamespace(write=lines.append), lineterminator="\r\n").writerows(rows)
+    return "".join(f"{line[:-2]}\n" for line in lines)
 
 
 def of_csv(cell: str) -> str:

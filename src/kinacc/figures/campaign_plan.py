@@ -47,7 +47,14 @@ def draw(
             colour, marker = _STYLES[number % len(_STYLES)]
             _band(left, curve, colour, top)
             middle = np.where(np.isfinite(curve.width_mm[:, 1]), curve.width_mm[:, 1], np.nan)
-            left.plot(curve.budget, middle, color=colour, marker=marker, ms=3, label=curve.name)
+            left.plot(
+                curve.budget,
+                middle,
+                color=colour,
+                marker=marker,
+                ms=3,
+                label=style.literal(curve.name),
+            )
             right.plot(curve.budget, curve.power, color=colour, marker=marker, ms=3)
         left.set_ylim(0.0, top)
         right.set_ylim(0.0, _POWER_TOP)

@@ -136,6 +136,11 @@ def shortened(name: str, limit: int) -> str:
     return f"{name[:head]}…{name[-(limit - 1 - head) :]}"
 
 
+def literal(text: str) -> str:
+    """A text that stands in a legend as it is: neither a formula nor, as _text, left out."""
+    return f"{' ' * text.startswith('_')}{text.replace('$', chr(92) + '$')}"
+
+
 def name_dataset(figure: Figure, dataset: str | None) -> None:
     """Write the data set's name small above the figure, where one is given."""
     if dataset:

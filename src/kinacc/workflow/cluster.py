@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
+from kinacc.workflow import cost
 from kinacc.workflow.catalogue import STAGES, TOURNAMENT, maker_of
 
 if TYPE_CHECKING:
@@ -26,14 +27,7 @@ _STAGE_S = 3.0
 
 
 def _simulations(config: Mapping) -> float:
-    study = config["study"]
-    return len(study["noise_mm"]) * study["repetitions"] * study["measurements"] / 200
-
-
-def _cells(config: Mapping) -> float:
-    space, grid_mm = config["evaluation"]["cylinder"], config["map"]["grid_mm"]
-    slices = len(config["map"]["slices_deg"])
-    return slices * space["radial_span_mm"] * space["height_mm"] / grid_mm**2
+    return cost.simulations(config) * config["study"]["measurements"] / 200
 
 
 # Seconds of all parts together, by the configuration of the data set, or by `tournament`.
@@ -41,13 +35,11 @@ _SECONDS: Mapping[str, Callable[[Mapping], float]] = {
     "vec": lambda config: 60.0 if config["calibration"]["vec"]["order"] == "auto" else 5.0,
     "compliance": lambda config: 10.0,
     "residuals": lambda config: 5.0,
-    "accuracy_map": lambda config: 2.0 + 3e-4 * _cells(config),
+    "accuracy_map": lambda config: 2.0 + 3e-4 * cost.cells(config),
     "study_chunk": lambda config: 0.01 * _simulations(config),
     "report": lambda config: 5.0,
-    "robustness_chunk": lambda config: 5.0 * config["robustness"]["draws"],
-    "map_readings_chunk": lambda config: 100.0 * config["map_readings"]["arms"],
-    "choices_chunk": lambda config: 8.0 * config["choices"]["runs"],
-    "tournament_chunk": lambda section: {"default": 600.0}.get(section["size"], 86400.0),
+    **{name: partial(cost.over_many, name) for name in cost.MANY},
+    "tournament_chunk": lambda section: cost.of_tournament(section["size"]).seconds,
 }
 
 

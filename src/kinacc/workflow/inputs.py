@@ -13,15 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from kinacc.artifacts import provenance, records
 from kinacc.errors import InputError, Problem, gathered, refuse
-from kinacc.workflow.catalogue import maker_of
+from kinacc.workflow.catalogue import STAGES, maker_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 Paths = Mapping[str, str | Sequence[str]]
-
-# The command that makes one file of this run anew, for {stage}, {dataset} and {file}.
-REMAKE = "KINACC_REMAKE"
 
 
 class Inputs(NamedTuple):
@@ -31,13 +28,13 @@ class Inputs(NamedTuple):
     digests: dict[str, str]
 
 
-def read_inputs(paths: Paths) -> Inputs:
+def read_inputs(paths: Paths, remake: str = "") -> Inputs:
     """Columns of every table, scattered ones joined in order, other files as paths, and digests.
 
     Every table is held to the checksums of its pages, to the digest of its columns and, byte by
     byte, to the record of the stage that made it; tables from before there were digests have none
     of these. Raises InputError naming every file that does not fit, and the command that makes it
-    again.
+    again: ``remake``, with places for {stage}, {dataset}, {file} and {target}, as far as known.
     """
     from kinacc.artifacts.store import columns_in
 
@@ -49,7 +46,7 @@ def read_inputs(paths: Paths) -> Inputs:
             found.digests[role] = provenance.file_hash(str(given))
             continue
         with gathered(problems):
-            parts = [_verified(role, path, known) for path in _listed(given)]
+            parts = [_verified(role, path, known, remake) for path in _listed(given)]
             table = parts[0] if isinstance(given, str) else _joined(role, given, parts)
             found.digests[role] = _digest(role, table, given)
             found.tables[role] = columns_in(table)
@@ -76,16 +73,17 @@ def digests(paths: Paths) -> dict[str, str]:
     return found
 
 
-def remake(stage: str, dataset: str, file: str) -> str:
+def _again(remake: str, stage: str, dataset: str, file: str) -> str:
     """What to do about a file that is not as its stage left it."""
-    template = os.environ.get(REMAKE)
-    if template is None:
-        from kinacc.artifacts.store import remake as by_check
+    if not remake:
+        from kinacc.artifacts import store
 
-        return by_check(file)
+        return store.remake(file)
+    # What is made on request alone is no target of the workflow unless it is named.
+    target = f" -- {shlex.quote(file)}" if STAGES[stage].on_request else ""
     words = {"{stage}": stage, "{dataset}": dataset, "{file}": file}
-    command = re.sub("|".join(words), lambda found: shlex.quote(words[found[0]]), template)
-    return f"make it again: {command}"
+    words = {place: shlex.quote(word) for place, word in words.items()} | {"{target}": target}
+    return "make it again: " + re.sub("|".join(words), lambda found: words[found[0]], remake)
 
 
 def _is_file(role: str) -> bool:
@@ -104,7 +102,9 @@ def _stated(path: str, changed_ns: int) -> str:
     return store.stated_digest(path) or store.columns_digest(store.read_table(path))
 
 
-def _verified(role: str, path: str, known: dict[str, records.Record | None]) -> pa.Table:
+def _verified(
+    role: str, path: str, known: dict[str, records.Record | None], remake: str
+) -> pa.Table:
     """The table in a file that is as its maker left it."""
     from kinacc.artifacts import store
 
@@ -127,7 +127,7 @@ def _verified(role: str, path: str, known: dict[str, records.Record | None]) -> 
     except FileNotFoundError:
         raise InputError(Problem(path, "no such file")) from None
     except InputError as error:
-        fix = remake(stage, folder.name, path)
+        fix = _again(remake, stage, folder.name, path)
         raise InputError([replace(each, fix=fix) for each in error.problems]) from None
     return table
 
@@ -136,22 +136,26 @@ def _joined(role: str, paths: Sequence[str], parts: Sequence[pa.Table]) -> pa.Ta
     """Parts of one artefact as one table; InputError where they come from different states."""
     import pyarrow as pa
 
-    from kinacc.artifacts.store import COLUMNS_DIGEST
+    from kinacc.artifacts import store
 
-    origins = {
-        tuple(
-            sorted((k, v) for k, v in part.schema.metadata.items() if k != COLUMNS_DIGEST.encode())
-        )
-        for part in parts
-    }
+    own = store.COLUMNS_DIGEST.encode()
+    marks = [dict(part.schema.metadata or {}) for part in parts]
+    origins = {tuple(sorted((k, v) for k, v in each.items() if k != own)) for each in marks}
     if len(origins) != 1:
         raise InputError(
             Problem(
                 ", ".join(paths),
                 f"parts of {role} made from {len(origins)} different states",
                 "parts of one run",
-                remake(maker_of(role.rpartition("/")[2]).name, "", paths[0]),
+                store.remake(paths[0]),
             )
+        )
+    key = store.artefact_named(role.rpartition("/")[2]).key
+    lacking = [name for name in key for part in parts if name not in part.schema.names]
+    if lacking or any(not part.schema.equals(parts[0].schema) for part in parts):
+        what = f"parts of {role} with different columns"
+        raise InputError(
+            Problem(", ".join(paths), what, "parts of one run", store.remake(paths[0]))
         )
     return pa.concat_tables(parts)
 

@@ -16,12 +16,12 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
 from kinacc.artifacts.atomic import sweep
-from kinacc.errors import KinaccError
+from kinacc.errors import InputError, KinaccError
 
 LOCK, JOBS = ".lock", ".lock-jobs"
 RUN = "KINACC_RUN"  # in the environment of jobs: the number of their run, and its folder
@@ -42,8 +42,10 @@ def _tell(words: str) -> None:
 def running(results: Path | str, tell: Callable[[str], object] = _tell) -> Iterator[None]:
     """Hold a results folder for one run, and remove what runs that were killed left in it.
 
-    Jobs of a run that was killed are waited for. Raises InUse where another run, of this or another
-    machine, is at work in it.
+    Jobs of a run that was killed are waited for. Where the last run did not come to its end, by a
+    loss of power perhaps, every file is held to its record first, and the records of those that
+    were not written to their end are removed, so that they are made anew. Raises InUse where
+    another run, of this or another machine, is at work in the folder.
     """
     with _opened(results, LOCK, tell) as lock, _opened(results, JOBS, tell) as jobs:
         if not _taken(lock, fcntl.LOCK_EX, _PATIENCE_S):
@@ -55,12 +57,14 @@ def running(results: Path | str, tell: Callable[[str], object] = _tell) -> Itera
                 f"{results}: waiting for jobs of a run that was ended, and which are still at work"
             )
             _taken(jobs, fcntl.LOCK_EX)
-        number = os.urandom(8).hex()
+        number, fell = os.urandom(8).hex(), bool(os.fstat(lock.fileno()).st_size)
         _name(lock, number)
         _HELD[:] = [lock, jobs]
         os.environ[RUN] = f"{number} {Path(results).absolute()}"
         try:
             sweep(results)
+            if fell:
+                _doubt_torn_files(results, tell)
             _taken(jobs, fcntl.LOCK_UN)
             yield
         finally:
@@ -80,6 +84,31 @@ def sharing(results: Path | str, tell: Callable[[str], object] = _tell) -> Itera
         lock.truncate(0)  # what a run that was killed left in it
         sweep(results)
         yield
+
+
+@contextmanager
+def undisturbed(results: Path | str) -> Iterator[None]:
+    """Look at a results folder that nobody writes to; holds nobody up.
+
+    Raises InUse where a run is seen to be at work when it begins, ends or fails.
+    """
+    _refuse_if_at_work(results)
+    try:
+        yield
+    except (KinaccError, OSError):
+        _refuse_if_at_work(results)
+        raise
+    _refuse_if_at_work(results)
+
+
+def _refuse_if_at_work(results: Path | str) -> None:
+    try:
+        lock = open(Path(results, LOCK), encoding="utf-8")  # noqa: SIM115 closed by the next block
+    except OSError:
+        return
+    with lock:
+        if not _taken(lock, fcntl.LOCK_SH, 0.0):
+            raise InUse(f"{results}: {_whose(lock)}; look at it when that has ended")
 
 
 @contextmanager
@@ -156,6 +185,22 @@ def _name(lock: TextIO, number: str) -> None:
     lock.truncate(0)
     lock.write(json.dumps(told | {"command": words if len(words) < 80 else words[:77] + "..."}))
     lock.flush()
+    with suppress(OSError):  # not on a device that cannot
+        os.fsync(lock.fileno())  # after a loss of power it tells that a run was at work
+
+
+def _doubt_torn_files(results: Path | str, tell: Callable[[str], object]) -> None:
+    """Remove every record that does not fit its files: what goes by it is made anew."""
+    from kinacc.artifacts import records
+
+    for place in sorted(Path(results).glob(f"*/{records.FOLDER}/*.json")):
+        try:
+            torn = records.misfits(place, records.read(place))
+        except InputError as error:
+            torn = list(error.problems)
+        if torn:
+            tell(f"{torn[0].where} {torn[0].what}: after a run that did not end, it is made anew")
+            place.unlink(missing_ok=True)
 
 
 def _whose(lock: TextIO) -> str:

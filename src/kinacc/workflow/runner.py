@@ -38,7 +38,8 @@ class Job:
     what its results depend on beside what its module imports, ``kind`` the error model it fits.
     ``label`` begins what is said of faults, ``doing`` what is said of progress. ``code``: hash of
     the code, where that is known already. ``record``: the file that the run of ``stage`` leaves
-    last; empty where its files stand in no folder of a data set.
+    last; empty where its files stand in no folder of a data set. ``remake``: the command that makes
+    an input again, see :func:`kinacc.workflow.inputs.read_inputs`.
     """
 
     module: str
@@ -55,6 +56,7 @@ class Job:
     code: str = ""
     stage: str = ""
     record: str = ""
+    remake: str = ""
 
 
 def execute(job: Job, bar: bool = False) -> None:
@@ -86,7 +88,7 @@ def _tell(text: str, log: TextIO | None) -> None:
 
 def perform(job: Job, progress: object = None) -> None:
     """Run a stage and let its errors through."""
-    tables, read = read_inputs(job.inputs)
+    tables, read = read_inputs(job.inputs, job.remake)
     stage = import_module(job.module)
     if not gc.isenabled():
         # What is imported stays; a collection need not look at it each time.

@@ -10,13 +10,15 @@ import gc
 import json
 import os
 import re
+import shlex
 import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from kinacc.starting import without_tools_of_numpy
+from kinacc.starting import ONE_THREAD, without_tools_of_numpy
 from kinacc.workflow.catalogue import STAGES, TABLES
 from kinacc.workflow.inputs import Paths
 from kinacc.workflow.results_lock import InUse, joined
@@ -30,8 +32,6 @@ COMMAND = (
     " --input {input:q} --output {output:q} --log {log:q}"
 )
 _AS_SAID = re.compile(r'exec "\$KINACC_PYTHON".* --log .*(?=\' (?:returned|died))', re.DOTALL)
-# More threads change the last bits of a sum. Has to be said before numpy is imported.
-_ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def job_of(
@@ -112,7 +112,7 @@ def from_words(words: Sequence[str]) -> Job:
     roles = stage.outputs if stage.leaves == TABLES else [Path(each).suffix[1:] for each in outputs]
     # Another Python, as of a conda environment, has other versions of libraries: it hashes anew.
     planned_here = os.environ.get("KINACC_PYTHON") == sys.executable
-    return job_of(
+    job = job_of(
         told["stage"],
         told["dataset"],
         told["part"],
@@ -124,6 +124,7 @@ def from_words(words: Sequence[str]) -> Job:
         record,
         told["code"] if planned_here else "",
     )
+    return replace(job, remake=os.environ.get("KINACC_REMAKE", ""))
 
 
 def _by_option(words: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
@@ -139,7 +140,7 @@ def main(words: Sequence[str]) -> None:
     tenth of a short stage went into looking.
     """
     gc.disable()
-    os.environ.update(_ONE_THREAD)
+    os.environ.update(ONE_THREAD)
     without_tools_of_numpy()
     signal.signal(signal.SIGTERM, _stop)
     try:
@@ -160,6 +161,27 @@ def python_of_stages(workflow: Any) -> str:
     methods = {method.name for method in workflow.deployment_settings.deployment_method}
     image = "APPTAINER" in methods and workflow.modifier.global_container_img
     return "python" if "CONDA" in methods or image else sys.executable
+
+
+def remaking(workflow: Any) -> str:
+    """The command that makes one {file} of a run of Snakemake again, and what follows from it.
+
+    Jobs of a cluster start Snakemake anew: what the first one said of itself holds.
+    """
+    if workflow.remote_exec and "KINACC_REMAKE" in os.environ:
+        return os.environ["KINACC_REMAKE"]
+    elsewhere = workflow.overwrite_workdir
+    put = os.path.abspath if elsewhere else os.path.relpath
+    words = ["snakemake", "-c2"]
+    if elsewhere or put(workflow.main_snakefile) not in ("Snakefile", "workflow/Snakefile"):
+        words += ["-s", put(workflow.main_snakefile)]
+    if elsewhere:
+        words += ["--directory", str(elsewhere)]
+    if workflow.overwrite_configfiles:
+        words += ["--configfile", *map(put, workflow.overwrite_configfiles)]
+    if given := workflow.config_settings.config:
+        words += ["--config", *(f"{key}={json.dumps(value)}" for key, value in given.items())]
+    return f"{shlex.join(words)} --forcerun {{file}}{{target}}"
 
 
 def without_commands(record: LogRecord) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 from collections.abc import Mapping
@@ -11,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinacc.config.names import csv_text, in_csv
 from kinacc.deployment.record import TOOL, Calibration
 from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
 from kinacc.kinematics.dh import PARAMETERS, DHModel
@@ -118,19 +117,10 @@ def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> st
 
     Last what the poses leave open of the joint; of base and tool in the row of the last one.
     """
-    dh, out = _dh_of(calibration), io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
+    dh = _dh_of(calibration)
     names = [name.replace("_rad", "_deg") for name in PARAMETERS]
-    writer.writerow(
-        [
-            "joint",
-            "type",
-            *names,
-            *(f"std_{name}" for name in names),
-            *(f"nominal_{n}" for n in names),
-            "undetermined",
-        ]
-    )
+    stds, nominals = ([f"{which}_{name}" for name in names] for which in ("std", "nominal"))
+    rows: list[list[object]] = [["joint", "type", *names, *stds, *nominals, "undetermined"]]
     factor = np.array([180.0 / np.pi if name.endswith("_rad") else 1.0 for name in PARAMETERS])
     fitted, given = (
         np.stack([getattr(model, name) for name in PARAMETERS], axis=1) * factor
@@ -140,8 +130,9 @@ def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> st
         cells = np.concatenate([fitted[joint], std[joint] * factor, given[joint]])
         kind = _kind(dh, joint)
         numbers = ("" if np.isnan(x) else f"{x:.12g}" for x in cells)
-        writer.writerow([joint + 1, kind, *numbers, "; ".join(_of_joint(calibration, joint))])
-    return out.getvalue()
+        left_open = in_csv("; ".join(_of_joint(calibration, joint)))
+        rows.append([joint + 1, kind, *numbers, left_open])
+    return csv_text(rows)
 
 
 def _of_joint(calibration: Calibration, joint: int) -> list[str]:

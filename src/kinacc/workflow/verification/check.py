@@ -14,8 +14,10 @@ import numpy as np
 from kinacc.artifacts import campaign_tables, store, tournament_tables
 from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.artifacts.contract import ARTEFACTS, INPUTS_DIGESTS
 from kinacc.artifacts.error_models import ALWAYS
+from kinacc.artifacts.pictures import as_text
+from kinacc.artifacts.records import Record
 from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
@@ -29,11 +31,13 @@ from kinacc.workflow.catalogue import (
     maker_of,
 )
 from kinacc.workflow.plan import RESULTS, Plan
+from kinacc.workflow.results_lock import undisturbed
 from kinacc.workflow.verification.conformity import check_file
-from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts
+from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts, strays
 from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_command
-from kinacc.workflow.verification.pictures import check_page, check_picture
+from kinacc.workflow.verification.pictures import check_picture
 from kinacc.workflow.verification.recomputation import computed_again
+from kinacc.workflow.verification.recorded import Unit, check_records, folded, records_there
 from kinacc.workflow.verification.rules import contradictions
 
 FORMATS = schema.key("figures.formats").choices
@@ -43,6 +47,7 @@ FORMATS = schema.key("figures.formats").choices
 class DatasetReport:
     """What was found in one data set's folder: files checked, problems, and notes beside them.
 
+    ``again`` are tables whose numbers were computed again.
     ``doubts`` are the stages the problems leave in doubt, ``marks`` the provenance of every
     readable table. ``advice`` says what to do where no stage of the study can help.
     """
@@ -54,6 +59,7 @@ class DatasetReport:
     doubts: frozenset[Doubt] = frozenset()
     marks: Marks = field(default_factory=dict, repr=False)
     advice: str = ""
+    again: tuple[str, ...] = ()
 
     def to_dict(self) -> dict:
         """Plain values for JSON."""
@@ -61,6 +67,7 @@ class DatasetReport:
             "name": self.name,
             "ok": not self.problems,
             "checked": list(self.checked),
+            "computed_again": list(self.again),
             "problems": [asdict(problem) for problem in self.problems],
             "notes": list(self.notes),
         }
@@ -70,13 +77,14 @@ class DatasetReport:
 class Report:
     """What was found in a results folder; ``ok`` if there is no problem anywhere.
 
-    ``advice`` says what to do about the problems.
+    ``advice`` says what to do about the problems. ``digest`` is one of all records.
     """
 
     folder: str
     datasets: tuple[DatasetReport, ...]
     problems: tuple[Problem, ...] = ()
     advice: str = ""
+    digest: str = ""
 
     @property
     def ok(self) -> bool:
@@ -95,6 +103,7 @@ class Report:
             "folder": self.folder,
             "problems": [asdict(problem) for problem in self.problems],
             "advice": self.advice,
+            "digest": self.digest,
             "datasets": [each.to_dict() for each in self.datasets],
         }
 
@@ -104,15 +113,21 @@ class Report:
         for each in self.datasets:
             count = len(each.problems)
             found = "no problem" if not count else f"{count} problem{'s' if count > 1 else ''}"
-            lines.append(f"{each.name}: {len(each.checked)} files checked, {found}")
+            again = f"{len(each.again)} tables computed again, " if each.again else ""
+            lines.append(f"{each.name}: {len(each.checked)} files checked, {again}{found}")
             lines += [f"  - {problem}" for problem in each.problems]
             lines += [f"  note: {note}" for note in each.notes]
         lines += [self.advice] if self.advice else []
+        lines += [f"digest of all records: {self.digest}"] if self.digest and self.ok else []
         return "\n".join(lines)
 
 
 def check_results(
-    results: Path | str, plan: Plan | None = None, configs: Sequence[str] = ()
+    results: Path | str,
+    plan: Plan | None = None,
+    configs: Sequence[str] = (),
+    every: bool = False,
+    expect: str | None = None,
 ) -> Report:
     """Check every data set's folder below ``results``.
 
@@ -120,8 +135,21 @@ def check_results(
     their limits, rows and tables consistent, inputs still those it was made from, claims readable,
     pictures whole. With a ``plan`` (the configuration, read from the files ``configs``) also that
     its data sets are all there and that the artefacts were made with these settings and files.
+    Numbers are computed again (see :mod:`recomputation`), with ``every`` in place of a sample.
+    ``expect``: the digest of all records as it was told before. Raises InUse while a run writes.
     """
     folder = Path(results)
+    with undisturbed(folder.parent if _is_dataset(folder) else folder):
+        report = _checked(folder, plan, configs, every)
+    if expect is not None and report.digest != expect:
+        what = f"digest of all records is {report.digest or 'none: there are no records'}"
+        fix = "the records were written anew since that digest was told, or are of another run"
+        problem = Problem(report.folder, what, expect, fix)
+        return replace(report, problems=(*report.problems, problem))
+    return report
+
+
+def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: bool) -> Report:
     if not folder.name.strip("."):
         folder = Path(os.path.abspath(folder))
     if not folder.is_dir():
@@ -138,7 +166,7 @@ def check_results(
             allowed = ", ".join(plan.datasets)
             problem = Problem(str(folder), "no data set of the configuration", allowed)
             return Report(str(folder), (), (problem,))
-        report = Report(str(folder), (check_dataset(folder, plan),))
+        report = Report(str(folder), (check_dataset(folder, plan, every),), digest=folded([folder]))
         return _advised(report, folder.parent, plan, configs)
     names = sorted(
         path.name
@@ -152,10 +180,11 @@ def check_results(
         names = [name for name in names if name in plan.datasets]
     elif not names:
         problems = [Problem(str(folder), "holds no data set", "one folder for each data set")]
-    reports = [check_dataset(folder / name, plan) for name in names]
+    reports = [check_dataset(folder / name, plan, every) for name in names]
     if (folder / TOURNAMENT).is_dir():
         reports.append(check_tournament(folder / TOURNAMENT))
-    report = Report(str(folder), tuple(reports), tuple(problems))
+    digest = folded([folder / each.name for each in reports])
+    report = Report(str(folder), tuple(reports), tuple(problems), digest=digest)
     return _advised(report, folder, plan, configs, missing)
 
 
@@ -195,15 +224,13 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         doubt = Doubt(maker_of(name).name, path.stem if is_part else None)
         columns, wrong = check_file(path, ARTEFACTS[name])
         found += [(problem, (doubt,)) for problem in wrong]
+        # Parts of a table are held to its schema; the whole is held to the rules.
         if is_part:
             of_parts[str(path)] = columns
-            continue  # parts of a table are held to its schema; the whole is held to the rules
-        if columns is not None:
+        elif columns is not None:
             tables[name] = columns
-        try:
-            marks[name] = store.read_metadata(path)
-        except InputError:
-            continue
+        with suppress(InputError):
+            marks[f"{name}/{path.stem}" if is_part else name] = store.read_metadata(path)
     left_out = _left_out(folder, marks, tables, plan)
     unmade = _not_studied(folder)
     told = {
@@ -221,19 +248,29 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         notes.append(f"{folder}: no study was made: kinacc study FILE.yaml makes one")
     absent = {*left_out, *unmade}
     found += _missing(folder, absent)
-    for name, picture in _pictures(folder, plan, absent):
+    known, wrong_records = records_there(folder)
+    for name, picture in _pictures(folder, plan, absent, known):
         checked += [str(picture)] if picture.exists() else []
-        look = check_page if STAGES[name].leaves == PAGE else check_picture
-        found += [(problem, (Doubt(name),)) for problem in look(picture)]
+        found += [(problem, (Doubt(name),)) for problem in check_picture(picture)]
+    kept = [s for s in STAGES.values() if not (s.joint or {*s.outputs} & {*behind})]
+    names = {stage.name for stage in kept} - set(left_out)
+    known = {unit: record for unit, record in known.items() if unit[0] in names}
+    wrong_files = {problem.where.partition(", column")[0] for problem, _ in found}
+    found += [*wrong_records, *check_records(folder, kept, known, wrong_files)]
+    marks |= {
+        name: {**record.marks, INPUTS_DIGESTS: as_text(record.inputs_digests)}
+        for (name, _), record in known.items()
+        if STAGES[name].leaves != TABLES
+    }
     for problem, names in contradictions(tables):
         doubts = tuple(Doubt(maker_of(name).name) for name in names)
         found.append((_placed(folder, problem), doubts))
     of_lineage, said = check_lineage(folder, marks, plan)
-    found += of_lineage
+    found += [*of_lineage, *strays(folder, marks)]
     again = computed_again(
         folder,
         tables | _joined(folder, of_parts),
-        marks | _marks_of_parts(of_parts),
+        marks,
         {doubt.stage for _, doubts in found for doubt in doubts},
         plan,
         every,
@@ -247,6 +284,7 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         (*notes, *said, *again.notes, *leftovers),
         frozenset(doubt for _, doubts in found for doubt in doubts),
         marks,
+        again=again.tables,
     )
 
 
@@ -259,12 +297,6 @@ def _joined(folder: Path, of_parts: Mapping[str, Columns | None]) -> dict[str, C
             if len(held) == len(own) and len({frozenset(each) for each in held}) == 1:
                 joined[name] = {c: np.concatenate([p[c] for p in held]) for c in held[0]}
     return joined
-
-
-def _marks_of_parts(of_parts: Mapping[str, Columns | None]) -> dict[str, dict[str, str]]:
-    """Provenance of scattered tables."""
-    whole = (path for path, columns in of_parts.items() if columns is not None)
-    return {Path(path).parent.name: store.read_metadata(path) for path in whole}
 
 
 def not_there(folder: Path) -> tuple[str, ...]:
@@ -407,7 +439,12 @@ def _not_studied(folder: Path) -> set[str]:
         for stage in STAGES.values()
         if not (stage.name in CALIBRATION or stage.fits or stage.joint)
     ]
-    there = {stage.name: stage.leaves for stage in beyond if _has_left(folder, stage)}
+    recorded = {stage for stage, _ in records_there(folder)[0]}
+    there = {
+        stage.name: stage.leaves
+        for stage in beyond
+        if stage.name in recorded or _has_left(folder, stage)
+    }
     if set(there.values()) - {PAGE}:
         return set()
     return {stage.name for stage in beyond} - set(there)
@@ -443,11 +480,14 @@ def _missing(folder: Path, left_out: Collection[str]) -> list[Found]:
 
 
 def _pictures(
-    folder: Path, plan: Plan | None, left_out: Collection[str]
+    folder: Path, plan: Plan | None, left_out: Collection[str], known: Mapping[Unit, Record]
 ) -> Iterator[tuple[str, Path]]:
-    formats = FORMATS if plan is None else plan.formats
+    """Pictures and pages that have to be there: without a plan in the formats that are recorded."""
     for name, stage in STAGES.items():
         if not (stage.leaves == TABLES or stage.on_request or name in left_out):
+            record = known.get((name, None))
+            told = [Path(file).suffix[1:] for file in record.files] if record else FORMATS
+            formats = told if plan is None else plan.formats
             yield from ((name, path) for path in _files(folder, stage, formats))
 
 

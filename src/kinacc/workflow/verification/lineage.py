@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import combinations
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from kinacc import __version__
 from kinacc.artifacts import provenance
-from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.artifacts.contract import ARTEFACTS, INPUTS_DIGESTS
 from kinacc.artifacts.store import read_metadata
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import STAGES, TABLES, Stage, maker_of
+from kinacc.workflow.catalogue import FIGURE_FOLDER, PAGE, STAGES, TABLES, Stage, maker_of
+from kinacc.workflow.inputs import digests
 from kinacc.workflow.plan import Plan
-from kinacc.workflow.runner import Job, stage_provenance
 from kinacc.workflow.verification.mending import Doubt, Marks
-
-Inputs = dict[str, "str | list[str]"]
 
 # A problem, and the stages whose files it leaves in doubt.
 Found = tuple[Problem, tuple[Doubt, ...]]
@@ -27,41 +26,41 @@ Found = tuple[Problem, tuple[Doubt, ...]]
 def check_lineage(
     folder: Path, marks: Marks, plan: Plan | None = None
 ) -> tuple[list[Found], list[str]]:
-    """Problems and notes on the provenance of the tables in a data set's folder.
+    """Problems and notes on the provenance of what is in a data set's folder.
 
-    ``marks`` holds the provenance of every readable table by artefact. Without a ``plan``, files
+    ``marks`` holds the provenance of every readable table by artefact, of parts by artefact and
+    part (``study_chunk/1-of-2``), of figures and pages by their stage. Without a ``plan``, files
     from outside the folder (measurements, a robot of one's own) and configuration are not known.
     """
     found = list(_one_version(folder, marks))
     older: list[str] = []
     held: dict[str, _Held] = {}
-    of_robot_file: dict[str, _Held] = {}
+    outside: set[str] = set()
+    now = _Now(folder)
     for stage in STAGES.values():
         if stage.joint:
             continue  # not of this data set alone
-        made = [name for name in stage.outputs if name in marks]
-        torn = list(_one_run(folder, made, marks))
+        units = _units(stage, marks)
+        torn = [each for made in units.values() for each in _one_run(folder, made, marks)]
         found += [(problem, (Doubt(stage.name),)) for problem in torn]
-        if stage.scattered and plan is not None:
-            found += _parts_held_to_settings(folder, stage, plan)
-        if not made or stage.scattered or (plan is None and "measurements_file" in _roles(stage)):
-            continue
-        own = _held_to_inputs(folder, stage, marks[made[0]], plan)
-        own = own._replace(vouched_for=set() if torn else own.vouched_for)
-        (of_robot_file if plan is None and stage.files else held)[made[0]] = own
-        older += [] if own.is_current else made
+        for part, made in units.items():
+            own = _held_to_inputs(folder, stage, made[0], marks[made[0]], now, plan)
+            own = own._replace(part=part, vouched_for=set() if torn else own.vouched_for)
+            held[made[0]] = own
+            older += [] if own.is_current else made
+            outside |= own.outside
+        if len({frozenset(marks[made[0]].items()) for made in units.values()}) > 1:
+            problem = Problem(str(folder / stage.outputs[0]), "parts of different states")
+            found.append((problem, (Doubt(stage.name),)))
     notes = []
-    if len(of_robot_file) > 1 and all(own.problems for own in of_robot_file.values()):
-        # One robot serves all stages: where every one that reads it differs, it has a file.
-        names = ", ".join(of_robot_file)
-        notes.append(f"{folder}: its robot file is not checked without --config: {names}")
-    else:
-        held |= of_robot_file
+    if outside:
+        names = ", ".join(sorted(outside))
+        notes.append(f"{folder}: not checked without --config: {names}")
     sound = set().union(*(own.vouched_for for own in held.values()))
     for name, own in held.items():
-        stage = maker_of(name).name
+        stage = maker_of(name.partition("/")[0]).name
         makers = {maker_of(each).name for each in own.in_doubt - sound}
-        doubts = tuple(map(Doubt, (stage, *sorted(makers))))
+        doubts = (Doubt(stage, own.part), *map(Doubt, sorted(makers)))
         found += [(problem, doubts) for problem in own.problems]
     if older:
         names = ", ".join(older)
@@ -86,17 +85,76 @@ def made_without(folder: Path, artefact: str, marks: Marks) -> bool:
         stage for stage in STAGES.values() if artefact in stage.optional and stage.leaves == TABLES
     ]
     return bool(users) and all(
-        stage.outputs[0] in marks and made_of_these(folder, stage, marks[stage.outputs[0]])
+        stage.outputs[0] in marks
+        and artefact not in digests_read(marks[stage.outputs[0]])
+        and made_of_these(folder, stage, marks[stage.outputs[0]])
         for stage in users
     )
 
 
 def made_of_these(folder: Path, stage: Stage, own: Mapping[str, str]) -> bool:
     """Whether a stage's table with the provenance ``own`` was made from the tables now there."""
-    return any(
-        _expected(stage, inputs, {}, 0)["inputs_hash"] == own.get("inputs_hash")
-        for inputs in _candidates(folder, stage)
+    now = _Now(folder)
+    return all(
+        digest in now[role] for role, digest in digests_read(own).items() if role in ARTEFACTS
     )
+
+
+def digests_read(own: Mapping[str, str]) -> dict[str, str]:
+    """Digests of what an artefact says it was made from; none where it does not say."""
+    try:
+        found = json.loads(own.get(INPUTS_DIGESTS, "{}"))
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+class _Now(dict[str, tuple[str, ...]]):
+    """Digests of artefacts as they are now; of one in parts that of every whole set of these."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self.folder = folder
+
+    def __missing__(self, artefact: str) -> tuple[str, ...]:
+        path = self.folder / f"{artefact}.parquet"
+        sets: Sequence[str | Sequence[str]] = [str(path)] if path.is_file() else []
+        found = []
+        for own in sets or parts(self.folder, artefact):
+            with suppress(InputError, OSError):
+                found.append(digests({artefact: own})[artefact])
+        self[artefact] = tuple(found)
+        return self[artefact]
+
+
+def strays(folder: Path, marks: Marks) -> Iterator[Found]:
+    """Parts of tables that are of another run than what was made from them."""
+    for stage in STAGES.values():
+        for artefact in stage.outputs if stage.scattered and not stage.joint else ():
+            read = [digests_read(own).get(artefact) for own in marks.values()]
+            whole = parts(folder, artefact)
+            right = []
+            for own in whole:
+                with suppress(InputError, OSError):
+                    right += own if digests({artefact: own})[artefact] in read else []
+            there = sorted((folder / artefact).glob("*.parquet"))
+            for path in there if right else ():
+                if str(path) not in right:
+                    what = f"is no part of what {artefact} of this folder was gathered from"
+                    yield Problem(str(path), what), (Doubt(stage.name, path.stem),)
+
+
+def _units(stage: Stage, marks: Marks) -> dict[str | None, list[str]]:
+    """What each run of a stage left that can be read, by the part it was about."""
+    if not stage.scattered:
+        made = [name for name in stage.outputs if name in marks]
+        return {None: made} if made else {}
+    units: dict[str | None, list[str]] = {}
+    for each in marks:
+        name, _, part = each.partition("/")
+        if part and name in stage.outputs:
+            units.setdefault(part, []).append(each)
+    return units
 
 
 def parts(folder: Path, artefact: str) -> list[list[str]]:
@@ -114,11 +172,6 @@ def parts(folder: Path, artefact: str) -> list[list[str]]:
     ]
 
 
-def _roles(stage: Stage) -> set[str]:
-    roles = {"measurements_file", "joints_file"}
-    return roles if "measurements.file.path" in stage.files else set()
-
-
 def _one_version(folder: Path, marks: Marks) -> Iterator[Found]:
     for key in ("kinacc_version", "seed"):
         groups: dict[str, list[str]] = {}
@@ -131,7 +184,10 @@ def _one_version(folder: Path, marks: Marks) -> Iterator[Found]:
         problem = Problem(str(folder), f"{key} {said}", "the same in all artefacts")
         right = __version__ if __version__ in groups else max(groups, key=lambda v: len(groups[v]))
         stages = {
-            maker_of(name).name for value in groups if value != right for name in groups[value]
+            maker_of(name.partition("/")[0]).name
+            for value in groups
+            if value != right
+            for name in groups[value]
         }
         yield problem, tuple(map(Doubt, sorted(stages)))
 
@@ -146,105 +202,93 @@ def _one_run(folder: Path, made: Sequence[str], marks: Marks) -> Iterator[Proble
 
 
 class _Held(NamedTuple):
-    """What the provenance of one stage says of it and of its inputs.
+    """What the provenance of one run of a stage says of it and of its inputs.
 
-    ``vouched_for`` are inputs that are those it was made from; of those ``in_doubt`` one or
-    another is not. ``is_current`` is whether it was made with the code installed.
+    ``vouched_for`` are inputs that are those it was made from; those ``in_doubt`` are not.
+    ``is_current`` is whether it was made with the code installed, ``outside`` are files it read
+    of which nothing is known here.
     """
 
     problems: list[Problem]
     vouched_for: set[str]
     in_doubt: set[str]
     is_current: bool
+    outside: set[str]
+    part: str | None = None
 
 
-def _held_to_inputs(folder: Path, stage: Stage, own: Mapping[str, str], plan: Plan | None) -> _Held:
-    where = str(folder / f"{stage.outputs[0]}.parquet")
-    settings, seed = {}, 0
-    candidates = _candidates(folder, stage)
-    if plan is not None:
-        settings, seed = plan.settings(stage.name, folder.name), plan.seed(folder.name)
-        known = plan.inputs(stage.name, folder.name)
-        files = {name: known[name] for name in known if name.endswith("_file")}
-        candidates = [
-            inputs | files
-            for inputs in candidates
-            if all(Path(each).is_file() for each in files.values())
-        ]
-    if not candidates:
-        return _Held([], set(), set(), True)
-    artefacts = {name for name in candidates[0] if not name.endswith("_file")}
-    problems = []
-    try:
-        expected = [_expected(stage, inputs, settings, seed) for inputs in candidates]
-    except InputError as error:
-        return _Held(list(error.problems), set(), artefacts, True)
-    matching = [
-        inputs
-        for inputs, each in zip(candidates, expected, strict=True)
-        if each["inputs_hash"] == own.get("inputs_hash")
-    ]
-    if not matching:
-        names = ", ".join(candidates[0]) or "nothing"
-        fix = ""
-        if plan is None and stage.files:
-            fix = "if the robot is a file of your own, give the configuration too"
-        what = f"inputs_hash {own.get('inputs_hash')} is not that of the inputs now there ({names})"
-        problems.append(Problem(where, what, expected[0]["inputs_hash"], fix))
-    if plan is not None and own.get("config_hash") != expected[0]["config_hash"]:
+def _held_to_inputs(
+    folder: Path,
+    stage: Stage,
+    name: str,
+    own: Mapping[str, str],
+    now: _Now,
+    plan: Plan | None,
+) -> _Held:
+    ending = {TABLES: f"{name}.parquet", PAGE: f"{name}.html"}
+    where = str(folder / ending.get(stage.leaves, f"{FIGURE_FOLDER}/{name}"))
+    if INPUTS_DIGESTS not in own:
+        return _Held([], set(), set(), True, set())  # of an earlier version; said elsewhere
+    read, problems = digests_read(own), []
+    if provenance.inputs_hash(read) != own.get("inputs_hash"):
+        problems.append(Problem(where, f"inputs_hash is not that of its {INPUTS_DIGESTS}"))
+    known = {*stage.inputs, *stage.optional}
+    unknown = [each for each in read if each not in known and not each.endswith("_file")]
+    lacking = [each for each in stage.inputs if each not in read]
+    if unknown or lacking:
+        said = ", ".join((*unknown, *lacking))
+        allowed = f"exactly what stage {stage.name} reads"
+        problems.append(Problem(where, f"{INPUTS_DIGESTS} with or without {said}", allowed))
+    tables = known & set(read)
+    # One that is not there is said to be missing, or was left out since.
+    other = {each for each in tables if now[each] and read[each] not in now[each]}
+    outside, settings = set[str](), None
+    if stage.leaves == TABLES:
+        outside = {each for each in read if each.endswith("_file")}
+    if plan is not None and stage.name in plan.stages(folder.name):
+        settings = plan.settings(stage.name, folder.name)
+        problems += _held_to_plan(where, stage, own, settings, plan.seed(folder.name))
+        if stage.leaves != PAGE:
+            other |= _other_files(plan, stage, folder.name, read)
+        outside = set()
+    if other:
+        what = f"was made from another {', '.join(sorted(other))}: {INPUTS_DIGESTS} differ"
+        problems.insert(0, Problem(where, what, "made from what is now there"))
+    vouched = set() if problems else tables
+    is_current = own.get("code_hash") in _codes(stage, settings, read)
+    return _Held(problems, vouched, other & known, is_current, outside)
+
+
+def _held_to_plan(
+    where: str, stage: Stage, own: Mapping[str, str], settings: Mapping, seed: int
+) -> Iterator[Problem]:
+    wanted = provenance.config_hash(settings)
+    # A page may be written by itself, with other settings of its own.
+    if own.get("config_hash") != wanted and stage.leaves != PAGE:
         what = f"config_hash {own.get('config_hash')}: made with another configuration"
-        problems.append(Problem(where, what, expected[0]["config_hash"]))
-    if plan is not None and own.get("seed") != str(seed):
-        problems.append(Problem(where, f"seed {own.get('seed')}", str(seed)))
-    vouched = set(matching[0]) if matching and not problems else set()
-    is_current = own.get("code_hash") in _codes(
-        stage, settings if plan else None, matching[0] if matching else None
-    )
-    return _Held(problems, vouched, set() if matching else artefacts, is_current)
+        yield Problem(where, what, wanted)
+    if own.get("seed") != str(seed):
+        yield Problem(where, f"seed {own.get('seed')}", str(seed))
 
 
-def _parts_held_to_settings(folder: Path, stage: Stage, plan: Plan) -> Iterator[Found]:
-    """Parts of a scattered table that were made with other settings than the plan's."""
-    from kinacc.artifacts.store import read_metadata
-
-    wanted = _expected(stage, {}, plan.settings(stage.name, folder.name), 0)["config_hash"]
-    for part in plan.part_names(stage.name, folder.name):
-        path = folder / stage.outputs[0] / f"{part}.parquet"
-        try:
-            own = read_metadata(path).get("config_hash") if path.is_file() else wanted
-        except InputError:
-            continue  # an unreadable part is reported where parts are held to the contract
-        if own != wanted:
-            what = f"config_hash {own}: made with another configuration"
-            yield Problem(str(path), what, wanted), (Doubt(stage.name, part),)
+def _other_files(plan: Plan, stage: Stage, dataset: str, read: Mapping[str, str]) -> set[str]:
+    """Roles of files from outside that are not those a stage read, as far as they are there."""
+    given = plan.inputs(stage.name, dataset)
+    files = {role: str(path) for role, path in given.items() if role.endswith("_file")}
+    if not all(Path(path).is_file() for path in files.values()):
+        return set()
+    roles = {role for role in read if role.endswith("_file")} | set(files)
+    return {r for r in roles if r not in files or provenance.file_hash(files[r]) != read.get(r)}
 
 
-def _expected(stage: Stage, inputs: Inputs, settings: Mapping, seed: int) -> dict[str, object]:
-    return stage_provenance(Job(stage.module, inputs, {}, settings, seed))
-
-
-def _codes(stage: Stage, settings: Mapping | None, inputs: Inputs | None) -> set[str]:
+def _codes(stage: Stage, settings: Mapping | None, read: Collection[str]) -> frozenset[str]:
     """Hashes of the code installed; for every robot it may be where the settings are not known."""
     from kinacc.kinematics import robot
 
-    known = [settings] if settings is not None else [{"robot": n} for n in ("", *robot.shipped())]
-    return {provenance.stage_code_hash(stage.module, stage.used(each, inputs)) for each in known}
-
-
-def _candidates(folder: Path, stage: Stage) -> list[Inputs]:
-    """Sets of artefacts a stage may have read, as they are now; none if a needed one is absent."""
-    found: list[Inputs] = [{}]
-    for name in stage.inputs:
-        maker = next(each for each in STAGES.values() if name in each.outputs)
-        path = folder / f"{name}.parquet"
-        if maker.scattered:
-            found = [old | {name: own} for old in found for own in parts(folder, name)]
-        else:
-            found = [old | {name: str(path)} for old in found] if path.is_file() else []
-    present = [name for name in stage.optional if (folder / f"{name}.parquet").is_file()]
-    chosen = [
-        {name: str(folder / f"{name}.parquet") for name in names}
-        for count in range(len(present), -1, -1)
-        for names in combinations(present, count)
-    ]
-    return [old | extra for old in found for extra in chosen]
+    if settings is not None:
+        return frozenset({provenance.stage_code_hash(stage.module, stage.used(settings, read))})
+    known = ("", *robot.shipped())
+    return frozenset(
+        provenance.stage_code_hash(stage.module, stage.used({"robot": each}, read))
+        for each in known
+    )

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from kinacc.artifacts.provenance import config_hash
 from kinacc.errors import InputError
-from kinacc.workflow.catalogue import STAGES, maker_of
+from kinacc.workflow.catalogue import PAGE, STAGES, maker_of
 from kinacc.workflow.plan import RESULTS, SNAKEFILE, Plan, planned
 
 CONFIG = "config.yaml"
@@ -152,7 +152,9 @@ def _beside(
             return None
         doubtful = {doubt.stage for doubt in doubts.get(dataset, ())}
         for artefact, known in own.items():
-            name = maker_of(artefact).name
+            name = maker_of(artefact.partition("/")[0]).name
+            if STAGES[name].leaves == PAGE:
+                continue  # which may be written by itself, with settings of its own
             expected = config_hash(plan.settings(name, dataset))
             if name not in doubtful and known.get("config_hash") != expected:
                 return None

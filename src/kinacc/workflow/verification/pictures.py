@@ -1,12 +1,10 @@
-"""Tell a whole picture or page from an empty, cut or foreign file, and whose page it is."""
+"""Tell a whole picture or page from an empty, cut or foreign file."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from kinacc.artifacts.pictures import inputs_digests
-from kinacc.errors import Problem, gathered
-from kinacc.workflow.inputs import digests
+from kinacc.errors import Problem
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_END = b"IEND\xaeB`\x82"
@@ -30,24 +28,6 @@ def check_picture(path: Path) -> list[Problem]:
     if not ends:
         return [Problem(str(path), "is cut off", is_a.replace(" ", " whole ", 1))]
     return []
-
-
-def check_page(path: Path) -> list[Problem]:
-    """What is wrong with the page of a results folder: not whole, or about other tables."""
-    problems = check_picture(path)
-    if problems:
-        return problems
-    read = inputs_digests("html", path.read_bytes()) or {}
-    tables = {name: path.parent / f"{name}.parquet" for name in read}
-    with gathered(problems):
-        other = [
-            name
-            for name, table in tables.items()
-            if table.is_file() and digests({name: str(table)})[name] != read[name]
-        ]
-    if problems or not other:
-        return problems
-    return [Problem(str(path), f"was made from another {', '.join(other)}", "made from these")]
 
 
 def _svg(content: bytes) -> tuple[bool, bool]:

@@ -29,7 +29,7 @@ from kinacc.study import monte_carlo
 from kinacc.workflow.catalogue import STAGES, TABLES, Stage
 from kinacc.workflow.configured import in_use
 from kinacc.workflow.plan import Plan, planned
-from kinacc.workflow.verification.lineage import Found
+from kinacc.workflow.verification.lineage import Found, digests_read
 from kinacc.workflow.verification.mending import CONFIG, Doubt, Marks, above
 
 # A number may differ from the one computed by this share of itself, and by this share of the
@@ -74,15 +74,16 @@ def computed_again(
     large: list[str] = []
     for stage in sorted(STAGES.values(), key=lambda each: len(above(each.name))):
         name = stage.name
-        made = [each for each in stage.outputs if each in tables and each in marks]
+        of_parts = {each.partition("/")[0]: own for each, own in marks.items()}
+        made = [each for each in stage.outputs if each in tables and each in of_parts]
         if not made or stage.leaves != TABLES or name in NOT_AGAIN:
             continue
         if name in doubted or above(name) & doubted:
             continue
-        inputs = {each: tables[each] for each in _read(stage, marks[made[0]], tables)}
+        inputs = {each: tables[each] for each in _read(stage, of_parts[made[0]], tables)}
         if not set(stage.inputs) <= set(inputs):
             continue
-        settings = _settings(stage, folder.name, marks[made[0]].get("config_hash"), plans)
+        settings = _settings(stage, folder.name, of_parts[made[0]].get("config_hash"), plans)
         if settings is None:
             unknown += made
             continue
@@ -198,7 +199,7 @@ _SAMPLES = {"study_chunk": _repetitions, "accuracy_map": _cells}
 
 def _read(stage: Stage, own: Mapping[str, str], tables: Collection[str]) -> list[str]:
     """Artefacts that a stage read."""
-    return [each for each in (*stage.inputs, *stage.optional) if each in tables]
+    return [each for each in digests_read(own) if each in tables]
 
 
 def _rows(inputs: Mapping[str, Columns]) -> int:

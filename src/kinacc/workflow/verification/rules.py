@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from kinacc.errors import Problem
 from kinacc.workflow.verification import assessment_rules, calibration_rules
-from kinacc.workflow.verification.rule import Tables
+from kinacc.workflow.verification.rule import Rule, Tables
 
 RULES = (*calibration_rules.RULES, *assessment_rules.RULES)
 
@@ -18,5 +18,13 @@ def contradictions(tables: Tables) -> list[tuple[Problem, tuple[str, ...]]]:
         (problem, needed)
         for needed, rule in RULES
         if all(name in tables and len(next(iter(tables[name].values()))) for name in needed)
-        for problem in rule(tables)
+        for problem in _told(rule, needed, tables)
     ]
+
+
+def _told(rule: Rule, needed: tuple[str, ...], tables: Tables) -> list[Problem]:
+    try:
+        return list(rule(tables))
+    except Exception as error:  # whatever values that nobody would write may lead to
+        where = ", ".join(f"{name}.parquet" for name in needed)
+        return [Problem(where, f"cannot be held to its rules: {type(error).__name__} {error}")]

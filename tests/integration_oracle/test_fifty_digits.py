@@ -1,0 +1,530 @@
+"""Tables of small studies and bounds derived a second time in 50 digits: how far off are floats?
+
+Every derivation begins from the table before it, taken bit by bit, so that each difference is that
+of one step. ``STATED`` holds them; docs/versions.md shows it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles import fifty_digits as fd
+from oracles import fifty_tables as ft
+from oracles import inverse, kinematics, maps, small_study, tables
+from versions_page import STATED
+
+from kinacc import distributions
+from kinacc.artifacts import store
+from kinacc.assess import binomial, ellipsoid, limits
+from kinacc.kinematics import dh
+from kinacc.kinematics.compliance import ComplianceModel
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import JointState
+from kinacc.kinematics.vec import VECModel
+
+SEED = 4711
+ALPHA = fd.exact(0.6)
+PAPER = """
+datasets: {small: {robot: mh180}}
+seed: 4711
+measurements: {folds: 4, validation_fold: 1, synthetic: {poses: 24, tracker_noise_mm: 0.02}}
+calibration: {vec: {order: 1}}
+evaluation: {points: 8}
+map: {slices_deg: [30], grid_mm: 450}
+study: {noise_mm: [0.1, 0.3], repetitions: 2, measurements: 12, chunks: 1}
+histories: {simulations_searched: 30}
+"""
+OWN = """
+datasets: {small: {robot: mh180, measurements: {source: file, file: {path: %s}}}}
+measurements: {folds: null, validation_fold: null}
+calibration: {base_and_tool: estimated, vec: {order: 0}, dh: {fit_to: measurements}}
+"""
+FREE = np.tile([True] * 4 + [False], 6)
+TURNING = np.zeros(6, dtype=bool)
+STD = ("std_theta_offset_rad", "std_d_mm", "std_a_mm", "std_alpha_rad")
+STATISTICS = ("mean", "max", "rms", "gamma99")
+
+
+@pytest.fixture(autouse=True)
+def in_sixty_digits():
+    with fd.working():
+        yield
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory) -> Path:
+    """A small study of the paper's arm."""
+    folder = tmp_path_factory.mktemp("paper")
+    (folder / "config.yaml").write_text(PAPER)
+    return small_study.run_stages(folder / "config.yaml", "small", folder / "results")
+
+
+@pytest.fixture(scope="module")
+def arm(paper) -> ft.Arm:
+    with fd.working():
+        return arm_of(paper)
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory) -> Path:
+    """20 poses that nothing of kinacc made, base and tool unknown, DH fitted to them."""
+    folder = tmp_path_factory.mktemp("own")
+    small_study.write_measurements(folder / "all.csv")
+    lines = (folder / "all.csv").read_text().splitlines()[:21]
+    (folder / "few.csv").write_text("\n".join(lines) + "\n")
+    (folder / "config.yaml").write_text(OWN % (folder / "few.csv"))
+    names = ("measurements", "vec", "dh")
+    return small_study.run_stages(folder / "config.yaml", "small", folder / "results", names)
+
+
+def arm_of(folder: Path) -> ft.Arm:
+    return ft.Arm.of(*(tables.rows(folder, name) for name in ("dh_model", "vec_model", "frames")))
+
+
+def training(folder: Path) -> list[tables.Row]:
+    return [row for row in tables.rows(folder, "measurements") if row["subset"] == "train"]
+
+
+def held(name: str, differences) -> None:
+    """The largest difference is what docs/versions.md allows, and not zero by mistake."""
+    largest = float(max(abs(each) for each in differences))
+    print(f"{name}: {largest:.1e} {STATED[name].unit}")
+    assert largest <= STATED[name].allowed, f"{name}: {largest:.3g} {STATED[name].unit}"
+
+
+def apart(found, expected) -> list[Decimal]:
+    """Differences of floats from Decimals, in their unit."""
+    return [fd.exact(a) - b for a, b in zip(found, expected, strict=True)]
+
+
+def shares(found, expected) -> list[Decimal]:
+    """Differences of floats from Decimals, as shares."""
+    return [Decimal(a) / b - 1 for a, b in zip(found, expected, strict=True) if a is not None]
+
+
+def in_last_places(found, expected) -> list[float]:
+    """Differences in units in the last place of the float."""
+    pairs = zip(found, expected, strict=True)
+    return [float(abs(Decimal(a) - b) / Decimal(math.ulp(a))) for a, b in pairs]
+
+
+def values(folder: Path, table: str, quantity: str) -> list[float]:
+    return [row["value"] for row in tables.rows(folder, table) if row["quantity"] == quantity]
+
+
+def rounded(numbers: np.ndarray) -> np.ndarray:
+    """A start near by: what a fit in 50 digits makes of six digits is its own."""
+    return np.vectorize(lambda x: Decimal(f"{x:.6f}"), otypes=[object])(numbers)
+
+
+# --- kinematics and fits --------------------------------------------------------------------------
+
+
+def test_forward_kinematics_of_all_models(arm, paper):
+    q = np.array([tables.joints(row) for row in tables.rows(paper, "measurements")])[:6]
+    found = defaultdict(list)
+    for kind, model in (
+        ("dh", DHModel.from_columns(store.read(paper / "dh_model.parquet"), TURNING)),
+        ("vec", VECModel.from_columns(store.read(paper / "vec_model.parquet"), TURNING)),
+    ):
+        at = model.pose(JointState(q, np.zeros(q.shape, dtype=np.int8)))
+        for angles, position, rotation in zip(q, at.position_mm, at.rotation, strict=True):
+            expected = arm.flange(kind, fd.exact(angles))
+            found["mm"] += apart(position, expected[:3, 3])
+            found["rotation"] += apart(rotation.ravel(), expected[:3, :3].ravel())
+    held("forward kinematics, position", found["mm"])
+    held("forward kinematics, rotation", found["rotation"])
+
+
+def test_forward_kinematics_of_joints_that_bend(arm):
+    rng = np.random.default_rng(5)
+    compliance, lever = np.full((2, 6), np.nan)
+    compliance[1:3], lever[4] = (1e-6, 3e-6), 2e-6
+    bodies = np.column_stack([rng.uniform(5, 100, 7), rng.normal(size=(7, 3)) * 200])
+    gravity = np.array([0.6, 0.0, -0.8])
+    table = np.vectorize(float)(arm.dh)
+    columns = dict(zip(dh.PARAMETERS, table.T, strict=True))
+    model = ComplianceModel(DHModel(**columns), compliance, lever, gravity, bodies[:6], bodies[6])
+    q = rng.uniform(-1, 1, (3, 6))
+    at = model.pose(JointState(q, np.zeros(q.shape, dtype=np.int8)))
+    found = []
+    for angles, position in zip(q, at.position_mm, strict=True):
+        coefficients = (fd.exact(np.nan_to_num(each)) for each in (compliance, lever))
+        expected = fd.bent_forward(
+            arm.dh, fd.exact(angles), *coefficients, fd.exact(gravity), fd.exact(bodies)
+        )
+        found += apart(position, expected[:3, 3])
+    held("forward kinematics, joints that bend", found)
+
+
+def test_the_vec_fit_is_the_coefficients_of_greatest_posterior_probability(arm, paper):
+    fit = ft.vec_fit(arm, training(paper), rounded(arm.series), 1.0, 1e-3)
+    unit = np.tile(np.repeat([Decimal(1)] * 3 + [ft.UNIT_RAD] * 3, arm.series.shape[2]), 6)
+    held("vec_model: coefficient", (arm.series.ravel() - fit.x) / unit)
+    held("vec_fit: cost", shares(values(paper, "vec_fit", "cost"), [fit.cost]))
+    names = sorted_names(arm)
+    place = {name: i for i, name in enumerate(names)}
+    covariance = [
+        (row["covariance"], fit.covariance[place[row["parameter"]], place[row["other"]]])
+        for row in tables.rows(paper, "vec_covariance")
+    ]
+    std = fit.covariance.diagonal()
+    largest = max(std)
+    assert len(covariance) == len(names) * (len(names) + 1) // 2
+    held("vec_covariance", [(Decimal(a) - b) / largest for a, b in covariance])
+    stated = {
+        f"j{row['joint']}.{row['error']}.{row['order']}": row["std"]
+        for row in tables.rows(paper, "vec_model")
+    }
+    held("vec_model: std", shares([stated[n] for n in names], [x.sqrt() for x in std]))
+
+
+def sorted_names(arm: ft.Arm) -> list[str]:
+    joints, errors, terms = arm.series.shape
+    return [
+        f"j{joint + 1}.{kinematics.ERROR_NAMES[error]}.{order}"
+        for joint in range(joints)
+        for error in range(errors)
+        for order in range(terms)
+    ]
+
+
+def test_the_dh_fit_to_the_vec_is_its_truncated_least_squares(arm, paper):
+    q = [fd.exact(tables.joints(row)) for row in training(paper)]
+    seen = [arm.tool("vec", angles) for angles in q]
+    fit = ft.dh_fit(arm.nominal, q, seen, arm.nominal, 0.01, arm.frames["vec", "tool"])
+    held_to_fit("", paper, arm, fit)
+
+
+def test_the_dh_fit_with_base_and_tool_unknown_is_truncated_least_squares(own):
+    arm, rows = arm_of(own), tables.rows(own, "measurements")
+    q = [fd.exact(tables.joints(row)) for row in rows]
+    start = arm.frames["nominal", "base"], arm.frames["nominal", "tool"]
+    seen = [ft.measured(row) for row in rows]
+    fit = ft.dh_fit(arm.nominal, q, seen, arm.nominal, 0.01, start[1], start[0])
+    held_to_fit(", base and tool estimated", own, arm, fit)
+    placed = zip(("base", "tool"), fit.frames, strict=True)
+    found = [(arm.frames["dh", name] - at)[:3] for name, at in placed]
+    held("frames: position", [x for each in found for x in each[:, 3]])
+    held("frames: rotation", [x for each in found for x in each[:, :3].ravel()])
+
+
+def held_to_fit(kind: str, folder: Path, arm: ft.Arm, fit: ft.Fit) -> None:
+    scale = np.tile([ft.UNIT_RAD, Decimal(1), Decimal(1), ft.UNIT_RAD], 6)
+    held(f"dh_model{kind}", (arm.dh.ravel()[FREE] - fit.x) / scale)
+    std = [row[name] for row in tables.rows(folder, "dh_model") for name in STD]
+    assert any(each is None for each in std)  # d of joints 2 and 3 cannot be told apart
+    expected = [x.sqrt() for x in fit.covariance.diagonal()]
+    held(f"dh_model: std{kind}", shares(std, expected))
+    held(f"dh_fit: cost{kind}", shares(values(folder, "dh_fit", "cost"), [fit.cost]))
+    singular = values(folder, "dh_fit", "singular_value")
+    held(
+        f"dh_fit: singular_value{kind}", [(a / fit.values[0]) for a in apart(singular, fit.values)]
+    )
+
+
+# --- errors and their statistics ------------------------------------------------------------------
+
+
+def test_errors_of_delivered_models_pose_by_pose(arm, paper):
+    rows = tables.rows(paper, "measurements")
+    found = defaultdict(list)
+    for row in tables.rows(paper, "pose_errors"):
+        delivered = row["estimate"] == "train" or row["fold"] == 1
+        if not delivered or row["row"] % 3:
+            continue
+        position, turn = ft.pose_error(arm, rows[row["row"]], row["comparison"])
+        found["mm"] += apart([row[f"e{c}_mm"] for c in "xyz"], position)
+        found["mrad"] += apart([row[f"r{c}_mrad"] for c in "xyz"], turn)
+    assert len(found["mm"]) >= 4 * 3 * 6
+    held("pose_errors: position", found["mm"])
+    held("pose_errors: orientation", found["mrad"])
+
+
+def test_tables_one_and_three_with_their_gamma_quantiles(paper):
+    """And the same statistics of held-out errors, from the errors row by row."""
+    vectors = defaultdict(list)
+    for row in tables.rows(paper, "pose_errors"):
+        subset = {"train": "train", "cross_validated": "validation"}[row["estimate"]]
+        for quantity, names in (("position", "e{}_mm"), ("orientation", "r{}_mrad")):
+            vector = fd.exact([row[names.format(c)] for c in "xyz"])
+            vectors[row["comparison"], subset, quantity].append(fd.size(vector))
+    found = defaultdict(list)
+    for row in tables.rows(paper, "residuals"):
+        if row["fold"] is None:
+            sizes = vectors.pop((row["comparison"], row["subset"], row["quantity"]))
+            assert row["n"] == len(sizes)
+            for name, expected in ft.statistics(sizes).items():
+                found[name == "gamma99"] += in_last_places([row[name]], [expected])
+    assert not vectors
+    held("residuals: mean, max, rms", found[False])
+    held("residuals: gamma99", found[True])
+
+
+def test_what_another_model_gains_on_held_out_configurations(paper):
+    squares = defaultdict(dict)
+    folds = {}
+    for row in tables.rows(paper, "pose_errors"):
+        if row["estimate"] == "cross_validated" and row["comparison"].endswith("_vs_measured"):
+            vector = fd.exact([row[f"e{c}_mm"] for c in "xyz"])
+            squares[row["comparison"].partition("_vs_")[0]][row["pose"]] = vector @ vector
+            folds[row["pose"]] = row["fold"]
+    found = []
+    for row in tables.rows(paper, "model_selection"):
+        own = squares[row["model"]]
+        assert row["configurations"] == len(own)
+        roots = [
+            mean([own[pose] for pose in own if folds[pose] == fold]).sqrt()
+            for fold in sorted({*folds.values()})
+        ]
+        gains = [squares["dh"][pose] - own[pose] for pose in own]
+        spread = sum((g - mean(gains)) ** 2 for g in gains) / (len(gains) - 1)
+        error = (spread / len(gains)).sqrt()
+        expected = [mean([*own.values()]).sqrt(), mean(roots), mean(gains), error]
+        names = ("held_out_rms_mm", "mean_of_folds_mm", "gain_mm2", "gain_std_error_mm2")
+        found += apart([row[name] for name in names], expected)
+    held("model_selection", found)
+
+
+def mean(numbers) -> Decimal:
+    return sum(numbers) / len(numbers)
+
+
+def test_what_models_leave_by_region_of_a_joint(paper):
+    vectors = defaultdict(dict)
+    for row in tables.rows(paper, "pose_errors"):
+        key = row["comparison"], row["estimate"]
+        vectors[key][row["row"]] = fd.exact([row[f"e{c}_mm"] for c in "xyz"])
+    q = [tables.joints(row) for row in tables.rows(paper, "measurements")]
+    found, seen = [], defaultdict(int)
+    for row in tables.rows(paper, "joint_bias"):
+        own, joint = vectors[row["comparison"], row["estimate"]], row["joint"] - 1
+        highest = max(q[i][joint] for i in own)
+        part = [
+            own[i]
+            for i in own
+            if row["from_rad"] <= q[i][joint] < row["to_rad"]
+            or q[i][joint] == highest <= row["to_rad"] + 1e-12
+        ]
+        assert row["n"] == len(part)
+        seen[row["comparison"], row["estimate"], joint] += len(part)
+        centre = sum(part) / len(part)
+        rms = (sum(x @ x for x in part) / len(part)).sqrt()
+        stated, expected = [row[f"e{c}_mm"] for c in "xyz"], [*centre]
+        if len(part) > 1:
+            stated += [row[f"std_error_{c}_mm"] for c in "xyz"]
+            squares = sum((x - centre) ** 2 for x in part) / (len(part) - 1) / len(part)
+            expected += [x.sqrt() for x in squares]
+        found += apart([*stated, row["rms_mm"]], [*expected, rms])
+    assert all(count == len(vectors[key[:2]]) for key, count in seen.items())
+    held("joint_bias", found)
+
+
+# --- accuracy map and points ----------------------------------------------------------------------
+
+
+def test_a_cell_of_the_accuracy_map(arm, paper):
+    rows = [row for row in tables.rows(paper, "accuracy_map") if row["solutions"]]
+    low, high = (np.vectorize(float)(x) for x in (arm.low, arm.high))
+    limits_rad = np.radians(kinematics.MH180_LIMITS_DEG).T
+    low, high = np.maximum(low, limits_rad[0]), np.minimum(high, limits_rad[1])
+    table = np.vectorize(float)(arm.dh)
+    found = defaultdict(list)
+    for row in rows[:1]:
+        angle = math.radians(row["slice_deg"])
+        reached = []
+        for signs in maps.SIGNS:
+            wanted = wanted_pose(row, signs)
+            start = np.vectorize(float)(wanted)
+            for q in inverse.all_solutions(
+                lambda q: inverse.dh_step(table, q), start, maps.starts(angle)
+            ):
+                branch, q = maps.branch_of(table, q), maps.nearest_turns(q, low, high)
+                if branch in maps.BRANCHES and ((q >= low) & (q <= high)).all():
+                    reached.append((fd.exact(q), wanted))
+        assert len(reached) == row["solutions"]
+        errors = []
+        for q, wanted in reached:
+            q = polished(arm.dh, q, wanted)
+            true, model = arm.tool("vec", q), arm.tool("dh", q)
+            turn = fd.rotation_vector(true[:3, :3] @ model[:3, :3].T)
+            errors.append((fd.size(true[:3, 3] - model[:3, 3]), 1000 * fd.size(turn), [*q]))
+        largest, _, q = max(errors)
+        found["mm"] += apart([row["position_max_mm"]], [largest])
+        found["mrad"] += apart([row["orientation_max_mrad"]], [max(e[1] for e in errors)])
+        found["rad"] += apart(tables.joints(row), q)
+    held("accuracy_map: position", found["mm"])
+    held("accuracy_map: orientation", found["mrad"])
+    held("accuracy_map: joints", found["rad"])
+
+
+def wanted_pose(row: tables.Row, signs) -> np.ndarray:
+    """The flange of a cell: on the slice, pointing down, turned about its own axes in turn."""
+    at = fd.eye(4)
+    degree = fd.dec(fd.mpmath.pi) / 180
+    for axis, angle in ((2, Decimal(row["slice_deg"])), (0, 180)):
+        at = at @ fd.frame(about(axis, angle * degree), fd.zeros(3))
+        if axis == 2:
+            place = fd.exact([row["radius_mm"], 0.0, row["height_mm"]])
+            at = at @ fd.frame(fd.eye(3), place)
+    for axis, sign in enumerate(signs):
+        at = at @ fd.frame(about(axis, sign * 45 * degree), fd.zeros(3))
+    return at
+
+
+def about(axis: int, angle: Decimal) -> np.ndarray:
+    vector = fd.zeros(3)
+    vector[axis] = angle
+    return fd.turned_by(vector)
+
+
+def polished(table, q, wanted):
+    """Newton's steps to the joints at which the arm is where it is wanted."""
+    for _ in range(8):
+        at, motion = joint_motions(table, q)
+        turn = fd.rotation_vector(wanted[:3, :3] @ at[:3, :3].T)
+        miss = np.concatenate([wanted[:3, 3] - at[:3, 3], turn])
+        gram = motion.T @ motion
+        step = fd.inverse(gram) @ (motion.T @ miss)
+        q = q + step
+        if max(abs(x) for x in step) < Decimal("1e-30"):
+            return q
+    raise AssertionError("no joints for this pose")
+
+
+def joint_motions(table, q):
+    """The flange and how each joint moves it: as its theta does."""
+    at, motion = fd.dh_motions(table, q)
+    return at, motion[:, ::5]
+
+
+def test_errors_of_the_operating_points(arm, paper):
+    found = []
+    for row in tables.rows(paper, "assessment_points"):
+        q = fd.exact(tables.joints(row))
+        error = arm.tool("vec", q)[:3, 3] - arm.tool("dh", q)[:3, 3]
+        stated = [row["ex_mm"], row["ey_mm"], row["ez_mm"], row["true_error_mm"]]
+        found += apart(stated, [*error, fd.size(error)])
+    held("assessment_points", found)
+
+
+# --- the study ------------------------------------------------------------------------------------
+
+
+def true_errors(paper) -> np.ndarray:
+    rows = tables.rows(paper, "assessment_points")
+    return fd.exact([[row["ex_mm"], row["ey_mm"], row["ez_mm"]] for row in rows])
+
+
+def test_simulations_replayed_from_the_words_of_their_random_stream(paper):
+    error = true_errors(paper)
+    points, budget, found = len(error), 12, []
+    for row in tables.rows(paper, "study"):
+        world = ft.World(error, row["noise_mm"], row["repetition"], SEED)
+        sizes = [fd.size(world(j, 1)) for j in range(min(points, budget))]
+        if row["assessor"] == "maximum":
+            expected = max(sizes)
+        elif row["assessor"] == "outlier_rejection":
+            expected = ft.outlier_rejection(sizes)
+        elif row["repetition"] == 0:
+
+            def rejects(eta: Decimal, world=world) -> bool:
+                steps = ft.invalidation(world, points, eta, budget, ALPHA)
+                return steps[-1].probability > ALPHA
+
+            number = ft.bound_from_above(rejects, max(sizes))
+            assert row["assessed_mm"] == number / ft.GRID_PER_MM  # a whole step of the grid
+            continue
+        else:
+            continue
+        found += apart([row["assessed_mm"]], [expected])
+    assert len(found) == 2 * 2 * 2
+    held("study", found)
+
+
+def test_a_history_step_by_step(paper):
+    error = true_errors(paper)
+    found, chances, shown = [], [], defaultdict(list)
+    for row in tables.rows(paper, "histories"):
+        shown[row["example"]].append(row)
+    for rows in shown.values():
+        first = rows[0]
+        world = ft.World(error, first["noise_mm"], first["simulation"], SEED)
+        eta, alpha = Decimal(first["eta_mm"]), Decimal(first["alpha"])
+        steps = ft.invalidation(world, len(error), eta, 12, alpha)
+        assert [(r["point"], r["repeat"]) for r in rows] == [(s.point, s.repeat) for s in steps]
+        for row, step in zip(rows, steps, strict=True):
+            stated = [row["measured_mm"], row["averaged_mm"], row["true_mm"]]
+            found += apart(stated, [step.measured, step.averaged, fd.size(error[step.point])])
+            chances += apart([row["rejection_probability"]], [step.probability])
+    held("histories: sizes", found)
+    held("histories: rejection_probability", chances)
+
+
+def test_the_summary_of_the_study_from_its_rows(paper):
+    truth = max(fd.size(each) for each in true_errors(paper))
+    assessed = defaultdict(list)
+    for row in tables.rows(paper, "study"):
+        assessed[row["assessor"], row["noise_mm"]].append(Decimal(row["assessed_mm"]))
+    found = []
+    for row in tables.rows(paper, "study_summary"):
+        own = assessed.pop((row["assessor"], row["noise_mm"]))
+        rmse = mean([(value - truth) ** 2 for value in own]).sqrt()
+        expected = [mean(own), min(own), max(own), mean(own) - truth, rmse]
+        names = ("mean_mm", "min_mm", "max_mm", "bias_mm", "rmse_mm")
+        found += apart([row[name] for name in names], expected)
+    assert not assessed
+    held("study_summary", found)
+
+
+# --- bounds ---------------------------------------------------------------------------------------
+
+
+def test_nearest_points_of_balls_where_noise_differs_by_direction():
+    rng = np.random.default_rng(7)
+    distances, places = [], []
+    for _ in range(4):
+        root = rng.normal(size=(3, 3)) * 0.1
+        covariance = root @ root.T + np.eye(3) * 1e-3
+        mean_mm, radius = rng.normal(size=3), 0.4
+        x, distance = ft.nearest_in_ball(fd.exact(mean_mm), fd.exact(covariance), Decimal(radius))
+        places += apart(ellipsoid.nearest_in_ball(mean_mm, covariance, radius), x)
+        distances += shares([ellipsoid.mahalanobis_beyond(mean_mm, covariance, radius)], [distance])
+    held("nearest point of a ball", places)
+    held("distance to a ball", distances)
+
+
+def test_limits_on_a_size_from_one_averaged_reading():
+    found = []
+    for size_mm, noise_mm, error in ((0.9, 0.1, 0.05), (0.9, 0.1, 0.95), (1.2, 0.05, 0.003)):
+        limit = limits.upper_limit_mm(np.array([size_mm, 0.0, 0.0]), noise_mm, error)
+        expected = Decimal(noise_mm) * ft.size_at(size_mm / noise_mm, error, limit / noise_mm)
+        found += apart([limit], [expected])
+    held("limits on sizes", found)
+
+
+def test_limits_on_a_probability_from_counts():
+    found = []
+    for hits, trials in ((3, 40), (17, 20), (1, 9)):
+        low, high = binomial.binomial_interval(hits, trials)
+        expected = [
+            ft.binomial_end(hits, trials, 0.5 * (1.0 - 0.95), low),
+            ft.binomial_end(hits + 1, trials, 1.0 - 0.5 * (1.0 - 0.95), high),
+        ]
+        found += apart([low, high], expected)
+    held("limits on probabilities", found)
+
+
+def test_the_gamma_quantile_of_samples_far_from_usual():
+    """Nearly alike and widely spread, where shapes are 1e4 and 0.4."""
+    rng = np.random.default_rng(3)
+    found = []
+    for sample in (1.0 + 0.01 * rng.normal(size=40), rng.gamma(0.4, size=40)):
+        expected = ft.gamma_quantile([*fd.exact(sample)], 0.99)
+        found += shares([distributions.gamma99(sample)], [expected])
+    held("gamma quantile", found)

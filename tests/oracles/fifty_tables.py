@@ -1,0 +1,418 @@
+"""Tables of a finished study derived a second time in 50 digits from the tables before them.
+
+Rows are dictionaries, as ``tables.rows`` gives them. Everything runs within ``working()``.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import mpmath
+import numpy as np
+
+from . import fifty_digits as fd
+from .fifty_digits import Matrix, dec, exact, mp, size
+from .kinematics import ERROR_NAMES
+from .tables import Row, dh_table, joints
+from .worlds import philox_words
+
+WEIGHT = Decimal(500)
+UNIT_RAD = Decimal("0.001")  # a mrad counts as much as a mm
+CLOSE = Decimal("1e-22")  # of the last step, mm and mrad: nothing in a float of 53 bits
+FREE = ("theta", "d", "a", "alpha")
+GRID_PER_MM = 1000
+
+
+# --- models and errors ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The models of a results folder and their frames."""
+
+    dh: Matrix
+    nominal: Matrix
+    series: Matrix
+    low: Matrix
+    high: Matrix
+    frames: dict[tuple[str, str], Matrix]
+
+    @classmethod
+    def of(cls, dh: Sequence[Row], vec: Sequence[Row], frames: Sequence[Row]) -> Arm:
+        order = max(row["order"] for row in vec)
+        count = max(row["joint"] for row in vec)
+        series = fd.zeros(count, 6, order + 1)
+        low, high = fd.zeros(count), fd.zeros(count)
+        for row in vec:
+            joint = row["joint"] - 1
+            assert row["direction"] == 0
+            series[joint, ERROR_NAMES.index(row["error"]), row["order"]] = exact(row["coefficient"])
+            low[joint], high[joint] = exact([row["q_min_rad"], row["q_max_rad"]])
+        placed = {
+            (row["model"], row["frame"]): fd.pose_frame(
+                row["x_mm"], row["y_mm"], row["z_mm"], [row[f"q{c}"] for c in "wxyz"]
+            )
+            for row in frames
+        }
+        nominal = dh_table({row["joint"]: row for row in vec}.values())
+        return cls(exact(dh_table(dh)), exact(nominal), series, low, high, placed)
+
+    def flange(self, model: str, q: Matrix) -> Matrix:
+        if model == "vec":
+            return fd.vec_motions(self.nominal, self.series, self.low, self.high, q)[0]
+        return fd.dh_forward(self.dh if model == "dh" else self.nominal, q)
+
+    def tool(self, model: str, q: Matrix, target: str = "tool") -> Matrix:
+        return self.flange(model, q) @ self.frames[model, target]
+
+
+def measured(row: Row) -> Matrix:
+    return fd.pose_frame(row["x_mm"], row["y_mm"], row["z_mm"], [row[f"q{c}"] for c in "wxyz"])
+
+
+def pose_error(arm: Arm, row: Row, comparison: str) -> tuple[Matrix, Matrix]:
+    """Reference minus model in the model's own base, mm, and the turn from it in mrad."""
+    model, reference = comparison.split("_vs_")
+    q, target = exact(joints(row)), row["target"]
+    back = fd.undone(arm.frames[model, "base"])
+    if reference == "measured":
+        seen = back @ measured(row)
+    else:
+        seen = back @ arm.frames[reference, "base"] @ arm.tool(reference, q, target)
+    at = arm.tool(model, q, target)
+    turn = fd.rotation_vector(seen[:3, :3] @ at[:3, :3].T)
+    return seen[:3, 3] - at[:3, 3], 1000 * turn
+
+
+# --- fits -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters (in mm and rad) with their covariance; the cost, the singular values."""
+
+    x: Matrix
+    covariance: Matrix
+    cost: Decimal
+    values: Matrix | None = None
+    frames: tuple[Matrix, Matrix] | None = None
+
+
+def vec_fit(arm: Arm, rows: Sequence[Row], start: Matrix, prior_mm: float, prior_rad: float) -> Fit:
+    """Coefficients of greatest posterior probability, base and tool known (eqs. 5 and 6).
+
+    What is least: the residuals' squares over their variance and the coefficients' squares over
+    the prior's. The variance is that of the residuals, over their number less that of the
+    coefficients they decide: P less the trace of the prior's share of the posterior."""
+    shape = arm.series.shape
+    scale = np.tile(np.repeat([Decimal(1)] * 3 + [UNIT_RAD] * 3, shape[2]), shape[0])
+    prior = np.tile(np.repeat(exact([prior_mm] * 3 + [prior_rad] * 3), shape[2]), shape[0])
+    weight = (scale / prior) ** 2
+    back, tool = fd.undone(arm.frames["vec", "base"]), arm.frames["vec", "tool"]
+    seen = [back @ measured(row) for row in rows]
+    at_last: dict[str, Matrix] = {}
+
+    def step(scaled: Matrix) -> Matrix:
+        """From coefficients in mm and mrad with the logarithm of the variance behind them."""
+        x, variance = scaled[:-1] * scale, scaled[-1].exp()
+        r, j = [], []
+        for row, wanted in zip(rows, seen, strict=True):
+            series = x.reshape(shape)
+            at, motion = fd.vec_motions(arm.nominal, series, arm.low, arm.high, exact(joints(row)))
+            one, taking = fd.residual(at @ tool, wanted, WEIGHT)
+            r.append(one)
+            j.append(taking @ carried_to(tool, at, motion))
+        r, j = np.concatenate(r), np.concatenate(j) * scale
+        posterior = fd.inverse(j.T @ j + np.diag(variance * weight))
+        effective = len(x) - variance * (weight @ np.diag(posterior))
+        at_last.update(r=r, posterior=posterior)
+        moved = -posterior @ (j.T @ r + variance * weight * scaled[:-1])
+        return np.append(moved, (r @ r / (len(r) - effective) / variance).ln())
+
+    end = fd.settled(step, np.append(start.ravel() / scale, Decimal(-2)), CLOSE)
+    r, posterior = at_last["r"], at_last["posterior"]
+    return Fit(end[:-1] * scale, end[-1].exp() * posterior * np.outer(scale, scale), r @ r)
+
+
+def carried_to(tool: Matrix, at: Matrix, motion: Matrix) -> Matrix:
+    """A motion of the flange as one of the tool."""
+    lever = at[:3, :3] @ tool[:3, 3]
+    return np.concatenate([motion[:3] - fd.cross(lever) @ motion[3:], motion[3:]])
+
+
+def dh_fit(
+    nominal: Matrix,
+    q: Sequence[Matrix],
+    seen: Sequence[Matrix],
+    start: Matrix,
+    threshold: float,
+    tool: Matrix,
+    base: Matrix | None = None,
+) -> Fit:
+    """DH parameters that are least squares of the poses ``seen`` of a target, truncated.
+
+    ``seen`` is in the base frame, ``tool`` known; or, with ``base`` (where it starts, as ``tool``
+    does), in the instrument's, and both are estimated: what they can take up is projected out
+    before the parameters' directions are judged."""
+    free = np.tile([name in FREE for name in fd.DH_MOVES], len(nominal))
+    scale = np.tile([UNIT_RAD, Decimal(1), Decimal(1), UNIT_RAD], len(nominal))
+    held, count = nominal.ravel()[free], int(free.sum())
+    estimated = base is not None
+    at_last: dict[str, Matrix] = {}
+
+    def placed(moved: Matrix) -> tuple[Matrix | None, Matrix]:
+        """Base and tool by their coordinates behind the parameters'."""
+        if not estimated:
+            return None, tool
+        return base @ motion_of(moved[:6]), tool @ motion_of(moved[6:])
+
+    def step(scaled: Matrix) -> Matrix:
+        table = nominal.ravel().copy()
+        table[free] = scaled[:count] * scale
+        table = table.reshape(nominal.shape)
+        own_base, own_tool = placed(scaled[count:])
+        r, j, moves = [], [], []
+        for angles, wanted in zip(q, seen, strict=True):
+            flange, motion = fd.dh_motions(table, angles)
+            at = flange @ own_tool
+            target = fd.undone(own_base) @ wanted if estimated else wanted
+            one, taking = fd.residual(at, target, WEIGHT)
+            r.append(one)
+            j.append(taking @ carried_to(own_tool, flange, motion)[:, free])
+            if estimated:
+                moves.append(np.concatenate([with_base(at, target), with_tool(at)], axis=1))
+                moves[-1] = taking @ moves[-1]
+        r, j = np.concatenate(r), np.concatenate(j) * scale
+        frames, own, rest = None, j, r
+        if estimated:
+            frames = np.concatenate(moves) * np.tile([Decimal(1)] * 3 + [UNIT_RAD] * 3, 2)
+            follow = -fd.inverse(frames.T @ frames) @ frames.T
+            own, rest = j + frames @ (follow @ j), r + frames @ (follow @ r)
+        values, kept, lost = fd.truncated(own, threshold)
+        moved = -kept @ ((kept.T @ (own.T @ rest)) / values[: kept.shape[1]] ** 2)
+        moved = moved - lost @ (lost.T @ (scaled[:count] - held / scale))
+        at_last.update(r=r, j=j, frames=frames, values=values, kept=kept)
+        return np.concatenate([moved, follow @ (r + j @ moved)]) if estimated else moved
+
+    begin = np.concatenate([start.ravel()[free] / scale, fd.zeros(12 if estimated else 0)])
+    end = fd.settled(step, begin, CLOSE)
+    r, values = at_last["r"], at_last["values"]
+    covariance = _covariance(r, at_last["j"], at_last["frames"], at_last["kept"], values, scale)
+    frames = placed(end[count:]) if estimated else None
+    return Fit(end[:count] * scale, covariance, r @ r, values, frames)
+
+
+def _covariance(r, j, frames, kept, values, scale) -> Matrix:
+    """Covariance of the parameters alone."""
+    count = kept.shape[1]
+    root = kept / values[:count]
+    if frames is None:
+        return fd.sandwich(r, j, root) * np.outer(scale, scale)
+    lower = fd.cholesky(fd.inverse(frames.T @ frames))  # its product with itself inverts
+    follow = -fd.inverse(frames.T @ frames) @ frames.T @ j
+    n = frames.shape[1]
+    whole = fd.zeros(n + len(root), n + count)
+    whole[:n, :n], whole[:n, n:], whole[n:, n:] = lower, follow @ root, root
+    every = np.concatenate([frames, j], axis=1)
+    return fd.sandwich(r, every, whole)[n:, n:] * np.outer(scale, scale)
+
+
+def with_base(at: Matrix, target: Matrix) -> Matrix:
+    """How model minus measurement follows small motions of the base, along its own axes."""
+    found = fd.zeros(6, 6)
+    found[:3, :3] = fd.eye(3)
+    found[:3, 3:] = -fd.cross(target[:3, 3])
+    found[3:, 3:] = at[:3, :3] @ target[:3, :3].T  # from the right of the rotation's difference
+    return found
+
+
+def with_tool(at: Matrix) -> Matrix:
+    """How it follows small motions of the target, along the target's own axes."""
+    found = fd.zeros(6, 6)
+    found[:3, :3] = found[3:, 3:] = at[:3, :3]
+    return found
+
+
+def motion_of(step: Matrix) -> Matrix:
+    """A small motion from scaled coordinates: shift in mm, then turn in mrad."""
+    return fd.frame(fd.turned_by(step[3:] * UNIT_RAD), step[:3])
+
+
+# --- statistics -----------------------------------------------------------------------------------
+
+
+def statistics(values: Sequence[Decimal]) -> dict[str, Decimal]:
+    """Mean, max, rms and the 99 % quantile of a gamma fitted by maximum likelihood."""
+    mean = sum(values) / len(values)
+    rms = (sum(v * v for v in values) / len(values)).sqrt()
+    return {"mean": mean, "max": max(values), "rms": rms, "gamma99": gamma_quantile(values, 0.99)}
+
+
+def gamma_quantile(values: Sequence[Decimal], probability: float) -> Decimal:
+    """Quantile of the gamma, location 0, of greatest likelihood: log k - psi(k) = log mean(x) -
+    mean(log x)."""
+    mean = mp(sum(values) / len(values))
+    gap = mpmath.log(mean) - mpmath.fsum(mpmath.log(mp(v)) for v in values) / len(values)
+    shape = mpmath.findroot(lambda k: mpmath.log(k) - mpmath.digamma(k) - gap, 1 / (2 * gap))
+    point = shape + 3 * mpmath.sqrt(shape)
+    while True:
+        miss = mpmath.gammainc(shape, 0, point, regularized=True) - mpmath.mpf(probability)
+        slope = mpmath.exp((shape - 1) * mpmath.log(point) - point - mpmath.loggamma(shape))
+        step = miss / slope
+        point -= min(max(step, -point / 2), point / 2)
+        if abs(step) < mpmath.mpf(10) ** -45 * point:
+            return dec(point * mean / shape)
+
+
+# --- assessors (eqs. 9 to 24) ---------------------------------------------------------------------
+
+
+class World:
+    """The readings of one simulation, from the words of its random stream (see ``worlds``)."""
+
+    def __init__(self, error: Matrix, noise_mm: float, repetition: int, seed: int) -> None:
+        entropy = [seed, round(noise_mm * 1e6), repetition]
+        self._key = [int(x) for x in np.random.SeedSequence(entropy).generate_state(2, np.uint64)]
+        self._error, self.noise = error, exact(noise_mm)
+        self._known: dict[tuple[int, int], Matrix] = {}
+
+    def __call__(self, point: int, visit: int) -> Matrix:
+        if (point, visit) not in self._known:
+            words = [word >> 11 for word in philox_words(self._key, visit - 1, point)]
+            a, b, c, d = (mpmath.mpf(word) for word in words)
+            whole = mpmath.mpf(2) ** 53
+            sizes = [mpmath.sqrt(-2 * mpmath.log((each + 1) / whole)) for each in (a, c)]
+            turns = [2 * mpmath.pi * each / whole for each in (b, d)]
+            drawn = (mpmath.cos(turns[0]), mpmath.sin(turns[0]), mpmath.cos(turns[1]))
+            at = np.array(
+                [dec(sizes[i] * z) for i, z in zip((0, 0, 1), drawn, strict=True)], dtype=object
+            )
+            self._known[point, visit] = self._error[point] + self.noise * at
+        return self._known[point, visit]
+
+
+def outlier_rejection(sizes: Sequence[Decimal]) -> Decimal:
+    """The largest that is not above mean + 1.96 standard deviations."""
+    mean = sum(sizes) / len(sizes)
+    deviation = (sum((s - mean) ** 2 for s in sizes) / len(sizes)).sqrt()
+    return max(s for s in sizes if s <= mean + Decimal("1.96") * deviation)
+
+
+def chi_square(square: Decimal) -> Decimal:
+    """Distribution of the squared distance in three dimensions (eq. 18)."""
+    at = mp(square)
+    root = mpmath.sqrt(at / 2)
+    return dec(mpmath.erf(root) - 2 * root / mpmath.sqrt(mpmath.pi) * mpmath.exp(-at / 2))
+
+
+@dataclass(frozen=True)
+class Step:
+    point: int
+    repeat: int
+    measured: Decimal
+    averaged: Decimal
+    probability: Decimal
+
+
+def invalidation(world: World, points: int, eta: Decimal, budget: int, alpha: Decimal):
+    """The steps of one pass at one bound; rejected where the last probability is above alpha."""
+    sums: dict[int, Matrix] = {}
+    counts: dict[int, int] = defaultdict(int)
+    distance: dict[int, Decimal] = {}
+    kept: dict[int, Decimal] = {}
+    steps: list[Step] = []
+    probability = Decimal(0)
+    for _ in range(budget):
+        if probability > alpha:
+            point = max(distance, key=distance.__getitem__)
+        elif len(counts) < points:
+            point = len(counts)
+        else:
+            break
+        counts[point] += 1
+        value = world(point, counts[point])
+        sums[point] = sums.get(point, fd.zeros(3)) + value
+        averaged = size(sums[point] / counts[point])
+        beyond = max(averaged - eta, Decimal(0))
+        distance[point] = beyond * Decimal(counts[point]).sqrt() / world.noise
+        kept[point] = 1 - chi_square(distance[point] ** 2) if beyond else Decimal(1)
+        probability = 1 - _product(kept.values())
+        steps.append(Step(point, counts[point], size(value), averaged, probability))
+    return steps
+
+
+def _product(values) -> Decimal:
+    found = Decimal(1)
+    for value in values:
+        found *= value
+    return found
+
+
+def bound_from_above(rejects: Callable[[Decimal], bool], top: Decimal) -> int:
+    """The grid step just above the highest bound that is rejected, of all from ``top`` down."""
+    number = int(top * GRID_PER_MM) + 1
+    while number >= 0 and not rejects(Decimal(number) / GRID_PER_MM):
+        number -= 1
+    return number + 1
+
+
+# --- ellipsoids and limits ------------------------------------------------------------------------
+
+
+def nearest_in_ball(mean: Matrix, covariance: Matrix, radius: Decimal) -> tuple[Matrix, Decimal]:
+    """The point of the ball with the least Mahalanobis distance (mm), and that distance.
+
+    Stationary: (I + t S) x = y with |x| = radius, t by bisection."""
+    inverse = fd.inverse(covariance)
+    if size(mean) <= radius:
+        return mean, Decimal(0)
+
+    def at(t: Decimal) -> Matrix:
+        # (I + t S)^-1 = S^-1 (S^-1 + t I)^-1
+        return inverse @ (fd.inverse(inverse + t * fd.eye(3)) @ mean)
+
+    low, high = Decimal(0), Decimal(1)
+    while size(at(high)) > radius:
+        low, high = high, 2 * high
+    for _ in range(190):
+        middle = (low + high) / 2
+        low, high = (middle, high) if size(at(middle)) > radius else (low, middle)
+    x = at(high)
+    return x, ((mean - x) @ inverse @ (mean - x)).sqrt()
+
+
+def reading_below(x: mpmath.mpf, a: mpmath.mpf) -> mpmath.mpf:
+    """Probability that a reading of unit noise at a point of size a has at most size x: the density
+    of a Gaussian about a over the ball of x."""
+    near, far = (x - a) / mpmath.sqrt(2), (x + a) / mpmath.sqrt(2)
+    bulge = (mpmath.exp(-(near**2)) - mpmath.exp(-(far**2))) / (a * mpmath.sqrt(2 * mpmath.pi))
+    return (mpmath.erf(near) + mpmath.erf(far)) / 2 - bulge
+
+
+def size_at(x: float, probability: float, near: float) -> Decimal:
+    """The size at which a reading of at most x has this probability, looked for from ``near``."""
+    wanted = mpmath.mpf(probability)
+    return dec(root(lambda a: reading_below(mpmath.mpf(x), a) - wanted, near))
+
+
+def binomial_end(hits: int, trials: int, tail: float, near: float) -> Decimal:
+    """The probability at which ``hits`` or more of ``trials`` have the probability ``tail``."""
+    wanted = mpmath.mpf(tail)
+
+    def excess(p: mpmath.mpf) -> mpmath.mpf:
+        terms = (
+            mpmath.binomial(trials, k) * p**k * (1 - p) ** (trials - k)
+            for k in range(hits, trials + 1)
+        )
+        return mpmath.fsum(terms) - wanted
+
+    return dec(root(excess, near))
+
+
+def root(function: Callable[[mpmath.mpf], mpmath.mpf], near: float) -> mpmath.mpf:
+    """Where a function is zero, by secants."""
+    beside = mpmath.mpf(near) * (1 + mpmath.mpf(10) ** -6)
+    return mpmath.findroot(function, (mpmath.mpf(near), beside), solver="secant")

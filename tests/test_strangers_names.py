@@ -1,0 +1,151 @@
+"""Names and texts from strangers: nothing runs, draws, steers or leads anywhere because of them."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import html
+import io
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+from command_line import call
+
+import kinacc
+from kinacc.cli.sheet import Field, Sheet
+from kinacc.errors import InputError, Problem
+from kinacc.figures import campaign_plan
+from kinacc.figures.save import render
+
+FORMULAS = ("=1+1", "+1+cmd", "-1+1", "@SUM(1)", "\t=1", "\r=1", "\n=1", "'=1", "＝1", "＠1")
+PLAIN = ("-1.5", "+2", "1e-3", "tool", "−3", "a=b", "'", "")
+SOURCES = sorted(Path(kinacc.__file__).parent.rglob("*.py"))
+
+
+def sheet(*texts: str) -> Sheet:
+    return Sheet("", {}, [Field("=name", np.array(texts, dtype=object), "@unit", "")], 10)
+
+
+def test_no_cell_of_a_csv_file_is_a_formula_and_numbers_stay_numbers():
+    text = sheet(*FORMULAS, *PLAIN, "behind\r=1").as_csv()
+    cells = [row[0] for row in csv.reader(io.StringIO(text, newline=""))]
+    assert cells == ["'=name", *(f"'{each}" for each in FORMULAS), *PLAIN, "behind\r=1"]
+    assert '"behind\r=1"' in text
+
+
+def test_no_cell_of_a_workbook_is_a_formula(tmp_path):
+    sheet(*FORMULAS, "\x1b[2J").write(tmp_path / "a.xlsx")
+    rows = list(openpyxl.load_workbook(tmp_path / "a.xlsx").active.iter_rows())
+    assert all(cell.data_type in "sn" for row in rows for cell in row)
+    assert [row[0].value for row in rows[:3]] == ["'=name", "'@unit", "'=1+1"]
+
+
+def test_a_table_of_a_calibrated_arm_holds_no_formula(monkeypatch):
+    from kinacc.deployment.export import description
+    from kinacc.kinematics import robot
+
+    arm = robot.load("mh180")
+    given = type("Calibrated", (), {"robot": arm, "left_open": ("=HYPERLINK(1)",)})
+    given.model = type("Model", (), {"table": arm.dh})
+    text = description.robot_csv(given, np.full((6, 5), np.nan), arm.dh)
+    assert [row[-1] for row in csv.reader(io.StringIO(text))][-1] == "'=HYPERLINK(1)"
+
+
+@pytest.mark.parametrize("name", ["$\\frac$", "$x$", "_left out", "a--><script>1</script>"])
+def test_a_file_of_errors_of_any_name_is_drawn_under_it(name):
+    curve = campaign_plan.Curve(name, np.array([1.0, 2.0]), np.ones((2, 3)), np.ones(2))
+    figure = campaign_plan.draw([curve], None, None, None)
+    picture = render(figure, ["svg"])["svg"]
+    assert not any("script" in each.tag for each in ET.fromstring(picture).iter())
+    assert name in html.unescape(picture.decode()).replace("- -", "--")
+
+
+def test_a_message_does_not_steer_the_terminal_it_is_shown_in(tmp_path):
+    said = str(InputError(Problem("a\x1b[2J.csv", "\x9b31m\u202e", "\x07", "two\nlines")))
+    assert said.isprintable() or set(said) - set(filter(str.isprintable, said)) == {"\n"}
+    name = "\x1b]0;owned\x07.yaml"
+    (tmp_path / name).write_text("seed: 1\n")
+    done = call("check-data", tmp_path / name)
+    assert "\x1b" not in done.output
+    assert "\\u001b]0;owned" in done.output
+
+
+def test_a_table_on_the_screen_does_not_steer_the_terminal():
+    assert "\x1b" not in sheet("\x1b[2Jtool").as_text()
+
+
+def calls(tree: ast.AST):
+    """Every call as (dotted name, node)."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            yield ast.unparse(node.func), node
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
+def test_nothing_in_the_package_runs_what_a_file_says(path):
+    tree = ast.parse(path.read_text("utf-8"))
+    imported = {
+        name.split(".")[0]
+        for node in ast.walk(tree)
+        for name in (
+            [each.name for each in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module or ""]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
+    assert not imported & {
+        "pickle",
+        "cPickle",
+        "dill",
+        "cloudpickle",
+        "joblib",
+        "shelve",
+        "marshal",
+    }
+    for name, node in calls(tree):
+        assert name not in ("eval", "exec", "compile", "__import__", "os.system", "os.popen"), name
+        assert name.rpartition(".")[2] not in ("getoutput", "getstatusoutput", "unsafe_load"), name
+        told = {each.arg: ast.unparse(each.value) for each in node.keywords}
+        assert told.get("shell", "False") == "False", name
+        assert told.get("allow_pickle", "False") == "False", name
+        if name == "yaml.load":
+            assert told.get("Loader") == "loader", "a safe one"
+        assert name not in ("np.load", "numpy.load", "pd.read_pickle"), name
+
+
+def planned_with(folder: Path, link: str, target: Path):
+    """The plan of a data set one of whose files or folders is a link."""
+    from kinacc.workflow.plan import planned
+
+    (folder / "own.yaml").write_text("datasets: {own: {robot: mh180}}\n")
+    place = folder / "results" / link
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.symlink_to(target)
+    return planned([folder / "own.yaml"], results=str(folder / "results"))
+
+
+@pytest.mark.parametrize("link", ["own", "own/logs", "own/logs/vec.log", "own/vec_model.parquet"])
+def test_nothing_is_written_through_a_link_out_of_the_results(tmp_path, link):
+    with pytest.raises(InputError, match="outside of the results") as caught:
+        planned_with(tmp_path, link, tmp_path / "elsewhere")
+    assert [each.where for each in caught.value.problems] == [str(tmp_path / "results" / link)]
+
+
+def test_artefacts_are_links_into_the_shared_cache_alone(tmp_path, monkeypatch):
+    monkeypatch.setenv("SNAKEMAKE_OUTPUT_CACHE", str(tmp_path / "cache"))
+    link = "own/vec_model.parquet"
+    assert planned_with(tmp_path, link, tmp_path / "cache" / "abc.parquet")
+    monkeypatch.delenv("SNAKEMAKE_OUTPUT_CACHE")
+    with pytest.raises(InputError, match="SNAKEMAKE_OUTPUT_CACHE"):
+        planned_with(tmp_path, "own/dh_model.parquet", tmp_path / "cache" / "abc.parquet")
+
+
+def test_the_results_folder_itself_may_be_on_another_disk(tmp_path):
+    (tmp_path / "disk" / "own").mkdir(parents=True)
+    (tmp_path / "results").symlink_to(tmp_path / "disk")
+    assert planned_with(tmp_path, "own/inside.parquet", tmp_path / "disk" / "own" / "a.parquet")
