@@ -25,6 +25,7 @@ SLOW = (
     "integration/test_real_arm.py",
     "integration",
     "integration_oracle",
+    "fuzz",
     "slurm",
     "measurements/test_files_as_they_come.py",
     "checks/test_planted_faults.py",

@@ -140,12 +140,13 @@ def _after(work: list[list], done: tuple[str, int, int]) -> list[list]:
     return left
 
 
-def shares(names: list[str], inputs: int, least: int = 1) -> dict[str, int]:
-    """Inputs of each target."""
+def shares(names: list[str], inputs: int) -> dict[str, int]:
+    """Inputs of each target, which has one at least where there are a thousand."""
     from fuzz.targets import TARGETS
 
     total = sum(TARGETS[name].share for name in names)
-    return {name: max(least, round(inputs * TARGETS[name].share / total)) for name in names}
+    counts = {name: round(inputs * TARGETS[name].share / total) for name in names}
+    return {name: count or int(inputs >= 1000) for name, count in counts.items()}
 
 
 def keep(finding: Finding, folder: Path) -> Path:
