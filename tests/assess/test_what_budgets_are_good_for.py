@@ -151,3 +151,21 @@ def test_a_bound_on_readings_of_unequal_noise_takes_each_ones_own_covariance():
     across = np.diag([1e-4, 1e-4, 0.04])
     assert bound([narrow, wide]) > bound([narrow, narrow]) + 0.1
     assert bound([narrow, narrow]) < bound([narrow, across]) < bound([narrow, wide])
+
+
+def test_too_few_points_of_many_say_nothing_of_all_and_tell_how_many_could_hide():
+    candidates = Candidates.with_equal_noise(np.full(100, 0.01))
+    campaign = paper.assessor(RECOMMENDED, measurements=12).begin(candidates)
+    rng = np.random.default_rng(6)
+    while (row := campaign.next()) is not None:
+        campaign.record(row, rng.normal(size=3))
+    measured, everywhere = campaign.statements()
+    seen = len(campaign.ledger.visited)
+    hidden = [Fraction(comb(100 - k, seen), comb(100, seen)) for k in range(1, 101 - seen)]
+    crowd = next(k for k, chance in enumerate(hidden, 1) if chance <= Fraction(2, 100))
+    assert everywhere.withheld == Reason(
+        "all_missed", {"seen": seen, "points": 100, "crowd": crowd}
+    )
+    assert np.isnan(everywhere.upper_mm)
+    assert measured.withheld is None
+    assert measured.lower_mm <= measured.value_mm <= measured.upper_mm

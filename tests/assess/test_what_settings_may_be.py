@@ -72,7 +72,9 @@ def candidates_of_an_arm(count):
     return Candidates(np.tile(0.01 * np.eye(3), (count, 1, 1)), **known)
 
 
-@pytest.mark.parametrize("name", ["search_and_confirm", "invalidation_calibrated", "kinematic"])
+@pytest.mark.parametrize(
+    "name", ["search_and_confirm", "invalidation_calibrated", "kinematic", "sequential"]
+)
 def test_before_the_first_visit_ends_it_is_said_how_many_points_are_left(name):
     campaign = paper.assessor(name, measurements=30).begin(candidates_of_an_arm(50))
     rng, left = np.random.default_rng(4), []
