@@ -156,9 +156,9 @@ def test_a_bound_on_readings_of_unequal_noise_takes_each_ones_own_covariance():
 def test_too_few_points_of_many_say_nothing_of_all_and_tell_how_many_could_hide():
     candidates = Candidates.with_equal_noise(np.full(100, 0.01))
     campaign = paper.assessor(RECOMMENDED, measurements=12).begin(candidates)
-    rng = np.random.default_rng(6)
+    errors = np.random.default_rng(6).normal(size=(100, 3))
     while (row := campaign.next()) is not None:
-        campaign.record(row, rng.normal(size=3))
+        campaign.record(row, errors[row])
     measured, everywhere = campaign.statements()
     seen = len(campaign.ledger.visited)
     hidden = [Fraction(comb(100 - k, seen), comb(100, seen)) for k in range(1, 101 - seen)]
