@@ -19,8 +19,8 @@ from kinacc.study.tournament.contest import SIZES, Cell, Contest, Job, campaigns
 from kinacc.study.tournament.fields import ErrorField, of_tables
 from kinacc.study.tournament.summary import summed
 from kinacc.workflow.catalogue import TOURNAMENT
+from kinacc.workflow.inputs import read_inputs
 from kinacc.workflow.plan import planned
-from kinacc.workflow.runner import read_inputs
 
 CANDIDATES, SHARE, SEED, CAMPAIGNS = 200, 0.6, 1, 40
 NOISE_MM = (0.05, 0.1, 0.2, 0.3)
@@ -30,7 +30,7 @@ WHOLE, ADAPTIVE = "single_shot", ("search_and_confirm", "sequential", "two_stage
 def measured(configs: list[str]) -> list[ErrorField]:
     """The error fields of all measured data sets of the configurations."""
     job = planned(configs).job("tournament_chunk", TOURNAMENT, "1-of-1")
-    found = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
+    found = of_tables(read_inputs(job.inputs).tables, job.settings["robots"], ())
     return [field for field in found if field.kind == "measured"]
 
 

@@ -104,6 +104,7 @@ REFERENCE = (
     "command-line",
     "claims",
     "configuration",
+    "mutants",
     "reading-the-paper",
     "tournament",
 )

@@ -169,6 +169,40 @@ def test_a_small_workbook_of_much_text_is_refused(tmp_path, command):
     assert "MB" in refused(tmp_path, *COMMANDS[command](tmp_path, "much.xlsx"))
 
 
+ENTITIES = {
+    "a bomb": "".join(f'<!ENTITY a{i + 1} "{f"&a{i};" * 10}">' for i in range(9)),
+    "a file": '<!ENTITY a9 SYSTEM "file:///etc/hostname">',
+}
+
+
+@pytest.mark.parametrize("entities", ENTITIES)
+@pytest.mark.parametrize("part", ["xl/worksheets/sheet1.xml", "xl/sharedStrings.xml"])
+def test_entities_in_a_workbook_stand_for_nothing(tmp_path, part, entities):
+    import zipfile
+
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    for row in (COLUMNS, *[[1.0] * 8 + ["two"]] * 5):
+        book.active.append(row)
+    book.save(tmp_path / "good.xlsx")
+    declared = f'<!DOCTYPE x [<!ENTITY a0 "lol">{ENTITIES[entities]}]>'.encode()
+    with (
+        zipfile.ZipFile(tmp_path / "good.xlsx") as good,
+        zipfile.ZipFile(tmp_path / "bad.xlsx", "w", zipfile.ZIP_DEFLATED) as bad,
+    ):
+        for name in good.namelist():
+            content = good.read(name)
+            if name == part:
+                begin = content.index(b"?>") + 2 if content.startswith(b"<?xml") else 0
+                content = content[:begin] + declared + content[begin:]
+                content = content.replace(b">two<", b">&a9;<").replace(b"<v>1</v>", b"<v>&a9;</v>")
+            bad.writestr(name, content)
+    said = refused(tmp_path, "check-data", data_set(tmp_path, "bad.xlsx"))
+    assert "bad.xlsx" in said
+    assert Path("/etc/hostname").read_text().strip() not in said
+
+
 @pytest.mark.parametrize("cell", ["<!ENTITY", "9" * 40_000, "=1/0"])
 def test_cells_of_a_workbook_that_are_no_numbers_are_named(tmp_path, cell):
     import openpyxl
@@ -301,6 +335,28 @@ def test_a_damaged_results_table_is_no_traceback(tmp_path):
     with pytest.raises(InputError, match=r"robot\.parquet: not a readable Parquet file"):
         read(path)
     assert set(read_metadata(path)) >= {"seed"}
+
+
+def test_long_texts_repeated_in_a_results_table_are_refused_before_they_are_unpacked(tmp_path):
+    from kinacc.artifacts.store import read
+    from kinacc.errors import InputError
+
+    text = pa.DictionaryArray.from_arrays(
+        pa.array(np.zeros(10_000, np.int32)), pa.array(["x" * 100_000])
+    )
+    repeated(tmp_path / "texts.parquet", {"name": text}, 1)
+    assert (tmp_path / "texts.parquet").stat().st_size < 1_000_000
+    with pytest.raises(InputError, match="column name: texts of more than 500 MB"):
+        read(tmp_path / "texts.parquet")
+
+
+def test_a_pipe_in_place_of_a_results_table_is_not_waited_for(tmp_path):
+    from kinacc.artifacts.store import read
+    from kinacc.errors import InputError
+
+    os.mkfifo(tmp_path / "robot.parquet")
+    with pytest.raises(InputError):
+        read(tmp_path / "robot.parquet")
 
 
 def test_a_results_table_of_a_billion_values_is_refused_before_it_is_unpacked(tmp_path):

@@ -114,7 +114,8 @@ class Project:
         return {
             path.relative_to(results).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
             for path in sorted(results.rglob("*"))
-            if path.is_file() and not {"logs", "study_chunk"} & set(path.parts)
+            if path.is_file()
+            and not {"logs", "study_chunk"} & {*path.parts, path.name.partition(".")[0]}
         }
 
 

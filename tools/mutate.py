@@ -27,7 +27,10 @@ from mutation import page, reach, trial
 from mutation.places import ROOT, Mutant, path_of, room_of, sequence
 
 REACH = ROOT / ".cache" / "mutation" / "reach.pickle"
-BATCHES_S = (4.0, 25.0)  # seconds of tests, under the tracer, that one process runs: first, then
+# Seconds of tests, under the tracer, that one process runs: at first, then, at last. Kernels are
+# compiled anew in each, so they have one process for all.
+BATCHES_S = (4.0, 16.0)
+COMPILED_S = (12.0,)
 EVERY_S = 240.0
 
 
@@ -66,30 +69,37 @@ def shortened(tests: list[str], size: float, selection: reach.Selection) -> tupl
 
 
 def judge(
-    mutant: Mutant, selection: reach.Selection, sizes: tuple[float, ...], log: Path | None = None
+    mutant: Mutant, selection: reach.Selection, every: bool = False, log: Path | None = None
 ) -> dict[str, str]:
-    """The row of one fault."""
+    """The row of one fault; with ``every`` slow tests get their turn too."""
     verdict, by = "survived", "no test reaches it"
-    compiles = any(word in path_of(mutant.module).read_text() for word in ("@compiled", "@njit"))
-    for tests, seconds in batches(mutant, selection, sizes):
+    compiles = compiled(mutant)
+    sizes = COMPILED_S if compiles else BATCHES_S
+    for tests, seconds in batches(mutant, selection, (*sizes, EVERY_S) if every else sizes):
         verdict, by = trial.attempt(mutant, tests, trial.limit(seconds, compiles), log)
         if verdict != "survived":
             break
     return dict(zip(page.COLUMNS, (*mutant.name, verdict, by), strict=True))
 
 
+def compiled(mutant: Mutant) -> bool:
+    """Whether its module has kernels, which every trial of it compiles anew: some ten seconds."""
+    return any(word in path_of(mutant.module).read_text() for word in ("@compiled", "@njit"))
+
+
 def run(arguments: argparse.Namespace, selection: reach.Selection) -> None:
-    """Judge what has no verdict yet."""
+    """Judge what has no verdict yet; those of compiled kernels last, as they take longest."""
     done = page.read()
     wanted = [each for each in sequence()[: arguments.count] if each.name not in done]
     if arguments.room:
         wanted = [each for each in wanted if room_of(each.module) == arguments.room]
+    wanted.sort(key=compiled)
     print(f"{arguments.count - len(wanted)} done, {len(wanted)} to go", flush=True)
     for mutant in wanted:
         if arguments.until and time.strftime("%H:%M") >= arguments.until:
             break
         began = trial.now()
-        row = judge(mutant, selection, BATCHES_S)
+        row = judge(mutant, selection)
         page.append(row)
         told(mutant, row, trial.now() - began)
 
@@ -102,7 +112,7 @@ def again(arguments: argparse.Namespace, selection: reach.Selection) -> None:
         if row is None or row["verdict"] != "survived" or mutant.name in known:
             continue
         began = trial.now()
-        row = judge(mutant, selection, (*BATCHES_S, EVERY_S))
+        row = judge(mutant, selection, every=True)
         if row["verdict"] != "survived":
             page.append(row)
         told(mutant, row, trial.now() - began)
@@ -143,7 +153,7 @@ def try_(arguments: argparse.Namespace) -> None:
     selection = reach.Selection(kept)
     for mutant in sequence(within=(arguments.text,))[: arguments.count]:
         began = trial.now()
-        told(mutant, judge(mutant, selection, BATCHES_S), trial.now() - began)
+        told(mutant, judge(mutant, selection), trial.now() - began)
 
 
 def main() -> None:

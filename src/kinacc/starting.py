@@ -5,6 +5,12 @@ from __future__ import annotations
 import sys
 from importlib.util import LazyLoader, find_spec, module_from_spec
 
+# Of BLAS, which reads it when numpy is first imported: more threads change the last bits of a sum,
+# and wait for each other over matrices as small as these.
+ONE_THREAD = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"), "1"
+)
+
 
 def without_tools_of_numpy() -> None:
     """Keep SciPy from importing numpy's Fortran compiler and test tools, 0.07 s of CPU time.

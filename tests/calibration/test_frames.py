@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -107,3 +109,23 @@ def test_coordinates_lead_back_to_frames():
     by_coordinates = inverse.rotation @ (point - coords.centroid_mm[0]) + inverse.position_mm
     by_frames = moved.base.rotation.T @ (point - moved.base.position_mm)
     np.testing.assert_allclose(by_coordinates, by_frames, atol=1e-9)
+
+
+def test_a_short_session_is_placed_by_the_long_one_whichever_comes_first():
+    """Two positions say nothing of a base by themselves; a tool found elsewhere places it."""
+    q = some_joints(40, 7)
+    flange = dh.forward(ARM.dh, q)
+    other = Pose(exp_so3(np.array([-0.2, 0.9, 2.0])), np.array([-700.0, 1500.0, 80.0]))
+    seen = compose(BASE, compose(flange, TOOL))
+    moved = compose(other, compose(flange, TOOL))
+    few = np.arange(40) < 3
+    whole = full_poses(q, Pose(np.full((40, 3, 3), np.nan), seen.position_mm))
+    position = np.where(few[:, None], moved.position_mm, seen.position_mm)
+    for short, names in ((0, ("morning", "evening")), (1, ("evening", "morning"))):
+        session = np.where(few, short, 1 - short)
+        both = replace(whole, position_mm=position, session=session, session_names=names)
+        start = closed_form_start(both, flange)
+        np.testing.assert_allclose(start.tool.position_mm, TOOL.position_mm, atol=1e-6)
+        np.testing.assert_allclose(start.bases.position_mm[1 - short], BASE.position_mm, atol=1e-5)
+        np.testing.assert_allclose(start.bases.position_mm[short], other.position_mm, atol=1e-5)
+        assert turned_by(start.bases.rotation[short], other.rotation) < 1e-8

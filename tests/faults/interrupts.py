@@ -28,7 +28,7 @@ import world  # noqa: E402
 def interrupted(name: str, here: Path, after_s: float) -> tuple[str, list[str]]:
     """How a command ends that is interrupted after a time, and what is not as promised of that."""
     words, leaves = world.COMMANDS[name]
-    before = matrix.digests(here)
+    before = matrix.contents(here)
     process = subprocess.Popen(
         [sys.executable, "-m", "kinacc", *words],
         cwd=here, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -39,7 +39,7 @@ def interrupted(name: str, here: Path, after_s: float) -> tuple[str, list[str]]:
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGINT)
     out, err = process.communicate()
-    after = matrix.digests(here)
+    after = matrix.contents(here)
     code = process.returncode
     if code == 0:
         return "finished", [f"lacks {path}" for path in leaves if path not in after]

@@ -47,7 +47,7 @@ def _call(*words: str) -> None:
     subprocess.run(words, check=True, capture_output=True)
 
 
-def _filled(left: int) -> Callable[[Path], None]:
+def filled(left: int) -> Callable[[Path], None]:
     def fill(here: Path) -> None:
         free = os.statvfs(here)
         with open(here / _BALLAST, "wb") as file:
@@ -57,7 +57,7 @@ def _filled(left: int) -> Callable[[Path], None]:
     return fill
 
 
-def _emptied(here: Path) -> None:
+def emptied(here: Path) -> None:
     (here / _BALLAST).unlink()
 
 
@@ -107,10 +107,10 @@ def _logs_opened(here: Path) -> None:
 
 _FULL = ("no space left on device",)
 FAULTS: dict[str, Fault] = {
-    "full disk": Fault(_FULL, _filled(0), _emptied),
-    "disk with 4 kB left": Fault(_FULL, _filled(4096), _emptied),
-    "disk with 16 kB left": Fault(_FULL, _filled(16384), _emptied),
-    "disk with 64 kB left": Fault(_FULL, _filled(65536), _emptied),
+    "full disk": Fault(_FULL, filled(0), emptied),
+    "disk with 4 kB left": Fault(_FULL, filled(4096), emptied),
+    "disk with 16 kB left": Fault(_FULL, filled(16384), emptied),
+    "disk with 64 kB left": Fault(_FULL, filled(65536), emptied),
     "disk that takes no more files": Fault(_FULL, _no_more_files, _remounted("nr_inodes=0")),
     "read-only disk": Fault(("read-only file system",), _remounted("ro"), _remounted("rw")),
     "folders without permission to write": Fault(

@@ -9,7 +9,7 @@ from command_line import call
 from whole_project import write_poses
 
 RESULTS = "results/own"
-STAGES = ("measurements", "data_check", "vec", "dh", "residuals", "excluded_rows", "summary")
+STAGES = ("measurements", "data_check", "vec", "dh", "residuals", "summary")
 _CONFIG = ("--config", "own.yaml")
 _READING = ("--position-mm", "1,2,3", "--accept-implausible")
 
@@ -63,17 +63,20 @@ COMMANDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }  # fmt: skip
 
 
-def build(folder: Path) -> Path:
-    """Make the world in a folder, which has to be the one we are in."""
-    write_poses(Path("poses.csv"))
+def inputs(folder: Path) -> None:
+    """What a calibration starts from, in a folder, which has to be the one we are in."""
+    write_poses(folder / "poses.csv")
     _done("init", "poses.csv", "--robot", "mh180", "--yes", "--name", "own")
-    path = Path("own.yaml")
-    path.write_text(
-        path.read_text().replace("order: auto", "order: 1").replace("folds: 5", "folds: 3")
-    )
+    path = folder / "own.yaml"
+    text = path.read_text().replace("order: auto", "order: 1")
+    path.write_text(text.replace("folds: 5", "folds: 3"))
+
+
+def build(folder: Path) -> None:
+    """Make the world in a folder, which has to be the one we are in."""
+    inputs(folder)
     for stage in STAGES:
-        if stage != "excluded_rows":
-            _done("run", stage, *_CONFIG)
+        _done("run", stage, *_CONFIG)
     shutil.copytree("results", "again")
     joints = ("--columns", "q*", "--csv")
     Path("joints.csv").write_text(_done("show", RESULTS, "measurements", *joints))
@@ -83,7 +86,6 @@ def build(folder: Path) -> Path:
     _done("campaign", "next", "check")
     _done("campaign", "record", "check", *_READING)
     _done("campaign", "next", "check")
-    return folder
 
 
 def _done(*words: str) -> str:

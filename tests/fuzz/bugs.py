@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib.abc
 import importlib.machinery
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
@@ -228,16 +227,16 @@ def put_back(name: str) -> None:
 
 
 def hunt(inputs: int, seed: int, names: Sequence[str] = ()) -> int:
-    """Look for each bug among some inputs of its targets; 0 where all but two in twenty are found."""
-    from run import FINDINGS, outcomes
+    """Look for each bug among some inputs of its targets; 0 where 18 of 20 are found."""
+    from fuzz.run import FINDINGS, outcomes
 
     found = 0
     for name in names or BUGS:
-        bug, began = BUGS[name], time.process_time()
+        bug = BUGS[name]
         work = [[each, seed, 0, inputs // len(bug.targets)] for each in bug.targets]
         said = "not found"
         looked = 0
-        for where, each in outcomes(work, bug=name):
+        for _, each in outcomes(work, bug=name):
             looked += 1
             if each["outcome"] in FINDINGS:
                 found += 1

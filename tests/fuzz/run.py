@@ -11,21 +11,24 @@ import argparse
 import json
 import os
 import selectors
+import signal
 import subprocess
 import sys
 import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parents[1] / "tools")]
-sys.path.insert(0, str(HERE.parents[1] / "src"))
+sys.path[:0] = [str(HERE.parents[1] / "src"), str(HERE.parent), str(HERE.parents[1] / "tools")]
 
 FINDINGS = ("crash", "hang", "memory", "wrote")
 _SILENT_S = 120  # of a worker; an input has 5 s of processor time
-_BATCH = 10_000
+_BATCH, _SLICES = 25_000, 20
 
 
 @dataclass
@@ -36,6 +39,13 @@ class Tally:
     parsed: int = 0
     seconds: float = 0.0
     slowest: float = 0.0
+
+    def add(self, said: dict) -> None:
+        """Count what came of an input."""
+        self.outcomes[said["outcome"]] += 1
+        self.parsed += said["parsed"]
+        self.seconds += said["seconds"]
+        self.slowest = max(self.slowest, said["seconds"])
 
     @property
     def inputs(self) -> int:
@@ -73,7 +83,8 @@ def outcomes(
         }
         with subprocess.Popen(
             [sys.executable, str(HERE / "worker.py")],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True, env=env,
         ) as worker:  # fmt: skip
             worker.stdin.write(json.dumps({"work": work, "bug": bug, "coverage": coverage}) + "\n")
             worker.stdin.flush()
@@ -137,7 +148,7 @@ def _after(work: list[list], done: tuple[str, int, int]) -> list[list]:
 
 def shares(names: list[str], inputs: int, least: int = 1) -> dict[str, int]:
     """Inputs of each target."""
-    from targets import TARGETS
+    from fuzz.targets import TARGETS
 
     total = sum(TARGETS[name].share for name in names)
     return {name: max(least, round(inputs * TARGETS[name].share / total)) for name in names}
@@ -145,9 +156,11 @@ def shares(names: list[str], inputs: int, least: int = 1) -> dict[str, int]:
 
 def keep(finding: Finding, folder: Path) -> Path:
     """Write the input of a finding as a text to keep."""
-    from targets import TARGETS
+    from fuzz.seeds import without_what_is_beside
+    from fuzz.targets import TARGETS
 
     case = TARGETS[finding.target].case(finding.target, finding.seed, finding.number)
+    case = without_what_is_beside(case)
     name = f"{finding.target}-{finding.seed}-{finding.number}.json".replace(" ", "_")
     folder.mkdir(exist_ok=True)
     path = folder / name
@@ -158,42 +171,43 @@ def keep(finding: Finding, folder: Path) -> Path:
 def fuzz(
     names: list[str], inputs: int, seed: int, until: float, coverage: str, first: int = 0
 ) -> tuple[dict[str, Tally], list[Finding]]:
-    """Go through inputs, in batches over all targets, until the number or the time is reached."""
+    """Go through inputs, all targets by turns, until the number or the time is reached, or Ctrl-C.
+
+    Each batch has a process of its own.
+    """
     tallies: dict[str, Tally] = defaultdict(Tally)
     found: list[Finding] = []
     kinds: Counter = Counter()
     counts = shares(names, inputs)
-    rounds = max(1, -(-inputs // _BATCH))
-    for turn in range(rounds):
-        work = []
-        for name, count in counts.items():
-            begin, end = count * turn // rounds, count * (turn + 1) // rounds
-            if end > begin:
-                work.append([name, seed, first + begin, first + end])
-        for (name, _, number), said in outcomes(work, coverage=coverage):
-            tally = tallies[name]
-            tally.outcomes[said["outcome"]] += 1
-            tally.parsed += said["parsed"]
-            tally.seconds += said["seconds"]
-            tally.slowest = max(tally.slowest, said["seconds"])
-            if said["outcome"] in FINDINGS:
-                finding = Finding(name, seed, number, said["outcome"], said["where"])
-                found.append(finding)
-                kinds[finding.kind] += 1
-                if kinds[finding.kind] <= 3:
-                    print(
-                        f"{keep(finding, HERE / 'found')}: {finding.outcome}: {finding.where}",
-                        flush=True,
-                    )
-            if time.time() > until:
-                return tallies, found
+    batches = max(1, -(-inputs // _BATCH))
+    steps = [Fraction(step, batches * _SLICES) for step in range(batches * _SLICES + 1)]
+    with suppress(KeyboardInterrupt):
+        for batch in range(batches):
+            work = [
+                [name, seed, first + int(count * begin), first + int(count * end)]
+                for begin, end in pairwise(steps[batch * _SLICES : (batch + 1) * _SLICES + 1])
+                for name, count in counts.items()
+                if int(count * end) > int(count * begin)
+            ]
+            for (name, _, number), said in outcomes(work, coverage=coverage):
+                tally = tallies[name]
+                tally.add(said)
+                if said["outcome"] in FINDINGS:
+                    finding = Finding(name, seed, number, said["outcome"], said["where"])
+                    found.append(finding)
+                    kinds[finding.kind] += 1
+                    if kinds[finding.kind] <= 3:
+                        print(f"{keep(finding, HERE / 'found')}: {finding.where}", flush=True)
+                if time.time() > until:
+                    return tallies, found
     return tallies, found
 
 
 def table(tallies: dict[str, Tally]) -> str:
     """What came of the inputs, target by target."""
     lines = [
-        f"{'target':28s} {'inputs':>7s} {'accepted':>9s} {'refused':>8s} {'parsed':>7s} {'findings':>9s} {'slowest':>9s} {'mean':>8s}"
+        f"{'target':28s} {'inputs':>7s} {'accepted':>9s} {'refused':>8s} {'parsed':>7s} "
+        f"{'findings':>9s} {'slowest':>9s} {'mean':>8s}"
     ]
     total = Tally()
     for name, each in [*tallies.items(), ("all", total)]:
@@ -205,9 +219,9 @@ def table(tallies: dict[str, Tally]) -> str:
         count = max(each.inputs, 1)
         findings = sum(each.outcomes[kind] for kind in FINDINGS)
         lines.append(
-            f"{name:28s} {each.inputs:7d} {each.outcomes['accepted']:9d} {each.outcomes['refused']:8d} "
-            f"{100 * each.parsed / count:6.1f}% {findings:9d} {each.slowest:7.2f} s "
-            f"{1e3 * each.seconds / count:5.1f} ms"
+            f"{name:28s} {each.inputs:7d} {each.outcomes['accepted']:9d} "
+            f"{each.outcomes['refused']:8d} {100 * each.parsed / count:6.1f}% {findings:9d} "
+            f"{each.slowest:7.2f} s {1e3 * each.seconds / count:5.1f} ms"
         )
     return "\n".join(lines)
 
@@ -216,10 +230,12 @@ def replay(path: Path) -> None:
     """Read a kept input in this process, so that what it raises is seen whole."""
     import tempfile
 
-    from case import Case
-    from targets import TARGETS
+    from fuzz.case import Case
+    from fuzz.seeds import with_what_is_beside
+    from fuzz.targets import TARGETS
 
     target, case = Case.of_json(path.read_text())
+    case = with_what_is_beside(case)
     with tempfile.TemporaryDirectory() as folder:
         case.write(Path(folder))
         os.chdir(folder)
@@ -229,7 +245,7 @@ def replay(path: Path) -> None:
 
 def main() -> None:
     """The command line."""
-    from targets import TARGETS
+    from fuzz.targets import TARGETS
 
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument(
@@ -255,9 +271,10 @@ def main() -> None:
         replay(Path(given.replay))
         return
     if given.bugs:
-        import bugs
+        from fuzz import bugs
 
         raise SystemExit(bugs.hunt(given.inputs or 3000, given.seed))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     until = time.time() + 60 * given.minutes if given.minutes else float("inf")
     inputs = given.inputs or (100_000_000 if given.minutes else 100_000)
     tallies, found = fuzz(

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from case import Case
+from fuzz.case import Case
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ROOT / "src" / "kinacc" / "kinematics" / "robots"
@@ -178,8 +178,8 @@ convention: modified
 dh:
 - {joint: revolute, theta_offset_deg: 0, d_mm: 300, a_mm: 0, alpha_deg: 0, limits_deg: [-130, 130]}
 - {theta_offset_rad: 0.1, d_m: 0, a_m: 0.4, alpha_rad: 0, sign: -1, limits_rad: [-2.5, 2.5]}
-- {joint: prismatic, theta_offset_deg: 0, d_mm: 0, a_mm: 250, alpha_deg: 180, limits_mm: [0, 200]}
-- {name: hand, theta_offset_deg: 0, d_mm: 0, a_mm: 0, alpha_deg: 0, beta_deg: 0.1, limits_deg: [-360, 360]}
+- {joint: prismatic, theta_offset_deg: 0, d_mm: 0, a_mm: 250, alpha_deg: 180, limits_m: [0, 0.2]}
+- {name: h, theta_offset_deg: 0, d_mm: 0, a_mm: 0, alpha_deg: 0, beta_deg: 1, limits_rad: [-1, 1]}
 joint_map: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0.5, 0, 1]]
 base: {position_mm: [0, 0, 100], rpy_deg: [0, 0, 90]}
 flange: {position_m: [0, 0, 0.1], quaternion_wxyz: [1, 0, 0, 0]}
@@ -226,7 +226,7 @@ def urdfs() -> tuple[Case, ...]:
         '<child link="finger"/><axis xyz="1 0 0"/><limit lower="0" upper="0.1"/>'
         '<mimic joint="j1" multiplier="2"/></joint>'
     )
-    shape = '<link name="box"><visual><geometry><box size="1 1 1"/></geometry></visual></link>'
+    shape = '<!-- by hand --><?pi x?><link name="box"><visual><box size="1 1 1"/></visual></link>'
     made = (_urdf(turning), _urdf(sliding), _urdf(turning, branch), _urdf(turning, shape))
     return tuple(Case({"arm.urdf": each}) for each in made)
 
@@ -245,10 +245,11 @@ def configurations() -> tuple[Case, ...]:
     texts.append(b"datasets: {a: {robot: mh180}}\nstudy: {repetitions: 20}\nmap: {grid_mm: 100}\n")
     texts.append(
         b"datasets:\n  own:\n    robot: arm.yaml\n    seed: 3\n    calibration:\n"
-        b"      vec: {order: auto, joint_range: [[-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90],"
-        b" [-90, 90]]}\n      dh: {parameters: {a2: free, d3: {value: 1, std: 0.1}}, loss: huber}\n"
+        b"      vec: {order: auto, joint_range: [[-9, 9], [-9, 9], [-9, 9], [-9, 9], [-9, 9]]}\n"
+        b"      dh: {parameters: {a2: free, d3: {value: 1, std: 0.1}}, loss: huber}\n"
         b"      frames: {tool_x: fixed}\n      compliance: {joints: [2, 3]}\n    measurements:\n"
-        b"      source: file\n      file: {path: series_B.csv, exclude: [{lines: [3], reason: slip}]}\n"
+        b"      source: file\n"
+        b"      file: {path: series_B.csv, exclude: [{lines: [3], reason: slip}]}\n"
     )
     arm = (SHIPPED / "ur10.yaml").read_bytes()
     return tuple(Case({"own.yaml": text, "arm.yaml": arm, **files}) for text in texts)
@@ -265,6 +266,20 @@ def small_results() -> dict[str, bytes]:
         return {
             name: data for name, data in _content(folder / "results").items() if ".log" not in name
         }
+
+
+def without_what_is_beside(case: Case) -> Case:
+    """A case as it is kept: of the files of results, those that were changed."""
+    if "mh180/frames.parquet" not in case.files or len(case.files) < 5:
+        return case
+    files = {k: v for k, v in case.files.items() if small_results().get(k) != v}
+    return Case(files, {**case.options, "given": [], "beside": "results"})
+
+
+def with_what_is_beside(case: Case) -> Case:
+    """A kept case as it is read."""
+    whole = small_results() if case.options.get("beside") else {}
+    return Case({**whole, **case.files}, case.options)
 
 
 @cache
@@ -291,7 +306,8 @@ def campaign() -> tuple[Case, ...]:
     cases = []
     for name, count in (("search_and_confirm", 0), ("search_and_confirm", 9), ("kinematic", 6)):
         plan = begin.plan_of(
-            arm, points, assessor_of(name, {"measurements": 12}), instruments(("tracker=0.05",), "base"),
+            arm, points, assessor_of(name, {"measurements": 12}),
+            instruments(("tracker=0.05",), "base"),
             Limits(np.deg2rad(0.02), 10.0), 3, np.zeros(6), about,
         )  # fmt: skip
         order = plan.visiting(frozenset())
@@ -340,7 +356,8 @@ def joint_files() -> tuple[Case, ...]:
     table |= dict(zip(("x_mm", "y_mm", "z_mm"), pose.position_mm.T.tolist(), strict=True))
     table |= dict(zip(("qw", "qx", "qy", "qz"), quaternion.T.tolist(), strict=True))
     table |= {"pose": [f"p{i}" for i in range(6)], "payload_kg": [0.0, 1, 2, 3, 4, 5]}
-    names = (list(table), [*JOINTS], [*table][:9], [*JOINTS, "x_mm", "y_mm", "z_mm", "rvx_deg", "rvy_deg", "rvz_deg"],
+    names = (list(table), [*JOINTS], [*table][:9],
+             [*JOINTS, "x_mm", "y_mm", "z_mm", "rvx_deg", "rvy_deg", "rvz_deg"],
              ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad", "q1_rad", *JOINTS[1:]],
              [*JOINTS, *(f"s{i}" for i in range(1, 7)), "status"])  # fmt: skip
     cases = []

@@ -13,11 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import mutations
-import seeds
-from case import Case
-
-from kinacc.errors import KinaccError
+from fuzz import mutations, readers, seeds, texts, trees
+from fuzz.case import Case
 
 Random = random.Random
 
@@ -43,7 +40,7 @@ class Target:
         """The input of a number: a seed with some changes."""
         rng = random.Random(f"{name} {seed} {number}")
         held = _pool(self.seeds)
-        mutations.OTHERS = [each.files[each.first] for each in held[:40]]
+        texts.OTHERS = [each.files[each.first] for each in held[:40]]
         case = rng.choice(held)
         names = [each for each in case.files if not self.only or each.endswith(self.only)]
         changed = _chosen(names, case, rng)
@@ -62,29 +59,6 @@ def _pool(make: Callable[[], Sequence[Case]]) -> Sequence[Case]:
 def _chosen(names: Sequence[str], case: Case, rng: Random) -> str:
     given = [each for each in case.options.get("given", names[:1]) if each in names] or names
     return rng.choice(given if rng.random() < 0.9 else names)
-
-
-class CrashError(Exception):
-    """A command that ended in something other than an answer or a message."""
-
-
-class RefusedError(KinaccError):
-    """A command that ended with a message."""
-
-
-def called(*words: object) -> None:
-    """Run a command as a person would; an exception that is no message comes out of it."""
-    from command_line import call
-
-    done = call(*words)
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    if done.exit_code not in (0, 1, 2) or "Traceback" in done.output:
-        raise CrashError(f"exit code {done.exit_code}: {done.output[-500:]}")
-    if "nested too deeply" in done.output or "not enough memory" in done.output:
-        raise CrashError(done.output[-500:])
-    if done.exit_code == 2:
-        raise RefusedError(done.output[-500:])
 
 
 # --- measured files -------------------------------------------------------------------------------
@@ -109,66 +83,9 @@ _ANSWERS = {
 def _asked(options: dict, rng: Random) -> dict:
     answers = {"sigma": "2"} if rng.random() < 0.7 else {}
     answers |= mutations.chosen(_ANSWERS, rng, 1) if rng.random() < 0.4 else {}
-    take = [rng.choice(mutations.HEADERS)] if rng.random() < 0.05 else []
+    take = [rng.choice(texts.HEADERS)] if rng.random() < 0.05 else []
     return {**options, "answers": answers, "take": take, "turned": rng.random() < 0.9,
             "strict": rng.random() < 0.5}  # fmt: skip
-
-
-def guessed(folder: Path, options: dict) -> None:
-    """What ``init`` makes of a file before it asks, its text, and the file read by it."""
-    from kinacc.cli.first_poses import poses_without_robot
-    from kinacc.kinematics import robot as robots
-    from kinacc.measurements.intake import guess as guesses
-    from kinacc.measurements.intake import write
-    from kinacc.measurements.reader import read
-
-    given = [Path(name) for name in options["given"]]
-    found = guesses.look(
-        given if len(given) > 1 else given[0],
-        options["take"],
-        options["turned"],
-        options["answers"],
-    )
-    if found.found.questions:
-        return
-    guesses.sigma_choice(found)
-    found.unused()
-    write.dataset_text("own", "own.robot.yaml", found, 30, "note")
-    poses_without_robot(found)
-    read(found.section, robots.load(options["robot"]), strict=options["strict"])
-
-
-def init(folder: Path, options: dict) -> None:
-    """The command, and the data set it wrote."""
-    words = ["--robot", options["robot"], "--json", "--out", "out", "--name", "own", "--force"]
-    for name, value in options["answers"].items():
-        words += [f"--{name.replace('_', '-')}", value]
-    called("init", *options["given"], *words)
-    called("check-data", "out/own.yaml", "--json")
-
-
-def described(folder: Path, options: dict) -> None:
-    """The stage ``measurements``: a file by its description, dealt into folds."""
-    from kinacc.config.schema import defaults
-    from kinacc.kinematics import robot as robots
-    from kinacc.measurements.reader import read, read_excluded
-    from kinacc.workflow.stages.measurements import split
-
-    usual = defaults()["measurements"]
-    given = options["section"]
-    section = {
-        **usual["file"],
-        **given,
-        "orientation": usual["file"]["orientation"] | given["orientation"],
-    }
-    arm = robots.load(options["robot"])
-    found = read(section, arm, strict=options["strict"])
-    found.left_out()
-    if section["exclude"]:
-        read_excluded(section, arm)
-    settings = {"measurements": {**usual, "folds": 3, "validation_fold": 0}, "seed": 1}
-    settings["measurements"]["fold_by"] = options["fold_by"]
-    split(found.columns, settings)
 
 
 _CONVENTIONS = ("XYZ", "ZYX", "xyz", "zyx", "ZYZ", "XYX")
@@ -219,60 +136,20 @@ def _section(options: dict, rng: Random) -> dict:
     if rng.random() < 0.3:
         section |= mutations.chosen(_KEYS, rng)
     if rng.random() < 0.1:
-        name = rng.choice(("q1", "q7", "x", "pose", "target", "repeat", "session", "temperature", "s1",
-                           "q1_cmd", "payload", "qw", "e1", "std_x", "cov_xx", "mA_x"))  # fmt: skip
-        section["columns"] = {**section.get("columns", {}), name: rng.choice(mutations.HEADERS)}
+        name = rng.choice(("q1", "q7", "x", "pose", "target", "repeat", "session",
+                           "temperature", "s1", "q1_cmd", "payload", "qw", "e1",
+                           "std_x", "cov_xx", "mA_x"))  # fmt: skip
+        section["columns"] = {**section.get("columns", {}), name: rng.choice(texts.HEADERS)}
     if section.get("joints") and rng.random() < 0.2:
-        joints = {"by": ("name", "time", "order"), "clock_offset_s": (0.0, 1e10), "within_s": (1e-3, 3600.0),
-                  "key": (None, "x", "name"), "delimiter": (",", ";"), "skip_lines": (0, 1, 50)}  # fmt: skip
+        joints = {"by": ("name", "time", "order"), "clock_offset_s": (0.0, 1e10),
+                  "within_s": (1e-3, 3600.0), "key": (None, "x", "name"), "delimiter": (",", ";"),
+                  "skip_lines": (0, 1, 50)}  # fmt: skip
         section["joints"] = {**section["joints"], **mutations.chosen(joints, rng)}
     return {**options, "section": section, "strict": rng.random() < 0.5,
             "fold_by": rng.choice(("whole", "time_block"))}  # fmt: skip
 
 
-def _all_described() -> Sequence[Case]:
-    return seeds.with_description()
-
-
-def examined(folder: Path, options: dict) -> None:
-    """``check-data`` of a described file."""
-    from kinacc.checks import check
-    from kinacc.config.schema import defaults
-    from kinacc.kinematics import robot as robots
-    from kinacc.measurements.layout import Layout
-    from kinacc.measurements.reader import read
-
-    usual = defaults()["measurements"]["file"]
-    given = options["section"]
-    section = {**usual, **given, "orientation": usual["orientation"] | given["orientation"]}
-    arm = robots.load(options["robot"])
-    reading = read(section, arm, strict=False)
-    found = check.check(
-        reading, Layout.of(section), arm, "own", section["path"], lambda items, words: items
-    )
-    found.as_text()
-    found.as_dict()
-
-
 # --- robots and configurations --------------------------------------------------------------------
-
-
-def robot_file(folder: Path, options: dict) -> None:
-    """A robot file, written again and read back."""
-    from kinacc.kinematics import robot as robots
-
-    name = options["file"]
-    robots.files(name)
-    arm = robots.load(name)
-    robots.of_text(robots.as_yaml(arm), "again")
-    robots.forward(arm, 0.5 * (arm.q_min_rad + arm.q_max_rad)[None])
-
-
-def configuration(folder: Path, options: dict) -> None:
-    """A configuration, alone or over the paper's."""
-    from kinacc.workflow.contradictions import load
-
-    load(["own.yaml"], options.get("overrides") or None)
 
 
 _OVERRIDES = (
@@ -290,22 +167,6 @@ _OVERRIDES = (
 # --- campaigns ------------------------------------------------------------------------------------
 
 
-def campaign(folder: Path, options: dict) -> None:
-    """A campaign's folder, where it stands, and what is said of it."""
-    from kinacc.campaign import marks, words
-    from kinacc.campaign.folder import open_
-    from kinacc.cli import campaigns_answers as answers
-
-    opened = open_(".")
-    state = opened.state()
-    marks.doubts(opened)
-    words.standing(state)
-    words.statements(state)
-    answers.as_facts(state, 1.0)
-    if state.asked is not None:
-        answers.next_in_words(state)
-
-
 def _chained(case: Case, rng: Random) -> Case:
     """Give changed lines of a journal the hashes that fit them, mostly."""
     import json
@@ -320,7 +181,7 @@ def _chained(case: Case, rng: Random) -> Case:
     for line in case.files[journal.JOURNAL].split(b"\n"):
         try:
             entry = json.loads(line)["entry"]
-            entry = mutations.tree(entry, rng) if rng.random() < 0.08 else entry
+            entry = trees.tree(entry, rng) if rng.random() < 0.08 else entry
             last = journal._chained(last, entry)
             lines.append(json.dumps({"chain": last, "entry": entry}, sort_keys=True).encode())
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -335,61 +196,6 @@ def _chained(case: Case, rng: Random) -> Case:
 # --- joints and poses given to commands -----------------------------------------------------------
 
 
-@cache
-def _calibration() -> Any:
-    from kinacc.deployment.record import nominal
-    from kinacc.kinematics import robot as robots
-
-    return nominal(robots.load("mh180"))
-
-
-def joints_given(folder: Path, options: dict) -> None:
-    """``predict``: joints of a file, and poses there."""
-    from kinacc.cli import tables
-    from kinacc.deployment.predict import predict
-
-    held = _calibration()
-    given = tables.given_joints(held.robot, options["given"], (), (), options["answers"])
-    predict(
-        held,
-        given.joints,
-        given.directions,
-        "base",
-        None,
-        lambda items, words: items,
-        given.payload,
-    )
-
-
-def poses_given(folder: Path, options: dict) -> None:
-    """``compensate``: poses of a file, and the joints for them."""
-    from kinacc.cli import target_poses
-    from kinacc.deployment.compensate import compensate
-
-    held = _calibration()
-    path, program = (None, options["given"]) if options["program"] else (options["given"], None)
-    given = target_poses.poses(held, path, (), options["near"], program, "base", None)
-    found = compensate(
-        held, given.pose, given.joints, given.directions, "base", None, given.payload
-    )
-    unlike = target_poses.unlike_measured(held, found, None)
-    target_poses.compensated(held, given, found, "base", None, unlike, program is not None)
-
-
-def words_given(folder: Path, options: dict) -> None:
-    """Numbers given as arguments: joints, a pose, joints to be near to."""
-    from kinacc.cli import rows, target_poses
-
-    held = _calibration()
-    kind, words = options["kind"], options["words"]
-    if kind == "pose":
-        target_poses.poses(held, None, (words,), options.get("near"), None, "base", None)
-    else:
-        found = rows.of_arguments((words,), kind, held.robot, "--joints")
-        given = rows.Rows(1, found[:, 0], found, None, None, ())
-        rows.require_within_limits(held.robot, given, "joints")
-
-
 def _arguments(options: dict, rng: Random) -> dict:
     kind = rng.choice(("deg", "rad", "pose"))
     numbers = (
@@ -399,16 +205,17 @@ def _arguments(options: dict, rng: Random) -> dict:
     )
     for _ in range(rng.choice((0, 1, 1, 2))):
         at = rng.randrange(len(numbers))
-        numbers[at] = mutations._number(numbers[at], rng)
+        numbers[at] = texts.number(numbers[at], rng)
     words = rng.choice((",", ", ", " ", ";")).join(numbers)
-    near = rng.choice((None, "0,0,0,0,0,0", mutations.odd(rng)))
+    near = rng.choice((None, "0,0,0,0,0,0", texts.odd(rng)))
     return {"kind": kind, "words": words, "near": near}
 
 
 def _rows_options(options: dict, rng: Random) -> dict:
-    answers = {"encoding": ("latin-1", "utf-16-le"), "decimal": (".", ","), "thousands": (".", "none"),
-               "names": ("a,b", "q1,q2,q3,q4,q5,q6"), "take": (("x",), ("q1_deg",)),
-               "joint_unit": ("deg", "rad"), "pulses_per_deg": ("1,2,3,4,5,6", "x")}  # fmt: skip
+    answers = {"encoding": ("latin-1", "utf-16-le"), "decimal": (".", ","),
+               "thousands": (".", "none"), "names": ("a,b", "q1,q2,q3,q4,q5,q6"),
+               "take": (("x",), ("q1_deg",)), "joint_unit": ("deg", "rad"),
+               "pulses_per_deg": ("1,2,3,4,5,6", "x")}  # fmt: skip
     return {**options, "answers": mutations.chosen(answers, rng, 1), "program": rng.random() < 0.4,
             "near": rng.choice((None, "0,0,0,0,0,0"))}  # fmt: skip
 
@@ -420,12 +227,6 @@ def _joint_seeds() -> Sequence[Case]:
 def _pose_seeds() -> Sequence[Case]:
     own = ("rows.csv", "rows.parquet", "rows.json")
     return [each for each in _joint_seeds() if each.first in own]
-
-
-def compared(folder: Path, options: dict) -> None:
-    """``compare``: two robot files, at the joints of a file."""
-    joints = ["--joints", options["joints"]] if options["joints"] else []
-    called("compare", "a.yaml", "b.yaml", "--poses", 10, "--json", *joints)
 
 
 def _pairs() -> Sequence[Case]:
@@ -467,20 +268,6 @@ def _sealed(case: Case, rng: Random) -> Case:
     return case.but(changed[0], written.getvalue())
 
 
-def table_read(folder: Path, options: dict) -> None:
-    """A table alone: read, its metadata, shown."""
-    from kinacc.artifacts import store
-
-    name = options["file"]
-    store.read_metadata(Path(name))
-    store.read(Path(name))
-
-
-def table_shown(folder: Path, options: dict) -> None:
-    """``show`` of a table, in one of its forms."""
-    called("show", options["file"], *options["form"])
-
-
 _FORMS = (
     (),
     ("--describe",),
@@ -501,35 +288,6 @@ def _results() -> Sequence[Case]:
     ]
 
 
-def results_used(folder: Path, options: dict) -> None:
-    """The results of a data set as predictions take them."""
-    import numpy as np
-
-    from kinacc.cli import choice
-    from kinacc.deployment.predict import predict
-
-    held = choice.calibration_of("mh180", options["model"], None, ())
-    predict(
-        held,
-        np.zeros((1, held.robot.dh.joints)),
-        None,
-        "base",
-        None,
-        lambda items, words: items,
-        None,
-    )
-
-
-def results_checked(folder: Path, options: dict) -> None:
-    """``check-results``, ``fitted`` and ``summary`` of a results folder."""
-    if options["command"] == "check-results":
-        from kinacc.workflow.verification.check import check_results
-
-        str(check_results("."))
-    else:
-        called(options["command"], *(("mh180",) if options["command"] == "fitted" else (".",)))
-
-
 def _first(
     cases: Callable[[], Sequence[Case]], name: str | None = None
 ) -> Callable[[], Sequence[Case]]:
@@ -542,49 +300,69 @@ def _first(
     return made
 
 
+def _overridden(options: dict, rng: Random) -> dict:
+    return {**options, "overrides": rng.choice(_OVERRIDES) if rng.random() < 0.1 else None}
+
+
+def _shown(options: dict, rng: Random) -> dict:
+    return {**options, "form": rng.choice(_FORMS)}
+
+
+def _by_model(options: dict, rng: Random) -> dict:
+    return {**options, "model": rng.choice((None, "dh", "vec", "nominal"))}
+
+
+def _by_command(options: dict, rng: Random) -> dict:
+    return {
+        **options,
+        "command": rng.choice(("check-results", "check-results", "fitted", "summary")),
+    }
+
+
+def _at_joints(options: dict, rng: Random) -> dict:
+    return {"joints": rng.choice((None, "rows.csv"))}
+
+
+def _nothing() -> Sequence[Case]:
+    return [Case({"none.txt": b""})]
+
+
 _LOADED = "kinacc.measurements.reader.convert"
+_LOOKED = "kinacc.measurements.intake.guess.name_of"
+_ROWS = "kinacc.cli.rows.numbers"
+_ANY_ROWS = f"{_ROWS} kinacc.measurements.intake.joint_files.name_of"
+_ROBOT = "kinacc.kinematics.robot.description.Reader"
+_CHAIN = "kinacc.kinematics.robot.urdf._joints_alone"
+_SET = "kinacc.config.load._resolve"
+_PLAN = "kinacc.campaign.plan._plan"
+_ARGUMENT = "kinacc.cli.rows.numbers_of"
+_ALIKE = "kinacc.cli.comparison_report.require_alike"
+_TABLE = "kinacc.artifacts.store.columns_in"
+_USED = "kinacc.deployment.folder.calibration"
+_CHECKED = "kinacc.workflow.verification.check.check_dataset"
 TARGETS: dict[str, Target] = {
-    "measured file": Target(
-        seeds.as_they_come, guessed, "kinacc.measurements.intake.guess.name_of", 0.07, _asked
+    "measured file": Target(seeds.as_they_come, readers.guessed, _LOOKED, 0.04, _asked),
+    "described text or workbook": Target(
+        seeds.with_description, readers.described, _LOADED, 0.15, _section
     ),
-    "described text or workbook": Target(_all_described, described, _LOADED, 0.15, _section),
-    "described Parquet": Target(seeds.parquet_files, described, _LOADED, 0.06, _section),
-    "described workbook": Target(seeds.workbooks, described, _LOADED, 0.012, _section),
-    "check-data": Target(_all_described, examined, _LOADED, 0.001, _section),
-    "init": Target(
-        seeds.as_they_come, init, "kinacc.measurements.intake.guess.name_of", 0.001, _asked, writes="out"
-    ),
-    "robot": Target(
-        _first(seeds.robots, "arm.yaml"), robot_file, "kinacc.kinematics.robot.description.Reader", 0.20,
-    ),
-    "URDF": Target(_first(seeds.urdfs), robot_file, "kinacc.kinematics.robot.urdf._joints_alone", 0.18),
+    "described Parquet": Target(seeds.parquet_files, readers.described, _LOADED, 0.06, _section),
+    "described workbook": Target(seeds.workbooks, readers.described, _LOADED, 0.006, _section),
+    "check-data": Target(seeds.with_description, readers.examined, _LOADED, 0.001, _section),
+    "init": Target(seeds.as_they_come, readers.init, _LOOKED, 0.001, _asked, writes="out"),
+    "robot": Target(_first(seeds.robots, "arm.yaml"), readers.robot_file, _ROBOT, 0.22),
+    "URDF": Target(_first(seeds.urdfs), readers.robot_file, _CHAIN, 0.24),
     "configuration": Target(
-        seeds.configurations, configuration, "kinacc.config.load._resolve", 0.15,
-        lambda options, rng: {**options, "overrides": rng.choice(_OVERRIDES) if rng.random() < 0.1 else None},
-        only=(".yaml",),
+        seeds.configurations, readers.configuration, _SET, 0.1, _overridden, only=(".yaml",)
     ),
-    "campaign": Target(seeds.campaign, campaign, "kinacc.campaign.plan._plan", 0.04, also=_chained),
-    "joints": Target(_joint_seeds, joints_given, "kinacc.cli.rows.numbers kinacc.measurements.intake.joint_files.name_of", 0.05, _rows_options),
-    "poses": Target(_pose_seeds, poses_given, "kinacc.cli.rows.numbers", 0.04, _rows_options),
+    "campaign": Target(seeds.campaign, readers.campaign, _PLAN, 0.03, also=_chained),
+    "joints": Target(_joint_seeds, readers.joints_given, _ANY_ROWS, 0.05, _rows_options),
+    "poses": Target(_pose_seeds, readers.poses_given, _ROWS, 0.04, _rows_options),
     "numbers on the command line": Target(
-        lambda: [Case({"none.txt": b""})], words_given, "kinacc.cli.rows.numbers_of", 0.04, _arguments
+        _nothing, readers.words_given, _ARGUMENT, 0.06, _arguments
     ),
-    "compare": Target(
-        _pairs, compared, "kinacc.cli.comparison_report.require_alike", 0.001,
-        lambda options, rng: {"joints": rng.choice((None, "rows.csv"))},
-    ),
-    "table": Target(_first(_tables), table_read, "kinacc.artifacts.store.columns_in", 0.04, also=_sealed),
-    "show": Target(
-        _first(_tables), table_shown, "kinacc.cli.show_table.words", 0.001,
-        lambda options, rng: {**options, "form": rng.choice(_FORMS)}, also=_sealed,
-    ),
-    "results used": Target(
-        _results, results_used, "kinacc.deployment.folder.calibration", 0.005,
-        lambda options, rng: {**options, "model": rng.choice((None, "dh", "vec", "nominal"))},
-        also=_sealed,
-    ),
-    "results checked": Target(
-        _results, results_checked, "kinacc.workflow.verification.check.check_dataset", 0.001,
-        lambda options, rng: {**options, "command": rng.choice(("check-results", "check-results", "fitted", "summary"))},
-    ),
-}  # fmt: skip
+    "compare": Target(_pairs, readers.compared, _ALIKE, 0.001, _at_joints),
+    "table": Target(_first(_tables), readers.table_read, _TABLE, 0.04, also=_sealed),
+    "show": Target(_first(_tables), readers.table_shown, _TABLE, 0.001, _shown, also=_sealed),
+    "results used": Target(_results, readers.results_used, _USED, 0.003, _by_model, also=_sealed),
+    "results checked": Target(_results, readers.results_checked, _CHECKED, 0.001, _by_command),
+}

@@ -25,8 +25,7 @@ from time import process_time
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parents[1] / "tools")]
-sys.path.insert(0, str(HERE.parents[1] / "src"))
+sys.path[:0] = [str(HERE.parents[1] / "src"), str(HERE.parent), str(HERE.parents[1] / "tools")]
 
 MOST_SECONDS, MOST_BYTES = 5.0, 1 << 30
 _FINDING_KINDS = ("crash", "hang", "memory", "wrote")
@@ -128,7 +127,7 @@ class Runner:
     """Reads inputs of targets, in a folder that each finds empty."""
 
     def __init__(self) -> None:
-        import targets
+        from fuzz import targets
 
         self.targets = targets.TARGETS
         self.counters: dict[str, Counter] = {}
@@ -214,7 +213,7 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     if plan.get("bug"):
-        import bugs
+        from fuzz import bugs
 
         bugs.put_back(plan["bug"])
     covered = None

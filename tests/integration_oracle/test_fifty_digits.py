@@ -21,6 +21,8 @@ from versions_page import STATED
 from kinacc import distributions
 from kinacc.artifacts import store
 from kinacc.assess import binomial, ellipsoid, limits
+from kinacc.kinematics import dh
+from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import VECModel
@@ -139,9 +141,31 @@ def test_forward_kinematics_of_all_models(arm, paper):
     held("forward kinematics, rotation", found["rotation"])
 
 
+def test_forward_kinematics_of_joints_that_bend(arm):
+    rng = np.random.default_rng(5)
+    compliance, lever = np.full((2, 6), np.nan)
+    compliance[1:3], lever[4] = (1e-6, 3e-6), 2e-6
+    bodies = np.column_stack([rng.uniform(5, 100, 7), rng.normal(size=(7, 3)) * 200])
+    gravity = np.array([0.6, 0.0, -0.8])
+    table = np.vectorize(float)(arm.dh)
+    columns = dict(zip(dh.PARAMETERS, table.T, strict=True))
+    model = ComplianceModel(DHModel(**columns), compliance, lever, gravity, bodies[:6], bodies[6])
+    q = rng.uniform(-1, 1, (3, 6))
+    at = model.pose(JointState(q, np.zeros(q.shape, dtype=np.int8)))
+    found = []
+    for angles, position in zip(q, at.position_mm, strict=True):
+        coefficients = (fd.exact(np.nan_to_num(each)) for each in (compliance, lever))
+        expected = fd.bent_forward(
+            arm.dh, fd.exact(angles), *coefficients, fd.exact(gravity), fd.exact(bodies)
+        )
+        found += apart(position, expected[:3, 3])
+    held("forward kinematics, joints that bend", found)
+
+
 def test_the_vec_fit_is_the_coefficients_of_greatest_posterior_probability(arm, paper):
     fit = ft.vec_fit(arm, training(paper), rounded(arm.series), 1.0, 1e-3)
-    held("vec_model: coefficient", arm.series.ravel() - fit.x)
+    unit = np.tile(np.repeat([Decimal(1)] * 3 + [ft.UNIT_RAD] * 3, arm.series.shape[2]), 6)
+    held("vec_model: coefficient", (arm.series.ravel() - fit.x) / unit)
     held("vec_fit: cost", shares(values(paper, "vec_fit", "cost"), [fit.cost]))
     names = sorted_names(arm)
     place = {name: i for i, name in enumerate(names)}
@@ -269,6 +293,36 @@ def test_what_another_model_gains_on_held_out_configurations(paper):
 
 def mean(numbers) -> Decimal:
     return sum(numbers) / len(numbers)
+
+
+def test_what_models_leave_by_region_of_a_joint(paper):
+    vectors = defaultdict(dict)
+    for row in tables.rows(paper, "pose_errors"):
+        key = row["comparison"], row["estimate"]
+        vectors[key][row["row"]] = fd.exact([row[f"e{c}_mm"] for c in "xyz"])
+    q = [tables.joints(row) for row in tables.rows(paper, "measurements")]
+    found, seen = [], defaultdict(int)
+    for row in tables.rows(paper, "joint_bias"):
+        own, joint = vectors[row["comparison"], row["estimate"]], row["joint"] - 1
+        highest = max(q[i][joint] for i in own)
+        part = [
+            own[i]
+            for i in own
+            if row["from_rad"] <= q[i][joint] < row["to_rad"]
+            or q[i][joint] == highest <= row["to_rad"] + 1e-12
+        ]
+        assert row["n"] == len(part)
+        seen[row["comparison"], row["estimate"], joint] += len(part)
+        centre = sum(part) / len(part)
+        rms = (sum(x @ x for x in part) / len(part)).sqrt()
+        stated, expected = [row[f"e{c}_mm"] for c in "xyz"], [*centre]
+        if len(part) > 1:
+            stated += [row[f"std_error_{c}_mm"] for c in "xyz"]
+            squares = sum((x - centre) ** 2 for x in part) / (len(part) - 1) / len(part)
+            expected += [x.sqrt() for x in squares]
+        found += apart([*stated, row["rms_mm"]], [*expected, rms])
+    assert all(count == len(vectors[key[:2]]) for key, count in seen.items())
+    held("joint_bias", found)
 
 
 # --- accuracy map and points ----------------------------------------------------------------------

@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -54,7 +54,7 @@ def _tables_of_data_sets(project: Path) -> None:
 
 WORKS: Mapping[str, Work] = {
     "study": Work((*SNAKEMAKE, "-c2", *_CONFIGS)),
-    "cached": Work((*SNAKEMAKE, "-c2", "--cache", *_CONFIGS, "--", "calibration")),
+    "cached": Work((*SNAKEMAKE, "-c2", "--cache", *_CONFIGS, "--", "own_dh")),
     "calibrate": Work((*KINACC, "calibrate", "-c", "2", *_CONFIGS[1:])),
     "tournament": Work(
         (*KINACC, "tournament", *_EACH_CONFIG, "--parts", "3", "--cores", "2", "--json"),
@@ -106,6 +106,11 @@ class Place:
             if path.is_file()
         }
 
+    def known(self) -> set[str]:
+        """Files whose settings and code Snakemake knows, by the names that it gives them."""
+        metadata = self.project / ".snakemake" / "metadata"
+        return {path.name for path in metadata.rglob("*") if path.is_file()}
+
     def left(self) -> list[str]:
         """Temporary files and folders anywhere, and what Snakemake holds for incomplete."""
         own = self.project / ".snakemake"
@@ -145,14 +150,18 @@ def killed(place: Place, command: tuple[str, ...], at: str) -> bool:
     return run.wait() == -signal.SIGKILL
 
 
-def faults(place: Place, command: tuple[str, ...], wanted: Mapping[str, str]) -> list[str]:
+def faults(
+    place: Place, command: tuple[str, ...], wanted: Mapping[str, str], known: Set[str] = frozenset()
+) -> list[str]:
     """What is wrong after the same command was started again."""
     code = started(place, command).wait()
     if code:
         return [f"exit code {code}: {(place.beside / 'said').read_text()[-2000:]}"]
     there = place.digests()
     differ = [name for name in {*there, *wanted} if there.get(name) != wanted.get(name)]
-    return [f"differs: {name}" for name in sorted(differ)] + place.left()
+    found = [f"differs: {name}" for name in sorted(differ)] + place.left()
+    unknown = known - place.known()
+    return found + [f"Snakemake does not know how {len(unknown)} files were made"] * bool(unknown)
 
 
 def cases(counts: Mapping[str, int], took_s: float, kills: int, seed: int) -> Iterator[str]:
@@ -214,7 +223,7 @@ def kill_all(name: str, kills: int, seed: int, folder: Path) -> int:
             here.environment()
             was = killed(here, command, at)
             here.reset_counts()
-            found = faults(here, command, wanted)
+            found = faults(here, command, wanted, undisturbed.known())
             bad += bool(found)
             told = "; ".join(found) if found else "as if undisturbed"
             print(f"{name} {number}: {at}{'' if was else ' (it had ended)'}: {told}", flush=True)

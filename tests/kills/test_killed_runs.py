@@ -103,7 +103,8 @@ def test_a_second_run_and_a_dry_run_beside_the_first(place):
     options = {"cwd": here.project, "env": here.environment(), "text": True, "capture_output": True}
     for command in (_RUN, (*KINACC, "calibrate", "small.yaml")):
         second = subprocess.run(command, **options, check=False)
-        said = [line for line in second.stderr.splitlines() if "left out" not in line]
+        by_snakemake = ("Using workflow specific profile", "own: ")
+        said = [line for line in second.stderr.splitlines() if not line.startswith(by_snakemake)]
         assert second.returncode == 1
         assert "another run is at work in it" in said[-1]
         assert len(said) == 1
@@ -112,3 +113,16 @@ def test_a_second_run_and_a_dry_run_beside_the_first(place):
     assert not [*Path(here.project, "results").glob("*/*.parquet")]
     first.communicate(b"\n")
     assert not here.left()
+
+
+def test_other_settings_are_noticed_where_snakemake_knows_nothing_of_a_file(project):
+    """As where the machine that submitted was lost, and its jobs went on."""
+    subprocess.run(["rm", "-r", ".snakemake"], cwd=project.folder, check=True)
+    before = project.digests()
+    project.snakemake("results/own/histories.parquet")
+    assert project.digests() == before
+    subprocess.run(["rm", "-r", ".snakemake"], cwd=project.folder, check=True)
+    project.configure("histories: {noise_mm: 0.2}")
+    project.snakemake("results/own/histories.parquet")
+    differ = {name for name, digest in project.digests().items() if digest != before.get(name)}
+    assert differ == {"own/histories.parquet", "own/records/histories.json"}

@@ -229,6 +229,29 @@ def dh_motions(table: Matrix, q: Sequence[Decimal]) -> tuple[Matrix, Matrix]:
     return at, np.array(columns, dtype=object).T
 
 
+def bent_forward(
+    table: Matrix, q: Matrix, compliance: Matrix, lever: Matrix, gravity: Matrix, bodies: Matrix
+) -> Matrix:
+    """The flange where each joint gives way by ``compliance`` (rad per N m) times the moment of the
+    ``bodies`` (mass in kg, centre in mm, in the frame of their joint; last the payload, in the last
+    frame) beyond it, and ``lever`` (rad per mm) times the last frame's lever, both unbent."""
+    frames = [eye(4)]
+    for row, angle in zip(table, q, strict=True):
+        frames.append(frames[-1] @ dh_link(row, angle))
+    carrying = [*frames[1:], frames[-1]]
+    given = []
+    for joint in range(len(q)):
+        axis, origin = frames[joint][:3, 2], frames[joint][:3, 3]
+        moment = Decimal(0)
+        for number, (at, (mass, *centre)) in enumerate(zip(carrying, bodies, strict=True)):
+            if number >= joint:
+                arm_mm = at[:3, :3] @ np.array(centre) + at[:3, 3] - origin
+                moment += mass * Decimal("9.80665e-3") * (gravity @ (cross(axis) @ arm_mm))
+        of_last = gravity @ (cross(axis) @ (frames[-1][:3, 3] - origin))
+        given.append(compliance[joint] * moment + lever[joint] * of_last)
+    return dh_forward(table, q + np.array(given, dtype=object))
+
+
 def chebyshev(order: int, u: Decimal) -> Matrix:
     """T_0 .. T_order at u."""
     found = [Decimal(1), u]

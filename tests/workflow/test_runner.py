@@ -133,6 +133,70 @@ def test_parts_of_different_runs_are_refused(tmp_path):
         stage_provenance(job(tmp_path, inputs={"frames": parts}))
 
 
+@pytest.fixture
+def made(tmp_path, monkeypatch):
+    """Two tables as a stage left them in the folder of a data set, with its record."""
+    folder = tmp_path / "arm"
+    outputs = {name: str(folder / f"{name}.parquet") for name in ("frames", "dh_model")}
+    monkeypatch.setattr(study, "run", lambda i, s: {"frames": frames(), "dh_model": dh_model()})
+    given = {"outputs": outputs, "stage": "dh", "record": f"{folder}/records/dh.json"}
+    execute(job(tmp_path, **given))
+    return folder
+
+
+def dh_model():
+    names = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad")
+    columns = {name: [0.0] for name in names} | {f"std_{name}": [0.1] for name in names}
+    return {"joint": [1], **columns}
+
+
+def flipped(folder):
+    path = folder / "frames.parquet"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3] ^= 4
+    path.write_bytes(content)
+
+
+def of_another_run_with_its_digest(folder):
+    write(folder / "frames.parquet", "frames", frames("nominal"), MARKS)
+
+
+def of_a_run_that_did_not_end(folder):
+    (folder / "records" / "dh.json").unlink()
+
+
+def with_a_record_cut_off(folder):
+    path = folder / "records" / "dh.json"
+    path.write_bytes(path.read_bytes()[:100])
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (flipped, "frames.parquet: "),
+        (of_another_run_with_its_digest, "is not the file that stage dh wrote"),
+        (of_a_run_that_did_not_end, "the run that wrote it did not come to its end"),
+        (with_a_record_cut_off, "dh.json: is no record of a stage"),
+    ],
+)
+def test_the_next_stage_refuses_a_table_by_name_with_the_command_that_makes_it(
+    made, tmp_path, monkeypatch, capsys, harm, words
+):
+    inputs = {"frames": str(made / "frames.parquet"), "dh_model": str(made / "dh_model.parquet")}
+    again = "snakemake -c2 --configfile 'my arm.yaml' --forcerun {file}{target}"
+    monkeypatch.setattr(study, "run", lambda i, s: {"vec_frames": frames(), "frames": frames()})
+    execute(job(tmp_path, inputs=inputs, remake=again))
+    assert capsys.readouterr().err == ""
+    harm(made)
+    with pytest.raises(SystemExit):
+        execute(job(tmp_path, inputs=inputs, remake=again))
+    said = capsys.readouterr().err
+    assert words in said
+    assert "make it again: snakemake -c2 --configfile 'my arm.yaml' --forcerun " in said
+    assert str(made / "frames.parquet") in said
+    assert "Traceback" not in said
+
+
 def test_a_long_stage_says_how_far_it_is_and_a_short_one_nothing(monkeypatch, capsys):
     monkeypatch.setattr(progress, "QUIET_S", 0.05)
     with progress.reporting("arm study") as report:

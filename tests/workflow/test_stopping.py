@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from recorded import write
 
-from kinacc.artifacts.store import read, write
+from kinacc.artifacts.store import read
 from kinacc.cli.group import main
 
 _SOON_S = 4.0

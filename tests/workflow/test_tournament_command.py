@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from recorded import write
 
 from kinacc.artifacts import store
-from kinacc.artifacts.store import read, write
+from kinacc.artifacts.store import read
 from kinacc.cli.group import main
 from kinacc.study.tournament import contest, fields
 from kinacc.workflow.verification.check import check_results

@@ -41,8 +41,9 @@ EXTREMES = {
 }
 EXTREMES |= {after: before for before, after in EXTREMES.items()}
 CIRCULAR = {"sin": "cos", "cos": "sin", "arcsin": "arccos", "arccos": "arcsin"}
-# Swapping what these are given only raises at once, which proves nothing.
+# Swapping what these are given raises at once or changes nothing: neither proves anything.
 NOT_SWAPPED = {"isinstance", "issubclass", "getattr", "hasattr", "partial", "Problem"}
+NOT_SWAPPED |= {"min", "max", "minimum", "maximum", "hypot", "array_equal"}
 # They save time or refuse mistakes of programmers, and change no result.
 WITHOUT_EFFECT = {"strict", "repr", "check_finite", "overwrite_a", "overwrite_b", "stacklevel"}
 
@@ -56,7 +57,7 @@ def changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     elif isinstance(node, ast.BinOp | ast.AugAssign):
         if type(node.op) in ARITHMETIC:
             yield "arithmetic", _with(node, op=ARITHMETIC[type(node.op)]())
-        elif isinstance(node.op, ast.MatMult) and isinstance(node, ast.BinOp):
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult) and _differ(node):
             yield "transpose", _with(node, left=node.right, right=node.left)
     elif isinstance(node, ast.UnaryOp):
         if isinstance(node.op, ast.USub):
@@ -66,7 +67,8 @@ def changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     elif isinstance(node, ast.BoolOp):
         yield "boolean", _with(node, op=ast.Or() if isinstance(node.op, ast.And) else ast.And())
     elif isinstance(node, ast.If | ast.IfExp | ast.While):
-        if not isinstance(node.test, ast.Compare | ast.BoolOp | ast.UnaryOp | ast.Constant):
+        told_apart = ast.Compare | ast.BoolOp | ast.UnaryOp | ast.Constant
+        if not (isinstance(node.test, told_apart) or "TYPE_CHECKING" in ast.dump(node.test)):
             negated = ast.UnaryOp(op=ast.Not(), operand=node.test)
             yield "boolean", _with(node, test=negated)
     elif isinstance(node, ast.Constant):
@@ -138,6 +140,10 @@ def left_alone(node: ast.AST) -> list[ast.AST]:
     if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
         alone += [node.test, *node.body]
     return alone
+
+
+def _differ(node: ast.BinOp) -> bool:
+    return ast.dump(node.left) != ast.dump(node.right)
 
 
 def _is_none(node: ast.AST) -> bool:

@@ -14,6 +14,9 @@ RESULTS = ROOT / "tests" / "mutation" / "results.csv"
 EQUIVALENT = ROOT / "tests" / "mutation" / "equivalent.csv"
 TARGET = ROOT / "docs" / "mutants.md"
 NAMED = ("module", "function", "text", "nth", "at", "operator", "before", "after")
+WANTED = 1000
+BEGUN = """ So far {count} of {wanted} were tried; lines of modules with compiled kernels,
+which take longest, come last."""
 COLUMNS = (*NAMED, "verdict", "by")
 Rows = Mapping[tuple, Mapping[str, str]]
 PAGE = """\
@@ -23,8 +26,8 @@ PAGE = """\
 
 A fault is planted in one line of kinacc: `<` becomes `<=`, a sign is lost, two arguments change
 places. The tests that reach the line are run; if none fails, nobody would have noticed. This is
-done for {count} lines, drawn by seed {seed} from all lines of the rooms below that can have a
-fault, one fault a line.
+done for lines drawn by seed {seed} from all lines of the rooms below that can have a fault, one
+fault a line.{progress}
 
 **{killed} of {count} faults were noticed: {share:.1f} %** (95 % confidence: {low:.1f} to
 {high:.1f} % of all such lines). {equivalent} of the {survived} others change nothing that a user
@@ -47,7 +50,7 @@ python tools/mutate.py page       # this page
 - Compiled kernels are compiled anew with their fault; what numba kept is not used for them.
 - A fault is noticed when a test fails, when a test ends in a crash ({crashes}), or when tests take
   longer than twice their time and 15 s ({timeouts}).
-- Messages, annotations, decorators and the conditions of `raise` statements' texts get no faults.
+- Messages, annotations and decorators get no faults.
 
 | room | faults | noticed | without effect | share of the rest |
 |---|---:|---:|---:|---:|
@@ -117,6 +120,7 @@ def page(rows: Rows, reasons: Mapping[tuple, str]) -> str:
     verdicts = Counter(row["verdict"] for row in rows.values())
     return PAGE.format(
         count=len(rows),
+        progress="" if len(rows) >= WANTED else BEGUN.format(count=len(rows), wanted=WANTED),
         seed=SEED,
         killed=killed,
         share=100 * killed / len(rows),
@@ -155,9 +159,10 @@ def _shares(rows: Rows, equal: Mapping, kinds: Mapping[tuple, str], order: list 
 
 def _line(name: tuple) -> str:
     """One fault as a line of a list."""
-    module, function, _, _, _, _, before, after = name
+    module, function, text, _, _, _, before, after = name
     place = module.removeprefix("kinacc.") + (f", {function}" if function else "")
-    return f"- {place}: {_code(before)} becomes {_code(after)}"
+    where = "" if before == text else f" in {_code(text)}"
+    return f"- {place}: {_code(before)} becomes {_code(after)}{where}"
 
 
 def _code(words: str) -> str:

@@ -3,6 +3,9 @@
 # With one data set its name stands in the paths, so that `snakemake -c1 dh` says which one it means.
 whose = "{dataset}" if len(plan.datasets) > 1 else next(iter(plan.datasets))
 
+# Only there limits are worked out for every job: each such question makes planning slower.
+on_a_cluster = workflow.resource_settings.nodes or workflow.remote_exec
+
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
     folder = TOURNAMENT if stage.joint else whose
@@ -44,15 +47,25 @@ for stage in STAGES.values():
                     plan, name, w.get("dataset", folder)
                 )
             )
-            if workflow.resource_settings.nodes and not workflow.remote_exec
+            if on_a_cluster and not workflow.remote_exec
             else None
         localrule: workflow.remote_exec
         conda:
             "../envs/kinacc.yaml"
         resources:
-            mem_mb=lambda w, attempt, name=stage.name: cluster.memory_mb(name, attempt),
-            runtime=lambda w, attempt, name=stage.name, folder=folder: cluster.runtime_min(
-                plan, name, w.get("dataset", folder), attempt
+            mem_mb=(
+                (lambda w, attempt, name=stage.name: cluster.memory_mb(name, attempt))
+                if on_a_cluster
+                else cluster.memory_mb(stage.name, 1)
+            ),
+            runtime=(
+                (
+                    lambda w, attempt, name=stage.name, folder=folder: cluster.runtime_min(
+                        plan, name, w.get("dataset", folder), attempt
+                    )
+                )
+                if on_a_cluster
+                else 0
             ),
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:

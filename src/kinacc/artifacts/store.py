@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -40,6 +41,7 @@ _ARROW_TYPES = {
     "text": pa.string(),
 }
 _MOST_VALUES = 100_000_000
+_MOST_BYTES = 500_000_000  # of the texts of a column
 Read = TypeVar("Read")
 
 
@@ -223,7 +225,30 @@ def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
         if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
         and field.type not in (pa.string(), pa.large_string(), pa.null())
     )
+    _refuse_long_texts(file, path)
     return file.read(use_threads=False)
+
+
+def _refuse_long_texts(file: pq.ParquetFile, path: Path | str) -> None:
+    """Raise InputError where texts, each held once in the file, are too much when repeated.
+
+    No text is longer than what all of a group's take, so that most files need no second look.
+    """
+    footer = file.metadata
+    for place, field in enumerate(file.schema_arrow):
+        if field.type not in (pa.string(), pa.large_string()):
+            continue
+        chunks = [footer.row_group(each).column(place) for each in range(footer.num_row_groups)]
+        longest = max((each.total_uncompressed_size for each in chunks), default=0)
+        if footer.num_rows * longest <= _MOST_BYTES:
+            continue
+        held = 0
+        rows = max(_MOST_BYTES // (10 * longest), 1)
+        for batch in file.iter_batches(rows, columns=[field.name], use_threads=False):
+            held += batch.nbytes
+            if held > _MOST_BYTES:
+                what = f"texts of more than {_MOST_BYTES // 1_000_000} MB"
+                raise InputError(Problem(f"{path}, column {field.name}", what, "short texts"))
 
 
 def remake(path: Path | str) -> str:
@@ -266,6 +291,8 @@ def _metadata(path: Path | str) -> dict[str, str]:
 def _open(
     path: Path | str, opening: Callable[[pq.ParquetFile], Read], content: bytes | None = None
 ) -> Read:
+    if content is None and os.path.exists(path) and not os.path.isfile(path):
+        raise InputError(Problem(str(path), "is no file", "a Parquet file"))  # a pipe has no end
     try:
         source = path if content is None else pa.BufferReader(content)
         with pq.ParquetFile(source, page_checksum_verification=True) as file:

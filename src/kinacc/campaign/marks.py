@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator
 
 from kinacc import __version__
 from kinacc.artifacts import provenance
+from kinacc.artifacts.contract import INPUTS_DIGESTS
+from kinacc.artifacts.pictures import as_text
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.campaign.folder import Opened
 
@@ -159,6 +161,7 @@ def marks_of(opened: Opened) -> dict[str, object]:
         ),
         "inputs_hash": opened.journal.last,
         "seed": opened.plan.seed,
+        INPUTS_DIGESTS: as_text({"plan": opened.digest, "journal": opened.journal.last}),
     }
 
 

@@ -124,7 +124,7 @@ def carried_out(
     command += more or ["--quiet", "all"]  # stages say how far they are, and what goes wrong
     command += ["--no-hooks"]  # what a run ends with is said by the command
     # Words for Snakemake may change what is read.
-    known = ONE_THREAD | ({} if words[first:] else {"KINACC_FILES_READ": "1"})
+    known = {} if words[first:] else {"KINACC_FILES_READ": "1"}
     code = _carried_out([*command, "--", target], os.environ | known)
     if code:
         raise SystemExit(code)
@@ -183,7 +183,3 @@ def profile_options() -> list[str]:
         values = value if isinstance(value, list) else [value]
         options += [f"--{name}", *(str(each) for each in values if each is not True)]
     return options
-
-
-# More BLAS threads change the last bits of a sum, and jobs share the cores as they are.
-ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,7 +18,7 @@ import click
 from kinacc import __version__
 from kinacc.cli.process import NOBODY_READS, STOPPED
 from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
-from kinacc.starting import without_tools_of_numpy
+from kinacc.starting import ONE_THREAD, without_tools_of_numpy
 
 _AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
 _HELP = ("-h", "--help")
@@ -168,6 +169,7 @@ class Commands(Lazy):
         try:
             with _listening(came):
                 if not context.meta[_ASKS_HELP]:
+                    os.environ.update(ONE_THREAD)
                     without_tools_of_numpy()
                 return super().invoke(context)
         except (Exception, KeyboardInterrupt) as error:

@@ -113,9 +113,9 @@ def _times(job) -> dict[str, float]:
     """Milliseconds of a campaign by assessor; no table holds them, for they differ by the hour."""
     from kinacc.study.tournament.contest import Contest, jobs, times_ms
     from kinacc.study.tournament.fields import of_tables
-    from kinacc.workflow.runner import read_inputs
+    from kinacc.workflow.inputs import read_inputs
 
-    fields = of_tables(read_inputs(job.inputs), job.settings["robots"], ())
+    fields = of_tables(read_inputs(job.inputs).tables, job.settings["robots"], ())
     contest = Contest.of(job.settings)
     work = jobs(fields, contest.size)
     cell = next((each for each in work if each.budget == 200), work[-1])

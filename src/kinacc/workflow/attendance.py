@@ -7,6 +7,7 @@ place, what killed runs left is removed, and Ctrl-C and SIGTERM end a run at onc
 from __future__ import annotations
 
 import atexit
+import base64
 import json
 import os
 import re
@@ -16,13 +17,17 @@ import sys
 import tempfile
 import threading
 import time
-from contextlib import AbstractContextManager, ExitStack, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kinacc.artifacts.atomic import abandoned, held, sweep, unfinished
 from kinacc.errors import KinaccError
 from kinacc.workflow.results_lock import joined, running
+
+if TYPE_CHECKING:
+    from kinacc.workflow.plan import Plan
 
 _OWN = Path(".snakemake")
 _CACHE = "SNAKEMAKE_OUTPUT_CACHE"
@@ -33,35 +38,34 @@ _STOPS = (signal.SIGINT, signal.SIGTERM)
 _PATIENCE_S = 2.0  # a compiled kernel keeps a polite signal waiting
 
 
-def attend(workflow: Any, results: str) -> None:
+def attend(workflow: Any, results: str, plan: Callable[[], Plan]) -> None:
     """Let the workflow that is being read hold its results while jobs run.
 
-    ``results``: where a path in the results folder would be, as rules would write it.
+    ``results``: where a path in the results folder would be, as rules would write it. ``plan`` is
+    asked for when the workflow has been read.
     """
-    is_module = bool(workflow.modifier.namespace)
+    is_module = bool(workflow.modifier.namespace)  # then all but results is the other workflow's
     elsewhere = workflow.storage_settings.default_storage_provider is not None
     folder = _OWN if elsewhere else Path(str(workflow.modifier.modify_path(results))).parent
+    stop = Stop(folder)
     if not is_module:
         _remove_what_killed_runs_left()
         _note_what_this_run_leaves(workflow)
-    stop = Stop(folder)
-    if workflow.is_main_process and not is_module:
-        stop.listen()
+        if workflow.is_main_process:
+            stop.listen()
     execute = workflow.execute
 
     def attended(*args: Any, **named: Any) -> object:
         if (named.get("executor_plugin") or args[0]).common_settings.dryrun_exec:
             return execute(*args, **named)
-        holding: AbstractContextManager = running(folder)
-        if not workflow.is_main_process:  # on a node of a cluster, say
-            holding = joined()
-        elif not is_module:
-            workflow.execution_settings.lock = False
-            stop.replace_snakemakes()
         try:
-            with holding:
+            # What is no main process is a job: on a node of a cluster, say.
+            with running(folder) if workflow.is_main_process else joined():
                 if workflow.is_main_process and not is_module:
+                    workflow.execution_settings.lock = False
+                    stop.replace_snakemakes()
                     _remove_scripts()
+                    _doubt_what_snakemake_does_not_know(plan())
                 return execute(*args, **named)
         except KinaccError as error:
             print(error, file=sys.stderr)
@@ -177,6 +181,20 @@ def _remove_scripts() -> None:
     for pattern in ("scripts/tmp*", "shell_tmp.*"):
         for path in _OWN.glob(pattern):
             _remove(path)
+
+
+def _doubt_what_snakemake_does_not_know(plan: Plan) -> None:
+    """Remove records of files made by other settings, code or inputs that nobody compares."""
+    try:
+        names = set(os.listdir(_OWN / "metadata"))
+    except OSError:
+        names = set()
+
+    def known(path: str) -> bool:
+        return base64.urlsafe_b64encode(path.encode()).decode() in names
+
+    for path in plan.others(known):
+        os.unlink(path)
 
 
 def _remove(path: Path) -> None:

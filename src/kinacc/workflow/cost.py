@@ -24,6 +24,7 @@ _PROCESS_B = 1e8  # Python, numpy and what they read
 _READINGS = 16  # assessors with their readings of the paper
 _JOINTS = 6
 _BYTES_A_ROW = 80  # of a file of measurements
+_TRIED = 12  # order, where it is chosen: the search ends where higher ones are no better
 _SHORT_S = 1.0  # of a stage whose table is not looked into
 _GROUPS = Path("/proc/self/cgroup")
 _LIMITS = {
@@ -62,15 +63,22 @@ def _poses(config: Mapping) -> float:
     return min(os.path.getsize(path) / _BYTES_A_ROW, 1e6) if os.path.isfile(path) else 0.0
 
 
-def _vec(config: Mapping) -> Cost:
+def _fit_of_vec(config: Mapping) -> Cost:
+    """One fit of a VEC model; where its order is chosen, of the highest that is tried as a rule."""
     poses, section = _poses(config), _at(config, "calibration.vec")
-    tried = section["order"] == "auto"
-    order = section["order_highest"] if tried else section["order"]
+    chosen = section["order"] == "auto"
+    order = min(section["order_highest"], _TRIED) if chosen else section["order"]
     unknowns = _JOINTS * _JOINTS * (order + 1)
     seconds = 0.06 + 2.9e-7 * poses * unknowns + 9.3e-10 * unknowns**3
     memory = _PROCESS_B + 40.0 * poses * unknowns + 90.0 * unknowns**2
-    chosen = "calibration.vec.order_highest" if tried else "calibration.vec.order"
-    return Cost(1.0 + seconds if tried else seconds, memory, (chosen, *_of_poses(config)))
+    key = "calibration.vec.order_highest" if chosen else "calibration.vec.order"
+    return Cost(seconds, memory, (key, *_of_poses(config)))
+
+
+def _vec(config: Mapping) -> Cost:
+    fit = _fit_of_vec(config)
+    chosen = _at(config, "calibration.vec.order") == "auto"
+    return fit._replace(seconds=0.4 + 3.0 * fit.seconds) if chosen else fit
 
 
 def _of_poses(config: Mapping) -> tuple[str, ...]:
@@ -84,7 +92,7 @@ def _dh(config: Mapping) -> Cost:
 
 
 def _residuals(config: Mapping) -> Cost:
-    folds, vec = _at(config, "measurements.folds") or 0, _vec(config)
+    folds, vec = _at(config, "measurements.folds") or 0, _fit_of_vec(config)
     seconds = 0.1 + folds * 0.7 * (vec.seconds + _dh(config).seconds)
     return Cost(seconds, vec.bytes, ("measurements.folds", *vec.keys))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, wraps
 from pathlib import Path
@@ -18,6 +18,7 @@ from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.campaign.journal import JOURNAL, PLAN, of_each
 from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.workflow.boundary import leading_out
 from kinacc.workflow.catalogue import (
     FIGURE_FOLDER,
     MAP_READINGS,
@@ -67,7 +68,7 @@ def planned(
         for name, config in full.items()
         if config["tournament"] != tournament
     ]
-    refuse(problems)
+    refuse([*problems, *leading_out(results, (*full, TOURNAMENT))])
     return Plan(
         {name: in_use(without_execution_keys(config)) for name, config in full.items()},
         {
@@ -283,6 +284,20 @@ class Plan:
         return made_of_these and all(
             os.path.isfile(path) for path in self.outputs(name, dataset, part).values()
         )
+
+    def others(self, known: Callable[[str], bool]) -> Iterator[str]:
+        """Records that are there, not ``known`` to Snakemake, and not of what would be made now.
+
+        Where a machine was lost, jobs of a cluster leave files that Snakemake knows nothing of, and
+        would take for made by whatever settings it is asked for next.
+        """
+        for dataset in (*self.datasets, TOURNAMENT):
+            for name in self.stages(dataset):
+                for part in self.part_names(name, dataset):
+                    path = self.record(name, dataset, part)
+                    there = not known(path) and os.path.exists(path)
+                    if there and not self._is_recorded(name, dataset, part):
+                        yield path
 
     def contents(self, name: str, dataset: str) -> dict[str, str]:
         """Content hashes of the files from outside that a stage reads."""

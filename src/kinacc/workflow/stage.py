@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from kinacc.starting import without_tools_of_numpy
+from kinacc.starting import ONE_THREAD, without_tools_of_numpy
 from kinacc.workflow.catalogue import STAGES, TABLES
 from kinacc.workflow.inputs import Paths
 from kinacc.workflow.results_lock import InUse, joined
@@ -32,8 +32,6 @@ COMMAND = (
     " --input {input:q} --output {output:q} --log {log:q}"
 )
 _AS_SAID = re.compile(r'exec "\$KINACC_PYTHON".* --log .*(?=\' (?:returned|died))', re.DOTALL)
-# More threads change the last bits of a sum. Has to be said before numpy is imported.
-_ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def job_of(
@@ -142,7 +140,7 @@ def main(words: Sequence[str]) -> None:
     tenth of a short stage went into looking.
     """
     gc.disable()
-    os.environ.update(_ONE_THREAD)
+    os.environ.update(ONE_THREAD)
     without_tools_of_numpy()
     signal.signal(signal.SIGTERM, _stop)
     try:

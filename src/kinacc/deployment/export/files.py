@@ -66,7 +66,8 @@ def contents(
         if each == "yaml":
             text = description.robot_yaml(arm)
         elif each == "json":
-            marks = store.read_metadata(Path(folder) / f"{model}_model.parquet")
+            known = store.read_metadata(Path(folder) / f"{model}_model.parquet")
+            marks = {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
             own = None if arm.model.table is not None else found[f"{model}_model"]
             text = description.robot_json(arm, std, robot.dh, marks, own)
         elif each == "csv":

@@ -6,6 +6,6 @@
 
 import os
 
-# Set before numpy is first imported: more BLAS threads change the last bits of a sum.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"):
-    os.environ[_name] = "1"
+from kinacc.starting import ONE_THREAD
+
+os.environ.update(ONE_THREAD)

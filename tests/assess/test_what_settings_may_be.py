@@ -1,0 +1,99 @@
+"""The limits of every assessor's settings: the last value that is taken, the first refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import paper_settings as paper
+import pytest
+
+from kinacc.assess.adaptive import Candidates
+from kinacc.assess.registry import ADAPTIVE
+from kinacc.assess.statement import CANDIDATES, MEASURED
+from kinacc.errors import InputError
+
+TAKEN, REFUSED = "taken", "refused"
+WITH_CONFIDENCE = ("region_share", "single_shot", "two_stage", "sequential", "kinematic",
+                   "invalidation_calibrated", "search_and_confirm")  # fmt: skip
+WITH_VISITED = ("sequential", "model_invalidation_full", "invalidation_calibrated", "kinematic")
+LIMITS = [
+    *((name, "measurements", 0, REFUSED) for name in ADAPTIVE),
+    *((name, "measurements", 1, TAKEN) for name in ADAPTIVE if name != "two_stage"),
+    *((name, "measurements", 2.5, REFUSED) for name in ADAPTIVE),
+    *((name, "confidence", 0.5, TAKEN) for name in WITH_CONFIDENCE),
+    *((name, "confidence", 0.49, REFUSED) for name in WITH_CONFIDENCE),
+    *((name, "confidence", 1.0, REFUSED) for name in WITH_CONFIDENCE),
+    *((name, "visited", 0.0, REFUSED) for name in WITH_VISITED),
+    *((name, "visited", 1.0, TAKEN) for name in WITH_VISITED),
+    *((name, "visited", 1.1, REFUSED) for name in WITH_VISITED),
+    *((name, "share", 0.0, REFUSED) for name in ("gamma_quantile", "region_share")),
+    *((name, "share", 1.0, REFUSED) for name in ("gamma_quantile", "region_share")),
+    *((name, "share", 0.999, TAKEN) for name in ("gamma_quantile", "region_share")),
+    ("region_share", "deviations", 0.0, TAKEN),
+    ("region_share", "deviations", -0.1, REFUSED),
+    ("model_invalidation_full", "bound_mm", 0.0, REFUSED),
+    ("model_invalidation_full", "bound_mm", 0.001, TAKEN),
+    ("sequential", "width_mm", 0.0, REFUSED),
+    ("sequential", "width_mm", 0.001, TAKEN),
+    ("search_and_confirm", "isolation", 1.0, REFUSED),
+    ("search_and_confirm", "isolation", 1.001, TAKEN),
+    ("search_and_confirm", "crowd", 0.0, REFUSED),
+    ("search_and_confirm", "crowd", 0.999, TAKEN),
+    ("search_and_confirm", "crowd", 1.0, REFUSED),
+    ("two_stage", "screened", 0.0, REFUSED),
+    ("two_stage", "screened", 0.001, TAKEN),
+    ("two_stage", "screened", 1.0, REFUSED),
+    ("two_stage", "repeats", 0, REFUSED),
+    ("two_stage", "repeats", 1, TAKEN),
+    ("two_stage", "measurements", 4, REFUSED),
+    ("two_stage", "measurements", 5, TAKEN),
+]
+
+
+@pytest.mark.parametrize(("name", "key", "value", "verdict"), LIMITS)
+def test_the_limits_of_a_setting(name, key, value, verdict):
+    settings = {"measurements": 40} | {key: value}
+    if verdict == TAKEN:
+        assert getattr(paper.assessor(name, **settings), key) == value
+        return
+    with pytest.raises(InputError) as caught:
+        paper.assessor(name, **settings)
+    (problem,) = caught.value.problems
+    assert problem.where == key
+    assert str(value) in problem.what
+    assert problem.allowed
+    assert name in str(caught.value)
+
+
+def test_before_the_first_visit_ends_it_is_said_how_many_points_are_left():
+    candidates = Candidates(np.tile(0.01 * np.eye(3), (50, 1, 1)))
+    campaign = paper.assessor("search_and_confirm", measurements=20).begin(candidates)
+    rng, left = np.random.default_rng(4), []
+    while (row := campaign.next()) is not None:
+        said = {each.target: each.withheld for each in campaign.statements()}
+        if said[MEASURED] is None:
+            break
+        assert said[MEASURED].code == said[CANDIDATES].code == "first_visit"
+        left.append(said[MEASURED].numbers["left"])
+        campaign.record(row, rng.normal(size=3))
+    assert left == list(range(len(left), 0, -1))
+    assert len(left) > 2
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [((3, 3), r"shape \(3, 3\)"), ((0, 3, 3), r"shape \(0, 3, 3\)"), ((4, 2, 2), r"\(4, 2, 2\)")],
+)
+def test_covariances_of_another_shape_are_refused_with_their_shape(shape, said):
+    with pytest.raises(InputError, match=said):
+        Candidates(np.ones(shape))
+
+
+@pytest.mark.parametrize("name", ["q_rad", "effects"])
+def test_what_is_known_of_candidates_has_a_row_for_each_and_numbers_only(name):
+    covariance = np.tile(np.eye(3), (4, 1, 1))
+    with pytest.raises(InputError, match="3 rows") as caught:
+        Candidates(covariance, **{name: np.zeros((3, 6))})
+    assert [each.where for each in caught.value.problems] == [name]
+    with pytest.raises(InputError, match="not finite"):
+        Candidates(covariance, **{name: np.full((4, 6), np.nan)})
+    assert getattr(Candidates(covariance, **{name: np.ones((4, 6))}), name).shape == (4, 6)
