@@ -39,15 +39,15 @@ def check(place: Place, wanted: dict[str, str], command: tuple[str, ...]) -> Non
     assert {name: there[f"own/{name}"] for name in _TABLES} == wanted
 
 
-@pytest.mark.parametrize("at", ["half 1", "finished 1"])
-def test_the_same_command_again_ends_as_if_nothing_had_happened(place, at):
-    assert killed(place[0], _RUN, at)
+def test_the_same_command_again_ends_as_if_nothing_had_happened(place):
+    assert killed(place[0], _RUN, "finished 1")
     check(*place, _RUN)
 
 
-def test_a_stage_by_hand_that_was_killed_between_two_tables(place):
+@pytest.mark.parametrize("at", ["half 1", "renamed 1"])
+def test_a_stage_by_hand_that_was_killed_within_or_between_its_tables(place, at):
     command = (*_STAGE, "--dataset", "own")
-    assert killed(place[0], command, "renamed 1")
+    assert killed(place[0], command, at)
     check(*place, command)
 
 
@@ -108,7 +108,7 @@ def test_a_second_run_and_a_dry_run_beside_the_first(place):
         assert second.returncode == 1
         assert "another run is at work in it" in said[-1]
         assert len(said) == 1
-    dry = subprocess.run([*_RUN, "--dry-run"], **options, check=False)
+    dry = subprocess.run([*_RUN[:-2], "--dry-run", *_RUN[-2:]], **options, check=False)
     assert dry.returncode == 0, dry.stderr
     assert not [*Path(here.project, "results").glob("*/*.parquet")]
     first.communicate(b"\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import json
 import os
 import signal
 import subprocess
@@ -140,11 +141,11 @@ def test_a_folder_that_cannot_be_written_is_told_of_in_a_line(tmp_path):
 @pytest.mark.parametrize("how", ["zeros", "cut off", "empty record"])
 def test_a_file_that_a_loss_of_power_tore_is_made_anew(tmp_path, how):
     folder, marks = tmp_path / "mh180", {"seed": "1"}
-    for stage in ("robot", "vec"):
+    for stage in ("measurements", "vec"):
         record = records.Record(stage, None, marks, {}, {})
-        path = folder / f"{stage}.parquet"
+        path = folder / f"{'vec_model' if stage == 'vec' else stage}.parquet"
         records.leave(records.place(folder, stage), record, {str(path): (b"whole", None)})
-    torn, place = folder / "vec.parquet", Path(records.place(folder, "vec"))
+    torn, place = folder / "vec_model.parquet", Path(records.place(folder, "vec"))
     before = torn.stat()
     if how == "empty record":
         place.write_bytes(b"")
@@ -156,7 +157,20 @@ def test_a_file_that_a_loss_of_power_tore_is_made_anew(tmp_path, how):
         assert place.exists()
     (tmp_path / ".lock").write_text("{}")
     with running(tmp_path, told.append):
-        assert not place.exists()
-    assert Path(records.place(folder, "robot")).exists()
+        names = {path.name for path in folder.rglob("*") if path.is_file()}
+    assert names == {"measurements.json", "measurements.parquet"}
     assert len(told) == 1
     assert "made anew" in told[0]
+
+
+def test_a_record_made_up_by_a_stranger_removes_nothing_elsewhere(tmp_path):
+    keep, place = tmp_path / "keep", tmp_path / "results" / "mh180" / "records" / "vec.json"
+    keep.touch()
+    place.parent.mkdir(parents=True)
+    files = {name: {"sha256": ""} for name in ("../../keep", str(keep))}
+    told = {"stage": "vec", "part": None, "marks": {}, "inputs_digests": {}, "files": files}
+    place.write_text(json.dumps(told))
+    (tmp_path / "results" / ".lock").write_text("{}")
+    with running(tmp_path / "results", print):
+        assert not place.exists()
+    assert keep.exists()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import base64
 import json
+import logging
 import os
 import re
 import shutil
@@ -17,14 +18,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinacc.artifacts.atomic import abandoned, held, sweep, unfinished
-from kinacc.errors import KinaccError
-from kinacc.workflow.results_lock import joined, running
+from kinacc.errors import KinaccError, refused
+from kinacc.workflow.results_lock import forget, joined, running
 
 if TYPE_CHECKING:
     from kinacc.workflow.plan import Plan
@@ -48,10 +49,13 @@ def attend(workflow: Any, results: str, plan: Callable[[], Plan]) -> None:
     elsewhere = workflow.storage_settings.default_storage_provider is not None
     folder = _OWN if elsewhere else Path(str(workflow.modifier.modify_path(results))).parent
     stop = Stop(folder)
+    logging.raiseExceptions = False  # a disk that takes no log of Snakemake's is said once
     if not is_module:
+        mine = [workflow.snakemake_tmp_dir, Path(workflow.sourcecache.runtime_cache_path)]
+        _note_what_this_run_leaves(mine)
         _remove_what_killed_runs_left()
-        _note_what_this_run_leaves(workflow)
         if workflow.is_main_process:
+            _remove_empty_folders(mine)
             stop.listen()
     execute = workflow.execute
 
@@ -70,8 +74,11 @@ def attend(workflow: Any, results: str, plan: Callable[[], Plan]) -> None:
         except KinaccError as error:
             print(error, file=sys.stderr)
             raise SystemExit(1) from None
-        except BaseException:
+        except BaseException as error:
             stop.end_if_asked()
+            if isinstance(error, OSError):
+                print(refused(error, error.filename or folder), file=sys.stderr)
+                raise SystemExit(1) from None
             raise
 
     workflow.execute = attended
@@ -139,19 +146,19 @@ def _end_jobs() -> None:
     late.start()
 
 
-def _note_what_this_run_leaves(workflow: Any) -> None:
+def _note_what_this_run_leaves(folders: Sequence[Path]) -> None:
     """Write down the temporary folders of this process, in a file held until it ends."""
     number = f"kinacc-{os.urandom(8).hex()}-"
     tempfile.template = number  # begins the names of folders that the shared cache is filled from
-    folders = [workflow.snakemake_tmp_dir, workflow.sourcecache.runtime_cache_path]
     note = unfinished(_OWN / "run")
     told = {"host": os.uname().nodename, "folders": [*map(str, folders)], "cache": number}
     with suppress(OSError):  # nothing can be noted in a folder that cannot be written
         _OWN.mkdir(exist_ok=True)
         kept = ExitStack()
-        os.write(kept.enter_context(held(note)), json.dumps(told).encode())
+        handle = kept.enter_context(held(note))
         atexit.register(note.unlink, missing_ok=True)
         atexit.register(kept.close)
+        os.write(handle, json.dumps(told).encode())
 
 
 def _remove_what_killed_runs_left() -> None:
@@ -168,12 +175,49 @@ def _remove_what_killed_runs_left() -> None:
         if _NUMBER.fullmatch(number) and os.environ.get(_CACHE):
             folders += Path(os.environ[_CACHE]).glob(f"{number}*")
         for folder in folders:
-            name = folder.name
-            if folder.parent.name == "snakemake-runtime-cache":
-                name = f"{folder.parent.name}/{name}"
-            if _MADE.fullmatch(name) or _NUMBER.match(name):
+            if _is_made(folder) or _NUMBER.match(folder.name):
                 _remove(folder)
         note.unlink(missing_ok=True)
+
+
+def _remove_empty_folders(mine: Sequence[Path]) -> None:
+    """Remove folders like ``mine`` of runs that were killed before they could note them.
+
+    They are empty, and older than any Snakemake at work that shares them. One that is at work
+    nevertheless, on another machine, makes them anew when it needs them.
+    """
+    with suppress(OSError):
+        found = [
+            folder
+            for place in {each.parent for each in mine}
+            for folder in place.iterdir()
+            if _is_made(folder) and folder not in mine and not any(folder.iterdir())
+        ]
+        oldest_s = _oldest_start_s() if found else 0.0
+        for folder in found:
+            if folder.stat().st_mtime < oldest_s:
+                folder.rmdir()
+
+
+def _oldest_start_s() -> float:
+    """When the oldest Snakemake at work began that puts temporary files where this one does."""
+    import psutil
+
+    begun = [psutil.Process().create_time()]
+    for each in psutil.process_iter():
+        with suppress(psutil.Error):
+            if "snakemake" not in " ".join(each.cmdline()) or each.uids().real != os.getuid():
+                continue
+            if each.environ().get("TMPDIR") == os.environ.get("TMPDIR"):
+                begun.append(each.create_time())
+    return min(begun)
+
+
+def _is_made(folder: Path) -> bool:
+    """Whether a name is one that Snakemake gives to a folder of its own."""
+    within = folder.parent.name == "snakemake-runtime-cache"
+    name = f"{folder.parent.name}/{folder.name}" if within else folder.name
+    return _MADE.fullmatch(name) is not None
 
 
 def _remove_scripts() -> None:
@@ -184,7 +228,7 @@ def _remove_scripts() -> None:
 
 
 def _doubt_what_snakemake_does_not_know(plan: Plan) -> None:
-    """Remove records of files made by other settings, code or inputs that nobody compares."""
+    """Forget runs of other settings, code or inputs, which Snakemake would not compare."""
     try:
         names = set(os.listdir(_OWN / "metadata"))
     except OSError:
@@ -194,7 +238,7 @@ def _doubt_what_snakemake_does_not_know(plan: Plan) -> None:
         return base64.urlsafe_b64encode(path.encode()).decode() in names
 
     for path in plan.others(known):
-        os.unlink(path)
+        forget(Path(path))
 
 
 def _remove(path: Path) -> None:

@@ -22,6 +22,7 @@ from typing import TextIO
 
 from kinacc.artifacts.atomic import sweep
 from kinacc.errors import InputError, KinaccError
+from kinacc.workflow.catalogue import STAGES
 
 LOCK, JOBS = ".lock", ".lock-jobs"
 RUN = "KINACC_RUN"  # in the environment of jobs: the number of their run, and its folder
@@ -190,7 +191,7 @@ def _name(lock: TextIO, number: str) -> None:
 
 
 def _doubt_torn_files(results: Path | str, tell: Callable[[str], object]) -> None:
-    """Remove every record that does not fit its files: what goes by it is made anew."""
+    """Forget every run whose record does not fit its files: what goes by it is made anew."""
     from kinacc.artifacts import records
 
     for place in sorted(Path(results).glob(f"*/{records.FOLDER}/*.json")):
@@ -200,7 +201,26 @@ def _doubt_torn_files(results: Path | str, tell: Callable[[str], object]) -> Non
             torn = list(error.problems)
         if torn:
             tell(f"{torn[0].where} {torn[0].what}: after a run that did not end, it is made anew")
-            place.unlink(missing_ok=True)
+            forget(place)
+
+
+def forget(place: Path) -> None:
+    """Remove the record of a run and the files it is about, so that Snakemake makes them anew."""
+    from kinacc.artifacts import records
+
+    folder = records.folder_of(place)
+    try:
+        names = list(records.read(place).files)
+    except InputError:  # by where files of its stage are
+        stage, _, part = place.stem.partition(".")
+        pictures = folder.glob(f"figures/{stage}.*")
+        names = [f"{stage}.html", *(str(path.relative_to(folder)) for path in pictures)]
+        for artefact in STAGES[stage].outputs if stage in STAGES else ():
+            names.append(f"{artefact}/{part}.parquet" if part else f"{artefact}.parquet")
+    for name in names:
+        if not Path(name).is_absolute() and ".." not in Path(name).parts:
+            (folder / name).unlink(missing_ok=True)
+    place.unlink(missing_ok=True)
 
 
 def _whose(lock: TextIO) -> str:
