@@ -114,9 +114,9 @@ def carried_out(
     from kinacc.workflow.catalogue import CALIBRATION, STAGES
 
     only = CALIBRATION if target == "calibration" else STAGES
-    ahead = [] if more else cost.expected(cost.foreseen(plan, only))  # else Snakemake says it
-    for line in ahead:
-        click.echo(line, err=True)
+    if target == "calibration" or not more:  # where it is not quiet, Snakemake says it of a study
+        for line in cost.expected(cost.foreseen(plan, only)):
+            click.echo(line, err=True)
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores or os.cpu_count() or 1), "--configfile", *configs]
     if "--workflow-profile" not in more:
