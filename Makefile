@@ -5,13 +5,16 @@
 # make test        everything a change has to pass
 # make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
+# make audit       known vulnerabilities of every locked package, asked of their database
+# make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
 # make lock        renew requirements/*.txt (needs uv)
 # make clean       remove results/ and public-robots/; make distclean removes .venv as well
 #
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test bench docs docs-links lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test bench docs docs-links audit sbom lock \
+  clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -30,6 +33,7 @@ PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
 KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
 CLUSTER := .venv/.cluster-$(call key,requirements/cluster.txt)
+AUDIT := .venv-audit/.audit-$(call key,requirements/audit.txt)
 PEERS := .venv-bench/.peers-$(call key,requirements/run.txt requirements/bench.txt pyproject.toml)
 
 reproduce: $(KINACC)
@@ -70,6 +74,17 @@ docs: $(KINACC) $(TOOLS)
 docs-links: $(KINACC) $(TOOLS)
 	$(SITE) -b linkcheck . docs/_build/links
 
+# A package that the database does not answer for fails the audit as well.
+audit: $(AUDIT)
+	@for each in run test cluster bench audit; do echo "requirements/$$each.txt"; \
+	  .venv-audit/bin/pip-audit --strict --require-hashes --disable-pip --progress-spinner off \
+	    -r requirements/$$each.txt || exit 1; done
+
+sbom: $(AUDIT)
+	@PYTHONWARNINGS=ignore .venv-audit/bin/cyclonedx-py requirements --pyproject pyproject.toml --output-reproducible \
+	  --output-file sbom.cdx.json requirements/run.txt
+	@echo "sbom.cdx.json"
+
 # A .venv that another folder or an unsupported Python left here is made anew.
 $(PACKAGES):
 	@if ! { sh requirements/find-python $(PY) && grep -qF "$$(pwd)/.venv" .venv/bin/activate; } >/dev/null 2>&1; then \
@@ -105,6 +120,13 @@ $(PEERS):
 	@.venv-bench/bin/python -m kinacc.workflow.warm_up
 	@touch $@
 
+$(AUDIT):
+	@echo "kinacc: installing the tools of an audit into .venv-audit"
+	@"$$(sh requirements/find-python $(PYTHON))" -m venv --clear .venv-audit
+	@.venv-audit/bin/python -m pip install -qq --disable-pip-version-check \
+	  --require-hashes -r requirements/audit.txt
+	@touch $@
+
 # Apart from the environment: Snakemake imports every plugin it finds, at every start.
 $(CLUSTER): $(PACKAGES)
 	@rm -rf .venv/cluster
@@ -118,6 +140,7 @@ lock:
 	$(LOCK) requirements/test.in --output-file requirements/test.txt
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
 	$(LOCK) requirements/bench.in --constraints requirements/test.txt --output-file requirements/bench.txt
+	$(LOCK) requirements/audit.in --output-file requirements/audit.txt
 	$(LOCK) requirements/cluster.in --constraints requirements/run.txt \
 	  $$(sed -n 's/^\([a-z0-9-]*\)==.*/--no-emit-package \1/p' requirements/run.txt) \
 	  --output-file requirements/cluster.txt
@@ -126,4 +149,4 @@ clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv .venv-bench
+	rm -rf .venv .venv-bench .venv-audit

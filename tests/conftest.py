@@ -25,6 +25,7 @@ SLOW = (
     "integration/test_real_arm.py",
     "integration",
     "integration_oracle",
+    "fuzz",
     "slurm",
     "kills",
     "measurements/test_files_as_they_come.py",

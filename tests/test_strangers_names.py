@@ -6,11 +6,14 @@ import ast
 import csv
 import html
 import io
+import shlex
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 import openpyxl
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from command_line import call
 
@@ -149,3 +152,16 @@ def test_the_results_folder_itself_may_be_on_another_disk(tmp_path):
     (tmp_path / "disk" / "own").mkdir(parents=True)
     (tmp_path / "results").symlink_to(tmp_path / "disk")
     assert planned_with(tmp_path, "own/inside.parquet", tmp_path / "disk" / "own" / "a.parquet")
+
+
+@pytest.mark.parametrize("name", ["$(touch owned)", "a; touch owned", "`touch owned` 'x\"", "a b&"])
+def test_a_command_that_is_printed_is_safe_to_paste(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    folder = Path(name) / "own"
+    folder.mkdir(parents=True)
+    pq.write_table(pa.table({"name": ["own"]}), folder / "robot.parquet")
+    for asked, ending in ((folder, "robot shows one"), (folder.parent, "lists the tables")):
+        done = call("show", asked)
+        assert done.exit_code == 0, done.output
+        said = " ".join(done.output.split()).partition("kinacc show ")[2].partition(ending)[0]
+        assert shlex.split(said) == [str(folder)]

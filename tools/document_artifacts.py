@@ -9,6 +9,7 @@ from kinacc.artifacts.columns import Artefact, Column
 from kinacc.artifacts.contract import ARTEFACTS, METADATA_KEYS
 from kinacc.artifacts.digests import columns_digest
 from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.verification import recomputation
 
 _HEAD = """\
 # Artefacts
@@ -51,6 +52,20 @@ chunk of PNG, `Keywords` in the Info of PDF, `kinacc:read:` in HTML.
 last: its name and part, the five marks, its `inputs_digests`, and for every file that it wrote the
 SHA-256 of its bytes and, of a table, its `columns_digest`. Files without a record that fits are
 those of a run that did not come to its end, or were changed since: no stage reads them.
+
+## What a check computes again
+
+`kinacc check-results` runs the functions of the stages again, on the tables that are there, and
+compares column by column: text has to be the same, a number within {relative:g} of itself or
+{of_largest:g} of the largest in its column. So a table that was rewritten is found although all
+digests were renewed. Settings are those of `--config`, of a `config.yaml` beside the results, or
+the defaults, where their hash is the one that a table carries; a note names the tables for which
+they are not known. Pictures and pages are not drawn again: they are held to their records, and to
+the digests of what they show.
+
+| tables | computed again |
+|---|---|
+{again}
 """
 
 
@@ -58,7 +73,19 @@ def artifacts_markdown() -> str:
     """The text of docs/artifacts.md: one table per artefact."""
     keys = ", ".join(f"`{key}`" for key in METADATA_KEYS)
     digest = cleandoc(columns_digest.__doc__ or "").partition("\n\nRaises")[0].replace("``", "`")
-    return "\n".join([_HEAD.format(keys=keys, digest=digest), *map(_section, ARTEFACTS.values())])
+    again = recomputation.described().items()
+    head = _HEAD.format(
+        keys=keys,
+        digest=digest,
+        relative=recomputation.RELATIVE,
+        of_largest=recomputation.OF_LARGEST,
+        again="\n".join(f"| {_tables(stage)} | {words} |" for stage, words in again),
+    )
+    return "\n".join([head, *map(_section, ARTEFACTS.values())])
+
+
+def _tables(stage: str) -> str:
+    return ", ".join(f"`{name}`" for name in STAGES[stage].outputs)
 
 
 def _section(artefact: Artefact) -> str:

@@ -4,6 +4,7 @@
     python tools/mutate.py run 1000    the first 1,000 faults; goes on where it stopped
     python tools/mutate.py again       survivors once more, with every test that reaches them
     python tools/mutate.py show TEXT   faults with verdicts whose line or function has the text
+    python tools/mutate.py confirm     tests that noticed a fault, run alone on sound code
     python tools/mutate.py page        docs/mutants.md, from tests/mutation/
     python tools/mutate.py try MODULE --tests "FILE .." --count 5
                                        some faults of one module against some tests, nothing kept
@@ -31,7 +32,7 @@ REACH = ROOT / ".cache" / "mutation" / "reach.pickle"
 # compiled anew in each, so they have one process for all.
 BATCHES_S = (4.0, 16.0)
 COMPILED_S = (12.0,)
-EVERY_S = 240.0
+EVERY_S = 30.0
 
 
 def batches(
@@ -118,6 +119,17 @@ def again(arguments: argparse.Namespace, selection: reach.Selection) -> None:
         told(mutant, row, trial.now() - began)
 
 
+def confirm(arguments: argparse.Namespace, selection: reach.Selection) -> None:
+    """Tests that noticed a fault must not fail without one, run as they were, without others."""
+    seconds = selection.reach.seconds
+    by = {row["by"] for row in page.read().values() if row["by"] in seconds}
+    tests = sorted(by)
+    for begin in range(0, len(tests), 30):
+        part = tests[begin : begin + 30]
+        verdict, failed = trial.attempt(None, part, trial.limit(300.0, True))
+        print(f"{len(part)} tests: {'sound' if verdict == 'survived' else verdict} {failed}")
+
+
 def told(mutant: Mutant, row: dict[str, str], seconds: float) -> None:
     """One line about one fault."""
     place = f"{path_of(mutant.module).relative_to(ROOT)}:{mutant.line}"
@@ -161,7 +173,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("what", choices=("cover", "run", "again", "show", "try", "page"))
+    parser.add_argument("what", choices=("cover", "run", "again", "confirm", "show", "try", "page"))
     parser.add_argument("text", nargs="?", default="")
     parser.add_argument("--tests", default="", help="files or folders below tests/, one text")
     parser.add_argument("--count", type=int, default=1000)
@@ -180,7 +192,9 @@ def main() -> None:
     else:
         kept = pickle.loads(arguments.reach.read_bytes())
         trial.load(kept.others)
-        {"run": run, "again": again}[arguments.what](arguments, reach.Selection(kept))
+        {"run": run, "again": again, "confirm": confirm}[arguments.what](
+            arguments, reach.Selection(kept)
+        )
 
 
 if __name__ == "__main__":

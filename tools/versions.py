@@ -61,7 +61,7 @@ ENVIRONMENTS = (
     REFERENCE,
     *(Environment(f"locked-{each}", each, "locked") for each in PYTHONS[1:]),
     *(Environment(f"oldest-{each}", each, "oldest") for each in PYTHONS),
-    *(Environment(f"newest-{each}", each, "newest") for each in PYTHONS),
+    *(Environment(f"newest-{each}", each, "newest") for each in PYTHONS[1:]),
     Environment("old-processor", "3.11", "locked", OLD_PROCESSOR),
 )
 
@@ -249,15 +249,25 @@ def results_of(folder: Path, environment: Environment) -> Path:
             "NUMBA_CACHE_DIR": str(folder / "compiled" / environment.name),
             **environment.variables,
         }
-        command = [str(python), "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile")]
-        command += ["--cores", "1", "--quiet", "--no-hooks", "--directory", str(place)]
         configs = [str(ROOT / "config.yaml"), str(measured(place / "measured.yaml"))]
-        run([*command, "--configfile", *configs], **settings)
+        run([str(python), __file__, "--stages", str(place / "results"), *configs], **settings)
         asked = "import json, sys, importlib.metadata as m\n"
         asked += "print(json.dumps({n: m.version(n) for n in sys.argv[1:]} "
         asked += "| {'python': sys.version.split()[0]}))"
         finished.write_text(run([str(python), "-c", asked, *MATTERS]), encoding="utf-8")
     return place
+
+
+def every_stage(results: str, configs: list[str]) -> None:
+    """Go through all stages, figures and pages too, in this process."""
+    from kinacc.workflow.plan import planned
+    from kinacc.workflow.runner import perform
+
+    plan = planned(configs, results=results)
+    for dataset in plan.datasets:
+        for stage in plan.stages(dataset).values():
+            for part in [] if stage.on_request else plan.part_names(stage.name, dataset):
+                perform(plan.job(stage.name, dataset, part))
 
 
 def measured(path: Path) -> Path:
@@ -334,6 +344,9 @@ def main(arguments: list[str]) -> int:
     names = {each.name: each for each in ENVIRONMENTS}
     if arguments[:1] == ["--compare"] and len(arguments) == 3:
         return compared(Path(arguments[1]), Path(arguments[2]), "these")
+    if arguments[:1] == ["--stages"]:
+        every_stage(arguments[1], arguments[2:])
+        return 0
     if not arguments or arguments[0].startswith("-") or {*arguments[1:]} - {*names}:
         print(__doc__, "Environments:", ", ".join(names), file=sys.stderr)
         return 2

@@ -7,9 +7,11 @@ import paper_settings as paper
 import pytest
 
 from kinacc.assess.adaptive import Candidates
+from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES, MEASURED
 from kinacc.errors import InputError
+from kinacc.kinematics import robot
 
 TAKEN, REFUSED = "taken", "refused"
 WITH_CONFIDENCE = ("region_share", "single_shot", "two_stage", "sequential", "kinematic",
@@ -64,15 +66,23 @@ def test_the_limits_of_a_setting(name, key, value, verdict):
     assert name in str(caught.value)
 
 
-def test_before_the_first_visit_ends_it_is_said_how_many_points_are_left():
-    candidates = Candidates(np.tile(0.01 * np.eye(3), (50, 1, 1)))
-    campaign = paper.assessor("search_and_confirm", measurements=20).begin(candidates)
+def candidates_of_an_arm(count):
+    q_rad = np.random.default_rng(11).uniform(-0.8, 0.8, (count, 6))
+    known = {"q_rad": q_rad, "effects": joint_errors(robot.load("mh180"), q_rad)}
+    return Candidates(np.tile(0.01 * np.eye(3), (count, 1, 1)), **known)
+
+
+@pytest.mark.parametrize(
+    "name", ["search_and_confirm", "invalidation_calibrated", "kinematic", "sequential"]
+)
+def test_before_the_first_visit_ends_it_is_said_how_many_points_are_left(name):
+    campaign = paper.assessor(name, measurements=30).begin(candidates_of_an_arm(50))
     rng, left = np.random.default_rng(4), []
     while (row := campaign.next()) is not None:
         said = {each.target: each.withheld for each in campaign.statements()}
-        if said[MEASURED] is None:
+        if said[MEASURED] is None or said[MEASURED].code != "first_visit":
             break
-        assert said[MEASURED].code == said[CANDIDATES].code == "first_visit"
+        assert said.get(CANDIDATES, said[MEASURED]) == said[MEASURED]
         left.append(said[MEASURED].numbers["left"])
         campaign.record(row, rng.normal(size=3))
     assert left == list(range(len(left), 0, -1))

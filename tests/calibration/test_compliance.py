@@ -6,11 +6,13 @@ The arms are bent here by plain products of matrices, which share nothing with t
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from kinacc.calibration import models, tables, uncertainty
+from kinacc.calibration.compliance_fit import ComplianceEstimator
 from kinacc.calibration.observations import Observations
 from kinacc.config.schema import defaults
 from kinacc.kinematics import dh, robot
@@ -191,3 +193,33 @@ def test_what_bends_is_selected_by_rows_held_out_and_what_does_not_is_not(compli
     )
     table = selection_columns(seen, held_out)
     assert table["model"][table["selected"] == 1].tolist() == [chosen]
+
+
+def problems_of(arm, **changes):
+    calibration = defaults()["calibration"]
+    calibration["compliance"] |= {"joints": [2], "gravity": [0.0, 0.0, -1.0]} | changes
+    found = ComplianceEstimator.contradictions(calibration, arm)
+    return {where[-1]: what for where, what, _ in found}
+
+
+def test_joints_that_cannot_bend_are_named_each_by_its_number():
+    sliding = np.array([False, True, False, False, True, False])
+    arm = replace(ARM, dh=replace(ARM.dh, prismatic=sliding))
+    for joint in range(1, 7):
+        found = problems_of(arm, joints=[joint])
+        assert bool(found) == sliding[joint - 1]
+        assert (
+            found.get("joints", f"joint {joint} of mh180 slides")
+            == f"joint {joint} of mh180 slides"
+        )
+    assert problems_of(arm, joints=[2, 3, 5])["joints"] == "joint 2, 5 of mh180 slides"
+    assert problems_of(ARM, joints=[1, 6]) == {}
+    assert problems_of(ARM, joints=[6, 7])["joints"] == "mh180 has no joint 7"
+
+
+def test_links_and_gravity_that_do_not_belong_to_the_arm_are_named():
+    link = {"mass_kg": 1.0, "centre_mm": [0.0, 0.0, 0.0]}
+    assert problems_of(ARM, links=[link] * 6) == {}
+    assert problems_of(ARM, links=[link] * 5) == {"links": "5 links for the 6 joints of mh180"}
+    assert problems_of(ARM, gravity=[0.0, 0.0, 0.0]) == {"gravity": "has no direction"}
+    assert problems_of(ARM, gravity=[0.0, 1e-3, 0.0]) == {}

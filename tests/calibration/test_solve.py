@@ -162,6 +162,24 @@ def test_prior_solution_is_ridge_with_the_variance_its_residuals_leave():
     assert np.sqrt(found.variance) == pytest.approx(0.3, rel=0.1)
 
 
+def test_what_a_prior_decides_is_not_counted_as_fitted_to_the_data():
+    """Ridge by hand: the data spend the trace of the hat matrix, the prior the rest."""
+    rng = np.random.default_rng(15)
+    a, truth = rng.normal(size=(60, 5)), rng.normal(size=5)
+    system = Linear(a, a @ truth + 0.2 * rng.normal(size=60))
+    nominal, weight = truth + 0.5 * rng.normal(size=5), np.array([0.0, 3.0, 8.0, 0.0, 20.0])
+    found = truncated(system, nominal, prior=weight)
+    inverse = np.linalg.inv(a.T @ a + np.diag(weight**2))
+    x = inverse @ (a.T @ system.b + weight**2 * nominal)
+    np.testing.assert_allclose(found.x, x, atol=1e-9)
+    freedom = 60 - np.trace(a @ inverse @ a.T)
+    assert 55.1 < freedom < 59.0
+    assert found.degrees_of_freedom == pytest.approx(freedom, rel=1e-9)
+    assert found.variance == pytest.approx(np.sum((a @ x - system.b) ** 2) / freedom, rel=1e-9)
+    plain = truncated(system, nominal)
+    assert plain.degrees_of_freedom == 55
+
+
 def test_directions_nobody_sees_stay_at_the_prior_mean():
     rng = np.random.default_rng(6)
     a = rng.normal(size=(60, 4))

@@ -134,3 +134,16 @@ def test_a_flange_that_always_points_one_way_is_told_with_how_far_it_strays():
     assert fact.value == pytest.approx(3.0, rel=1e-6)
     both[:, 4] += np.deg2rad([-3.0, 3.0])
     assert list(summary.of_pointing(measurements(both), ARM)) == []
+
+
+def test_facts_come_back_from_their_table():
+    table = {
+        "topic": ["data", "range"], "item": ["measurements", "joint 1"],
+        "statistic": ["source", "low"], "value": np.array([np.nan, -90.0]),
+        "unit": [None, "deg"], "text": ["file", None],
+    }  # fmt: skip
+    source, low = summary.facts_in(table)
+    assert (source.topic, source.item, source.statistic, source.text) == (
+        "data", "measurements", "source", "file")  # fmt: skip
+    assert np.isnan(source.value)
+    assert low == summary.Fact("range", "joint 1", "low", -90.0, "deg", None)

@@ -36,13 +36,6 @@ BUGS: dict[str, Bug] = {
         ("configuration",),
         "560def0",
     ),
-    "huge whole numbers in a robot file": Bug(
-        "kinacc.kinematics.robot.reader",
-        "return number and abs(value) < math.inf",
-        "return number and math.isfinite(value)",
-        ("robot",),
-        "560def0",
-    ),
     "huge whole numbers in cells": Bug(
         "kinacc.measurements.table",
         """        return _number(cell, decimal, thousands)
@@ -58,13 +51,6 @@ BUGS: dict[str, Bug] = {
         "    except pa.ArrowException:",
         ("described Parquet",),
         "560def0",
-    ),
-    "lists in Parquet cells": Bug(
-        "kinacc.measurements.parquet_file",
-        "flat = [field.name for field in schema if not pa.types.is_nested(field.type)]",
-        "flat = list(schema.names)",
-        ("described Parquet",),
-        "94eebc4",
     ),
     "damaged Parquet files": Bug(
         "kinacc.measurements.parquet_file",
@@ -94,19 +80,19 @@ BUGS: dict[str, Bug] = {
         _TEXT,
         "560def0",
     ),
-    "processing instructions in URDF": Bug(
-        "kinacc.kinematics.robot.urdf",
-        "remove_comments=True, remove_pis=True,",
-        "remove_comments=True,",
-        ("URDF",),
-        "cf8b85c",
+    "a number of thousands of digits in a name": Bug(
+        "kinacc.measurements.joining",
+        r're.compile(r"(?<!\d)\d{1,100}(?!\d)")',
+        r're.compile(r"\d+")',
+        ("measured file",),
+        "57a210f",
     ),
-    "numbers in URDF that only Python takes": Bug(
-        "kinacc.kinematics.robot.urdf",
-        "    return len(values) == count and all(abs(value) <= most for value in values)",
-        "    return len(values) == count",
-        ("URDF",),
-        "cf8b85c",
+    "a column of results that is not there": Bug(
+        "kinacc.deployment.folder",
+        "    def __missing__(self, name: str)",
+        "    def missing(self, name: str)",
+        ("results used",),
+        "148b454",
     ),
     "tags that do not fit in YAML": Bug(
         "kinacc.config.reading",
@@ -173,10 +159,31 @@ BUGS: dict[str, Bug] = {
     ),
     "words of a table that are no text": Bug(
         "kinacc.artifacts.store",
-        "    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:",
-        "    except (pa.ArrowException, OSError) as error:",
+        "    except UnicodeDecodeError as error:\n        what",
+        "    except ZeroDivisionError as error:\n        what",
         ("table",),
         "6eec24f",
+    ),
+    "a unit of a column that is no text": Bug(
+        "kinacc.cli.rows",
+        '.decode(errors="replace")',
+        ".decode()",
+        ("poses", "joints"),
+        "148b454",
+    ),
+    "an entry that no command writes": Bug(
+        "kinacc.campaign.folder",
+        "state.require_readable(",
+        "(lambda *words: None)(",
+        ("campaign",),
+        "379443d",
+    ),
+    "a column name that is an accent alone": Bug(
+        "kinacc.measurements.column_names",
+        "if not word:",
+        "if False:",
+        ("measured file",),
+        "4b9064a",
     ),
     "an answer in JSON that holds no rows": Bug(
         "kinacc.cli.rows",

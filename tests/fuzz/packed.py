@@ -169,7 +169,7 @@ def workbook(data: bytes, rng: Random) -> bytes:
                     True,
                     1e308,
                     -5,
-                    10**15,
+                    10**400,
                     0.1,
                     "=A1*2",
                     "#N/A",

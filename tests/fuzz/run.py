@@ -27,7 +27,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1] / "src"), str(HERE.parent), str(HERE.parents[1] / "tools")]
 
 FINDINGS = ("crash", "hang", "memory", "wrote")
-_SILENT_S = 120  # of a worker; an input has 5 s of processor time
+_SILENT_S = 600  # of a worker; an input has 5 s of processor time
 _BATCH, _SLICES = 25_000, 20
 
 
@@ -86,35 +86,29 @@ def outcomes(
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             text=True, env=env,
         ) as worker:  # fmt: skip
-            worker.stdin.write(json.dumps({"work": work, "bug": bug, "coverage": coverage}) + "\n")
-            worker.stdin.flush()
-            current, done = None, False
-            for line in _lines(worker):
-                said = json.loads(line)
-                if "done" in said:
-                    done = True
-                elif "begins" in said:
-                    current = tuple(said["begins"])
-                else:
-                    yield current, said
-                    work = _after(work, current)
-                    current = None
+            try:
+                plan = {"work": work, "bug": bug, "coverage": coverage}
+                worker.stdin.write(json.dumps(plan) + "\n")
+                worker.stdin.flush()
+                current, done = None, False
+                for line in _lines(worker):
+                    said = json.loads(line)
+                    if "done" in said:
+                        done = True
+                    elif "begins" in said:
+                        current = tuple(said["begins"])
+                    else:
+                        yield current, said
+                        work = _after(work, current)
+                        current = None
+            finally:
+                if not coverage:  # which is written at the end
+                    worker.kill()
             if done:
                 return
-            worker.kill()
             if current is None:
-                raise SystemExit(
-                    f"the worker ended before an input:\n{worker.stderr.read()[-3000:]}"
-                )
-        yield (
-            current,
-            {
-                "outcome": "crash",
-                "where": "the process ended or hung",
-                "seconds": 0.0,
-                "parsed": True,
-            },
-        )
+                raise SystemExit(f"the worker ended early:\n{worker.stderr.read()[-3000:]}")
+        yield current, {"outcome": "crash", "where": "the process ended", "seconds": 0, "parsed": 1}
         work = _after(work, current)
 
 
@@ -146,12 +140,13 @@ def _after(work: list[list], done: tuple[str, int, int]) -> list[list]:
     return left
 
 
-def shares(names: list[str], inputs: int, least: int = 1) -> dict[str, int]:
-    """Inputs of each target."""
+def shares(names: list[str], inputs: int) -> dict[str, int]:
+    """Inputs of each target, which has one at least where there are a thousand."""
     from fuzz.targets import TARGETS
 
     total = sum(TARGETS[name].share for name in names)
-    return {name: max(least, round(inputs * TARGETS[name].share / total)) for name in names}
+    counts = {name: round(inputs * TARGETS[name].share / total) for name in names}
+    return {name: count or int(inputs >= 1000) for name, count in counts.items()}
 
 
 def keep(finding: Finding, folder: Path) -> Path:
@@ -266,14 +261,15 @@ def main() -> None:
         action="store_true",
         help="put faults of the past back, one by one, and look for them",
     )
+    parser.add_argument("--bug", action="append", default=[], help="only this one of --bugs")
     given = parser.parse_args()
     if given.replay:
         replay(Path(given.replay))
         return
-    if given.bugs:
+    if given.bugs or given.bug:
         from fuzz import bugs
 
-        raise SystemExit(bugs.hunt(given.inputs or 3000, given.seed))
+        raise SystemExit(bugs.hunt(given.inputs or 3000, given.seed, given.bug))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     until = time.time() + 60 * given.minutes if given.minutes else float("inf")
     inputs = given.inputs or (100_000_000 if given.minutes else 100_000)

@@ -42,9 +42,10 @@ def fuzzed(*words: object) -> str:
 
 
 def test_some_hundred_strange_files_bring_messages_and_nothing_else():
-    said = fuzzed("--inputs", 600, "--seed", 20)
-    assert said.splitlines()[-1].startswith("all")
-    assert all(name in said for name in TARGETS)
+    said = fuzzed("--inputs", 250, "--seed", 20)
+    *each, whole = said.splitlines()[1:]
+    assert whole.startswith("all")
+    assert len(each) >= 12
 
 
 def test_an_input_is_made_again_from_its_number():
@@ -64,8 +65,8 @@ def test_a_fault_of_the_past_can_be_put_back(name):
 
 
 def test_the_fuzzer_finds_a_fault_that_is_put_back():
-    name = "huge whole numbers in a robot file"
+    name = "huge whole numbers in a configuration"
     from fuzz.run import FINDINGS, outcomes
 
-    found = outcomes([["robot", 1, 0, 400]], bug=name)
+    found = outcomes([["configuration", 1, 0, 400]], bug=name)
     assert any(each["outcome"] in FINDINGS for _, each in found)

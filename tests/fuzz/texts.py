@@ -219,7 +219,9 @@ def lines_changed(lines: list[str], rng: Random) -> list[str]:
     elif kind == 9:
         lines = lines[:to] if rng.random() < 0.5 else lines[at:]
     else:
-        lines[at] += rng.choice((",", ";", "\t", " ", '"', "\r", "\\", "#", ",,,,", '"a'))
+        lines[at] += rng.choice(
+            ('"' + "1" * 140_000, ",", ";", "\t", " ", '"', "\r", "\\", "#", ",,,,", '"a')
+        )
     return lines or [""]
 
 

@@ -31,7 +31,7 @@ def test_no_suitable_python_gives_one_clear_line():
 
 
 def test_lock_files_hold_names_versions_and_hashes_only():
-    for name in ("run.txt", "test.txt"):
+    for name in ("run.txt", "test.txt", "audit.txt"):
         text = (ROOT / "requirements" / name).read_text()
         assert "--hash=sha256:" in text
         for foreign in ("://", "--index", "--find-links", "--extra", "file:", "/home", " @ "):

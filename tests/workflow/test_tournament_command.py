@@ -103,7 +103,7 @@ def test_noise_that_the_size_does_not_have_is_refused(results):
     cells = read(results / "tournament" / "tournament_cells.parquet")
     assert set(cells["noise_mm"]) == {0.1}
     said = run(results, "--noise-mm", "0.7")
-    assert said.exit_code == 1
+    assert said.exit_code == 2
     assert "0.1, 0.3" in said.stderr
 
 

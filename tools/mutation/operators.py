@@ -45,7 +45,15 @@ CIRCULAR = {"sin": "cos", "cos": "sin", "arcsin": "arccos", "arccos": "arcsin"}
 NOT_SWAPPED = {"isinstance", "issubclass", "getattr", "hasattr", "partial", "Problem"}
 NOT_SWAPPED |= {"min", "max", "minimum", "maximum", "hypot", "array_equal"}
 # They save time or refuse mistakes of programmers, and change no result.
-WITHOUT_EFFECT = {"strict", "repr", "check_finite", "overwrite_a", "overwrite_b", "stacklevel"}
+WITHOUT_EFFECT = {
+    "strict",
+    "repr",
+    "check_finite",
+    "overwrite_a",
+    "overwrite_b",
+    "overwrite_c",
+    "stacklevel",
+}
 
 
 def changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:

@@ -101,7 +101,8 @@ def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> 
                 continue
             state = opened.state()
         except InputError:
-            remarks.append(f"campaign {place} cannot be read: kinacc campaign status {place}")
+            command = shlex.join(["kinacc", "campaign", "status", str(place)])
+            remarks.append(f"campaign {place} cannot be read: {command}")
             continue
         if others := [str(each) for each in found[number:]]:
             remarks.append(f"there are older campaigns: {', '.join(others)}")

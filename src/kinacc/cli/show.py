@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -164,5 +165,5 @@ def _of_tables(folder: Path, given: dict[str, object]) -> list[Problem]:
     names = [name for name, value in given.items() if value]
     if not names:
         return []
-    fix = f"name one as well; `kinacc show {folder}` lists them"
+    fix = f"name one as well; `{shlex.join(['kinacc', 'show', str(folder)])}` lists them"
     return [Problem(str(folder), f"is a folder, {', '.join(names)} is about one table", "", fix)]

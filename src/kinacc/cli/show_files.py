@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,7 +57,7 @@ def _absent(asked: Path) -> Problem:
     if name in ARTEFACTS and _of_dataset(above):
         fix = f"{_command(name)} makes it" if _command(name) else ""
     elif name in ARTEFACTS and elsewhere:
-        fix = f"there is one in {first_few(elsewhere)}: kinacc show {elsewhere[0]} {name}"
+        fix = f"there is one in {first_few(elsewhere)}: {_typed('show', elsewhere[0], name)}"
     what = "no such table" if tables else "no such file or folder"
     return Problem(str(asked), what, first_few([*tables, *sorted(others)], 30), fix)
 
@@ -73,8 +74,8 @@ def listing(folder: Path) -> Listing:
     if within:
         return _of_folders(folder, within)
     if (folder / PLAN).is_file():
-        fix = f"`kinacc campaign report {folder}` writes them, `kinacc campaign status {folder}` "
-        fix += "says where it stands"
+        report, status = (_typed("campaign", each, folder) for each in ("report", "status"))
+        fix = f"`{report}` writes them, `{status}` says where it stands"
         raise InputError(Problem(str(folder), "a campaign without tables so far", fix=fix))
     raise InputError(
         Problem(str(folder), "holds no table", "the folder of a data set, or of all results")
@@ -114,7 +115,7 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
             Field("made by", texts(row[3] for row in rows), "", "stage or command that does"),
         ],
     )
-    below = [f"kinacc show {folder} {names[0]} shows one; --describe says what its columns mean"]
+    below = [f"{_typed('show', folder, names[0])} shows one; --describe says what its columns mean"]
     if drawn := [name for name in names if name in PICTURES]:
         below.append(f"--plot draws {', '.join(drawn)}")
     pictures = sorted({each.stem for each in (folder / FIGURE_FOLDER).glob("*.*")})
@@ -160,10 +161,15 @@ def _of_folders(folder: Path, within: list[Path]) -> Listing:
             Field("not there", columns[4], "", "tables that other data sets would have"),
         ],
     )
-    below = [f"kinacc show {within[0]} lists the tables of one"]
+    below = [f"{_typed('show', within[0])} lists the tables of one"]
     if (folder / PLAN).is_file():
-        below.append(f"a campaign: kinacc campaign status {folder} says where it stands")
+        below.append(f"a campaign: {_typed('campaign', 'status', folder)} says where it stands")
     return Listing(sheet, tuple(below))
+
+
+def _typed(*words: object) -> str:
+    """A command of kinacc as it is typed."""
+    return shlex.join(["kinacc", *map(str, words)])
 
 
 def _of_dataset(folder: Path) -> bool:

@@ -216,7 +216,9 @@ def _sector(ax: Axes3D, cylinder: Mapping[str, Any]) -> np.ndarray:
     for end in (0, -1):
         edges += [np.array([corners[r, low][end], corners[r, high][end]]) for r in (inner, outer)]
         edges += [np.array([corners[inner, h][end], corners[outer, h][end]]) for h in (low, high)]
-    ax.add_collection3d(Line3DCollection(edges, colors=style.BLUE, linewidths=0.9, zorder=4))
+    # Not as a 3D one: for the limits of the axes, which are set, matplotlib 3.9 wants lines alike.
+    lines = Line3DCollection(edges, colors=style.BLUE, linewidths=0.9, zorder=4)
+    ax.add_collection(lines, autolim=False)
     return np.concatenate(list(corners.values()))
 
 

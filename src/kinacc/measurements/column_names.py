@@ -251,6 +251,8 @@ def _says_more(inside: str) -> bool:
 def _parted(spelled: str) -> list[tuple[str, str]]:
     """A word, parted where an axis is written together with what it is: dX, Xsoll, rxdeg."""
     word = plain(spelled)
+    if not word:  # an accent alone
+        return []
     if word in WORDS or word in UNITS or word in _TYPES:
         return [(word, spelled)]
     if (joined := _JOINED.fullmatch(word)) and _AXIS.fullmatch(joined[1]):

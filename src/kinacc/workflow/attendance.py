@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import base64
 import json
+import logging
 import os
 import re
 import shutil
@@ -23,7 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinacc.artifacts.atomic import abandoned, held, sweep, unfinished
-from kinacc.errors import KinaccError
+from kinacc.errors import KinaccError, refused
 from kinacc.workflow.results_lock import forget, joined, running
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def attend(workflow: Any, results: str, plan: Callable[[], Plan]) -> None:
     elsewhere = workflow.storage_settings.default_storage_provider is not None
     folder = _OWN if elsewhere else Path(str(workflow.modifier.modify_path(results))).parent
     stop = Stop(folder)
+    logging.raiseExceptions = False  # a disk that takes no log of Snakemake's is said once
     if not is_module:
         mine = [workflow.snakemake_tmp_dir, Path(workflow.sourcecache.runtime_cache_path)]
         _note_what_this_run_leaves(mine)
@@ -72,8 +74,11 @@ def attend(workflow: Any, results: str, plan: Callable[[], Plan]) -> None:
         except KinaccError as error:
             print(error, file=sys.stderr)
             raise SystemExit(1) from None
-        except BaseException:
+        except BaseException as error:
             stop.end_if_asked()
+            if isinstance(error, OSError):
+                print(refused(error, error.filename or folder), file=sys.stderr)
+                raise SystemExit(1) from None
             raise
 
     workflow.execute = attended
@@ -150,9 +155,10 @@ def _note_what_this_run_leaves(folders: Sequence[Path]) -> None:
     with suppress(OSError):  # nothing can be noted in a folder that cannot be written
         _OWN.mkdir(exist_ok=True)
         kept = ExitStack()
-        os.write(kept.enter_context(held(note)), json.dumps(told).encode())
+        handle = kept.enter_context(held(note))
         atexit.register(note.unlink, missing_ok=True)
         atexit.register(kept.close)
+        os.write(handle, json.dumps(told).encode())
 
 
 def _remove_what_killed_runs_left() -> None:

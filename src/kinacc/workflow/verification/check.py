@@ -327,6 +327,11 @@ def check_tournament(folder: Path) -> DatasetReport:
         for name in gathered
         if name not in marks and any(other in marks for other in gathered)
     ]
+    known, found = records_there(folder)
+    joint = [stage for stage in STAGES.values() if stage.joint]
+    doubted = {problem.where.partition(", column")[0] for problem in problems}
+    found += check_records(folder, joint, known, doubted)
+    problems += [problem for problem, _ in found]
     leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
     advice = "To mend the tournament, run `kinacc tournament` again with the options it had."
     return DatasetReport(

@@ -46,6 +46,23 @@ NOT_AGAIN = {
 _FITTED_ROWS = ("vec", "dh", "compliance", "residuals", "data_check", "summary")
 
 
+def described() -> dict[str, str]:
+    """What is computed again of the tables of each stage that leaves some, in words."""
+    words = {}
+    for name, stage in STAGES.items():
+        if stage.leaves == TABLES:
+            words[name] = "all of it"
+            if name in _FITTED_ROWS:
+                words[name] = f"all of it, up to {ROWS} rows; with `--all` of any number"
+            if name in NOT_AGAIN:
+                words[name] = f"nothing: {NOT_AGAIN[name]}"
+    some = "chosen anew in every check; with `--all` all of them"
+    return words | {
+        "accuracy_map": f"{CELLS} cells, {some}",
+        "study_chunk": f"{REPETITIONS} repetitions at every noise under every reading, {some}",
+    }
+
+
 class Again(NamedTuple):
     """What was computed again: the tables that were, what differs, and what was left and why."""
 
@@ -87,7 +104,7 @@ def computed_again(
         if settings is None:
             unknown += made
             continue
-        if not every and name in _FITTED_ROWS and _rows(inputs) > ROWS:
+        if not every and name in _FITTED_ROWS and _rows(tables) > ROWS:
             large += made
             continue
         problems = list(_differing(folder, stage, tables, inputs, settings, every))
@@ -202,8 +219,8 @@ def _read(stage: Stage, own: Mapping[str, str], tables: Collection[str]) -> list
     return [each for each in digests_read(own) if each in tables]
 
 
-def _rows(inputs: Mapping[str, Columns]) -> int:
-    return len(inputs.get("measurements", {}).get("pose", ()))
+def _rows(tables: Mapping[str, Columns]) -> int:
+    return len(tables.get("measurements", {}).get("pose", ()))
 
 
 def _settings(

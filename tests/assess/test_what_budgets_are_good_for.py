@@ -1,0 +1,171 @@
+"""What a budget can state, said before it is spent, against chances counted by hand or drawn."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+import paper_settings as paper
+import pytest
+from scipy.stats import binom, hypergeom
+
+from kinacc.assess.adaptive import Candidates
+from kinacc.assess.binomial import binomial_interval
+from kinacc.assess.coverage import at_most, companions, hardly_missed, records
+from kinacc.assess.random_numbers import key_of
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.assess.simulate import assessed, is_broken, noisy, truth_mm
+from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
+from kinacc.assess.visits import first_points
+from kinacc.assess.world import drawn_world
+
+
+@pytest.mark.parametrize(("hits", "trials"), [(0, 20), (1, 20), (7, 20), (19, 20), (20, 20)])
+def test_limits_on_a_probability_are_where_the_count_becomes_improbable(hits, trials):
+    low, high = binomial_interval(hits, trials)
+    assert 0.0 <= low <= hits / trials <= high <= 1.0
+    assert (low == 0.0) == (hits == 0)
+    assert (high == 1.0) == (hits == trials)
+    if hits:
+        assert binom.sf(hits - 1, trials, low) == pytest.approx(0.025, rel=1e-6)
+    if hits < trials:
+        assert binom.cdf(hits, trials, high) == pytest.approx(0.025, rel=1e-6)
+
+
+@pytest.mark.parametrize(("points", "seen", "marked"), [(30, 10, 4), (30, 29, 2), (12, 3, 12)])
+def test_the_chance_of_having_read_few_of_the_marked_points_is_hypergeometric(points, seen, marked):
+    for found in range(marked + 1):
+        wanted = hypergeom.cdf(found, points, marked, seen)
+        assert at_most(found, marked, points, seen) == pytest.approx(wanted, abs=1e-12)
+
+
+def test_companions_are_the_fewest_that_are_hardly_all_missed():
+    for points, seen, error in ((100, 40, 0.02), (100, 90, 0.02), (50, 1, 0.5), (20, 19, 0.05)):
+        missed = [Fraction(comb(points - k, seen), comb(points, seen)) for k in range(points + 1)]
+        wanted = next(k for k in range(1, points + 1) if missed[k] <= Fraction(error))
+        assert companions(points, seen, error) == wanted
+
+
+def test_the_largest_of_all_is_hardly_missed_by_nearly_all():
+    assert hardly_missed(100, 0.02) == 98
+    assert hardly_missed(100, 0.025) == 98
+    assert hardly_missed(10, 0.02) == 10
+    assert records(10, 10) == 1.0
+    assert records(3, 6) == pytest.approx(1 + 1 / 4 + 1 / 5 + 1 / 6)
+
+
+@pytest.mark.parametrize(
+    ("measurements", "points", "share", "first"),
+    [(150, 100, 0.6, 100), (149, 100, 0.6, 60), (40, 100, 0.6, 24), (41, 100, 0.6, 25),
+     (1, 100, 0.6, 1), (1, 1, 0.6, 1), (50, 40, 0.5, 20), (60, 40, 0.5, 40)],
+)  # fmt: skip
+def test_the_first_visit_is_a_share_or_everything_where_the_budget_is_half_as_large_again(
+    measurements, points, share, first
+):
+    assert first_points(measurements, points, share) == first
+
+
+def test_a_budget_too_small_to_speak_of_all_candidates_is_told_what_would_do():
+    """The recommended assessor, 95 %: two of a hundred may be missed, or five may stand close."""
+
+    def said(measurements):
+        return paper.assessor(RECOMMENDED, measurements=measurements).shortfall(100, 6)
+
+    assert said(98) is None
+    assert said(97) == Reason("assumption_ahead", {"enough": 98})
+    # Five companions are all missed by s of a hundred with probability C(95, s) / C(100, s).
+    missed = [Fraction(comb(95, seen), comb(100, seen)) for seen in range(96)]
+    needed = next(seen for seen, chance in enumerate(missed) if chance <= Fraction(2, 100))
+    assert said(needed) == Reason("assumption_ahead", {"enough": 98})
+    for fewer in (1, needed // 2, needed - 1):
+        assert said(fewer) == Reason("no_bound_on_all", {"needed": needed})
+
+
+def test_the_kinematic_process_needs_a_component_for_every_coefficient():
+    """Two causes a joint, each a polynomial of order 2: the first visit must hold their number."""
+    enough = paper.assessor("kinematic", measurements=600)
+    assert enough.shortfall(400, 6) is None
+    few = paper.assessor("kinematic", measurements=6).shortfall(400, 6)
+    assert few.code == "no_bound_ahead"
+    needed = few.numbers["needed"]
+    assert paper.assessor("kinematic", measurements=6).shortfall(400, 12).numbers["needed"] == (
+        pytest.approx(2 * needed, abs=1)
+    )
+    # All of so many points are visited at first where the budget is half as large again.
+    assert enough.shortfall(needed, 6) is None
+    assert enough.shortfall(needed - 1, 6) == few
+
+
+def test_statements_are_held_to_what_they_speak_of():
+    size = np.array([0.2, 0.9, 0.4])
+    assert truth_mm(Statement(CANDIDATES, 1.0), size, [0, 2]) == 0.9
+    assert truth_mm(Statement(MEASURED, 1.0), size, [0, 2]) == 0.4
+    assert np.isnan(truth_mm(Statement(MEASURED, 1.0), size, None))
+
+
+@pytest.mark.parametrize(("crowd", "broken"), [(1, False), (2, False), (3, True)])
+def test_an_assumption_is_broken_where_the_largest_has_less_company_than_it_says(crowd, broken):
+    size = np.array([1.0, 0.8, 0.79, 0.1])  # 0.8 is the largest divided by 1.25, 0.79 less
+    assumption = Reason("company", {"crowd": crowd, "isolation": 1.25})
+    assert is_broken(Statement(CANDIDATES, 1.0, assumption=assumption), size) == broken
+    assert not is_broken(Statement(CANDIDATES, 1.0), size)
+
+
+def test_noisy_readings_are_the_errors_and_noise_of_the_covariance_asked_for():
+    errors = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
+    root = np.array([[0.3, 0.0, 0.0], [0.1, 0.2, 0.0], [0.0, 0.05, 0.1]])
+    read = noisy(errors, root, 4000, 3, 1)
+    readings = np.array([read(0, visit) for visit in range(4000)])
+    np.testing.assert_allclose(readings.mean(axis=0), errors[0], atol=0.02)
+    np.testing.assert_allclose(np.cov(readings.T), root @ root.T, atol=0.006)
+    again = noisy(errors, root, 4000, 3, 1)
+    np.testing.assert_array_equal(again(1, 7), read(1, 7))
+    assert not np.array_equal(read(1, 7), read(1, 8))
+    assert not np.array_equal(noisy(errors, root, 4000, 3, 2)(1, 7), read(1, 7))
+
+
+@pytest.mark.parametrize("name", ["maximum", "single_shot"])
+def test_either_interface_tells_what_it_took(name):
+    errors = np.random.default_rng(5).normal(size=(12, 3))
+    world = drawn_world(errors, 1e-6, key_of(4), 20)
+    found = assessed(name, paper.study(measurements=12), world)
+    assert found.measurements == found.points_visited == 12
+    assert (found.visited is None) == (name == "maximum")
+    assert found.visited is None or sorted(found.visited) == list(range(12))
+    size = np.linalg.norm(errors, axis=1)
+    assert found.statements[0].value_mm == pytest.approx(size.max(), abs=1e-4)
+
+
+def test_a_bound_on_readings_of_unequal_noise_takes_each_ones_own_covariance():
+    """Two points read alike; the one whose noise is wide leaves more room above."""
+
+    def bound(covariances):
+        candidates = Candidates(np.array(covariances))
+        campaign = paper.assessor("invalidation_calibrated", measurements=4).begin(candidates)
+        while (row := campaign.next()) is not None:
+            campaign.record(row, np.array([1.0, 0.0, 0.0]))
+        return campaign.statements()[0].upper_mm
+
+    narrow, wide = 1e-4 * np.eye(3), np.diag([0.04, 1e-4, 1e-4])
+    across = np.diag([1e-4, 1e-4, 0.04])
+    assert bound([narrow, wide]) > bound([narrow, narrow]) + 0.1
+    assert bound([narrow, narrow]) < bound([narrow, across]) < bound([narrow, wide])
+
+
+def test_too_few_points_of_many_say_nothing_of_all_and_tell_how_many_could_hide():
+    candidates = Candidates.with_equal_noise(np.full(100, 0.01))
+    campaign = paper.assessor(RECOMMENDED, measurements=12).begin(candidates)
+    errors = np.random.default_rng(6).normal(size=(100, 3))
+    while (row := campaign.next()) is not None:
+        campaign.record(row, errors[row])
+    measured, everywhere = campaign.statements()
+    seen = len(campaign.ledger.visited)
+    hidden = [Fraction(comb(100 - k, seen), comb(100, seen)) for k in range(1, 101 - seen)]
+    crowd = next(k for k, chance in enumerate(hidden, 1) if chance <= Fraction(2, 100))
+    assert everywhere.withheld == Reason(
+        "all_missed", {"seen": seen, "points": 100, "crowd": crowd}
+    )
+    assert np.isnan(everywhere.upper_mm)
+    assert measured.withheld is None
+    assert measured.lower_mm <= measured.value_mm <= measured.upper_mm
