@@ -14,8 +14,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from kinacc.artifacts import records
+from kinacc.cli.group import main
 from kinacc.workflow import results_lock
 from kinacc.workflow.results_lock import RUN, InUse, joined, running, sharing
 
@@ -174,3 +176,13 @@ def test_a_record_made_up_by_a_stranger_removes_nothing_elsewhere(tmp_path):
     with running(tmp_path / "results", print):
         assert not place.exists()
     assert keep.exists()
+
+
+@pytest.mark.parametrize("folder", ["", "mh180"])
+def test_a_check_while_a_run_writes_says_so_and_finds_nothing_amiss(tmp_path, hold, folder):
+    (tmp_path / "mh180").mkdir()
+    first, _ = hold("running(FOLDER)")
+    done = CliRunner().invoke(main, ["check-results", str(tmp_path / folder)])
+    assert done.exit_code == 1
+    assert f"process {first.pid} on" in done.output
+    assert done.output.count("\n") == 1

@@ -8,6 +8,7 @@ import click
 
 from kinacc.cli.output import Output, answers
 from kinacc.workflow.plan import planned
+from kinacc.workflow.results_lock import refuse_while_running
 from kinacc.workflow.verification import check
 
 
@@ -34,6 +35,7 @@ def check_results(
       kinacc check-results results/
       kinacc check-results results/ --config config.yaml --config my-robot.yaml --json
     """
+    refuse_while_running(folder)
     report = check.check_results(folder, planned(config) if config else None, config, every, expect)
     out.say(report.to_dict(), str(report))
     sys.exit(report.exit_code)

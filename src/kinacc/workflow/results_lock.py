@@ -112,6 +112,14 @@ def _refuse_if_at_work(results: Path | str) -> None:
             raise InUse(f"{results}: {_whose(lock)}; look at it when that has ended")
 
 
+def refuse_while_running(results: Path | str) -> None:
+    """Raise InUse where a run is at work in a folder, or in the one that it stands in."""
+    for place in (Path(results), Path(results).resolve().parent):
+        with suppress(OSError), open(place / LOCK, encoding="utf-8") as lock:
+            if not _taken(lock, fcntl.LOCK_SH, 0.0):
+                raise InUse(f"{place}: {_whose(lock)}; start this when it has ended")
+
+
 @contextmanager
 def joined() -> Iterator[None]:
     """Be a job of the run that the environment names, if it names one that is seen from here.
