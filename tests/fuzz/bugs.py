@@ -110,8 +110,8 @@ BUGS: dict[str, Bug] = {
     ),
     "aliases of aliases in YAML": Bug(
         "kinacc.config.reading",
-        "if walk.left < 0:",
-        "if False:",
+        "self.left -= 1",
+        "self.left -= 0",
         ("configuration", "robot"),
         "560def0",
     ),

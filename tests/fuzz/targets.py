@@ -187,9 +187,8 @@ def _chained(case: Case, rng: Random) -> Case:
         except (ValueError, KeyError, TypeError, RecursionError):
             lines.append(line)
     if rng.random() < 0.02:
-        lines.append(
-            rng.choice((b"[" * 100_000, b'{"entry": {"a": ' + b"9" * 100_000 + b"}}", b"[]"))
-        )
+        long = (b"[" * 100_000, b'{"entry": {"a": ' + b"9" * 100_000 + b"}}", b"[]")
+        lines.insert(rng.randrange(len(lines)), rng.choice(long))
     return case.but(journal.JOURNAL, b"\n".join(lines))
 
 
