@@ -99,6 +99,9 @@ $(PACKAGES):
 $(KINACC): $(PACKAGES)
 	@echo "kinacc: installing kinacc itself and compiling its kernels"
 	@$(PIP) --no-build-isolation --no-deps --editable .
+	@.venv/bin/kinacc --version >/dev/null 2>&1 || { \
+	  echo "kinacc: programs in .venv do not start in $$(pwd): give the folder a plain name" >&2; exit 1; \
+	}
 	@$(PY) -m compileall -q src
 	@$(PY) -m kinacc.workflow.warm_up
 	@touch $@

@@ -68,6 +68,7 @@ SLOW = (
     "deployment/test_compensate.py",
     "deployment/test_poses_unlike_the_measured.py",
     "deployment/test_predict.py",
+    "faults",
     "figures/test_figure_files.py",
     "figures/test_figure_stages.py",
     "figures/test_figures.py",

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
+from command_line import call
+
+from kinacc.kinematics import robot
 
 HERE = Path(__file__).parent
 
@@ -43,3 +47,15 @@ def test_a_disk_that_is_full_or_closed_and_output_that_goes_nowhere_are_told_in_
 
 def test_a_run_on_a_disk_that_fills_is_carried_on_when_there_is_room():
     assert "2 moments, 0 not as promised" in held("filling.py", "--stages", "--moments", "2")
+
+
+def test_ctrl_c_is_told_in_a_line_where_it_finds_a_library_that_makes_an_error_of_it(monkeypatch):
+    def load(*_: object) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ImportError("numpy.core.multiarray failed to import") from None
+
+    monkeypatch.setattr(robot, "load", load)
+    done = call("plan-poses", "ur10")
+    assert (done.exit_code, done.output) == (130, "stopped\n")

@@ -6,6 +6,11 @@ whose = "{dataset}" if len(plan.datasets) > 1 else next(iter(plan.datasets))
 # Only there limits are worked out for every job: each such question makes planning slower.
 on_a_cluster = workflow.resource_settings.nodes or workflow.remote_exec
 
+environment = "../envs/kinacc.yaml"
+# Snakemake takes braces in the name of a folder for wildcards.
+if not {"{", "}"}.isdisjoint(here := str(workflow.current_basedir)):
+    environment = re.sub(r"([{}])", r"\1\1", os.path.join(here, environment))
+
 for stage in STAGES.values():
     part = "{part}" if stage.scattered else None
     folder = TOURNAMENT if stage.joint else whose
@@ -51,7 +56,7 @@ for stage in STAGES.values():
             else None
         localrule: workflow.remote_exec
         conda:
-            "../envs/kinacc.yaml"
+            environment
         resources:
             mem_mb=(
                 (lambda w, attempt, name=stage.name: cluster.memory_mb(name, attempt))

@@ -7,6 +7,7 @@ hashes, so that either leaves the same bytes. Importing it costs nothing but the
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -316,6 +317,12 @@ class Plan:
         problems: list[Problem] = []
         for dataset, config in self.datasets.items():
             files = self._files(STAGES["measurements"], dataset)
+            what = "has braces in its name, which Snakemake takes for a wildcard"
+            problems += [
+                Problem(path, what, fix="rename it")
+                for path in dict.fromkeys(files.values())
+                if re.search(r"\{\s*\w.*\}", path)
+            ]
             read = [files[role] for role in ("measurements_file", "joints_file") if role in files]
             table = self._table("measurements", dataset)
             settings = self.settings("measurements", dataset)
