@@ -6,6 +6,7 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
+import scipy.linalg  # noqa: F401 (its BLAS is one of those counted)
 import simulated
 from threadpoolctl import threadpool_info, threadpool_limits
 
