@@ -74,6 +74,7 @@ SLOW = (
     "figures/test_figures.py",
     "kinematics/inverse/test_any_arm.py",
     "measurements/test_what_files_hold.py",
+    "mutation",
     "report/test_in_a_browser.py",
     "study/tournament/test_tournament.py",
     "synthetic/test_accepted.py",

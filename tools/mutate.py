@@ -80,7 +80,7 @@ def judge(
         verdict, by = trial.attempt(mutant, tests, trial.limit(seconds, compiles), log)
         if verdict != "survived":
             break
-    return dict(zip(page.COLUMNS, (*mutant.name, verdict, by), strict=True))
+    return dict(zip(page.COLUMNS, (*mutant.name, verdict, by, verdict), strict=True))
 
 
 def compiled(mutant: Mutant) -> bool:
@@ -110,10 +110,12 @@ def again(arguments: argparse.Namespace, selection: reach.Selection) -> None:
     done, known = page.read(), page.equivalents()
     for mutant in sequence()[: arguments.count]:
         row = done.get(mutant.name)
+        if arguments.room and room_of(mutant.module) != arguments.room:
+            continue
         if row is None or row["verdict"] != "survived" or mutant.name in known:
             continue
         began = trial.now()
-        row = judge(mutant, selection, every=True)
+        row = judge(mutant, selection, every=True) | {"first": row["first"]}
         if row["verdict"] != "survived":
             page.append(row)
         told(mutant, row, trial.now() - began)
