@@ -96,6 +96,14 @@ def test_a_journal_that_is_no_file_is_told_at_once(tmp_path, made):
         journal.read(path, SEED)
 
 
+def test_a_journal_larger_than_any_campaigns_is_told_before_it_is_read(tmp_path):
+    path = tmp_path / "j"
+    path.touch()
+    os.truncate(path, 10**12)
+    with pytest.raises(InputError, match="1000000 MB"):
+        journal.read(path, SEED)
+
+
 def test_a_file_system_without_locks_is_told_as_that(tmp_path, monkeypatch):
     import fcntl
 

@@ -27,6 +27,7 @@ from kinacc.errors import InputError, MachineError, Problem, refused
 PLAN, JOURNAL, LOCK, HEAD = "campaign.json", "readings.jsonl", "lock", "head.json"
 _PATIENCE_S = 5.0
 _HASH = 16
+_MOST_BYTES = 400_000_000  # of a million readings, the largest budget, with joints
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,11 @@ def read(path: Path, seed: str) -> Journal:
 def _content(path: Path) -> bytes:
     """Bytes of a file; none where there is no file. InputError where it is no plain file."""
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # a pipe would be waited for
+        about = path.stat()
+        if not stat.S_ISREG(about.st_mode):  # a pipe would be waited for
             raise _damaged(str(path), "is not a file but a folder, a pipe or a device")
+        if about.st_size > _MOST_BYTES:
+            raise _damaged(str(path), f"is {about.st_size / 1e6:.0f} MB, more than a campaign writes")
         return path.read_bytes()
     except FileNotFoundError:
         return b""
