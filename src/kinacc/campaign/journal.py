@@ -86,7 +86,8 @@ def _content(path: Path) -> bytes:
         if not stat.S_ISREG(about.st_mode):  # a pipe would be waited for
             raise _damaged(str(path), "is not a file but a folder, a pipe or a device")
         if about.st_size > _MOST_BYTES:
-            raise _damaged(str(path), f"is {about.st_size / 1e6:.0f} MB, more than a campaign writes")
+            size = f"{about.st_size / 1e6:.0f} MB"
+            raise _damaged(str(path), f"is {size}, more than a campaign writes")
         return path.read_bytes()
     except FileNotFoundError:
         return b""
