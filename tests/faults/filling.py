@@ -23,7 +23,7 @@ import machine  # noqa: E402
 import matrix  # noqa: E402
 import world  # noqa: E402
 
-_STAGES = ("measurements", "vec", "dh", "residuals")
+_STAGES = ("measurements", "data_check", "vec", "dh")
 _INPUTS = ("poses.csv", "own.yaml", "own.robot.yaml")
 
 
@@ -88,7 +88,7 @@ def main() -> int:
             for each in here.iterdir():
                 if each.name not in _INPUTS:
                     shutil.rmtree(each) if each.is_dir() else each.unlink()
-            machine.filled(grows * moment // given.moments)(here)
+            machine.filled(int(grows * (moment + 0.5) / given.moments))(here)
             found = complaints(calibrated(here, given.stages), here)
             machine.emptied(here)
             again = calibrated(here, given.stages)
