@@ -48,7 +48,7 @@ def parquet(data: bytes, rng: Random) -> bytes:
     elif kind == 10:
         kept = dict(held.schema.metadata or {})
         keys = [*kept, b"x", b"pandas"]
-        kept[rng.choice(keys)] = odd(rng).encode("utf-8", "replace")
+        kept[rng.choice(keys)] = rng.choice((b"\xff\xfe", odd(rng).encode("utf-8", "replace")))
         held = held.replace_schema_metadata(kept)
     elif kind == 11:
         field = held.schema.field(at)

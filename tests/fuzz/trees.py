@@ -62,7 +62,10 @@ def _places(tree: Any, path: tuple = ()) -> list[tuple]:
 def tree(data: Any, rng: Random) -> Any:
     """One change of nested dictionaries and lists: values, keys, types, items."""
     data = copy.deepcopy(data)
-    path = rng.choice(_places(data))
+    places = _places(data)
+    if rng.random() < 0.4:  # deep lists hold most places, and are read by one line of code
+        places = [each for each in places if len(each) < 4]
+    path = rng.choice(places)
     if not path:
         return _value(rng) if rng.random() < 0.1 else tree(data, rng)
     around = data
