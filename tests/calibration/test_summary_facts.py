@@ -147,3 +147,21 @@ def test_facts_come_back_from_their_table():
         "data", "measurements", "source", "file")  # fmt: skip
     assert np.isnan(source.value)
     assert low == summary.Fact("range", "joint 1", "low", -90.0, "deg", None)
+
+
+def test_a_joint_bends_where_either_of_its_coefficients_was_fitted():
+    nan = np.nan
+    table = {
+        "joint": np.array([1, 2, 3]),
+        "compliance_rad_per_nm": np.array([nan, 1e-6, nan]),
+        "std_compliance_rad_per_nm": np.array([nan, nan, nan]),
+        "lever_coefficient_rad_per_mm": np.array([nan, nan, 2e-6]),
+        "std_lever_coefficient_rad_per_mm": np.array([nan, nan, 1e-7]),
+    }
+    two, three = summary.bending(table)
+    assert (two["joint"], two["compliance_rad_per_nm"]) == (2, 1e-6)
+    assert two["std_compliance_rad_per_nm"] is None
+    assert two["lever_coefficient_rad_per_mm"] is None
+    assert (three["joint"], three["lever_coefficient_rad_per_mm"]) == (3, 2e-6)
+    assert three["compliance_rad_per_nm"] is None
+    assert summary.bending(None) == []
