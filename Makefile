@@ -5,6 +5,12 @@
 # make test        everything a change has to pass
 # make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
+# make fuzz        what reads files, given files that nobody would write; FUZZ="--minutes 600" for longer
+# make kills       runs that are killed at every phase, and carried on (as root, also on a Slurm that it starts)
+# make corrupt     a thousand corruptions of a study's results, and what the check finds of them
+# make faults      every command on full and read-only disks and beside other faults (as root)
+# make mutants     faults planted in the code one by one, what the tests notice, and the page about it
+# make versions    the study with the oldest and newest supported packages, and the page about it (needs uv)
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
 # make lock        renew requirements/*.txt (needs uv)
@@ -13,8 +19,8 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test bench docs docs-links audit sbom lock \
-  clean distclean
+.PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults mutants \
+  versions docs docs-links audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -65,6 +71,29 @@ test: lint $(CLUSTER)
 bench: $(PEERS)
 	@.venv-bench/bin/python benchmarks/run.py $(TOPICS)
 	@.venv-bench/bin/python tools/document_benchmarks.py
+
+# What docs/promises.md promises, at full size: an hour each and more.
+FUZZ = --inputs 100000
+fuzz: $(KINACC) $(TOOLS)
+	$(PY) tests/fuzz/run.py $(FUZZ)
+
+kills: $(KINACC) $(TOOLS) $(CLUSTER)
+	$(PY) tests/kills/kill_runs.py --work study cached calibrate tournament slurm
+
+corrupt: $(KINACC) $(TOOLS)
+	$(PY) tools/corrupt --cases 1000 --seed 1
+
+faults: $(KINACC) $(TOOLS)
+	unshare -m $(PY) tests/faults/matrix.py
+	$(PY) tests/faults/interrupts.py
+
+mutants: $(KINACC) $(TOOLS)
+	$(PY) tools/mutate.py cover
+	$(PY) tools/mutate.py run 1000
+	$(PY) tools/mutate.py page
+
+versions: $(KINACC)
+	$(PY) tools/versions.py .versions
 
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
 docs: $(KINACC) $(TOOLS)
@@ -152,4 +181,4 @@ clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv .venv-bench .venv-audit
+	rm -rf .venv .venv-bench .venv-audit .versions
