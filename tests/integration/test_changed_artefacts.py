@@ -199,7 +199,7 @@ def test_without_the_configuration_a_command_is_printed_only_where_it_is_sure(pr
     text = project.run(check, ok=False)  # small.yaml made these results, config.yaml is beside them
     assert "snakemake -c2" not in text
     assert "--config" in text
-    for path in (project.folder / "results").iterdir():
+    for path in (project.folder / "results").glob("*/"):
         shutil.rmtree(path)
     project.run([sys.executable, "-m", "snakemake", "-c2", "results/mh180/robot.parquet"])
     before = store.read(project.folder / "results/mh180/measurements.parquet")["x_mm"]
