@@ -92,8 +92,10 @@ def main() -> int:
             found = complaints(calibrated(here, given.stages), here)
             machine.emptied(here)
             again = calibrated(here, given.stages)
-            if again.code or made(here) != wanted:
-                found.append(f"makes something else afterwards: {again}")
+            now = made(here)
+            other = [name for name in {**wanted, **now} if now.get(name) != wanted.get(name)]
+            if again.code or other:
+                found.append(f"makes other {', '.join(other)} afterwards, exit code {again.code}")
             wrong += [f"disk that fills at {moment} of {given.moments}: {each}" for each in found]
     finally:
         os.chdir("/")
