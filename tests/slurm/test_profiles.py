@@ -45,7 +45,8 @@ def test_results_go_to_a_volume_and_measured_files_stay_where_they_are(tmp_path)
     command += ["--configfile", ROOT / "config.yaml", "small.yaml"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), *sys.path])}
     done = subprocess.run(
-        [*command, "--", "results/own/data_check.parquet"],
+        # A model is read from a table, which is held to a record: both come from the volume.
+        [*command, "--", "results/own/data_check.parquet", "results/own/dh_model.parquet"],
         cwd=tmp_path,
         env=environment,
         capture_output=True,
@@ -54,4 +55,5 @@ def test_results_go_to_a_volume_and_measured_files_stay_where_they_are(tmp_path)
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert (volume / "results" / "own" / "data_check.parquet").is_file()
+    assert (volume / "results" / "own" / "dh_model.parquet").is_file()
     assert not (tmp_path / "results").exists()

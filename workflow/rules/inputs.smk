@@ -12,4 +12,8 @@ def files_read(name, dataset, part):
         role: local(paths) if role.endswith("_file") else paths
         for role, paths in plan.inputs(name, dataset, with_robustness()).items()
     }
-    return plan.waited_for(name, dataset, part, ancient) | files
+    waited_for = plan.waited_for(name, dataset, part, ancient)
+    if workflow.storage_settings.default_storage_provider is not None:
+        # A job has of a storage what is named alone; elsewhere records stand beside the tables.
+        waited_for["records"] = plan.records_read(name, dataset)
+    return waited_for | files

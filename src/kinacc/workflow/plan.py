@@ -366,6 +366,17 @@ class Plan:
         """File that a run of a stage leaves last: what it wrote, and from what."""
         return records.place(f"{self.results}/{dataset}", name, part)
 
+    def records_read(self, name: str, dataset: str) -> list[str]:
+        """Records that the tables a stage reads are held to."""
+        roles = [role for role in self.inputs(name, dataset) if not role.endswith("_file")]
+        found: dict[str, None] = {}
+        for whose, _, artefact in (role.rpartition("/") for role in roles):
+            maker = maker_of(artefact)
+            owner = TOURNAMENT if maker.joint else whose or dataset
+            parts = self.part_names(maker.name, owner)
+            found |= dict.fromkeys(self.record(maker.name, owner, part) for part in parts)
+        return [*found]
+
     def part_names(self, name: str, dataset: str) -> list[str | None]:
         """Names of the parts a stage is computed in: 1-of-2, 2-of-2; None where it is whole."""
         if not STAGES[name].scattered:
