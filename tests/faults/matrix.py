@@ -82,6 +82,8 @@ def complaints(name: str, fault: machine.Fault, here: Path) -> list[str]:
         ]
         # A lock and a log may be begun.
         fresh = [path for path in after if path not in before and "logs/" not in path]
+        if fault.stdout:
+            fresh = []
         known = {path for path in fresh if Path(path).name in LOCKS}
         found += [f"fails and changes {path}" for path in changed if "logs/" not in path]
         found += [f"fails and leaves {path}" for path in fresh if path not in {*known, *leaves}]
