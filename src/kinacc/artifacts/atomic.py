@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -104,8 +104,14 @@ def _refused(error: OSError, targets: Sequence[Path], temporary: Sequence[Path])
 
 def write_whole(path: Path | str, content: bytes, on_disk: bool = False) -> None:
     """Write a file so that it appears whole or not at all; see ``replacing``."""
-    with replacing([path], on_disk) as (part,):
-        part.write_bytes(content)
+    write_together({path: content}, on_disk)
+
+
+def write_together(contents: Mapping[Path | str, bytes], on_disk: bool = False) -> None:
+    """Write files so that all of them appear or none; see ``replacing``."""
+    with replacing([*contents], on_disk) as temporary:
+        for content, part in zip(contents.values(), temporary, strict=True):
+            part.write_bytes(content)
 
 
 def synchronise(path: Path) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kinacc.artifacts.atomic import replacing
+from kinacc.artifacts.atomic import write_together
 from kinacc.artifacts.columns import (
     JOINTS_MAX,
     JOINTS_MIN,
@@ -155,12 +155,12 @@ def write_all(tables: Sequence[TableToWrite]) -> None:
 
     Every table is cast and written under a temporary name before the first one is renamed.
     """
-    contents = [
-        content_of(to_table(table.artefact, table.columns, table.provenance)) for table in tables
-    ]
-    with replacing([Path(table.path) for table in tables]) as temporary:
-        for content, place in zip(contents, temporary, strict=True):
-            place.write_bytes(content)
+    write_together(
+        {
+            table.path: content_of(to_table(table.artefact, table.columns, table.provenance))
+            for table in tables
+        }
+    )
 
 
 def content_of(table: pa.Table) -> bytes:

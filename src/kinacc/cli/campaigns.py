@@ -161,12 +161,12 @@ def status(
 
 def write_report(path: str, to: str | None, formats: Sequence[str], out: Output) -> None:
     """Write tables, picture, text and, where one is asked for, the page of a campaign."""
-    from kinacc.artifacts.atomic import write_whole
-    from kinacc.artifacts.store import TableToWrite, write_all
+    from kinacc.artifacts.atomic import write_together
+    from kinacc.artifacts.store import content_of, to_table
     from kinacc.campaign import report
     from kinacc.cli.output import require_writable
     from kinacc.figures import campaign as drawing
-    from kinacc.figures.save import write
+    from kinacc.figures.save import render
     from kinacc.progress import reporting
 
     opened = open_(path)
@@ -188,15 +188,19 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     if not state.told:
         raise InputError(Problem(str(opened.folder), "no reading was asked for and taken yet"))
     made = marks.marks_of(opened)
-    write_all([TableToWrite(at, name, tables[name], made) for name, at in tables_to.items()])
+    contents = {
+        at: content_of(to_table(name, tables[name], made)) for name, at in tables_to.items()
+    }
     for at, name in sheets_to.items():
-        answers.sheet_of(name, tables[name]).write(at)
+        contents[at] = answers.sheet_of(name, tables[name]).content(at.suffix)
     figure = drawing.draw(
         tables["campaign_points"], tables["campaign_bounds"], len(state.plan.route),
         state.plan.limits.tolerance_mm, state.plan.about["calibration"],
     )  # fmt: skip
-    write(figure, pictures)
-    write_whole(text, report.markdown(opened, state, tables, "campaign.svg").encode())
+    drawn = render(figure, pictures)
+    contents |= {pictures[kind]: content for kind, content in drawn.items()}
+    contents[text] = report.markdown(opened, state, tables, "campaign.svg").encode()
+    write_together(contents)
     written = [each.name for each in made_here]
     if out.page is not None:
         from kinacc.report.campaign import campaign_page

@@ -96,15 +96,16 @@ class Sheet:
 
     def write(self, path: Path | str) -> None:
         """Write a .csv, .xlsx, .json or .parquet file, whole or not at all."""
-        path = Path(path)
-        if path.suffix == ".parquet":
-            content = self._parquet()
-        elif path.suffix == ".xlsx":
-            content = self._excel()
-        else:
-            text = self.as_csv() if path.suffix == ".csv" else self.as_json() + "\n"
-            content = text.encode()
-        write_whole(path, content)
+        write_whole(path, self.content(Path(path).suffix))
+
+    def content(self, ending: str) -> bytes:
+        """Bytes of a file with this ending: .csv, .xlsx, .json or .parquet."""
+        if ending == ".parquet":
+            return self._parquet()
+        if ending == ".xlsx":
+            return self._excel()
+        text = self.as_csv() if ending == ".csv" else self.as_json() + "\n"
+        return text.encode()
 
     def _excel(self) -> bytes:
         """Names, units and rows on one sheet; the same rows, the same bytes."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from kinacc.artifacts import pictures
-from kinacc.artifacts.atomic import replacing
+from kinacc.artifacts.atomic import write_together
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
 
@@ -60,9 +60,7 @@ def settle(figure: Figure) -> None:
 def write(figure: Figure, paths: Mapping[str, Path]) -> None:
     """Write one file per format; each appears whole, and none appears unless all rendered."""
     contents = render(figure, paths)
-    with replacing(list(paths.values())) as parts:
-        for name, part in zip(paths, parts, strict=True):
-            part.write_bytes(contents[name])
+    write_together({path: contents[name] for name, path in paths.items()})
 
 
 def _bytes(figure: Figure, name: str, read: Mapping[str, str] | None) -> bytes:
