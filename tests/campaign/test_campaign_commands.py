@@ -625,7 +625,7 @@ def test_a_folder_that_cannot_be_written_is_said(begun, calibration, tmp_path):
     taken.write_text("")
     done = call("campaign", "start", taken / "campaign", "--calibration", calibration, "--robot",
                 "mh180", "--noise-mm", "0.1")  # fmt: skip
-    assert done.exit_code == 2
+    assert done.exit_code == 1
     assert "cannot be written" in done.output
     assert "Traceback" not in done.output
 
