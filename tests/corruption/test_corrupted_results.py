@@ -10,11 +10,12 @@ import sys
 from pathlib import Path
 
 import corruptions
+import numpy as np
 import pytest
 from command_line import call
 from corruptions import Case, Study, study
 
-from kinacc.workflow.verification import check
+from kinacc.workflow.verification import check, recomputation
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +54,21 @@ def test_a_table_rewritten_with_every_digest_and_record_renewed_is_found(finishe
     draws = (Case("mh180", file, kind, draw, "all") for draw in range(9))
     case = next(case for case in draws if finished.corrupted(case) is not None)
     assert finished.told(case)
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_undetermined_directions_may_be_any_basis_of_what_they_span(turned):
+    """Another processor rounds to another basis, and the numbers mean the same."""
+    first, second = np.array([0.6, 0.8, 0.0]), np.array([0.0, 0.0, 1.0])
+    right = {
+        "quantity": np.array(["rank", *["undetermined_direction"] * 6], dtype=object),
+        "number": np.array([np.nan, 1, 1, 1, 2, 2, 2]),
+        "parameter": np.array([None, *["a_1", "a_2", "base_z"] * 2], dtype=object),
+        "value": np.array([27.0, *first, *second]),
+    }
+    other = 0.6 * second - 0.8 * first if turned else second
+    own = {**right, "value": np.array([27.0, *(0.6 * first + 0.8 * second), *other])}
+    assert (list(recomputation._held(Path("dh_fit"), own, right)) == []) is turned
 
 
 def test_a_rewritten_simulation_is_found_where_all_of_them_are_computed_again(finished):

@@ -35,6 +35,7 @@ from kinacc.workflow.verification.mending import CONFIG, Doubt, Marks, above
 # A number may differ from the one computed by this share of itself, and by this share of the
 # largest one of its column: other processors and libraries move last digits, and fits amplify it.
 RELATIVE, OF_LARGEST = 1e-6, 1e-9
+_DIRECTION, _EXACT = "undetermined_direction", 1e9
 REPETITIONS, CELLS, ROWS = 5, 500, 5000  # computed again without --all
 NOT_AGAIN = {
     "robustness_chunk": "every draw is a calibration and a study of its own",
@@ -169,13 +170,44 @@ def _held(path: Path, own: Columns, right: Columns) -> Iterator[Problem]:
     if set(own) != set(right):
         names = ", ".join(sorted(set(own) ^ set(right)))
         yield Problem(str(path), f"columns {names}", "those computed again")
+    free = _by_rounding(own, right)
+    if free is None:
+        what = "its undetermined directions span another space"
+        yield Problem(str(path), what, "that of those computed again")
     for name in [each for each in right if each in own]:
         wrong = _unlike(own[name], right[name])
+        if free is not None and name == "value":
+            wrong &= ~free
         if wrong.any():
             row = int(np.argmax(wrong))
             is_, should = (_said(values[row]) for values in (own[name], right[name]))
             where, what = f"{path}, column {name}", f"{is_} in {store.rows(wrong)}"
             yield Problem(where, what, f"{should}, computed again")
+
+
+def _by_rounding(own: Columns, right: Columns) -> np.ndarray | None:
+    """Rows of a fit's table whose numbers another processor may round to quite others.
+
+    Directions that nothing determines may be any basis of what they span: None where they span
+    something else. A gap beyond all rounding has no value of its own.
+    """
+    if not {"quantity", "number", "parameter", "value"} <= set(right):
+        return np.zeros(len(next(iter(right.values()))), dtype=bool)
+    directions = right["quantity"] == _DIRECTION
+    spans = [_projection(each, each["quantity"] == _DIRECTION) for each in (own, right)]
+    if spans[0].shape != spans[1].shape or not np.allclose(*spans, rtol=0.0, atol=RELATIVE):
+        return None
+    gaps = [(each["quantity"] == "gap") & (each["value"] > _EXACT) for each in (own, right)]
+    return directions | (gaps[0] & gaps[1])
+
+
+def _projection(columns: Columns, rows: np.ndarray) -> np.ndarray:
+    """On what the directions in some rows span, by the names of parameters."""
+    numbers, place = np.unique(columns["number"][rows], return_inverse=True)
+    names, of = np.unique(columns["parameter"][rows].astype(str), return_inverse=True)
+    basis = np.zeros((len(numbers), len(names)))
+    basis[place.ravel(), of.ravel()] = columns["value"][rows]
+    return basis.T @ basis
 
 
 def _unlike(own: np.ndarray, right: np.ndarray) -> np.ndarray:
