@@ -191,6 +191,7 @@ def test_a_plan_simulates_with_the_errors_of_the_model_a_campaign_would_be_about
         chosen = (np.array(table["model"].to_pylist()) == model).astype(int)
         place = table.column_names.index("selected")
         column = pa.array(chosen, table.schema.field("selected").type)
-        pq.write_table(table.set_column(place, table.schema.field("selected"), column), path)
+        table = table.set_column(place, table.schema.field("selected"), column)
+        pq.write_table(table.replace_schema_metadata(), path)
         largest = sizes[held_out & (errors["comparison"] == f"{model}_vs_measured")].max()
         assert field_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)

@@ -182,7 +182,8 @@ def test_one_artefact_asked_for_by_name(project):
     before = project.digests()
     project.snakemake("results/mh180/accuracy_map.parquet")
     after = project.digests()
-    assert {name for name in after if after[name] != before[name]} == {"mh180/accuracy_map.parquet"}
+    made = {"mh180/accuracy_map.parquet", "mh180/records/accuracy_map.json"}
+    assert {name for name in after if after[name] != before[name]} == made
 
 
 def test_the_shares_are_in_the_claims_after_one_command(project):

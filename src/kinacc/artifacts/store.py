@@ -170,31 +170,31 @@ def content_of(table: pa.Table) -> bytes:
     return written.getvalue().to_pybytes()
 
 
-def read(path: Path | str) -> Columns:
+def read(path: Path | str, any_type: bool = False) -> Columns:
     """Columns of a table: float64 and whole numbers as numpy, text as object arrays.
 
-    Null numbers are NaN (a nullable whole number is therefore float64), null text is None.
-    Raises InputError if the file is absent or not Parquet, or if its columns are not those that it
-    was written with.
+    Null numbers are NaN (a nullable whole number is therefore float64), null text is None. Columns
+    of other types are refused, or object arrays where ``any_type`` says so. Raises InputError if
+    the file is absent or not Parquet, or if its columns are not those that it was written with.
     """
     try:
-        table = read_table(path)
+        table = read_table(path, any_type=any_type)
         if COLUMNS_DIGEST.encode() in (table.schema.metadata or {}):
             verified_digest(table, path)
         return columns_in(table)
-    except UnicodeDecodeError as error:
+    except (OverflowError, ValueError) as error:  # no UTF-8, or a day that no calendar has
         what = f"not a readable Parquet file: {error}"
         raise InputError(Problem(str(path), what, fix=remake(path))) from None
     except InputError as error:
         raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
 
 
-def read_table(path: Path | str, content: bytes | None = None) -> pa.Table:
+def read_table(path: Path | str, content: bytes | None = None, any_type: bool = False) -> pa.Table:
     """The table in a file, or in its ``content`` where that has been read already.
 
-    Checksums of pages are held to the pages. Raises InputError as :func:`read`.
+    Checksums of pages are held to the pages. ``any_type`` and errors as of :func:`read`.
     """
-    return _open(path, lambda file: _unpacked(file, path), content)
+    return _open(path, lambda file: _unpacked(file, path, any_type), content)
 
 
 def verified_digest(table: pa.Table, path: Path | str) -> str:
@@ -213,7 +213,7 @@ def verified_digest(table: pa.Table, path: Path | str) -> str:
     return found
 
 
-def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
+def _unpacked(file: pq.ParquetFile, path: Path | str, any_type: bool) -> pa.Table:
     """All of a file, if its footer says that it can be held: few bytes may unpack to many."""
     rows, columns = file.metadata.num_rows, file.metadata.num_columns
     if rows * columns > _MOST_VALUES:
@@ -222,7 +222,7 @@ def _unpacked(file: pq.ParquetFile, path: Path | str) -> pa.Table:
     refuse(
         Problem(f"{path}, column {field.name}", f"is of type {field.type}", "numbers, text")
         for field in file.schema_arrow
-        if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
+        if not (any_type or pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
         and field.type not in (pa.string(), pa.large_string(), pa.null())
     )
     _refuse_long_texts(file, path)

@@ -53,7 +53,7 @@ def read(path: Path) -> Shown:
     """A Parquet file, of kinacc or not. Raises InputError where it is none, or damaged."""
     artefact = contract_of(path)
     try:
-        columns, schema = store.read(path), store.read_schema(path)
+        columns, schema = store.read(path, artefact is None), store.read_schema(path)
     except InputError as error:
         if artefact is not None and path.suffix == ".parquet":
             raise

@@ -184,6 +184,7 @@ def _recording(path: str | None, label: str) -> Iterator[TextIO | None]:
         return
     with _log(path, label) as log, warnings.catch_warnings():
         warnings.simplefilter("default")
+        warnings.simplefilter("ignore", ResourceWarning)  # of a file that was open at Ctrl-C
 
         def show(message, category, filename, lineno, file=None, line=None) -> None:
             # A plain warning speaks to the user; others (overflow, deprecation) to a developer.

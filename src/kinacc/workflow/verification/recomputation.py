@@ -295,7 +295,7 @@ def _assumed(dataset: str, tables: Mapping[str, Columns], marks: Marks) -> Itera
     name, seed = str(tables["robot"]["name"][0]), marks["robot"].get("seed", "")
     if name in robot.shipped() and seed.isdecimal():
         usual = without_execution_keys({**defaults(), "robot": name, "seed": int(seed)})
-        parts = {section: usual[section].get("chunks", 1) for section in ("study", "choices")}
+        parts = {"study": 1, "choices": 1}
         yield Plan({dataset: in_use(usual)}, {dataset: parts}, ())
 
 
