@@ -319,7 +319,8 @@ def _from_urdf(reader: Reader, path: Path) -> Robot | None:
         reader.fault(("dh",), "given beside urdf", "one description of the joints")
     texts = {key: content.get(key) for key in ("urdf", "base_link", "tip_link")}
     for key, value in texts.items():
-        if value is not None and (not isinstance(value, str) or not value):
+        may_be_absent = key != "urdf" and value is None
+        if not may_be_absent and (not isinstance(value, str) or not value):
             reader.fault((key,), "is not text", "a name", value=value)
     tool = _frame(reader, content, "tool")
     if reader.problems:
