@@ -57,6 +57,22 @@ def test_confirmed_lines_missing_at_the_end_are_noticed(tmp_path, kept):
         journal.read(path, SEED)
 
 
+def test_what_was_confirmed_cannot_be_deleted_with_the_lines(tmp_path):
+    path = tmp_path / "j"
+    written(path, 3)
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:2]))
+    (tmp_path / journal.HEAD).unlink()
+    with pytest.raises(InputError, match=r"head\.json: is missing"):
+        journal.read(path, SEED)
+
+
+def test_a_writer_killed_before_it_confirmed_its_first_line_leaves_a_journal(tmp_path):
+    path = tmp_path / "j"
+    written(path, 1)
+    (tmp_path / journal.HEAD).unlink()
+    assert len(journal.read(path, SEED).entries) == 1
+
+
 def test_a_journal_that_was_deleted_is_noticed(tmp_path):
     path = tmp_path / "j"
     written(path, 3)

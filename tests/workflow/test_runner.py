@@ -175,7 +175,7 @@ def with_a_record_cut_off(folder):
     [
         (flipped, "frames.parquet: "),
         (of_another_run_with_its_digest, "is not the file that stage dh wrote"),
-        (of_a_run_that_did_not_end, "the run that wrote it did not come to its end"),
+        (of_a_run_that_did_not_end, "its run did not come to its end"),
         (with_a_record_cut_off, "dh.json: is no record of a stage"),
     ],
 )

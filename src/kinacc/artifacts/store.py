@@ -181,12 +181,22 @@ def read(path: Path | str, any_type: bool = False) -> Columns:
         table = read_table(path, any_type=any_type)
         if COLUMNS_DIGEST.encode() in (table.schema.metadata or {}):
             verified_digest(table, path)
+        elif _has_a_record(Path(path)):
+            what = f"states no {COLUMNS_DIGEST}: another program has written it"
+            raise InputError(Problem(str(path), what, "the table that its stage left"))
         return columns_in(table)
     except (OverflowError, ValueError) as error:  # no UTF-8, or a day that no calendar has
         what = f"not a readable Parquet file: {error}"
         raise InputError(Problem(str(path), what, fix=remake(path))) from None
     except InputError as error:
         raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
+
+
+def _has_a_record(path: Path) -> bool:
+    """Whether the run that left a table has left a record too, as every run does since digests."""
+    is_part = re.fullmatch(r"\d+-of-\d+", path.stem) is not None
+    artefact, folder = (path.parent.name, path.parents[1]) if is_part else (path.stem, path.parent)
+    return artefact in ARTEFACTS and os.path.isdir(folder / "records")
 
 
 def read_table(path: Path | str, content: bytes | None = None, any_type: bool = False) -> pa.Table:

@@ -58,7 +58,7 @@ def read(path: Path, seed: str) -> Journal:
     """
     content = _content(path)
     entries: list[Mapping] = []
-    chain, end = [seed], 0
+    chain, end, headed = [seed], 0, 0
     whole = content.split(b"\n")[:-1]
     for number, line in enumerate(whole, start=1):
         try:
@@ -71,11 +71,13 @@ def read(path: Path, seed: str) -> Journal:
             raise _damaged(f"{path}, line {number}", "cannot be read") from None
         if said != follows:
             what = "was changed, or belongs to another campaign"
+            what += f", or {PLAN} was changed" if number == 1 else ""
             raise _damaged(f"{path}, line {number}", what)
+        headed += "head" in parsed
         entries.append(entry)
         chain.append(follows)
         end += len(line) + 1
-    _require_confirmed(path, chain)
+    _require_confirmed(path, chain, headed)
     return Journal(tuple(entries), seed, tuple(chain[1:]), end, len(content) - end)
 
 
@@ -95,10 +97,15 @@ def _content(path: Path) -> bytes:
         raise _damaged(str(path), f"cannot be read: {error.strerror}") from None
 
 
-def _require_confirmed(path: Path, chain: list[str]) -> None:
-    """Raise InputError where a journal does not go as far as was confirmed."""
+def _require_confirmed(path: Path, chain: list[str], headed: int) -> None:
+    """Raise InputError where a journal does not go as far as was confirmed.
+
+    ``headed``: lines after which the head was written; the last of them may not have come to that.
+    """
     beside = path.with_name(HEAD)
     if not beside.exists():
+        if headed > 1:
+            raise _damaged(str(beside), "is missing")
         return  # begun by an earlier version, or nothing was confirmed yet
     try:
         head = json.loads(_content(beside))
@@ -121,7 +128,8 @@ def append(path: Path, known: Journal, entry: Mapping) -> None:
     Raises InputError where the disk does not take it.
     """
     chain = _chained(known.last, entry)
-    line = json.dumps({"chain": chain, "entry": entry}, sort_keys=True).encode() + b"\n"
+    told = {"chain": chain, "entry": entry, "head": HEAD}
+    line = json.dumps(told, sort_keys=True).encode() + b"\n"
     head = json.dumps({"chain": chain, "entries": len(known.entries) + 1}).encode() + b"\n"
     fresh = not path.exists()
     try:

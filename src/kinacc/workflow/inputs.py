@@ -121,7 +121,7 @@ def _verified(
         if record is not None:
             refuse(records.misfit(place, record, path, content))
         elif stated in (table.schema.metadata or {}):
-            what = f"has no record, {place}: the run that wrote it did not come to its end"
+            what = f"has no record: {place} is lost, or its run did not come to its end"
             raise InputError(Problem(path, what))
         store.verified_digest(table, path)
     except FileNotFoundError:

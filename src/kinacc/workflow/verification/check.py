@@ -114,6 +114,7 @@ class Report:
             count = len(each.problems)
             found = "no problem" if not count else f"{count} problem{'s' if count > 1 else ''}"
             again = f"{len(each.again)} tables computed again, " if each.again else ""
+            again = again or ("no number computed again, " if each.marks else "")
             lines.append(f"{each.name}: {len(each.checked)} files checked, {again}{found}")
             lines += [f"  - {problem}" for problem in each.problems]
             lines += [f"  note: {note}" for note in each.notes]

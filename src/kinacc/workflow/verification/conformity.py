@@ -11,7 +11,7 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, Columns, joint_count
-from kinacc.artifacts.contract import METADATA_KEYS
+from kinacc.artifacts.contract import METADATA_KEYS, PROVENANCE_KEYS
 from kinacc.errors import InputError, Problem, gathered
 
 
@@ -22,6 +22,9 @@ def check_file(path: Path, artefact: Artefact) -> tuple[Columns | None, list[Pro
         columns, schema = store.columns_in(table), table.schema
     except InputError as error:
         return None, [replace(problem, fix="") for problem in error.problems]
+    if not any(key.encode() in (schema.metadata or {}) for key in PROVENANCE_KEYS):
+        what = "holds none of the marks of its stage: another program has written it"
+        return None, [Problem(str(path), what)]
     structure = _structure(path, artefact, schema)
     problems = [*structure, *_provenance(path, schema.metadata or {})]
     with gathered(problems):

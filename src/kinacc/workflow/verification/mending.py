@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from kinacc.artifacts.provenance import config_hash
 from kinacc.errors import InputError
-from kinacc.workflow.catalogue import PAGE, STAGES, maker_of
+from kinacc.workflow.catalogue import CALIBRATION, PAGE, STAGES, maker_of
 from kinacc.workflow.plan import RESULTS, SNAKEFILE, Plan, planned
 
 CONFIG = "config.yaml"
@@ -56,7 +56,8 @@ def remedy(
     made, unmade = _files(folder, doubts, plan)
     commands = [shlex.join(["rm", *unmade])] if unmade else []
     if folder.name == RESULTS:
-        commands.append(_snakemake(folder, configs, made))
+        whole = any(map(_is_studied, marks.values())) or not any(marks.values())
+        commands.append(_snakemake(folder, configs, made, "" if whole else "calibration"))
     else:
         commands += _by_hand(folder, doubts, plan, configs)
     return f"To mend this, run\n  {' && '.join(commands)}"
@@ -75,9 +76,18 @@ def workflow_command(configs: Sequence[str], folder: Path | str = ".") -> list[s
     return words
 
 
-def _snakemake(folder: Path, configs: Sequence[str], made: Sequence[str]) -> str:
+def _is_studied(marks: Marks) -> bool:
+    """Whether tables go beyond a calibration."""
+    makers = {maker_of(each.partition("/")[0]) for each in marks}
+    return any(
+        not (stage.name in CALIBRATION or stage.fits or stage.leaves == PAGE) for stage in makers
+    )
+
+
+def _snakemake(folder: Path, configs: Sequence[str], made: Sequence[str], target: str) -> str:
     words = workflow_command(configs, folder.parent)
-    return shlex.join([*words, "--forcerun", *made] if made else words)
+    words += ["--forcerun", *made] if made else []
+    return shlex.join([*words, "--", target] if target else words)
 
 
 def _by_hand(

@@ -26,7 +26,7 @@ def check_picture(path: Path) -> list[Problem]:
     if not begins:
         return [Problem(str(path), f"is not a {kind} file", is_a)]
     if not ends:
-        return [Problem(str(path), "is cut off", is_a.replace(" ", " whole ", 1))]
+        return [Problem(str(path), "is cut off", f"a whole {is_a.partition(' ')[2]}")]
     return []
 
 

@@ -26,6 +26,7 @@ from kinacc.config.schema import defaults, without_execution_keys
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot
 from kinacc.study import monte_carlo
+from kinacc.workflow import cost
 from kinacc.workflow.catalogue import STAGES, TABLES, Stage
 from kinacc.workflow.configured import in_use
 from kinacc.workflow.plan import Plan, planned
@@ -35,6 +36,8 @@ from kinacc.workflow.verification.mending import CONFIG, Doubt, Marks, above
 # A number may differ from the one computed by this share of itself, and by this share of the
 # largest one of its column: other processors and libraries move last digits, and fits amplify it.
 RELATIVE, OF_LARGEST = 1e-6, 1e-9
+WORK_S = 1.0  # of a stage, as is foreseen; more without --all would make a check slow
+_FILES = 20  # beside results, looked through for a configuration
 _DIRECTION, _EXACT = "undetermined_direction", 1e9
 REPETITIONS, CELLS, ROWS = 5, 500, 5000  # computed again without --all
 NOT_AGAIN = {
@@ -54,7 +57,10 @@ def described() -> dict[str, str]:
         if stage.leaves == TABLES:
             words[name] = "all of it"
             if name in _FITTED_ROWS:
-                words[name] = f"all of it, up to {ROWS} rows; with `--all` of any number"
+                words[name] = (
+                    f"all of it, up to {ROWS} rows and {WORK_S:g} s of work foreseen; with `--all` "
+                    "of any number"
+                )
             if name in NOT_AGAIN:
                 words[name] = f"nothing: {NOT_AGAIN[name]}"
     some = "chosen anew in every check; with `--all` all of them"
@@ -84,10 +90,14 @@ def computed_again(
 
     ``tables`` hold the joined parts of scattered ones too. ``in_doubt``: stages of which something
     else is wrong; what follows from them is not computed. Settings are those whose hash a table
-    carries, of the ``plan``, of config.yaml beside the folder or of the defaults. ``every``:
+    carries, of the ``plan``, of a configuration beside the results or of the defaults. ``every``:
     all simulations, cells and rows in place of a sample of them.
     """
-    plans = [plan] if plan else [*_beside(folder.parent), *_assumed(folder.name, tables, marks)]
+    plans = (
+        [plan]
+        if plan
+        else [*_beside(folder.parent, folder.name), *_assumed(folder.name, tables, marks)]
+    )
     doubted, found, done, unknown = set(in_doubt), [], [], []
     large: list[str] = []
     for stage in sorted(STAGES.values(), key=lambda each: len(above(each.name))):
@@ -101,11 +111,14 @@ def computed_again(
         inputs = {each: tables[each] for each in _read(stage, of_parts[made[0]], tables)}
         if not set(stage.inputs) <= set(inputs):
             continue
-        settings = _settings(stage, folder.name, of_parts[made[0]].get("config_hash"), plans)
+        settings, work_s = _settings(
+            stage, folder.name, of_parts[made[0]].get("config_hash"), plans
+        )
         if settings is None:
             unknown += made
             continue
-        if not every and name in _FITTED_ROWS and _rows(tables) > ROWS:
+        of_rows = name in _FITTED_ROWS and _rows(tables) > ROWS
+        if not every and (of_rows or (name not in _SAMPLES and work_s > WORK_S)):
             large += made
             continue
         problems = list(_differing(folder, stage, tables, inputs, settings, every))
@@ -117,7 +130,7 @@ def computed_again(
         words = "without their settings (--config)" if plan is None else "by other settings"
         notes.append(f"{folder}: not computed again {words}: {', '.join(unknown)}")
     if large:
-        words = f"of more than {ROWS} rows without --all"
+        words = f"without --all, of more than {ROWS} rows or {WORK_S:g} s of work"
         notes.append(f"{folder}: not computed again {words}: {', '.join(large)}")
     return Again(tuple(done), found, notes)
 
@@ -257,17 +270,19 @@ def _rows(tables: Mapping[str, Columns]) -> int:
 
 def _settings(
     stage: Stage, dataset: str, wanted: str | None, plans: Sequence[Plan]
-) -> Mapping[str, object] | None:
-    """The settings that have the hash a table carries; None where nobody knows them."""
+) -> tuple[Mapping[str, object] | None, float]:
+    """The settings that have the hash a table carries, None where nobody knows them; and the work.
+
+    The work is what the stage is foreseen to take, s."""
     for plan in plans:
         if dataset not in plan.datasets or stage.name not in plan.stages(dataset):
             continue
         found = plan.settings(stage.name, dataset)
         if config_hash(found) == wanted and all(map(os.path.isfile, _files(plan, stage, dataset))):
-            return found
+            return found, cost.of_stage(stage.name, plan.datasets[dataset]).seconds
     if stage.name == "study":  # few enough to be tried
-        return _readings().get(wanted or "")
-    return None
+        return _readings().get(wanted or ""), 0.0
+    return None, 0.0
 
 
 def _files(plan: Plan, stage: Stage, dataset: str) -> list[str]:
@@ -275,12 +290,12 @@ def _files(plan: Plan, stage: Stage, dataset: str) -> list[str]:
     return [str(path) for role, path in given.items() if role.endswith("_file")]
 
 
-def _beside(results: Path) -> Iterator[Plan]:
-    """The plan of config.yaml, where it lies beside the folder of all results."""
-    path = results / ".." / CONFIG
-    if path.is_file():
-        with suppress(InputError):
-            yield _planned(str(path), path.stat().st_mtime_ns)
+def _beside(results: Path, dataset: str) -> Iterator[Plan]:
+    """Plans of configurations beside the folder of all results that name a data set."""
+    for path in sorted((results / "..").glob("*.yaml"))[:_FILES]:
+        with suppress(InputError, OSError):
+            if path.name == CONFIG or dataset.encode() in path.read_bytes():
+                yield _planned(str(path), path.stat().st_mtime_ns)
 
 
 @cache
