@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -81,11 +82,16 @@ def _space(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
     if evaluation["space"] != "cylinder":
         return
     cylinder, grid_mm = evaluation["cylinder"], full["map"]["grid_mm"]
-    sides = [math.ceil(cylinder[key] / grid_mm) + 1 for key in ("radial_span_mm", "height_mm")]
-    cells = len(full["map"]["slices_deg"]) * sides[0] * sides[1]
-    if cells > _MOST_CELLS:
-        what = f"{grid_mm:g} mm between {cells} cells of all slices"
-        allowed = f"a grid of at most {_MOST_CELLS} cells (map.slices_deg, evaluation.cylinder)"
+    sides_mm = [cylinder[key] for key in ("radial_span_mm", "height_mm")]
+
+    def cells(apart_mm: float) -> int:
+        sides = [math.ceil(each / apart_mm) + 1 for each in sides_mm]
+        return len(full["map"]["slices_deg"]) * sides[0] * sides[1]
+
+    if cells(grid_mm) > _MOST_CELLS:
+        least_mm = next(mm for mm in count(math.ceil(grid_mm)) if cells(mm) <= _MOST_CELLS)
+        what = f"{grid_mm:g} mm makes {cells(grid_mm)} cells over all slices"
+        allowed = f"at most {_MOST_CELLS}: {least_mm} mm or more, or fewer map.slices_deg"
         yield Problem(place("map", "grid_mm"), what, allowed)
     low, high = cylinder["angle_deg"]
     outside = [f"{each:g}" for each in full["map"]["slices_deg"] if not low <= each <= high]
@@ -131,11 +137,13 @@ def _work(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
     measurements = study["measurements"]
     if noises * repetitions > _MOST_SIMULATIONS:
         what = f"{repetitions} simulations at each of {noises} noises"
-        allowed = f"at most {_MOST_SIMULATIONS} in all (study.noise_mm)"
+        most = f"{_MOST_SIMULATIONS // noises} repetitions, or fewer of study.noise_mm"
+        allowed = f"at most {_MOST_SIMULATIONS} in all: {most}"
         yield Problem(place("study", "repetitions"), what, allowed)
     elif noises * repetitions * measurements > _MOST_READINGS:
         what = f"{repetitions} repetitions at {noises} noises of {measurements} measurements"
-        allowed = f"at most {_MOST_READINGS:.0e} measurements in all (study.measurements)"
+        most = f"{_MOST_READINGS // (noises * measurements)} repetitions"
+        allowed = f"at most {_MOST_READINGS} in all: {most}, or fewer study.measurements"
         yield Problem(place("study", "repetitions"), what, allowed)
     if min(points, measurements) * measurements > _MOST_HELD:
         what = f"{measurements} measurements, of which any of {points} points may take all"

@@ -85,9 +85,10 @@ def _is_studied(marks: Marks) -> bool:
 
 
 def _snakemake(folder: Path, configs: Sequence[str], made: Sequence[str], target: str) -> str:
-    words = workflow_command(configs, folder.parent)
-    words += ["--forcerun", *made] if made else []
-    return shlex.join([*words, "--", target] if target else words)
+    # The target comes first: options may take all words that follow them.
+    first, *more = workflow_command(configs, folder.parent)
+    words = [first, target, *more] if target else [first, *more]
+    return shlex.join([*words, "--forcerun", *made] if made else words)
 
 
 def _by_hand(
