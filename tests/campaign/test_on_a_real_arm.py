@@ -6,8 +6,6 @@ import json
 import shutil
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 import shared_data
 from command_line import call
@@ -187,11 +185,8 @@ def test_a_plan_simulates_with_the_errors_of_the_model_a_campaign_would_be_about
         folder = tmp_path / model
         shutil.copytree(results, folder)
         path = folder / "model_selection.parquet"
-        table = pq.read_table(path)
-        chosen = (np.array(table["model"].to_pylist()) == model).astype(int)
-        place = table.column_names.index("selected")
-        column = pa.array(chosen, table.schema.field("selected").type)
-        table = table.set_column(place, table.schema.field("selected"), column)
-        pq.write_table(table.replace_schema_metadata(), path)
+        columns = store.read(path)
+        columns["selected"] = (columns["model"] == model).astype(int)
+        store.write(path, "model_selection", columns, store.read_metadata(path))
         largest = sizes[held_out & (errors["comparison"] == f"{model}_vs_measured")].max()
         assert field_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)

@@ -159,8 +159,8 @@ BUGS: dict[str, Bug] = {
     ),
     "words of a table that are no text": Bug(
         "kinacc.artifacts.store",
-        "    except UnicodeDecodeError as error:\n        what",
-        "    except ZeroDivisionError as error:\n        what",
+        "    except (OverflowError, ValueError) as error:",
+        "    except ZeroDivisionError as error:",
         ("table",),
         "6eec24f",
     ),
