@@ -47,6 +47,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "ea9a47cd4976503f",
         "8dfb42ad2f1fa880",
         "b1cf89dd11ffcffe",
+        "92c21a4bb3ec2a38",
         "1f2b66209ee755c1",
     },
     "invalidation_calibrated": _BEFORE_ROOMS
@@ -54,6 +55,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "342f7d8eb92a4336",
         "2359c6c565f88431",
         "b295789925e904fc",
+        "136d34131906ef05",
         "b607931e6f633d3a",
     },
     "kinematic": _BEFORE_ROOMS
@@ -61,6 +63,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "013c4e27f85dfbe6",
         "5d46601c6b4a848f",
         "ec5bc9a390f5ab84",
+        "8e1bb6d080eeda6f",
         "e13db065367f0d1a",
     },
     "model_invalidation_full": _BEFORE_ROOMS
@@ -68,6 +71,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "9c378ac63b7a94d6",
         "ba028a354b6609f4",
         "f922bfe981ed1abf",
+        "6c3f88d9087efb73",
         "ec7a1a87ea98390e",
     },
     "region_share": _BEFORE_ROOMS
@@ -75,6 +79,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "f78096dfad5397d1",
         "26e6f3ceebbbcf39",
         "02b91a8e49c3da8c",
+        "9e5efc1a7d7755e5",
         "3985176744349931",
     },
     "search_and_confirm": _BEFORE_ROOMS
@@ -83,6 +88,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "0e1ed1ef42570ea4",
         "7d799bcacdd9b633",
         "e6b1d5ee9f4f4ddb",
+        "8b22e7a5c8c0731b",
         "12f8150f3e56878e",
     },
     "sequential": _BEFORE_ROOMS
@@ -90,6 +96,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "94960c384a0a8485",
         "803268b7890760fe",
         "c98c882b0f01018a",
+        "a0f441f47bd0567b",
         "34dd982a0979230b",
     },
     "single_shot": _BEFORE_ROOMS
@@ -97,6 +104,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "79f6c4e7bcbed712",
         "9bc00b590c848797",
         "99bc95063c5154d9",
+        "0fd8bee355f51b05",
         "b26433629f82dbdb",
     },
     "two_stage": _BEFORE_ROOMS
@@ -104,6 +112,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "aa386e4d4cbe4d9c",
         "63218d533e28078f",
         "42c20fc02fe70a7a",
+        "6de38d1bb0294859",
         "e9a469f2807caf7a",
     },
 }

@@ -102,9 +102,8 @@ def perform(job: Job, progress: object = None) -> None:
     if "progress" in inspect.signature(stage.run).parameters:
         more["progress"] = progress
     result = stage.run(tables, settings, **more)
-    records.leave(
-        job.record, _record(job, read), _written(job, result, stage_provenance(job, read), read)
-    )
+    marks = stage_provenance(job, read)
+    records.leave(job.record, _record(job, marks, read), _written(job, result, marks, read))
 
 
 def stage_provenance(
@@ -130,19 +129,19 @@ def is_done(job: Job) -> bool:
     """Whether the files of a job are there, whole, made from the same inputs, settings and code."""
     try:
         record = records.read(job.record)
-        return record == _record(job, digests(job.inputs), record.files) and not records.misfits(
-            job.record, record
-        )
+        read = digests(job.inputs)
+        wanted = _record(job, stage_provenance(job, read), read, record.files)
+        return record == wanted and not records.misfits(job.record, record)
     except (InputError, OSError):
         return False
 
 
 def _record(
     job: Job,
+    marks: Mapping[str, object],
     inputs_digests: Mapping[str, str],
     files: Mapping[str, records.Written] = MappingProxyType({}),
 ) -> records.Record:
-    marks = stage_provenance(job, inputs_digests)
     told = {key: str(marks[key]) for key in PROVENANCE_KEYS}
     return records.Record(job.stage, job.part, told, dict(inputs_digests), files)
 

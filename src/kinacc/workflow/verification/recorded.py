@@ -90,7 +90,7 @@ def check_records(
         if unit not in known:
             if not place.exists():
                 names = ", ".join(each.name for each in there[unit])
-                what = f"missing: the run that wrote {names} did not come to its end"
+                what = f"missing: it is lost, or the run that wrote {names} did not come to its end"
                 found.append((Problem(str(place), what), (Doubt(*unit),)))
             continue
         own = _held(folder, place, known[unit], there.get(unit, []), in_doubt)
