@@ -49,6 +49,7 @@ SLOW = (
     "campaign/test_campaign_commands.py",
     "campaign/test_forecast.py",
     "campaign/test_growing_file.py",
+    "campaign/test_lost_readings.py",
     "campaign/test_on_a_real_arm.py",
     "campaign/test_planning.py",
     "campaign/test_report_above_its_bounds.py",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from command_line import call, small_study
 
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.world import drawn_world
@@ -64,3 +65,23 @@ def make_world(errors_mm):
         return drawn_world(errors[order], sigma_mm, key_of(seed), 400)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def calibration(tmp_path_factory):
+    """Results of a small synthetic study, made by the workflow's own stages."""
+    return small_study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.fixture
+def begun(calibration, tmp_path):
+    """Start a campaign with further options; its folder."""
+
+    def start(*more, points=20, budget=20):
+        folder = tmp_path / f"campaign {len(list(tmp_path.iterdir()))}"
+        done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+                    "--model", "dh", "--drawn", points, "--budget", budget, *more)  # fmt: skip
+        assert done.exit_code == 0, done.output
+        return folder
+
+    return start

@@ -3,90 +3,24 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import call, small_study
+from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
+from command_line import call
 
 from kinacc.artifacts import store
 from kinacc.artifacts.contract import ARTEFACTS
-from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import CHOOSING
 from kinacc.assess.simulate import conduct
-from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import prediction_check
-from kinacc.campaign.reading import Reading
 from kinacc.campaign.words import reason
 from kinacc.cli import campaigns_answers
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics.model import JointState
 from kinacc.workflow.verification.conformity import check_file
-
-SIGMA_MM = 0.05
-
-
-@pytest.fixture(scope="module")
-def calibration(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
-
-
-@pytest.fixture
-def begun(calibration, tmp_path):
-    """Start a campaign with further options; its folder."""
-
-    def start(*more, points=20, budget=20):
-        folder = tmp_path / f"campaign {len(list(tmp_path.iterdir()))}"
-        done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
-                    "--model", "dh", "--drawn", points, "--budget", budget, *more)  # fmt: skip
-        assert done.exit_code == 0, done.output
-        return folder
-
-    return start
-
-
-class Arm:
-    """The arm at the campaign: its errors are known here, and its readings are those of a world."""
-
-    def __init__(self, folder, sigma_mm=SIGMA_MM):
-        self.plan = campaigns.open_(folder).plan
-        rows = self.plan.visiting(frozenset())
-        errors = np.random.default_rng(11).normal(size=(len(rows), 3)) * 0.2
-        errors[5] = (0.9, -0.6, 0.5)
-        self.world = drawn_world(errors[rows], sigma_mm, key_of(5), 200)
-        self.row = {int(point): row for row, point in enumerate(rows)}
-        self.reads = np.zeros(len(rows), dtype=int)
-
-    def position(self, label):
-        """What the instrument reads next at a point, as text."""
-        point = self.plan.points.number(label)
-        row = self.row[point]
-        seen = self.plan.points.modelled_mm[point] + self.world.reading_mm(row, self.reads[row])
-        self.reads[row] += 1
-        return ",".join(repr(float(each)) for each in seen)
-
-
-def standing(folder):
-    """What status says, without a forecast."""
-    return json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).stdout)
-
-
-def files_of(folder):
-    """Everything in a campaign's folder but the empty lock."""
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
-
-
-def refused(folder, *words):
-    """The message of a command that must fail and leave the campaign as it was."""
-    before = files_of(folder)
-    done = call("campaign", *words)
-    assert done.exit_code == 2, done.output
-    assert "Traceback" not in done.output
-    assert files_of(folder) == before
-    return done.output
 
 
 def test_a_budget_below_the_candidates_is_told_what_more_would_bring(calibration, tmp_path):
@@ -334,27 +268,6 @@ def test_readings_of_a_file_that_has_grown_are_taken_once(begun, tmp_path):
     assert "was recorded before" in refused(folder, "record", folder, file, "--again")
 
 
-def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    arm = Arm(folder)
-    first, second = (arm.plan.points.label[point] for point in arm.plan.route[:2])
-    call("campaign", "record", folder, "--position-mm", arm.position(first))
-    journal = folder / "readings.jsonl"
-    whole, confirmed = journal.read_bytes(), (folder / "head.json").read_bytes()
-    call("campaign", "record", folder, "--position-mm", arm.position(second))
-    journal.write_bytes(journal.read_bytes()[:-9])
-    (folder / "head.json").write_bytes(confirmed)  # the command ended while it wrote
-    shown = call("campaign", "status", folder)
-    assert "was cut off" in shown.output
-    assert "1 of 20 readings taken" in shown.output
-    arm.reads[arm.row[arm.plan.points.number(second)]] = 0
-    done = call("campaign", "record", folder, "--position-mm", arm.position(second))
-    assert done.exit_code == 0
-    assert journal.read_bytes().startswith(whole)
-    assert "cut off" not in call("campaign", "status", folder).output
-    assert len(campaigns.open_(folder).state().told) == 2
-
-
 @pytest.mark.parametrize(
     ("noise", "words"),
     [
@@ -464,17 +377,6 @@ def test_there_is_no_campaign(tmp_path):
     assert not (tmp_path / "nowhere").exists()
 
 
-def recorded(folder, arm, count):
-    """Take the next ``count`` readings through one file per reading of the arm."""
-    for _ in range(count):
-        with campaigns.writing(folder) as opened:
-            state = opened.state()
-            label = arm.plan.points.label[state.asked]
-            seen = [float(each) for each in arm.position(label).split(",")]
-            taken = Reading(state.asked, np.array(seen), arm.plan.instruments[0].name)
-            opened.write(campaigns.readings_entry([taken]))
-
-
 def test_a_report_holds_its_contract_and_says_what_status_says(begun):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", "--tolerance-mm", "2")
     arm = Arm(folder)
@@ -504,75 +406,6 @@ def test_a_report_holds_its_contract_and_says_what_status_says(begun):
     before = {path.name: path.read_bytes() for path in made.iterdir()}
     assert call("campaign", "report", folder).exit_code == 0
     assert {path.name: path.read_bytes() for path in made.iterdir()} == before
-
-
-def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(begun):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    recorded(folder, arm := Arm(folder), 5)
-    earlier = {each.name: each.read_bytes() for each in folder.iterdir() if each.is_file()}
-    recorded(folder, arm, 2)
-    call("campaign", "report", folder)
-    text = (folder / "report" / "report.md").read_text()
-    head = re.search(r"7 readings, head (\w{16})\.", text)[1]
-    known = ("verify", folder, "--head", head, "--readings", 7)
-    assert "it holds what was reported" in call("campaign", *known).output
-    recorded(folder, arm, 1)
-    assert call("campaign", *known).exit_code == 0
-    for name, content in earlier.items():  # the folder as it was before the two readings
-        (folder / name).write_bytes(content)
-    assert call("campaign", "verify", folder).exit_code == 0
-    done = call("campaign", *known)
-    assert done.exit_code == 1
-    assert f"holds no entry {head}: it was shortened or rewritten" in done.output
-    done = call("campaign", "verify", folder, "--readings", 7)
-    assert done.exit_code == 1
-    assert "5 readings; allowed: 7 as reported" in done.output
-
-
-def test_a_clock_that_went_back_is_asked_about_before_a_reading_is_taken(begun, monkeypatch):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    recorded(folder, arm := Arm(folder), 2)
-    label = standing(folder)["next"]
-    reading = ("--point", label, "--position-mm", arm.position(label))
-    with monkeypatch.context() as patched:
-        patched.setattr(campaigns, "_stamp", _in_1999(campaigns._stamp))
-        said = refused(folder, "record", folder, *reading)
-        assert "the clock of this computer: says 1999-12-31" in said
-        assert call("campaign", "record", folder, *reading, "--accept-implausible").exit_code == 0
-    recorded(folder, arm, 1)
-    call("campaign", "report", folder)
-    assert "clock was set in between" in (folder / "report" / "report.md").read_text()
-
-
-def _in_1999(stamp):
-    return lambda time=None: stamp(time) if time else "1999-12-31T23:59:59+00:00"
-
-
-def test_a_reading_from_beyond_all_rooms_is_never_taken(begun, tmp_path):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    label = standing(folder)["next"]
-    file = tmp_path / "far.csv"
-    file.write_text(f"pose,x_mm,y_mm,z_mm\n{label},1e308,0,0\n")
-    said = refused(folder, "record", folder, file, "--accept-implausible")
-    assert "three numbers within 1e+06 mm" in said
-
-
-def test_a_candidate_with_spaces_about_its_name_can_be_recorded(calibration, tmp_path):
-    joints = tmp_path / "candidates.csv"
-    names = [f"q{joint}_deg" for joint in range(1, 7)]
-    rows = [f"  sp{n} ,{n},{10 + n},{n},{n},{20 + n},{n}" for n in range(4)]
-    joints.write_text("\n".join(["pose," + ",".join(names), *rows]) + "\n")
-    folder = tmp_path / "spaced"
-    done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
-                "--model", "dh", "--candidates", joints, "--budget", 4, "--noise-mm", SIGMA_MM,
-                "--frame", "base", "--sure")  # fmt: skip
-    assert done.exit_code == 0, done.output
-    label = standing(folder)["next"]
-    assert label == label.strip()
-    plan = campaigns.open_(folder).plan
-    seen = ",".join(map(repr, map(float, plan.points.modelled_mm[plan.points.number(label)])))
-    done = call("campaign", "record", folder, "--point", f" {label} ", "--position-mm", seen)
-    assert done.exit_code == 0, done.output
 
 
 def left_to_visit(folder):

@@ -1,0 +1,67 @@
+"""A campaign in a folder, as tests of its commands use it: the arm at it, and what it says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+from command_line import call
+
+from kinacc.assess.random_numbers import key_of
+from kinacc.assess.world import drawn_world
+from kinacc.campaign import folder as campaigns
+from kinacc.campaign.reading import Reading
+
+SIGMA_MM = 0.05
+
+
+class Arm:
+    """The arm at the campaign: its errors are known here, and its readings are those of a world."""
+
+    def __init__(self, folder, sigma_mm=SIGMA_MM):
+        self.plan = campaigns.open_(folder).plan
+        rows = self.plan.visiting(frozenset())
+        errors = np.random.default_rng(11).normal(size=(len(rows), 3)) * 0.2
+        errors[5] = (0.9, -0.6, 0.5)
+        self.world = drawn_world(errors[rows], sigma_mm, key_of(5), 200)
+        self.row = {int(point): row for row, point in enumerate(rows)}
+        self.reads = np.zeros(len(rows), dtype=int)
+
+    def position(self, label):
+        """What the instrument reads next at a point, as text."""
+        point = self.plan.points.number(label)
+        row = self.row[point]
+        seen = self.plan.points.modelled_mm[point] + self.world.reading_mm(row, self.reads[row])
+        self.reads[row] += 1
+        return ",".join(repr(float(each)) for each in seen)
+
+
+def standing(folder):
+    """What status says, without a forecast."""
+    return json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).stdout)
+
+
+def files_of(folder):
+    """Everything in a campaign's folder but the empty lock."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
+
+
+def refused(folder, *words):
+    """The message of a command that must fail and leave the campaign as it was."""
+    before = files_of(folder)
+    done = call("campaign", *words)
+    assert done.exit_code == 2, done.output
+    assert "Traceback" not in done.output
+    assert files_of(folder) == before
+    return done.output
+
+
+def recorded(folder, arm, count):
+    """Take the next ``count`` readings through one file per reading of the arm."""
+    for _ in range(count):
+        with campaigns.writing(folder) as opened:
+            state = opened.state()
+            label = arm.plan.points.label[state.asked]
+            seen = [float(each) for each in arm.position(label).split(",")]
+            taken = Reading(state.asked, np.array(seen), arm.plan.instruments[0].name)
+            opened.write(campaigns.readings_entry([taken]))

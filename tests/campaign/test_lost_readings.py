@@ -1,0 +1,100 @@
+"""Readings that could be lost, taken away or never taken: cuts, deletions, clocks, odd names."""
+
+from __future__ import annotations
+
+import re
+
+from campaign_on_disk import SIGMA_MM, Arm, recorded, refused, standing
+from command_line import call
+
+from kinacc.campaign import folder as campaigns
+
+
+def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    arm = Arm(folder)
+    first, second = (arm.plan.points.label[point] for point in arm.plan.route[:2])
+    call("campaign", "record", folder, "--position-mm", arm.position(first))
+    journal = folder / "readings.jsonl"
+    whole, confirmed = journal.read_bytes(), (folder / "head.json").read_bytes()
+    call("campaign", "record", folder, "--position-mm", arm.position(second))
+    journal.write_bytes(journal.read_bytes()[:-9])
+    (folder / "head.json").write_bytes(confirmed)  # the command ended while it wrote
+    shown = call("campaign", "status", folder)
+    assert "was cut off" in shown.output
+    assert "1 of 20 readings taken" in shown.output
+    arm.reads[arm.row[arm.plan.points.number(second)]] = 0
+    done = call("campaign", "record", folder, "--position-mm", arm.position(second))
+    assert done.exit_code == 0
+    assert journal.read_bytes().startswith(whole)
+    assert "cut off" not in call("campaign", "status", folder).output
+    assert len(campaigns.open_(folder).state().told) == 2
+
+
+def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(begun):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    recorded(folder, arm := Arm(folder), 5)
+    earlier = {each.name: each.read_bytes() for each in folder.iterdir() if each.is_file()}
+    recorded(folder, arm, 2)
+    call("campaign", "report", folder)
+    text = (folder / "report" / "report.md").read_text()
+    head = re.search(r"7 readings, head (\w{16})\.", text)[1]
+    known = ("verify", folder, "--head", head, "--readings", 7)
+    assert "it holds what was reported" in call("campaign", *known).output
+    recorded(folder, arm, 1)
+    assert call("campaign", *known).exit_code == 0
+    for name, content in earlier.items():  # the folder as it was before the two readings
+        (folder / name).write_bytes(content)
+    assert call("campaign", "verify", folder).exit_code == 0
+    done = call("campaign", *known)
+    assert done.exit_code == 1
+    assert f"holds no entry {head}: it was shortened or rewritten" in done.output
+    done = call("campaign", "verify", folder, "--readings", 7)
+    assert done.exit_code == 1
+    assert "5 readings; allowed: 7 as reported" in done.output
+
+
+def test_a_clock_that_went_back_is_asked_about_before_a_reading_is_taken(begun, monkeypatch):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    recorded(folder, arm := Arm(folder), 2)
+    label = standing(folder)["next"]
+    reading = ("--point", label, "--position-mm", arm.position(label))
+    with monkeypatch.context() as patched:
+        patched.setattr(campaigns, "_stamp", _in_1999(campaigns._stamp))
+        said = refused(folder, "record", folder, *reading)
+        assert "the clock of this computer: says 1999-12-31" in said
+        assert call("campaign", "record", folder, *reading, "--accept-implausible").exit_code == 0
+    recorded(folder, arm, 1)
+    call("campaign", "report", folder)
+    assert "clock was set in between" in (folder / "report" / "report.md").read_text()
+
+
+def _in_1999(stamp):
+    return lambda time=None: stamp(time) if time else "1999-12-31T23:59:59+00:00"
+
+
+def test_a_reading_from_beyond_all_rooms_is_never_taken(begun, tmp_path):
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    label = standing(folder)["next"]
+    file = tmp_path / "far.csv"
+    file.write_text(f"pose,x_mm,y_mm,z_mm\n{label},1e308,0,0\n")
+    said = refused(folder, "record", folder, file, "--accept-implausible")
+    assert "three numbers within 1e+06 mm" in said
+
+
+def test_a_candidate_with_spaces_about_its_name_can_be_recorded(calibration, tmp_path):
+    joints = tmp_path / "candidates.csv"
+    names = [f"q{joint}_deg" for joint in range(1, 7)]
+    rows = [f"  sp{n} ,{n},{10 + n},{n},{n},{20 + n},{n}" for n in range(4)]
+    joints.write_text("\n".join(["pose," + ",".join(names), *rows]) + "\n")
+    folder = tmp_path / "spaced"
+    done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+                "--model", "dh", "--candidates", joints, "--budget", 4, "--noise-mm", SIGMA_MM,
+                "--frame", "base", "--sure")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    label = standing(folder)["next"]
+    assert label == label.strip()
+    plan = campaigns.open_(folder).plan
+    seen = ",".join(map(repr, map(float, plan.points.modelled_mm[plan.points.number(label)])))
+    done = call("campaign", "record", folder, "--point", f" {label} ", "--position-mm", seen)
+    assert done.exit_code == 0, done.output
