@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -37,6 +39,25 @@ def held(path: Path) -> Iterator[int]:
         os.close(handle)
 
 
+def taken(handle: int, how: int, patience_s: float | None = None) -> bool:
+    """Whether a lock of an open file was had (``fcntl.LOCK_EX`` or ``LOCK_SH``), within a time.
+
+    For as long as it takes where no ``patience_s`` is given. OSError where the file system of the
+    file has no locks.
+    """
+    until = None if patience_s is None else time.monotonic() + patience_s
+    while True:
+        try:
+            fcntl.flock(handle, how if until is None else how | fcntl.LOCK_NB)
+            return True
+        except OSError as error:
+            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
+                raise
+            if until is not None and time.monotonic() > until:
+                return False
+        time.sleep(0.05)
+
+
 def abandoned(path: Path) -> bool:
     """Whether nobody holds a file that was ``held``; not known on a file system without locks."""
     try:
@@ -44,12 +65,11 @@ def abandoned(path: Path) -> bool:
     except OSError:
         return False
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return taken(handle, fcntl.LOCK_EX, 0.0)
     except OSError:
         return False
     finally:
         os.close(handle)
-    return True
 
 
 def sweep(folder: Path | str) -> None:

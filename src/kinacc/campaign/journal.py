@@ -9,18 +9,17 @@ a journal that has lost whole lines at its end is noticed too.
 
 from __future__ import annotations
 
-import errno
+import fcntl
 import hashlib
 import json
 import os
 import stat
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kinacc.artifacts.atomic import synchronise, write_whole
+from kinacc.artifacts.atomic import synchronise, taken, write_whole
 from kinacc.config import json_files
 from kinacc.errors import InputError, MachineError, Problem, refused
 
@@ -147,37 +146,26 @@ def append(path: Path, known: Journal, entry: Mapping) -> None:
 
 
 @contextmanager
-def writing(
-    folder: Path, patience_s: float = _PATIENCE_S, sleep: Callable[[float], None] = time.sleep
-) -> Iterator[None]:
+def writing(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
     """Hold the campaign for one writer; the system lets go of it when the process ends.
 
     Raises InputError where another holds it for longer than ``patience_s``.
     """
-    import fcntl
-
     try:
         lock = open(folder / LOCK, "a+")  # noqa: SIM115 closed by the next line's block
     except OSError as error:
         raise _not_written(folder / LOCK, error) from None
     with lock as file:
-        waited = 0.0
-        while True:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except OSError as error:
-                if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
-                    what = f"the file system of this folder holds no locks: {error.strerror}"
-                    fix = "two writers could spoil the campaign: move its folder to a local disk"
-                    raise InputError(Problem(str(folder), what, fix=fix)) from None
-                if waited >= patience_s:
-                    what = "another process is writing to this campaign"
-                    raise InputError(
-                        Problem(str(folder), what, fix="wait until it is done, then try again")
-                    ) from None
-                sleep(0.05)
-                waited += 0.05
+        try:
+            held = taken(file.fileno(), fcntl.LOCK_EX, patience_s)
+        except OSError as error:
+            what = f"the file system of this folder holds no locks: {error.strerror}"
+            fix = "two writers could spoil the campaign: move its folder to a local disk"
+            raise InputError(Problem(str(folder), what, fix=fix)) from None
+        if not held:
+            what = "another process is writing to this campaign"
+            fix = "wait until it is done, then try again"
+            raise InputError(Problem(str(folder), what, fix=fix))
         yield
 
 

@@ -8,20 +8,18 @@ when nothing runs. The standard library alone, since every job imports this.
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import json
 import os
 import shlex
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
-from kinacc.artifacts.atomic import sweep
-from kinacc.errors import InputError, KinaccError
+from kinacc.artifacts.atomic import sweep, taken
+from kinacc.errors import InputError, KinaccError, refused
 from kinacc.workflow.catalogue import STAGES
 
 LOCK, JOBS = ".lock", ".lock-jobs"
@@ -153,36 +151,23 @@ def _opened(results: Path | str, name: str, tell: Callable[[str], object]) -> It
         path.parent.mkdir(parents=True, exist_ok=True)
         file = open(path, "a+", encoding="utf-8")  # noqa: SIM115 closed by the next block
     except OSError as error:
-        raise KinaccError(f"{path}: cannot be written: {error.strerror}") from None
+        raise refused(error, path, "cannot be written") from None
     with file:
         try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            fcntl.flock(file, fcntl.LOCK_UN)
-        except OSError as error:
-            if name == LOCK and error.errno not in _BUSY:
+            if taken(file.fileno(), fcntl.LOCK_SH, 0.0):
+                fcntl.flock(file, fcntl.LOCK_UN)
+        except OSError:
+            if name == LOCK:
                 tell(f"{results}: this file system has no locks: see that nothing else runs in it")
         yield file
 
 
-_BUSY = (errno.EWOULDBLOCK, errno.EACCES)
-
-
 def _taken(file: TextIO, how: int, patience_s: float | None = None) -> bool:
-    """Whether a lock was had; for as long as it takes where no patience is given.
-
-    A file system without locks has every lock for everybody.
-    """
-    until = None if patience_s is None else time.monotonic() + patience_s
-    while True:
-        try:
-            fcntl.flock(file, how if until is None else how | fcntl.LOCK_NB)
-            return True
-        except OSError as error:
-            if error.errno not in _BUSY:
-                return True
-            if until is not None and time.monotonic() > until:
-                return False
-        time.sleep(0.05)
+    """Whether a lock was had; a file system without locks has every lock for everybody."""
+    try:
+        return taken(file.fileno(), how, patience_s)
+    except OSError:
+        return True
 
 
 def _name(lock: TextIO, number: str) -> None:
