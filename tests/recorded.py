@@ -8,6 +8,15 @@ from pathlib import Path
 from kinacc.artifacts import records, store
 from kinacc.workflow.catalogue import maker_of
 
+# Marks of a table that was made from nothing.
+MARKS = {
+    "kinacc_version": "0",
+    "config_hash": "c",
+    "code_hash": "d",
+    "inputs_hash": "i",
+    "seed": 1,
+}
+
 
 def write(path: Path, artefact: str, columns: Mapping, marks: Mapping) -> None:
     """Write the one table of a stage, made from nothing, and the stage's record."""

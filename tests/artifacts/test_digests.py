@@ -9,18 +9,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from recorded import MARKS
 
 from kinacc.artifacts import records, store
 from kinacc.artifacts.pictures import inputs_digests
 from kinacc.errors import InputError
 
-MARKS = {
-    "kinacc_version": "0",
-    "config_hash": "c",
-    "code_hash": "d",
-    "inputs_hash": "i",
-    "seed": 1,
-}
 _VALUES = {"double": "<d", "int64": "<q", "int8": "<b"}
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recorded import MARKS
 
 from kinacc import progress
 from kinacc.artifacts.store import read_metadata, write
@@ -13,14 +14,6 @@ from kinacc.errors import InputError, Problem
 from kinacc.workflow.plan import planned
 from kinacc.workflow.runner import Job, execute, stage_provenance
 from kinacc.workflow.stages import error_model, study
-
-MARKS = {
-    "kinacc_version": "0",
-    "config_hash": "c",
-    "code_hash": "d",
-    "inputs_hash": "i",
-    "seed": 1,
-}
 
 
 def frames(model="vec"):

@@ -35,6 +35,7 @@ _CACHE = "SNAKEMAKE_OUTPUT_CACHE"
 _NUMBER = re.compile(r"kinacc-[0-9a-f]{16}-")
 # Folders that Snakemake makes for a run: in TMPDIR, and beside its cache of source files.
 _MADE = re.compile(r"snakemake[a-z0-9_]{8}|snakemake-runtime-cache/tmp[a-z0-9_]{8}")
+_ALL = {"all", "everything"}  # targets that are all of a run
 _STOPS = (signal.SIGINT, signal.SIGTERM)
 _PATIENCE_S = 2.0  # a compiled kernel keeps a polite signal waiting
 
@@ -60,9 +61,11 @@ def attend(workflow: Any, results: str, plan: Callable[[], Plan]) -> None:
     execute = workflow.execute
 
     def attended(*args: Any, **named: Any) -> object:
-        if (named.get("executor_plugin") or args[0]).common_settings.dryrun_exec:
-            return execute(*args, **named)
         try:
+            if workflow.is_main_process and not is_module:
+                _say_what_is_ahead(workflow, plan())
+            if (named.get("executor_plugin") or args[0]).common_settings.dryrun_exec:
+                return execute(*args, **named)
             # What is no main process is a job: on a node of a cluster, say.
             with running(folder) if workflow.is_main_process else joined():
                 if workflow.is_main_process and not is_module:
@@ -128,6 +131,20 @@ class Stop:
         if self.code:
             sweep(self.folder)
             raise SystemExit(self.code) from None
+
+
+def _say_what_is_ahead(workflow: Any, plan: Plan) -> None:
+    """Say what a run of everything costs where that is a lot.
+
+    Raises InputError where this machine cannot hold it; nodes of a cluster may have more memory.
+    """
+    from snakemake.logging import logger
+
+    from kinacc.workflow import cost
+
+    if set(workflow.dag_settings.targets) <= _ALL:
+        for line in cost.expected(cost.foreseen(plan), workflow.resource_settings.nodes is None):
+            logger.info(line)
 
 
 def _end_jobs() -> None:
