@@ -66,9 +66,9 @@ class Outcome:
     """What one gate found of one data set.
 
     ``kind`` is the kind of gate (value, change, campaign, claims, suspicions, history, results,
-    accepted); ``says`` one sentence with the figures, ``fix`` what to do or look at where it did not
-    pass. ``figures`` are the numbers by name with unit (``mean_mm``), ``differences`` those from the
-    accepted run.
+    accepted); ``says`` one sentence with the figures, ``fix`` what to do or look at where it did
+    not pass. ``figures`` are the numbers by name with unit (``mean_mm``), ``differences`` those
+    from the accepted run.
     """
 
     dataset: str
