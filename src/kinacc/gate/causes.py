@@ -52,30 +52,26 @@ class Causes:
         old, new = self.before.record(name), self.now.record(name)
         if old is None or new is None:
             return self._more_or_fewer(name)
-        found = dict.fromkeys(changes(old, new))
+        found = dict.fromkeys((*changes(old, new), *_files(old, new)))
         for role in {**old.inputs_digests, **new.inputs_digests}:
             was, is_ = old.inputs_digests.get(role, ""), new.inputs_digests.get(role, "")
-            if was != is_:
-                found |= dict.fromkeys(self._read(role, was, is_, new))
+            if was != is_ and not _is_file(role):
+                found |= dict.fromkeys(self._read(role, was, is_))
         found |= dict.fromkeys(self._made_from_others(name, new))
         return tuple(found) or (Cause(UNEXPLAINED, name),)
 
-    def _read(self, role: str, was: str, is_: str, new: Record) -> Iterable[Cause]:
-        """Causes of another input; what a file from outside holds has none before it."""
+    def _read(self, role: str, was: str, is_: str) -> Iterable[Cause]:
+        """Causes of another table that was read."""
         whose, _, artefact = role.rpartition("/")
-        if artefact.endswith("_file"):
-            return [Cause(INPUT, _file(role, new), was[:16], is_[:16])]
-        if whose:
-            return [Cause(INPUT, role, was[:16], is_[:16])]
         maker = maker_of(artefact).name
-        if self.before.record(maker) and self.now.record(maker):
+        if not whose and self.before.record(maker) and self.now.record(maker):
             return self.of_stage(maker)
-        return [Cause(INPUT, artefact, was[:16] or "not read", is_[:16] or "not read")]
+        return [Cause(INPUT, role, was[:16] or "not read", is_[:16] or "not read")]
 
     def _made_from_others(self, name: str, new: Record) -> Iterator[Cause]:
         """Inputs that are not those now in the folder: the file comes from another run."""
         for role, digest in new.inputs_digests.items():
-            if role.endswith("_file") or "/" in role:
+            if _is_file(role) or "/" in role:
                 continue
             maker = maker_of(role)
             there = self.now.digest(role, maker) if self.now.record(maker.name) else ""
@@ -83,7 +79,7 @@ class Causes:
                 yield Cause(UNEXPLAINED, name, f"made from {role} {there[:16]}", digest[:16])
 
     def _more_or_fewer(self, name: str) -> tuple[Cause, ...]:
-        """Why a stage is of one of the runs alone: what the configurations of the runs differ in."""
+        """Why one of the runs alone has a stage: what the configurations differ in."""
         found = {
             cause: None
             for stage in self.now.stages()
@@ -95,19 +91,14 @@ class Causes:
 
     def own(self) -> tuple[Cause, ...]:
         """All that changed, whether anything differs for it or not."""
-        found: dict[Cause, None] = {}
-        for stage in self.now.stages():
-            old, new = self.before.record(stage.name), self.now.record(stage.name)
-            if old is None or new is None:
-                continue
-            found |= dict.fromkeys(changes(old, new))
-            for role in new.inputs_digests:
-                was = old.inputs_digests.get(role, "")
-                if role.endswith("_file") and was != new.inputs_digests[role]:
-                    found[
-                        Cause(INPUT, _file(role, new), was[:16], new.inputs_digests[role][:16])
-                    ] = None
-        return tuple(found)
+        return tuple(
+            dict.fromkeys(
+                cause
+                for stage in self.now.stages()
+                if (old := self.before.record(stage.name)) and (new := self.now.record(stage.name))
+                for cause in (*changes(old, new), *_files(old, new))
+            )
+        )
 
 
 def changes(old: Record, new: Record) -> Iterator[Cause]:
@@ -160,6 +151,17 @@ def _unequal(
             yield key, old.get(key), new.get(key)
 
 
+def _files(old: Record, new: Record) -> Iterator[Cause]:
+    """Files from outside that hold something else."""
+    for role, was, is_ in _unequal(old.inputs_digests, new.inputs_digests):
+        if _is_file(role):
+            yield Cause(INPUT, _file(role, new), (was or "")[:16], (is_ or "")[:16])
+
+
+def _is_file(role: str) -> bool:
+    return role.endswith("_file")
+
+
 def _file(role: str, record: Record) -> str:
     """A file from outside by the key that names it, and its name."""
     key = _KEYS.get(role.rpartition("/")[2])
@@ -192,7 +194,5 @@ _WORDS: dict[str, Callable[[list[Cause]], str]] = {
     VERSION: lambda found: f"version: {', '.join(map(_from_to, found))}",
     CODE: lambda found: f"code changed: {', '.join(each.where for each in found)}",
     INPUT: lambda found: f"data changed: {', '.join(each.where for each in found)}",
-    UNEXPLAINED: lambda found: (
-        f"unexplained: {', '.join(' '.join(filter(None, (each.where, each.before))) for each in found)}"
-    ),
+    UNEXPLAINED: lambda found: f"unexplained: {', '.join(each.where for each in found)}",
 }
