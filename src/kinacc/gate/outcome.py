@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import dataclass, field
 
 # "undecided": the data do not tell; the gate's own words say whether that is a failure.
 PASSED, WARNED, FAILED, UNDECIDED = "passed", "warned", "failed", "undecided"
@@ -78,7 +77,7 @@ class Outcome:
     verdict: str
     says: str
     fix: str = ""
-    figures: Mapping[str, float | int | str | None] = MappingProxyType({})
+    figures: Mapping[str, float | int | str | None] = field(default_factory=dict)
     differences: tuple[Difference, ...] = ()
     file: str = ""
 
