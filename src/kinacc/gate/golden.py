@@ -91,9 +91,9 @@ class _Comparison:
 
     def of_table(self, artefact: str, stage: Stage) -> list[Found]:
         """What differs in one table."""
-        if not self.before.record(stage.name):
+        if not self.before.has(artefact, stage):
             return [Found("", "is not in the accepted run", 0, 0)]
-        if not self.now.record(stage.name):
+        if not self.now.has(artefact, stage):
             return [Found("", "is in the accepted run and not here", 0, 0)]
         edited = self.edited(artefact, stage)
         if not edited and self.before.digest(artefact, stage) == self.now.digest(artefact, stage):
@@ -143,7 +143,7 @@ def _differences(name: str, both: _Comparison, exact: bool) -> Iterator[Differen
     for artefact, stage in both.stages().items():
         found = both.of_table(artefact, stage)
         why = both.causes.of_stage(stage.name) if found else ()
-        if found and both.now.record(stage.name) and both.edited(artefact, stage):
+        if found and both.now.has(artefact, stage) and both.edited(artefact, stage):
             why = (Cause(UNEXPLAINED, artefact),)
         for each in found:
             yield Difference(

@@ -38,7 +38,13 @@ class Made:
         """Every table that a record tells of, with the stage that made it."""
         for stage in self.stages():
             if stage.leaves == TABLES:
-                yield from ((artefact, stage) for artefact in stage.outputs)
+                yield from ((name, stage) for name in stage.outputs if self.has(name, stage))
+
+    def has(self, artefact: str, stage: Stage) -> bool:
+        """Whether the records tell of a table."""
+        files = [name for record in self.by_stage.get(stage.name, ()) for name in record.files]
+        ending = f"{artefact}/" if stage.scattered else f"{artefact}.parquet"
+        return any(name.startswith(ending) for name in files)
 
     def paths(self, artefact: str, stage: Stage) -> list[Path]:
         """The files of a table that its records name, one or its parts in their order."""
