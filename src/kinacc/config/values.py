@@ -322,6 +322,13 @@ def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     return (INVALID if problems else dict(value)), problems
 
 
+def _series(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
+    from kinacc.config import series
+
+    lines, problems = series.lines(value, path, place)
+    return (INVALID if problems else lines), problems
+
+
 _CHECKS: dict[str, Check] = {
     "int": _int,
     "float": _float,
@@ -336,4 +343,5 @@ _CHECKS: dict[str, Check] = {
     "parameters": _parameters,
     "rows": _rows,
     "records": _records,
+    "series": _series,
 }
