@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date, datetime
+from itertools import pairwise
 from typing import Any
 
 from kinacc.config.names import LONGEST
@@ -101,7 +102,7 @@ def _wrong(each: Mapping, here: KeyPath, place: Place) -> Iterator[Problem]:
 
 def _of_each_other(found: Sequence[Line], path: KeyPath, place: Place) -> Iterator[Problem]:
     """What is wrong with lines, ordered by date, beside one another."""
-    for before, line in zip(found, found[1:], strict=False):
+    for before, line in pairwise(found):
         here = (*path, line.number)
         if line.date == before.date:
             what = f"{line.date} is the date of two lines"

@@ -238,7 +238,7 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
     told = {
         name: reason
         for name, reason in left_out.items()
-        if not (STAGES[name].by_choice or name in unmade or plan and folder.name not in plan.told)
+        if not (STAGES[name].by_choice or name in unmade or (plan and folder.name not in plan.told))
     }
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
