@@ -89,7 +89,8 @@ class Stage:
         reads, where optional ones are among them.
         """
         found: dict[str, None] = {}
-        there = {*(self.inputs if inputs is None else inputs), *self.outputs}
+        read = self.inputs if inputs is None else (role.rpartition("/")[2] for role in inputs)
+        there = {*read, *self.outputs}
         models = [kind for kind in FITTED if f"{kind}_model" in there]
         settings = {**settings, "models": models, "fits": self.fits}
         for use in self.uses:

@@ -235,10 +235,11 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
             marks[f"{name}/{path.stem}" if is_part else name] = store.read_metadata(path)
     left_out = _left_out(folder, marks, tables, plan)
     unmade = _not_studied(folder)
+    is_line = plan is not None and folder.name not in plan.told
     told = {
         name: reason
         for name, reason in left_out.items()
-        if not (STAGES[name].by_choice or name in unmade or (plan and folder.name not in plan.told))
+        if not (STAGES[name].by_choice or name in unmade or is_line)
     }
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
@@ -246,7 +247,7 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         for reason in dict.fromkeys(told.values())
     ]
     notes += [f"{folder / name}.parquet: left from before, {why}" for name, why in behind.items()]
-    if unmade:
+    if unmade and not is_line:
         notes.append(f"{folder}: no study was made: kinacc study FILE.yaml makes one")
     absent = {*left_out, *unmade}
     found += _missing(folder, absent)
