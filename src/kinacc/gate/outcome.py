@@ -67,7 +67,8 @@ class Outcome:
     ``kind`` is the kind of gate (value, change, campaign, claims, suspicions, history, results,
     accepted); ``says`` one sentence with the figures, ``fix`` what to do or look at where it did
     not pass. ``figures`` are the numbers by name with unit (``mean_mm``), ``differences`` those
-    from the accepted run.
+    from the accepted run. ``file`` is the one to open: the configuration that states the gate, or
+    the artefact that did not hold; empty where there is none.
     """
 
     dataset: str
@@ -78,6 +79,7 @@ class Outcome:
     fix: str = ""
     figures: Mapping[str, float | int | str | None] = field(default_factory=dict)
     differences: tuple[Difference, ...] = ()
+    file: str = ""
 
 
 @dataclass(frozen=True)
