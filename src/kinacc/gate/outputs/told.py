@@ -30,8 +30,8 @@ def line(text: str) -> str:
     anywhere.
     """
     text = text.encode("utf-8", "backslashreplace").decode()  # names of files may be no characters
-    text = as_seen(" ".join(text.split()))
-    return text.replace("::", ": :").replace("##", "# #")
+    text = as_seen(" ".join(text.split())).replace("::", ": :").replace("##", "# #")
+    return "".join(each if each.isprintable() else "\ufffd" for each in text)
 
 
 def ordered(outcomes: Iterable[Outcome]) -> list[Outcome]:
