@@ -1,10 +1,10 @@
 """What the gate says as JUnit XML, in what GitLab, Jenkins and Azure Pipelines all read.
 
 A suite is a data set, a test case a gate; GitLab tells suites apart by ``classname``. A gate that
-warns or cannot tell is a case that was skipped, with the verdict before its message: all three count
-skipped cases apart and fail no build for them, while a case that passed shows nothing of its words
-unless one opens it. What a gate says stands in the attribute and in the text: GitLab shows the text,
-the others lead with the attribute.
+warns or cannot tell is a case that was skipped, with the verdict before its message: all three
+count skipped cases apart and fail no build for them, while a case that passed shows nothing of its
+words unless one opens it. What a gate says stands in the attribute and in the text: GitLab shows
+the text, the others lead with the attribute.
 """
 
 from __future__ import annotations
