@@ -105,9 +105,7 @@ def _sound(report: Report) -> tuple[Outcome, ...]:
         if each.problems:
             count = len(each.problems)
             says = f"{count} problem{'s' if count > 1 else ''}: {first_few(each.problems, 3)}"
-            found.append(
-                Outcome(each.name, "results", "results", FAILED, says, report.advice)
-            )
+            found.append(Outcome(each.name, "results", "results", FAILED, says, report.advice))
         else:
             says = f"{len(each.checked)} files are as their records say"
             found.append(Outcome(each.name, "results", "results", PASSED, says))

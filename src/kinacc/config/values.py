@@ -378,6 +378,13 @@ def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     return (INVALID if problems else dict(value)), problems
 
 
+def _series(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
+    from kinacc.config import series
+
+    lines, problems = series.lines(value, path, place)
+    return (INVALID if problems else lines), problems
+
+
 _CHECKS: dict[str, Check] = {
     "int": _int,
     "float": _float,
@@ -393,4 +400,5 @@ _CHECKS: dict[str, Check] = {
     "rows": _rows,
     "records": _records,
     "variants": _variants,
+    "series": _series,
 }
