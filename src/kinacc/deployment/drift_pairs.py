@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,6 +21,7 @@ from kinacc.kinematics.vec import ERRORS
 from kinacc.measurements.folds import configurations
 
 ORDER = 8  # of the polynomials of the misfit; finer misfit differs between configurations
+CUTS = 4  # of one series into halves
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
 _TRUNCATION = 1e-4
 _NARROW_RAD = 1e-3
@@ -36,8 +38,8 @@ class Setup(NamedTuple):
 class Pair:
     """m residual components (mm) of two series about one DH model, and what may explain them.
 
-    ``frames`` (m, F): motions of bases and targets; ``own`` (F,) marks those only the second series
-    has. ``constant`` (m, 6k): errors in front of every joint, ``ERRORS`` joint by joint in mm and
+    ``frames`` (m, F): motions of bases and targets, ``is_base`` (F,) says which; ``own`` (F,) marks
+    those only the second series has. ``constant`` (m, 6k): errors in front of every joint, ``ERRORS`` joint by joint in mm and
     rad. ``misfit`` (m, Q): the same growing with the joints, of prior proportions; ``joint`` (Q,)
     says of which (0-based). ``residual`` (m,) is measured minus model. ``second``, ``position``
     (m,): of the second series, of a position. ``cluster`` (m,): configuration, alike in both.
@@ -45,6 +47,7 @@ class Pair:
     """
 
     frames: np.ndarray
+    is_base: np.ndarray
     own: np.ndarray
     constant: np.ndarray
     misfit: np.ndarray
@@ -67,17 +70,39 @@ def of_observations(
     """The pair about the DH model of both together. Raises FitError and InputError as fits do."""
     first, second = thinned(first), thinned(second)
     both = joined(first, second, setup)
-    free = free_parameters(robot.dh.joints, parallel_joints(robot.dh))
-    counts = len(both.session_names), len(both.target_names)
-    fit = dh_fit.fit(
+    return about(
+        *_fitted(both, robot, rotation_weight_mm_per_rad),
         both,
+        len(first),
+        rotation_weight_mm_per_rad,
+    )
+
+
+@one_thread
+def cut(
+    series: Observations, setup: Setup, robot: Robot, rotation_weight_mm_per_rad: float
+) -> list[Pair]:
+    """One series as pairs of ``halves``, between which nothing happened at the arm."""
+    series = thinned(series)
+    fitted = _fitted(series, robot, rotation_weight_mm_per_rad)
+    alone = about(*fitted, series, len(series), rotation_weight_mm_per_rad)
+    row = np.repeat(np.arange(len(series)), 3 + 3 * series.has_rotation)
+    return [*halves(alone, series.q_rad[row], setup)]
+
+
+def _fitted(
+    observations: Observations, robot: Robot, rotation_weight_mm_per_rad: float
+) -> tuple[DHModel, Frames]:
+    counts = len(observations.session_names), len(observations.target_names)
+    fit = dh_fit.fit(
+        observations,
         robot.dh,
-        free=free,
+        free=free_parameters(robot.dh.joints, parallel_joints(robot.dh)),
         rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
         threshold=_TRUNCATION,
-        frame_terms=frame_terms(both, known(robot.base, carried(robot), *counts)),
+        frame_terms=frame_terms(observations, known(robot.base, carried(robot), *counts)),
     )
-    return about(fit.model, fit.frames, both, len(first), rotation_weight_mm_per_rad)
+    return fit.model, fit.frames
 
 
 def about(
@@ -111,6 +136,7 @@ def about(
     late = np.concatenate([_late(first), _late(len(both) - first)])
     return Pair(
         frames=of_frames,
+        is_base=np.arange(coords.size) < 6 * coords.anchor.sessions,
         own=~np.any(of_frames[~second] != 0.0, axis=0),
         constant=errors[:, :polynomials][:, order == 0],
         misfit=np.concatenate([growing, travelling], axis=1),
@@ -123,6 +149,31 @@ def about(
         cluster=configurations(both.pose, both.q_rad)[row],
         late=late[row],
     )
+
+
+def halves(series: Pair, q_rad: np.ndarray, setup: Setup) -> Iterator[Pair]:
+    """A series (a pair without a second one) as pairs of halves that lie apart in the joints.
+
+    Each is cut at the median of one of the ``CUTS`` principal coordinates of the joints (m, k) of
+    the components. Frames that ``setup`` does not have in common are free in both halves.
+    """
+    turned = np.concatenate([np.sin(q_rad), np.cos(q_rad)], axis=1)
+    turned = turned - turned.mean(axis=0)
+    axes = np.linalg.svd(turned, full_matrices=False)[2][:CUTS]
+    anew = ~(series.is_base & setup.same_base | ~series.is_base & setup.same_tool)
+    for along in (turned @ axes.T).T:
+        # Whole configurations: their mean decides.
+        mean = np.bincount(series.cluster, along) / np.bincount(series.cluster)
+        second = (mean > np.median(mean))[series.cluster]
+        yield replace(
+            series,
+            frames=np.concatenate(
+                [series.frames, series.frames[:, anew] * second[:, None]], axis=1
+            ),
+            is_base=np.concatenate([series.is_base, series.is_base[anew]]),
+            own=np.concatenate([np.zeros(len(anew), bool), np.ones(anew.sum(), bool)]),
+            second=second,
+        )
 
 
 def joined(first: Observations, second: Observations, setup: Setup) -> Observations:
@@ -181,5 +232,4 @@ def _span(q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _late(count: int) -> np.ndarray:
     """Order of measuring (count,), of mean 0 and variance 1."""
     order = np.arange(count) - 0.5 * (count - 1)
-    spread = np.sqrt(np.mean(order**2))
-    return order / spread if spread > 0.0 else order
+    return order / max(np.sqrt(np.mean(order**2)), 0.5) if count else order
