@@ -81,8 +81,17 @@ def commands() -> list[list[str]]:
     ]
     fits = [["kinacc", "calibrate", f"{each}.yaml"] for each in FITTED]
     held = [
-        ["kinacc", "verify", f"{judged}.yaml", "--calibration", f"results/{fitted}"]
-        + ["--base", setup, "--tool", setup]
+        [
+            "kinacc",
+            "verify",
+            f"{judged}.yaml",
+            "--calibration",
+            f"results/{fitted}",
+            "--base",
+            setup,
+            "--tool",
+            setup,
+        ]
         for fitted, judged, setup in VERIFIED
     ]
     return [*described, *fits, *held]
