@@ -183,7 +183,7 @@ def _resolve(
         what = f"{len(datasets)} data sets are given"
         allowed = f"at most {_MOST_DATASETS} in one run"
         return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
-    resolved = {}
+    resolved: dict[str, dict[str, Any]] = {}
     for name, content in datasets.items():
         if len(problems) > _MOST_PROBLEMS:
             what = "this data set and those after it were not looked at"

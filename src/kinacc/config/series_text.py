@@ -68,7 +68,7 @@ def _with_items(text: str, own: yaml.Node, lines: Sequence[Mapping[str, str]]) -
         node = series[1]
         if not isinstance(node, yaml.SequenceNode) or not node.value:
             return None
-        if node.flow_style:
+        if _is_flow(node):
             end = node.end_mark.index - 1
             comma = "" if text[:end].rstrip().endswith(",") else ", "
             return f"{text[:end].rstrip(' ')}{comma}{', '.join(items)}{text[end:]}"
@@ -77,7 +77,7 @@ def _with_items(text: str, own: yaml.Node, lines: Sequence[Mapping[str, str]]) -
     section = _pair(own, "measurements")
     file = _at(own, _FILE)
     path = _pair(file, "path") if file is not None else None
-    if section is None or path is None or own.flow_style:
+    if section is None or file is None or path is None or _is_flow(own):
         return None
     indent = " " * own.start_mark.column
     without, comment = _without(text, file, path)
@@ -95,7 +95,7 @@ def _without(text: str, file: yaml.Node, path: Pair) -> tuple[str | None, str]:
     begin, end = key.start_mark.index, value.end_mark.index
     if end < begin:
         return None, ""  # an alias: what it stands for is elsewhere
-    if file.flow_style:
+    if _is_flow(file):
         if number + 1 < len(file.value):
             end = file.value[number + 1][0].start_mark.index
         elif number:
@@ -123,11 +123,16 @@ def _line_end(text: str, place: int) -> int:
 
 def _end(text: str, node: yaml.Node) -> int:
     """Where the last thing of a node ends, without comments and blanks that follow."""
-    if isinstance(node, yaml.ScalarNode) or node.flow_style or not node.value:
+    if isinstance(node, yaml.ScalarNode) or _is_flow(node) or not node.value:
         return len(text[: node.end_mark.index].rstrip())
     pairs = node.value if isinstance(node, yaml.MappingNode) else [(node, n) for n in node.value]
     ends = [_end(text, each) for pair in pairs for each in pair if each is not node]
     return max(ends)
+
+
+def _is_flow(node: yaml.Node) -> bool:
+    """Whether it is written in brackets."""
+    return isinstance(node, yaml.CollectionNode) and bool(node.flow_style)
 
 
 def _pair(node: yaml.Node, key: str) -> Pair | None:
