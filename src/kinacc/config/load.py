@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from kinacc.config import gate_rules
 from kinacc.config.reading import Document, KeyPath, dotted, read
 from kinacc.config.schema import Section, plain, settings
 from kinacc.config.series import contradicted, expanded, taken
@@ -183,6 +184,9 @@ def _resolve(
         what = f"{len(datasets)} data sets are given"
         allowed = f"at most {_MOST_DATASETS} in one run"
         return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
+    problems += gate_rules.wrong_datasets(
+        shared.get("gates", ()), list(datasets), lambda *at: place(at)
+    )
     resolved: dict[str, dict[str, Any]] = {}
     for name, content in datasets.items():
         if len(problems) > _MOST_PROBLEMS:
@@ -220,9 +224,11 @@ def _dataset(
         problems.append(Problem(place(path), "names no robot", allowed))
     full = {"robot": robot, **complete(shared, own)}
 
-    def origin(*keys: str) -> str:
+    def origin(*keys: str | int) -> str:
         given = own
         for key in keys:
+            if isinstance(given, list):
+                break  # a list is given whole
             given = given.get(key, {}) if isinstance(given, Mapping) else {}
         return place((*path, *keys)) if given != {} else f"{place(keys)} (data set {name})"
 
@@ -234,6 +240,9 @@ def _dataset(
         return of_file
 
     problems += [*found, *(contradicted(full, origin) if lines else ())]
+    problems += gate_rules.wrong_datasets(own.get("gates", ()), None, origin)
+    problems += gate_rules.without_limit(full["gates"], name, full["tolerance"], origin)
+    full["gates"] = gate_rules.about(full["gates"], name)
     if not lines:
         has_series = isinstance(content, Mapping) and "series" in content
         given = () if has_series else contradictions(name, known_robot, full, origin, folder)

@@ -168,7 +168,7 @@ def expanded(
     """Full settings of the data set ``name``, its newest line, and of the data set of each line.
 
     The first has its lines under ``series``, without their paths; those of lines have the name of
-    the first under ``line_of``.
+    the first under ``line_of``, and no gates: these are about the arm as it is now.
     """
 
     def of(line: Line) -> dict[str, Any]:
@@ -179,5 +179,5 @@ def expanded(
     series = [
         {"name": line.dataset(name), **{key: asdict(line)[key] for key in told}} for line in found
     ]
-    own = {line.dataset(name): {**of(line), "line_of": name} for line in found}
+    own = {line.dataset(name): {**of(line), "gates": [], "line_of": name} for line in found}
     return {name: {**of(found[-1]), "series": series}, **own}
