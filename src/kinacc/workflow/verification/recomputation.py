@@ -20,7 +20,7 @@ import numpy as np
 from kinacc.artifacts import store
 from kinacc.artifacts.allowed import COVARIANCES, DISTANCES, OUTLIER_RULES, SEARCHES
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.provenance import config_hash
+from kinacc.artifacts.provenance import config_hash, file_hash
 from kinacc.config.schema import defaults, without_execution_keys
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot
@@ -110,8 +110,8 @@ def computed_again(
             continue
         if name in doubted or above(name) & doubted:
             continue
-        inputs = {each: tables[each] for each in _read(stage, of_parts[made[0]], tables)}
-        if not set(stage.inputs) <= set(inputs):
+        inputs = _inputs(stage, folder, of_parts[made[0]], tables, plans)
+        if inputs is None:
             continue
         settings, work_s = _settings(
             stage, folder.name, of_parts[made[0]].get("config_hash"), plans
@@ -141,7 +141,7 @@ def _differing(
     folder: Path,
     stage: Stage,
     tables: Mapping[str, Columns],
-    inputs: Mapping[str, Columns],
+    inputs: Mapping[str, object],
     settings: Mapping[str, object],
     every: bool,
 ) -> Iterator[Problem]:
@@ -261,9 +261,29 @@ def _cells(settings: Mapping, tables: Mapping[str, Columns]) -> tuple[Chosen, di
 _SAMPLES = {"study_chunk": _repetitions, "accuracy_map": _cells}
 
 
-def _read(stage: Stage, own: Mapping[str, str], tables: Collection[str]) -> list[str]:
-    """Artefacts that a stage read."""
-    return [each for each in digests_read(own) if each in tables]
+def _inputs(
+    stage: Stage,
+    folder: Path,
+    own: Mapping[str, str],
+    tables: Mapping[str, Columns],
+    plans: Sequence[Plan],
+) -> dict[str, object] | None:
+    """What a stage read, of the ``tables`` or of lines beside; None where it is not all there."""
+    read = digests_read(own)
+    if not stage.of_lines:
+        found = {each: tables[each] for each in read if each in tables}
+        return found if set(stage.inputs) <= set(found) else None
+    inputs: dict[str, object] = {}
+    files = next((_of_outside(each, stage, folder.name) for each in plans), {})
+    for role, digest in read.items():
+        try:
+            if not role.endswith("_file"):
+                inputs[role] = store.read(folder.parent / f"{role}.parquet")
+            elif file_hash(files[role]) == digest:  # else the campaign went on
+                inputs[role] = Path(files[role])
+        except (InputError, KeyError, OSError):
+            return None
+    return inputs if len(inputs) == len(read) else None
 
 
 def _rows(tables: Mapping[str, Columns]) -> int:
@@ -280,16 +300,20 @@ def _settings(
         if dataset not in plan.datasets or stage.name not in plan.stages(dataset):
             continue
         found = plan.settings(stage.name, dataset)
-        if config_hash(found) == wanted and all(map(os.path.isfile, _files(plan, stage, dataset))):
+        files = _of_outside(plan, stage, dataset).values()
+        if config_hash(found) == wanted and all(map(os.path.isfile, files)):
             return found, cost.of_stage(stage.name, plan.datasets[dataset]).seconds
     if stage.name == "study":  # few enough to be tried
         return _readings().get(wanted or ""), 0.0
     return None, 0.0
 
 
-def _files(plan: Plan, stage: Stage, dataset: str) -> list[str]:
+def _of_outside(plan: Plan, stage: Stage, dataset: str) -> dict[str, str]:
+    """Files from outside of a stage by role; none where the data set has no such stage."""
+    if dataset not in plan.datasets or stage.name not in plan.stages(dataset):
+        return {}
     given = plan.inputs(stage.name, dataset)
-    return [str(path) for role, path in given.items() if role.endswith("_file")]
+    return {role: str(path) for role, path in given.items() if role.endswith("_file")}
 
 
 def _assumed(dataset: str, tables: Mapping[str, Columns], marks: Marks) -> Iterator[Plan]:
