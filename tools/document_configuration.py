@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.config.schema import Key, Section, settings
+from kinacc.config.validate import ROBOT, SERIES
 
 _WIDTH = 100
 _HEAD = """\
@@ -31,6 +32,7 @@ datasets:
     measurements:
       source: synthetic
 """
+_ALONE = "Keys of an entry under `datasets` that the top level has not ([series](history.md))."
 _TABLE_HEAD = """\
 # Configuration
 
@@ -52,7 +54,9 @@ def config_yaml() -> str:
 
 def configuration_markdown() -> str:
     """The text of docs/configuration.md: one table per section."""
-    parts = [_TABLE_HEAD, *_table("Top level", "", settings(), "")]
+    alone = Section("", "", (ROBOT, SERIES))
+    parts = [_TABLE_HEAD, *_table("A data set alone", _ALONE, alone, "")]
+    parts += _table("Top level", "", settings(), "")
     for entry in settings().entries:
         if isinstance(entry, Section):
             parts += _section_tables(entry, entry.name)

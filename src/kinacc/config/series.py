@@ -67,8 +67,8 @@ def lines(value: Any, path: KeyPath, place: Place) -> tuple[list[Line], list[Pro
             continue
         wrong = list(_wrong(each, here, place))
         problems += wrong
-        if not wrong:
-            day = day_of(each["date"])
+        day = day_of(each.get("date"))
+        if day is not None and not wrong:
             found.append(Line(each["path"], day, each.get("base"), each.get("tool"), number))
     found.sort(key=lambda line: line.date)
     if not problems:
@@ -79,7 +79,7 @@ def lines(value: Any, path: KeyPath, place: Place) -> tuple[list[Line], list[Pro
     return found, problems
 
 
-def _wrong(each: Mapping, here: KeyPath, place: Place) -> Iterator[Problem]:
+def _wrong(each: Mapping[Any, Any], here: KeyPath, place: Place) -> Iterator[Problem]:
     """What is wrong with one line by itself."""
     for name in each:
         if name not in KEYS:

@@ -289,7 +289,7 @@ STAGES: dict[str, Stage] = {
             "holding the calibrations of a series to one another",
             ("measurements", "robot", *_MODELS, "pose_errors", "model_selection"),
             ("history",),
-            ("seed", "series", "calibration"),
+            ("seed", "series", "calibration", "tolerance.mm"),
             uses=(_MODEL,),
             optional=_FURTHER,
             of_lines=True,

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, wraps
 from pathlib import Path
+from typing import Any
 
 from kinacc.artifacts import records
 from kinacc.artifacts.error_models import asked_for
@@ -157,7 +158,8 @@ class Plan:
 
     def lines(self, dataset: str) -> list[str]:
         """Data sets of the lines of a data set's series, by date; none where it has no series."""
-        return [line["name"] for line in self.datasets[dataset].get("series", ())]
+        series: Any = self.datasets[dataset].get("series", ())
+        return [line["name"] for line in series]
 
     @_once
     def stages(self, dataset: str) -> dict[str, Stage]:
