@@ -262,6 +262,9 @@ SECTIONS = {
         "campaign": "measure: what next, what was read, what may be said",
         "tournament": "hold all assessors to errors that are known",
     },
+    "In a pipeline": {
+        "gate": "hold results to what is good enough, and to the accepted run",
+    },
 }
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from kinacc.config import gate_rules
 from kinacc.config.reading import Document, KeyPath, dotted, read
 from kinacc.config.schema import Section, plain, settings
 from kinacc.config.validate import (
@@ -169,6 +170,9 @@ def _resolve(
         what = f"{len(datasets)} data sets are given"
         allowed = f"at most {_MOST_DATASETS} in one run"
         return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
+    problems += gate_rules.wrong_datasets(
+        shared.get("gates", ()), list(datasets), lambda *at: place(at)
+    )
     resolved = {}
     for name, content in datasets.items():
         if len(problems) > _MOST_PROBLEMS:
@@ -204,15 +208,19 @@ def _dataset(
         problems.append(Problem(place(path), "names no robot", allowed))
     full = complete(shared, own)
 
-    def origin(*keys: str) -> str:
+    def origin(*keys: str | int) -> str:
         given = own
         for key in keys:
+            if isinstance(given, list):
+                break  # a list is given whole
             given = given.get(key, {}) if isinstance(given, Mapping) else {}
         return place((*path, *keys)) if given != {} else f"{place(keys)} (data set {name})"
 
     problems += found
+    problems += gate_rules.wrong_datasets(own.get("gates", ()), None, origin)
+    problems += gate_rules.without_limit(full["gates"], name, full["tolerance"], origin)
     problems += contradictions(name, known_robot, full, origin, folder)
-    return {"robot": robot, **full}, problems
+    return {"robot": robot, **full, "gates": gate_rules.about(full["gates"], name)}, problems
 
 
 def _place(documents: Sequence[Document], path: KeyPath) -> str:

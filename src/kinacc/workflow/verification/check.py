@@ -36,7 +36,7 @@ from kinacc.workflow.verification.conformity import check_file
 from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts, strays
 from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_command
 from kinacc.workflow.verification.pictures import check_picture
-from kinacc.workflow.verification.recomputation import computed_again
+from kinacc.workflow.verification.recomputation import Again, computed_again
 from kinacc.workflow.verification.recorded import Unit, check_records, folded, records_there
 from kinacc.workflow.verification.rules import contradictions
 
@@ -129,6 +129,7 @@ def check_results(
     configs: Sequence[str] = (),
     every: bool = False,
     expect: str | None = None,
+    again: bool = True,
 ) -> Report:
     """Check every data set's folder below ``results``.
 
@@ -136,12 +137,12 @@ def check_results(
     their limits, rows and tables consistent, inputs still those it was made from, claims readable,
     pictures whole. With a ``plan`` (the configuration, read from the files ``configs``) also that
     its data sets are all there and that the artefacts were made with these settings and files.
-    Numbers are computed again (see :mod:`recomputation`), with ``every`` in place of a sample.
+    Numbers are computed ``again`` (see :mod:`recomputation`), with ``every`` in place of a sample.
     ``expect``: the digest of all records as it was told before. Raises InUse while a run writes.
     """
     folder = Path(results)
     with undisturbed(folder.parent if _is_dataset(folder) else folder):
-        report = _checked(folder, plan, configs, every)
+        report = _checked(folder, plan, configs, every if again else None)
     if expect is not None and report.digest != expect:
         what = f"digest of all records is {report.digest or 'none: there are no records'}"
         fix = "the records were written anew since that digest was told, or are of another run"
@@ -150,7 +151,9 @@ def check_results(
     return report
 
 
-def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: bool) -> Report:
+def _checked(
+    folder: Path, plan: Plan | None, configs: Sequence[str], every: bool | None
+) -> Report:
     if not folder.name.strip("."):
         folder = Path(os.path.abspath(folder))
     if not folder.is_dir():
@@ -213,8 +216,13 @@ def _is_dataset(folder: Path) -> bool:
     return any((folder / artefact.file_name).is_file() for artefact in ARTEFACTS.values())
 
 
-def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -> DatasetReport:
-    """Check the folder of one data set; see :func:`check_results`."""
+def check_dataset(
+    folder: Path, plan: Plan | None = None, every: bool | None = False
+) -> DatasetReport:
+    """Check the folder of one data set; see :func:`check_results`.
+
+    ``every``: None where no number is computed again.
+    """
     checked, found, tables, marks, of_parts = [], [], {}, {}, {}
     behind = _left_behind(folder, plan)
     for name, path in _tables_there(folder):
@@ -268,14 +276,11 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         found.append((_placed(folder, problem), doubts))
     of_lineage, said = check_lineage(folder, marks, plan)
     found += [*of_lineage, *strays(folder, marks)]
-    again = computed_again(
-        folder,
-        tables | _joined(folder, of_parts),
-        marks,
-        {doubt.stage for _, doubts in found for doubt in doubts},
-        plan,
-        every,
-    )
+    in_doubt = {doubt.stage for _, doubts in found for doubt in doubts}
+    again = Again((), [], [])
+    if every is not None:
+        joined = tables | _joined(folder, of_parts)
+        again = computed_again(folder, joined, marks, in_doubt, plan, every)
     found += again.found
     leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
     return DatasetReport(
