@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from code_changes import COMMENTED, DATA_FILES, SCALED, STAGES, WRAPPED
-from worlds import World, other_numbers, other_version, rerun
+from worlds import SOURCE, World, other_numbers, other_version, rerun
 
 OWN, PAPER = "own", "mh180"
 
@@ -25,11 +25,11 @@ class Change:
     """One thing that is changed.
 
     ``family`` groups it in the table. ``causes`` are (kind, pattern of where) of the gate's answer,
-    of which every difference has to name one at least and nothing else. ``random``: only the seed or
-    the number of repetitions changed, so that random results may be held to their standard error.
-    ``code``: file of the package, a text in it and what stands there instead (at its end where there
-    is no such text), changed before anything is imported. ``only``: of several changes at once, those
-    that lead to artefacts of a pattern of ``data set/artefact``.
+    of which every difference has to name one at least and nothing else. ``random``: only the seed
+    or the number of repetitions changed: random results may be held to their standard error.
+    ``code``: file of the package, a text in it and what stands there instead (at its end where
+    there is no such text), changed before anything is imported. ``only``: of several changes at
+    once, those that lead to artefacts of a pattern of ``data set/artefact``.
     """
 
     name: str
@@ -74,12 +74,12 @@ ROBOT = (("input", r"own_arm\.yaml|robot_file"),)
 def _inputs(draw: np.random.Generator) -> Iterator[Change]:
     columns = ("q1_deg", "q2_deg", "q3_deg", "q5_deg", "x_mm", "y_mm", "z_mm")
     for number in range(18):
-        given = {
-            "row": int(draw.integers(6, 40)),
-            "column": str(draw.choice(columns)),
-            "by": float(f"{10.0 ** draw.uniform(-3, -0.3):.1g}") * float(draw.choice([-1, 1])),
-        }
-        said = f"input: row {given['row']}, {given['column']} by {given['by']:g} ({number})"
+        column, size = str(draw.choice(columns)), 10.0 ** draw.uniform(-3, -0.3)
+        if column.endswith("_deg"):
+            size /= 10  # the check of the data refuses joints that are farther off
+        by = float(f"{size:.1g}") * float(draw.choice([-1, 1]))
+        given = {"row": int(draw.integers(6, 40)), "column": column, "by": by}
+        said = f"input: row {given['row']}, {column} by {by:g} ({number})"
         yield Change(said, "number of an input file", "cell", given, POSES)
     for row in (7, 11, 19, 33):  # far below what is told apart
         given = {"row": row, "column": "x_mm", "by": 1e-9}
@@ -145,7 +145,12 @@ def run(*given, **named):
 
 
 def _file_of(module: str) -> str:
-    return "/".join(module.split(".")[1:]) + ".py"
+    parts = module.split(".")[1:]
+    return (
+        "/".join([*parts, "__init__.py"])
+        if SOURCE.joinpath(*parts).is_dir()
+        else ("/".join(parts) + ".py")
+    )
 
 
 LIBRARIES = {"numpy": "9.9.9", "scipy": "8.1.0", "numba": "3.2.1", "pyarrow": "99.0.0"}

@@ -16,10 +16,12 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import sitefallback  # noqa
 import changes
 import judged
 import unchanged
@@ -174,7 +176,8 @@ def _in_a_process(
 
 def _tell(do: Callable[[], dict], said: Path) -> None:
     try:
-        found = do()
+        with warnings.catch_warnings(action="ignore"):
+            found = do()
     except BaseException:
         found = {"error": traceback.format_exc()}
     said.write_text(json.dumps(found))
@@ -223,7 +226,7 @@ def main() -> int:
     for case in cases():
         before = known.get(case.name)
         chosen = only[1:] in case.name if only.startswith("~") else case.name.startswith(only)
-        if not chosen or before and not (given.anew and before["faults"]):
+        if not chosen or (before and not (given.anew and before["faults"])):
             continue
         if time.monotonic() - began > 60 * given.minutes:
             break

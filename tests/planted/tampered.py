@@ -50,7 +50,7 @@ def _path(world: World, dataset: str, artefact: str) -> Path:
 
 
 def write(world: World, dataset: str, artefact: str, table: pa.Table, renewed: bool) -> None:
-    """Put a table in its place; ``renewed``: with every digest of it, and of what is made from it."""
+    """Put a table in its place; ``renewed``: every digest of it and of what is made from it."""
     name = f"{dataset}/{artefact}.parquet"
     if not renewed:
         (world.results / name).write_bytes(store.content_of(table))

@@ -2,34 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
-
 import judged
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import tampered
-from worlds import World, finished
+from worlds import World
 
 from kinacc.artifacts import store
-
-
-@pytest.fixture(scope="module")
-def base(tmp_path_factory) -> World:
-    world = finished(tmp_path_factory.mktemp("golden") / "base")
-    world.accept()
-    return world
-
-
-@pytest.fixture
-def world(base: World):
-    """The finished study to be changed, as it was again afterwards."""
-    kept = base.folder / "kept"
-    shutil.copytree(base.results, kept)
-    yield base
-    shutil.rmtree(base.results)
-    kept.rename(base.results)
 
 
 def changed(world: World, dataset: str, artefact: str, change, renewed: bool = True) -> None:
