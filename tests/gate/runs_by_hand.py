@@ -23,6 +23,7 @@ READS = {
     "assessment_points": ("dh_model", "frames"),
     "study_chunk": ("assessment_points",),
     "study": ("study_chunk", "assessment_points"),
+    "claims": ("residuals", "study_summary"),
 }
 KEYS = {
     "measurements": {"seed": 1, "measurements": {"file": {"path": "march.csv"}}},
@@ -31,6 +32,7 @@ KEYS = {
     "assessment_points": {"evaluation": {"points": 3}},
     "study_chunk": {"seed": 1, "study": {"repetitions": 40, "noise_mm": [0.1, 0.3]}},
     "study": {"study": {"search": "from_above"}},
+    "claims": {"robot": "mh180"},
 }
 POSES = 6
 _DH = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad")
@@ -123,7 +125,7 @@ class Run:
 
 
 _NO_MARKS = dict.fromkeys(store.PROVENANCE_KEYS, "-")
-_STUDY = ("study_chunk", "study", "study_summary")
+_STUDY = ("study_chunk", "study", "study_summary", "claims")
 
 
 def tables() -> dict[str, Columns]:
@@ -235,7 +237,19 @@ def _study(seed: int, repetitions: int) -> dict[str, Columns]:
         "repetitions": [repetitions] * 2,
         "std_error_mm": [each.std(ddof=1) / np.sqrt(repetitions) for each in of_noise],
     }
+    claims = {
+        "claim": ["table_3.mean", "bias"],
+        "statement": ["The mean is 0.4 mm.", "The bias is positive."],
+        "statistic": ["mean", "bias"],
+        "evidence": ["residuals.parquet", "study_summary.parquet"],
+        "paper": [0.4, np.nan],
+        "reproduced": [0.4, summary["bias_mm"][0]],
+        "tolerance": [0.1, np.nan],
+        "verdict": ["agrees", "agrees"],
+        "share": [np.nan, np.nan],
+    }
     return {
+        "claims": claims,
         "study_chunk": {name: np.asarray(values) for name, values in chunk.items()},
         "study": {name: np.asarray(values) for name, values in {**runs, **found}.items()},
         "study_summary": {name: np.asarray(values) for name, values in summary.items()},

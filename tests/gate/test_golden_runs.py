@@ -246,6 +246,15 @@ def test_a_table_of_another_run_is_told_for_what_it_is(tmp_path, with_record):
     assert "residuals" not in artefacts(outcome)
 
 
+def test_a_study_of_another_run_with_its_record_was_not_made_from_these_parts(tmp_path):
+    other = drawn(2, 40).write(tmp_path / "other")
+    accepted, results = Run().write(tmp_path / "accepted"), Run().write(tmp_path / "now")
+    put_in(other, results, "study.parquet", "study_summary.parquet", "records/study.json")
+    (outcome,) = compared(results, accepted)
+    assert artefacts(outcome) == {"study", "study_summary"}
+    assert "study was not made from what is here: made from study_chunk" in outcome.says
+
+
 def test_a_lost_table_and_a_stage_of_one_run_alone(tmp_path):
     accepted, results = Run().write(tmp_path / "accepted"), Run().write(tmp_path / "now")
     (results / "arm" / "dh_model.parquet").unlink()
@@ -301,9 +310,29 @@ def test_the_same_seed_and_repetitions_ask_for_the_same_simulations(tmp_path, mo
     accepted, real = Run().write(tmp_path / "accepted"), runs_by_hand._study
     monkeypatch.setattr(runs_by_hand, "_study", lambda _, repetitions: real(9, repetitions))
     (outcome,) = compared(Run().write(tmp_path / "now"), accepted)
-    assert artefacts(outcome) == {"study_chunk", "study", "study_summary"}
+    assert artefacts(outcome) == {"study_chunk", "study", "study_summary", "claims"}
     assert ("study_chunk", "assessed_mm") in told(outcome)
     assert all(not each.explained for each in outcome.differences if "chunk" in each.artefact)
+
+
+def test_claims_on_a_study_drawn_anew_are_left_aside_and_others_are_not(tmp_path, monkeypatch):
+    import runs_by_hand
+
+    accepted, real = Run().write(tmp_path / "accepted"), runs_by_hand._study
+
+    def worse(seed, repetitions):
+        found = real(seed, repetitions)
+        found["claims"]["verdict"][0] = "differs"
+        return found
+
+    monkeypatch.setattr(runs_by_hand, "_study", worse)
+    (outcome,) = compared(drawn(2, 40).write(tmp_path / "now"), accepted)
+    (found,) = outcome.differences
+    assert (found.artefact, found.column, found.first) == (
+        "claims",
+        "verdict",
+        "claim=table_3.mean",
+    )
 
 
 def test_a_study_of_other_points_is_compared_number_by_number(held):

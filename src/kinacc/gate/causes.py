@@ -84,7 +84,8 @@ class Causes:
             if _is_file(role) or "/" in role:
                 continue
             maker = maker_of(role)
-            there = self.now.digest(role, maker) if self.now.record(maker.name) else ""
+            digest_of = self.now.joined if maker.scattered else self.now.digest
+            there = digest_of(role, maker) if self.now.record(maker.name) else ""
             if there and there != digest:
                 yield Cause(UNEXPLAINED, name, f"made from {role} {there[:16]}", digest[:16])
 

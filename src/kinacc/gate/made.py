@@ -60,7 +60,7 @@ class Made:
         of parts does not count.
         """
         if stage.scattered:
-            return self._gathered.get(artefact) or self._joined(artefact, stage)
+            return self._gathered.get(artefact) or self.joined(artefact, stage)
         record = self.record(stage.name)
         written = record.files.get(f"{artefact}.parquet") if record else None
         return (written.columns_digest if written else None) or ""
@@ -70,7 +70,8 @@ class Made:
         all_ = [each for found in self.by_stage.values() for each in found]
         return {role: digest for each in all_ for role, digest in each.inputs_digests.items()}
 
-    def _joined(self, artefact: str, stage: Stage) -> str:
+    def joined(self, artefact: str, stage: Stage) -> str:
+        """The digest of the parts of a table that are there, which are read; empty without."""
         try:
             return digests({artefact: [str(path) for path in self.paths(artefact, stage)]})[
                 artefact
