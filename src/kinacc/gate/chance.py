@@ -143,7 +143,8 @@ class _Group:
         features, self.of = _SMOOTH[statistic]
         every = np.concatenate([each.configuration for each, _ in samples])
         numbers = np.unique(every)
-        sums, self.parts = [], []
+        sums: list[np.ndarray] = []
+        self.parts: list[tuple[slice, float]] = []
         for sample, sign in samples:
             found = features(sample.sizes)
             rows = np.column_stack([np.ones(len(found)), found])
@@ -185,7 +186,7 @@ def _least_of_means(
     groups = [_Group(statistic, own) for own in ([signed] if paired else [[x] for x in signed])]
     sizes = [len(each.sums) for each in groups]
     whole = [group.seen(np.ones((1, size))) for group, size in zip(groups, sizes, strict=True)]
-    difference = float(sum(value for value, _ in whole)[0])
+    difference = float(sum(value[0] for value, _ in whole))
     parts = np.array([variance[0] for _, variance in whole])
     error = float(np.sqrt(parts.sum()))
     if error <= _NOTHING * max(abs(difference), _NOTHING):

@@ -17,7 +17,7 @@ from kinacc.config.values import nearest
 from kinacc.errors import InputError, first_few
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.run_tables import SELECTED, RunTables
-from kinacc.gate.values import change_of, figure
+from kinacc.gate.values import Compared, Figure, change_of, figure
 
 Gate = Mapping[str, Any]
 _ROUNDING = 1e-9
@@ -151,12 +151,17 @@ def _change(
     )
     if found.open:
         return _outcome(gate, dataset, UNDECIDED, f"undecided: {says}; {found.open}", "", figures)
-    sure = f"{100.0 * asked:g} % confidence"
     if found.difference:
-        says += f"; with {sure} it is worse by {now.worded(found.least)} at least, {found.drawn}"
+        says += f"; with {100.0 * asked:g} % confidence {_at_least(now, found)}, {found.drawn}"
     failed = found.least > allowed
     fix = "look at what changed: kinacc gate --against names it"
     return _outcome(gate, dataset, FAILED if failed else PASSED, says, fix, figures)
+
+
+def _at_least(now: Figure, found: Compared) -> str:
+    if found.least > 0.0:
+        return f"it is at least {now.worded(found.least)} worse"
+    return f"it may as well be {now.worded(-found.least)} better"
 
 
 def _campaign(
@@ -177,8 +182,8 @@ def _campaign(
         return _outcome(gate, dataset, FAILED, says, fix)
     allowed = tolerance["mm"] if gate["tolerance_mm"] is None else gate["tolerance_mm"]
     standing = Standing(tables.folder, model=tables.model(SELECTED), campaigns=sought)
-    judged_as = standing.verdict(BOUND, allowed)
-    bound = standing.bound()
+    judged_as, bound = standing.verdict(BOUND, allowed), standing.bound()
+    assert judged_as is not None  # a tolerance is given
     figures = {"tolerance_mm": allowed, **bound}
     says = f"campaign {place}: {judged_as.says}, {judged_as.because}"
     if "bound_mm" in bound:
