@@ -63,7 +63,7 @@ def made(folder: Path) -> dict[str, dict[str, float]]:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "robots.yaml").write_text(CONFIG)
-    write_poses(tmp_path / "poses.csv", 30)
+    write_poses(tmp_path / "poses.csv")
     return tmp_path
 
 
