@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from itertools import product
@@ -29,15 +28,15 @@ from kinacc.study import monte_carlo
 from kinacc.workflow import cost
 from kinacc.workflow.catalogue import STAGES, TABLES, Stage
 from kinacc.workflow.configured import in_use
-from kinacc.workflow.plan import Plan, planned
+from kinacc.workflow.described import beside
+from kinacc.workflow.plan import Plan
 from kinacc.workflow.verification.lineage import Found, digests_read
-from kinacc.workflow.verification.mending import CONFIG, Doubt, Marks, above
+from kinacc.workflow.verification.mending import Doubt, Marks, above
 
 # A number may differ from the one computed by this share of itself, and by this share of the
 # largest one of its column: other processors and libraries move last digits, and fits amplify it.
 RELATIVE, OF_LARGEST = 1e-6, 1e-9
 WORK_S = 1.0  # of a stage, as is foreseen; more without --all would make a check slow
-_FILES = 20  # beside results, looked through for a configuration
 _DIRECTION, _EXACT = "undetermined_direction", 1e9
 REPETITIONS, CELLS, ROWS = 5, 500, 5000  # computed again without --all
 NOT_AGAIN = {
@@ -96,7 +95,10 @@ def computed_again(
     plans = (
         [plan]
         if plan
-        else [*_beside(folder.parent, folder.name), *_assumed(folder.name, tables, marks)]
+        else [
+            *(found for _, found in beside(folder.parent, folder.name)),
+            *_assumed(folder.name, tables, marks),
+        ]
     )
     doubted, found, done, unknown = set(in_doubt), [], [], []
     large: list[str] = []
@@ -312,19 +314,6 @@ def _of_outside(plan: Plan, stage: Stage, dataset: str) -> dict[str, str]:
         return {}
     given = plan.inputs(stage.name, dataset)
     return {role: str(path) for role, path in given.items() if role.endswith("_file")}
-
-
-def _beside(results: Path, dataset: str) -> Iterator[Plan]:
-    """Plans of configurations beside the folder of all results that name a data set."""
-    for path in sorted((results / "..").glob("*.yaml"))[:_FILES]:
-        with suppress(InputError, OSError):
-            if path.name == CONFIG or dataset.encode() in path.read_bytes():
-                yield _planned(str(path), path.stat().st_mtime_ns)
-
-
-@cache
-def _planned(path: str, changed_ns: int) -> Plan:
-    return planned([path])
 
 
 def _assumed(dataset: str, tables: Mapping[str, Columns], marks: Marks) -> Iterator[Plan]:
