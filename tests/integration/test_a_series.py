@@ -49,7 +49,7 @@ datasets:
       vec: {{order: 1}}
       dh: {{fit_to: measurements, hayati_joints: [2, 3]}}
     evaluation: {{space: measured}}
-    data_check: {{accept: {{few_poses: a small part of a series}}}}
+    figures: {{formats: [svg]}}
     series:
 {lines}
 {more}""")
