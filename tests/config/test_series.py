@@ -83,6 +83,7 @@ def test_the_settings_of_a_line_do_not_depend_on_the_other_lines(written):
     for line in (MARCH, MAY):
         for stage in before.stages(line):
             assert before.job(stage, line) == every.job(stage, line)
+            assert before.job_text(stage, line) == every.job_text(stage, line)
 
 
 def test_files_are_sought_beside_the_configuration(written, tmp_path, monkeypatch):
