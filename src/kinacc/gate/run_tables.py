@@ -75,5 +75,3 @@ def errors_of(
         what = f"has no {quantity} errors of model {model} at rows {at.replace('_', ' ')}"
         raise Absent(Problem("pose_errors.parquet", what, fix="name another model, or other rows"))
     return sizes[known], row[own][known]
-
-

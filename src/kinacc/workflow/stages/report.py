@@ -9,7 +9,7 @@ from pathlib import Path
 from kinacc.campaign import folder, of_calibration, report
 from kinacc.campaign.of_calibration import Assessed
 from kinacc.kinematics import robot
-from kinacc.report import campaign, dataset
+from kinacc.report import campaign, dataset, robot_history
 from kinacc.report.first_screen import Answers
 from kinacc.report.page import Page, Section
 from kinacc.workflow.answer import told
@@ -38,6 +38,7 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
         following=found.following,
         outdated=settings.get("outdated", ()),
         more=shlex.join(["kinacc", "fitted", str(place), "--all"]),
+        history=robot_history.said(tables["history"]) if "history" in tables else "",
     )
     section = _campaign(assessed) if assessed else None
     return dataset.page(name, tables, arm, found.facts, answers, section)
