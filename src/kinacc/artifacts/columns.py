@@ -23,6 +23,8 @@ SAME_WITHIN = {
 }
 # Where a column is not held to its unit: what it is held to in its place.
 BY_ROW, BY_POSES, BY_STD = "the row's unit", "predicted poses", "standard deviations"
+# Means of simulations that were drawn anew, by another seed or number of them, are held to it.
+BY_STD_ERROR = "study_summary.std_error_mm"
 
 
 @dataclass(frozen=True)

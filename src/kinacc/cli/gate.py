@@ -81,7 +81,11 @@ def _configurations(
         what = f"{first_few(unknown)} is none of the configuration"
         raise InputError(Problem("--dataset", what, ", ".join(full)))
     kept = list(datasets or full)
-    own = {name: plan.datasets[name] for name in plan.datasets if name in kept}
+    own = {
+        name: settings
+        for name, settings in plan.datasets.items()
+        if name in kept or settings.get("line_of") in kept
+    }
     return {name: full[name] for name in kept}, replace(plan, datasets=own)
 
 

@@ -265,6 +265,7 @@ SECTIONS = {
     },
     "In a pipeline": {
         "gate": "hold results to what is good enough, and to the accepted run",
+        "accept": "make a run the accepted one, by a person",
     },
 }
 

@@ -39,6 +39,8 @@ _FILES = (
     ("measurements", "file", "path"),
     ("measurements", "file", "joints", "path"),
 )
+# The same in lists of mappings: the list, and the key.
+_LISTED_FILES = (("series", "path"), ("gates", "campaign"))
 
 
 def _none(*given: Any) -> tuple[Problem, ...]:
@@ -119,12 +121,13 @@ def _from_here(document: Document, folder: Path) -> tuple[Document, list[Problem
 def _places_of_files(data: Mapping[str, Any]) -> Iterator[KeyPath]:
     """Paths of the keys whose values name files, of the top level and of every data set."""
     datasets = data.get("datasets")
-    yield from _FILES
-    for name in datasets if isinstance(datasets, Mapping) else ():
-        yield from (("datasets", name, *keys) for keys in _FILES)
-        lines = _value(data, ("datasets", name, "series"))
-        for number in range(len(lines) if isinstance(lines, list) else 0):
-            yield ("datasets", name, "series", number, "path")
+    names = datasets if isinstance(datasets, Mapping) else ()
+    for start in [(), *(("datasets", name) for name in names)]:
+        yield from ((*start, *keys) for keys in _FILES)
+        for listed, key in _LISTED_FILES:
+            items = _value(data, (*start, listed))
+            for number in range(len(items) if isinstance(items, list) else 0):
+                yield (*start, listed, number, key)
 
 
 def _value(data: Any, path: KeyPath) -> Any:
@@ -225,7 +228,7 @@ def _dataset(
     full = {"robot": robot, **complete(shared, own)}
 
     def origin(*keys: str | int) -> str:
-        given = own
+        given: Any = own
         for key in keys:
             if isinstance(given, list):
                 break  # a list is given whole

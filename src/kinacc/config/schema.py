@@ -10,7 +10,7 @@ from typing import Any
 
 DATASET_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]*"  # with - first it would read as an option
 KINDS: tuple[str, ...] = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair")
-KINDS += ("pairs", "names", "parameters", "rows", "records", "variants", "series")
+KINDS += ("pairs", "names", "parameters", "rows", "records", "series", "variants")
 NUMERIC = {
     "int": "a whole number",
     "float": "a number",
@@ -198,7 +198,7 @@ def _key(name: str, content: Mapping[str, Any]) -> Key:
 def _fields(inside: Mapping[str, Mapping[str, Any]]) -> tuple[Key, ...]:
     """Keys of a mapping that stands in a list."""
     blank = {"default": None, "about": ""}
-    return tuple(_key(each, blank | content) for each, content in inside.items())
+    return tuple(_key(each, {**blank, **content}) for each, content in inside.items())
 
 
 def walk(section: Section, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Key]]:

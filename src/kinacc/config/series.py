@@ -179,5 +179,5 @@ def expanded(
     series = [
         {"name": line.dataset(name), **{key: asdict(line)[key] for key in told}} for line in found
     ]
-    own = {line.dataset(name): {**of(line), "gates": [], "line_of": name} for line in found}
+    own = {line.dataset(name): {**of(line), "line_of": name, "gates": []} for line in found}
     return {name: {**of(found[-1]), "series": series}, **own}

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from kinacc.artifacts import records
-from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.artifacts.records import Record
 from kinacc.errors import InputError, Problem, gathered
 from kinacc.workflow.catalogue import STAGES, TABLES, Stage
 from kinacc.workflow.inputs import digests
-
-ACCEPTED = "accepted.json"  # stands beside the data sets of the accepted run
 
 
 @dataclass(frozen=True)
@@ -105,11 +102,6 @@ def datasets_in(results: Path) -> list[str]:
     if not results.is_dir():
         return []
     return sorted(each.name for each in results.iterdir() if (each / records.FOLDER).is_dir())
-
-
-def known_tables(names: Sequence[str]) -> list[str]:
-    """Those of the names that are tables of the contract."""
-    return [name for name in names if name in ARTEFACTS]
 
 
 def _number(part: str) -> int:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 import pyarrow as pa
@@ -26,6 +27,8 @@ _OF_ANY_UNIT = 1e-9
 # value that counts is above one that is zero but for rounding.
 _ROUNDING = ("last_step", "gap")
 _DIRECTION = "undetermined_direction"
+_MEAN, _STD_ERROR = "mean_mm", "std_error_mm"
+_ALARM = 1e-3
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,33 @@ def differences(artefact: Artefact, before: pa.Table, now: pa.Table) -> list[Fou
         found += [difference] if difference else []
     places = {name: place for place, name in enumerate(known)}
     return sorted(found, key=lambda each: (places.get(each.column, -1), each.what))
+
+
+def within_chance(artefact: Artefact, before: pa.Table, now: pa.Table) -> list[Found]:
+    """What differs of a table of simulations drawn anew beyond chance: means with standard errors.
+
+    Two means differ beyond chance where they are further apart than z standard errors of their
+    difference, z of a normal distribution such that one of a thousand tables in which nothing
+    changed is said to differ, whatever the number of its means (Bonferroni). Other columns, single
+    simulations, smallest and largest values, are not compared.
+    """
+    old, new = columns_in(before), columns_in(now)
+    if _STD_ERROR not in old or _STD_ERROR not in new:
+        return []
+    key = [*artefact.key]
+    rows = aligned([old[name] for name in key], [new[name] for name in key])
+    found = _rows(key, old, rows.only_before, "fewer") + _rows(key, new, rows.only_now, "more")
+    old = {name: values[rows.before] for name, values in old.items()}
+    new = {name: values[rows.now] for name, values in new.items()}
+    count = max(len(rows.now), 1)
+    z = NormalDist().inv_cdf(1.0 - _ALARM / (2.0 * count))
+    allowed = z * np.hypot(old[_STD_ERROR], new[_STD_ERROR])
+    column = next(each for each in artefact.columns if each.name == _MEAN)
+    difference = _of_numbers(column, old, new, key, allowed)
+    if difference:
+        words = f"; {z:.2f} standard errors (study_summary.{_STD_ERROR}) are allowed"
+        found.append(replace(difference, what=difference.what + words))
+    return found
 
 
 def _whole(artefact: Artefact, table: pa.Table) -> Columns:
@@ -157,10 +187,15 @@ def _of_column(column: Column, old: Columns, new: Columns, key: list[str]) -> Fo
         row = int(other[0])
         what = f"{_quoted(a[row])} before, {_quoted(b[row])} now"
         return Found(column.name, what, int(other.size), len(b), named(key, new, row))
-    a, b = a.astype(np.float64), b.astype(np.float64)
+    return _of_numbers(column, old, new, key, _allowed(column, old, new))
+
+
+def _of_numbers(
+    column: Column, old: Columns, new: Columns, key: list[str], allowed: np.ndarray | float
+) -> Found | None:
+    a, b = (each[column.name].astype(np.float64) for each in (old, new))
     null = np.isnan(a) != np.isnan(b)
     apart = np.abs(b - a)  # NaN where there is null
-    allowed = _allowed(column, old, new)
     with np.errstate(invalid="ignore"):
         other = np.flatnonzero(null | (apart > allowed))
     if not other.size:

@@ -50,10 +50,10 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
     """The section of a page on ``history``, one row a line by date."""
     history = tables["history"]
     data, count = _data(history), len(history["date"])
-    blocks: list[Text | Picture | Table] = [Text(_as_sentence(sentence(history)))]
-    blocks.append(_errors(history, data))
+    errors = _errors(history, data)
+    pictures_of = [errors]
     if np.isfinite(np.asarray(history["chance_mm"], dtype=float)).any():
-        blocks.append(_moved(history, data, blocks[1].plot.x_range))
+        pictures_of.append(_moved(history, data, errors.plot.x_range))
     first, last = history["date"][0], history["date"][-1]
     lines = f"{count} lines of its series, {first} to {last}" if count > 1 else f"one line, {first}"
     return Section(
@@ -67,13 +67,8 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
         "above that bar, and errors of the calibration in force that leave those of a new one.",
         "Recalibrate where the last line says so: put the calibration of that line into use, and "
         "look at the joint named. Else go on with the one in force.",
-        (*blocks, _table(history)),
+        (Text(_as_sentence(sentence(history))), *pictures_of, _table(history)),
     )
-
-
-def said(history: Columns) -> str:
-    """What the last line says, as a sentence of the first screen."""
-    return f"History, {len(history['date'])} lines: {sentence(history)}."
 
 
 def _as_sentence(words: str) -> str:
