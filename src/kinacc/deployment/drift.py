@@ -13,6 +13,7 @@ from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.deployment.record import Calibration
 from kinacc.measurements.folds import configurations
 
+LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
 SAME, MOVED = "same", "moved"
 FIRST, HOLDS, RECALIBRATE, OPEN = "first", "holds", "recalibrate", "cannot be told"
 _TEXT = ("series", "date", "digest", "base", "tool", "model", "in_force", "verdict", "reason")
@@ -94,3 +95,8 @@ def _stated(session: Session) -> dict:
         "verdict": OPEN,
         "reason": None,
     }
+
+
+def factor(first: float, second: float) -> float:
+    """On the deviations of misfit that is not shared, by what halves of both series showed."""
+    return float(np.sqrt(max(1.0, 0.5 * (first + second))))

@@ -21,7 +21,7 @@ from kinacc.kinematics.vec import ERRORS
 from kinacc.measurements.folds import configurations
 
 ORDER = 8  # of the polynomials of the misfit; finer misfit differs between configurations
-CUTS = 4  # of one series into halves
+CUTS = 2  # of one series into halves, across the widest directions of its joints
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
 _TRUNCATION = 1e-4
 _NARROW_RAD = 1e-3
