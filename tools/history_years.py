@@ -7,12 +7,12 @@ effects drawn anew), calibrated twelve times with POSES poses of the synthetic c
 same every month, or others every month. Each time the tracker is set up anew, its noise and the
 arm's repeatability are drawn anew, and the run of RUN_H hours begins at a random time up to RUN_H
 after the cold start: the arm warms up differently each time. Nothing else happens, so every
-"recalibrate" is a false alarm; after one, the new calibration is in force. Fits are linear ones about
-the draw's geometry; all else is the code that makes a history.
+"recalibrate" is a false alarm; after one, the new calibration is in force. Fits are linear ones
+about the draw's geometry; all else is the code that makes a history.
 
-A change of a joint moves what is estimated by just as much and nothing else, as a change of the second
-series is a free unknown beside all variances; so every month that nothing happened says as well which
-sizes of a change would have been seen in it.
+A change of a joint moves the estimate by as much and changes nothing else, as a change of the
+second series is a free unknown beside all variances. So every month in which nothing happened
+says as well which sizes of a change would have been seen in it.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ SIZES_MM = np.arange(0.0, 1.001, 0.02)
 
 
 def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
-    """Decisions of a year; which sizes (24, SIZES) were seen of so many, and mm rms per mrad, mm."""
+    """Decisions; how often sizes (24, SIZES) were seen; rms mm (24,) by one mm or mrad."""
     force = arm.series()
     wide = arm.understated(force)
     decisions, seen, size = [], np.zeros((24, len(SIZES_MM))), []
@@ -127,8 +127,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the tables")
     asked = parser.parse_args()
     pool = plan.configurations(robots.load("mh180"), POOL)
-    years = [(n / asked.same, SAME, n) for n in range(asked.same)]
-    years += [(n / asked.other, OTHER, n) for n in range(asked.other)]
+    years = [(n / max(asked.same, 1), SAME, n) for n in range(asked.same)]
+    years += [(n / max(asked.other, 1), OTHER, n) for n in range(asked.other)]
     done, seen, size = [], {}, {}
     begin = time.process_time()
     for _, plans, number in sorted(years):
@@ -138,9 +138,14 @@ def main() -> None:
         size.setdefault(plans, []).append(per_unit)
         if len(done) % (20 * (MONTHS - 1)) == 0:
             _write(asked.out, done, seen, size)
-            alarms = {p: len({d["year"] for d in done if d["alarm"] and d["plans"] == p}) for p in seen}
+            alarms = {
+                p: len({d["year"] for d in done if d["alarm"] and d["plans"] == p}) for p in seen
+            }
             of = {p: len(size[p]) for p in seen}
-            print(f"{time.process_time() - begin:.0f} s of CPU: years with an alarm {alarms} of {of}", flush=True)
+            print(
+                f"{time.process_time() - begin:.0f} s of CPU: years with an alarm {alarms} of {of}",
+                flush=True,
+            )
     _write(asked.out, done, seen, size)
 
 
@@ -155,7 +160,10 @@ def _write(folder: Path, done: list[dict], seen: dict, size: dict) -> None:
     with open(folder / "decisions.csv", "w") as file:
         file.write(",".join(done[0]) + "\n")
         for each in done:
-            file.write(",".join(f"{v:.5g}" if isinstance(v, float) else str(v) for v in each.values()) + "\n")
+            file.write(
+                ",".join(f"{v:.5g}" if isinstance(v, float) else str(v) for v in each.values())
+                + "\n"
+            )
 
 
 if __name__ == "__main__":

@@ -1,19 +1,22 @@
 """What moved between two series of one arm, and how much of that chance alone shows.
 
-The null hypothesis. Between two series nothing happened at the arm; that does not make them alike.
-(1) A model is wrong in ways that depend on the pose, the same ways in both series: two series at the
-same configurations share that misfit, and it cancels; two pose sets do not, and fits to them differ
-however small the noise. The misfit is taken as errors in front of every joint that change smoothly
-with that joint, of a size that the two series themselves show, joint by joint (variance components
-by the evidence), and beside these whatever differs from configuration to configuration. (2) The arm
-warms up, each time differently: what changes with the order of measuring inside the series is a
-state of the arm that a series may be in as a whole. (3) Visits repeat within limits, and the
-instrument has noise.
+The null hypothesis: between two series nothing happened at the arm. That does not make them alike.
 
-The change is estimated together with all of these, by least squares under their variances. Chance
-of (1), smooth, and (2) is drawn from these; all else is drawn by resampling configurations (the wild
-bootstrap: the share of every configuration in the change, computed from residuals of a fit without
-it, with random factors), whatever it is made of: readings of one configuration go together, in both
+1. A model is wrong in ways that depend on the pose, the same ways in both series. Two series at the
+   same configurations share that misfit, and it cancels; two pose sets do not, and fits to them
+   differ however small the noise is. Misfit is taken as errors in front of every joint that change
+   smoothly with that joint, of a size that both series show, joint by joint (variance components by
+   the evidence), and beside these whatever differs from configuration to configuration. Misfit may
+   go further from one part of the joints to another than that: how much, halves of one series say,
+   between which nothing happened either (``understated``).
+2. The arm warms up, each time differently. What changes with the order of measuring inside the
+   series is a state of the arm in which a series may be as a whole.
+3. Visits repeat within limits, and the instrument has noise.
+
+The change is estimated together with all of these, by least squares under their variances. Smooth
+misfit and states are drawn from their variances. All else is drawn by resampling configurations
+(wild bootstrap: the share of every configuration in the change, from residuals of a fit without it,
+times a random factor), whatever it is made of; readings of one configuration go together, in both
 series.
 """
 
