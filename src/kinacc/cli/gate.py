@@ -81,7 +81,11 @@ def _configurations(
         what = f"{first_few(unknown)} is none of the configuration"
         raise InputError(Problem("--dataset", what, ", ".join(full)))
     kept = list(datasets or full)
-    own = {name: plan.datasets[name] for name in plan.datasets if name in kept}
+    own = {
+        name: settings
+        for name, settings in plan.datasets.items()
+        if name in kept or settings.get("line_of") in kept
+    }
     return {name: full[name] for name in kept}, replace(plan, datasets=own)
 
 
@@ -105,9 +109,7 @@ def _sound(report: Report) -> tuple[Outcome, ...]:
         if each.problems:
             count = len(each.problems)
             says = f"{count} problem{'s' if count > 1 else ''}: {first_few(each.problems, 3)}"
-            found.append(
-                Outcome(each.name, "results", "results", FAILED, says, report.advice)
-            )
+            found.append(Outcome(each.name, "results", "results", FAILED, says, report.advice))
         else:
             says = f"{len(each.checked)} files are as their records say"
             found.append(Outcome(each.name, "results", "results", PASSED, says))

@@ -239,6 +239,7 @@ SECTIONS = {
         "check-data": "look for mistakes before anything is fitted",
         "plan-poses": "choose poses for a calibration, in a short order",
         "calibrate": "fit the models, and say what they are worth",
+        "add": "new readings of the same arm, to its series",
     },
     "The study": {
         "study": "everything beside: maps, the assessors under noise, claims",

@@ -114,9 +114,7 @@ def without_limit(
         elif gate["kind"] == "value" and not _has_limit(gate):
             of = next((o for o, name in OF_TOLERANCE.items() if name == gate["value"]), "")
             if said is None or tolerance["of"] != of:
-                yield _no_limit(
-                    place("gates", number), limit_key(LIMITS[0], gate), of, tolerance
-                )
+                yield _no_limit(place("gates", number), limit_key(LIMITS[0], gate), of, tolerance)
 
 
 def _no_limit(where: str, limit: str, of: str, tolerance: Mapping[str, Any]) -> Problem:
@@ -127,9 +125,7 @@ def _no_limit(where: str, limit: str, of: str, tolerance: Mapping[str, Any]) -> 
 
 
 def _has_limit(gate: Gate) -> bool:
-    return any(
-        gate[word + ending] is not None for word in LIMITS for ending in _ENDINGS.values()
-    )
+    return any(gate[word + ending] is not None for word in LIMITS for ending in _ENDINGS.values())
 
 
 def limited(gate: Gate, tolerance: Mapping[str, Any]) -> tuple[str, float, bool]:

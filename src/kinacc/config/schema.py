@@ -10,7 +10,7 @@ from typing import Any
 
 DATASET_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]*"  # with - first it would read as an option
 KINDS: tuple[str, ...] = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair")
-KINDS += ("pairs", "names", "parameters", "rows", "records", "variants")
+KINDS += ("pairs", "names", "parameters", "rows", "records", "series", "variants")
 NUMERIC = {
     "int": "a whole number",
     "float": "a number",
@@ -61,6 +61,11 @@ class Key:
             parts.append(
                 f"a mapping of names ({names[self.choices[0]]}) to free, fixed or "
                 "{value_mm: .., prior_std_mm: ..}, with mm, mrad, rad or deg"
+            )
+        elif self.kind == "series":
+            parts.append(
+                "a list of {path: .., date: 2026-03-01, base: same or moved, tool: same or moved}, "
+                "base and tool since the one before, the first without"
             )
         elif self.kind == "rows":
             parts.append("a list of {lines: [8, 12], reason: ..}")
@@ -193,7 +198,7 @@ def _key(name: str, content: Mapping[str, Any]) -> Key:
 def _fields(inside: Mapping[str, Mapping[str, Any]]) -> tuple[Key, ...]:
     """Keys of a mapping that stands in a list."""
     blank = {"default": None, "about": ""}
-    return tuple(_key(each, blank | content) for each, content in inside.items())
+    return tuple(_key(each, {**blank, **content}) for each, content in inside.items())
 
 
 def walk(section: Section, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Key]]:

@@ -312,59 +312,11 @@ def _records(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
 
 
 def _variants(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
-    """Mappings of several kinds, told by a key of each; whole, with defaults, and their ``kind``."""
-    if not isinstance(value, list):
-        return _refuse(key, path, place, f"{shown(value)} is not a list", "write - before each")
-    fewest, most = key.length
-    if not fewest <= len(value) <= most:
-        return _refuse(key, path, place, f"has {len(value)} items, more than {most}")
-    from kinacc.config import gate_rules
+    from kinacc.config import variants
 
-    items: dict[int, dict[str, Any]] = {}
-    problems: list[Problem] = []
-    for number, each in enumerate(value):
-        found, wrong = _variant(key, each, (*path, number), place)
-        items |= {} if wrong else {number: found}
-        problems += wrong
-    problems += gate_rules.wrong(items, lambda *at: place((*path, *at)))
-    return (INVALID if problems else [*items.values()]), problems
-
-
-def _variant(
-    key: Key, value: Any, path: KeyPath, place: Place
-) -> tuple[dict[str, Any], list[Problem]]:
-    if not isinstance(value, dict):
-        return {}, _refuse(key, path, place, f"{shown(value)} is not a mapping")[1]
-    told = [each for each in key.variants if each.name in value]
-    # A kind may have the key of another as a field of its own: then the former is meant.
-    told = [a for a in told if not any(b is not a and b.entry(a.name) for b in told)]
-    kinds = tuple(each.name for each in key.variants)
-    if len(told) != 1:
-        close = [near for each in value if (near := nearest(each, kinds))]
-        fix = f"did you mean {close[0]}?" if close and not told else ""
-        what = f"is of {len(told)} kinds" if told else "says nothing to hold results to"
-        return {}, [Problem(place(path), what, f"one of {', '.join(kinds)}", fix)]
-    (kind,) = told
-    known = Section(kind.name, "", (*key.fields, *kind.entries))
-    found: dict[str, Any] = {"kind": kind.name}
-    problems: list[Problem] = []
-    for name in value:
-        if name not in known.names:
-            what, fix = unknown_key(name, known, Section("", "", ()))
-            problems.append(Problem(place((*path, name)), what, ", ".join(known.names), fix))
-    for field in known.entries:
-        if not isinstance(field, Key):
-            continue
-        if field.name not in value and field.needed:
-            what = f"has no {field.name}"
-            problems.append(Problem(place(path), what, f"{field.name}: {field.allowed}"))
-        elif field.name not in value:
-            found[field.name] = field.default
-        else:
-            here = (*path, field.name)
-            found[field.name], wrong = check(field, value[field.name], here, place)
-            problems += wrong
-    return found, problems
+    found, problems = variants.variants(key, value, path, place)
+    problems = [each if each.allowed else replace(each, allowed=key.allowed) for each in problems]
+    return (INVALID if problems else found), problems
 
 
 def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
@@ -376,6 +328,13 @@ def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
         return _refuse(key, path, place, f"has {len(value)} names, more than {_MOST_NAMES}")
     problems = parameter_rules.rules(value, key.choices[0], lambda name: place((*path, name)))[1]
     return (INVALID if problems else dict(value)), problems
+
+
+def _series(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
+    from kinacc.config import series
+
+    lines, problems = series.lines(value, path, place)
+    return (INVALID if problems else lines), problems
 
 
 _CHECKS: dict[str, Check] = {
@@ -393,4 +352,5 @@ _CHECKS: dict[str, Check] = {
     "rows": _rows,
     "records": _records,
     "variants": _variants,
+    "series": _series,
 }

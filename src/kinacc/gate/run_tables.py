@@ -23,7 +23,7 @@ class Absent(InputError):
 
 
 class RunTables(dict[str, Columns]):
-    """Tables by artefact, read once. Absent where there is none, InputError where it is no table."""
+    """Tables by artefact, read once. Absent where there is none, InputError where it is none."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__()
@@ -43,6 +43,8 @@ class RunTables(dict[str, Columns]):
 
 def maker_of_table(artefact: str) -> str:
     """The command that makes a table, in words."""
+    if artefact == "history":
+        return "give the data set a series of measured files, of which it is the history"
     stage = maker_of(artefact)
     calibrated = stage.name in CALIBRATION or stage.fits
     command = shlex.join(["kinacc", "calibrate" if calibrated else "study", "FILE.yaml"])
@@ -52,7 +54,7 @@ def maker_of_table(artefact: str) -> str:
 def errors_of(
     tables: Mapping[str, Columns], model: str, at: str, quantity: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes (n,) of a model's errors, mm or mrad, and the rows (n,) of ``measurements`` they are at.
+    """Sizes (n,) of a model's errors, mm or mrad, and their rows (n,) of ``measurements``.
 
     ``at``: held_out, every row by a fit that has not seen it; validation, those of them in the
     fold kept for it; training, rows that were fitted. Of rows held out those that every model was
@@ -75,5 +77,3 @@ def errors_of(
         what = f"has no {quantity} errors of model {model} at rows {at.replace('_', ' ')}"
         raise Absent(Problem("pose_errors.parquet", what, fix="name another model, or other rows"))
     return sizes[known], row[own][known]
-
-

@@ -133,7 +133,7 @@ def _of_bound(word: str, tables: RunTables, unit: str) -> Figure:
     size = found.said.upper_mm if found.said else float("nan")
     why = "its campaign states no upper bound so far" if np.isnan(size) else ""
     called = f"{word} bound on the largest error, by campaign {found.place}"
-    about = {"campaign": str(found.place)}
+    about: dict[str, Any] = {"campaign": str(found.place)}
     if found.said:
         about |= {"confidence": found.said.confidence}
     return Figure(size, unit, called, about, why)

@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from kinacc.artifacts.allowed import FINDING_LEVELS
+from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
+from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
@@ -225,3 +226,15 @@ def _text(words: str) -> Text:
     return Text(
         printed(words), code=words.startswith("kinacc ") and not words.startswith("kinacc check-r")
     )
+
+
+def remedies(found: Columns | None) -> list[str]:
+    """What to do about findings of the data check that nobody accepted."""
+    if found is None:
+        return []
+    columns = (found[name] for name in ("level", "lines", "fix", "accepted"))
+    return [
+        ": ".join(str(each) for each in (lines, fix) if each)
+        for level, lines, fix, accepted in zip(*columns, strict=True)
+        if level not in (FINDING_LEVELS[-1], LEFT_OUT) and fix and not accepted
+    ]

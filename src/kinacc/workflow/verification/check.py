@@ -24,6 +24,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import (
     CALIBRATION,
     FIGURE_FOLDER,
+    HISTORY,
     PAGE,
     STAGES,
     TABLES,
@@ -151,9 +152,7 @@ def check_results(
     return report
 
 
-def _checked(
-    folder: Path, plan: Plan | None, configs: Sequence[str], every: bool | None
-) -> Report:
+def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: bool | None) -> Report:
     if not folder.name.strip("."):
         folder = Path(os.path.abspath(folder))
     if not folder.is_dir():
@@ -242,10 +241,11 @@ def check_dataset(
             marks[f"{name}/{path.stem}" if is_part else name] = store.read_metadata(path)
     left_out = _left_out(folder, marks, tables, plan)
     unmade = _not_studied(folder)
+    is_line = plan is not None and folder.name not in plan.told
     told = {
         name: reason
         for name, reason in left_out.items()
-        if not (STAGES[name].measured or STAGES[name].fits or name in unmade)
+        if not (STAGES[name].by_choice or name in unmade or is_line)
     }
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
@@ -253,7 +253,7 @@ def check_dataset(
         for reason in dict.fromkeys(told.values())
     ]
     notes += [f"{folder / name}.parquet: left from before, {why}" for name, why in behind.items()]
-    if unmade:
+    if unmade and not is_line:
         notes.append(f"{folder}: no study was made: kinacc study FILE.yaml makes one")
     absent = {*left_out, *unmade}
     found += _missing(folder, absent)
@@ -402,7 +402,7 @@ def _left_out(folder: Path, marks: dict, tables: dict, plan: Plan | None) -> dic
         return dict(plan.left_out(folder.name))
     own = _of_paper_alone(folder)
     without = _without_file(folder, tables) | own | _without_map(folder, marks, "claims" in own)
-    return without | _without_models(folder, tables)
+    return without | _without_models(folder, tables) | _without_series(folder)
 
 
 def _without_file(folder: Path, tables: dict) -> dict[str, str]:
@@ -425,6 +425,12 @@ def _without_models(folder: Path, tables: dict) -> dict[str, str]:
         if stage.fits and stage.fits not in (*ALWAYS, *known)
         if not any((folder / f"{each}.parquet").exists() for each in stage.outputs)
     }
+
+
+def _without_series(folder: Path) -> dict[str, str]:
+    """Stages of a series, where nothing here is of one."""
+    there = any(path.exists() for name in HISTORY for path in _files(folder, STAGES[name]))
+    return {} if there else dict.fromkeys(HISTORY, "no history of a series is here")
 
 
 def _without_map(folder: Path, marks: dict, no_claims: bool) -> dict[str, str]:
