@@ -48,7 +48,7 @@ class Team:
 
     def types(self, text: str) -> str:
         """What a command says that is typed in the clone by a person, not by a build server."""
-        code, said, _ = self.shell(text, self.clone, CI="", BUILD_ID="", BUILD_NUMBER="")
+        code, said, _ = self.shell(text, self.clone)
         assert code == 0, said
         return said
 
