@@ -25,8 +25,9 @@ from kinacc.calibration.system import FlangeModel
 from kinacc.deployment import drift_chance, drift_pairs
 from kinacc.deployment.drift_joint import joint_of
 from kinacc.deployment.drift_pairs import Setup
+from kinacc.deployment.handful import LEAST_HELD_OUT
 from kinacc.deployment.record import Calibration
-from kinacc.deployment.verify import LEAST, says_there
+from kinacc.deployment.verify import says_there
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import configurations
@@ -107,9 +108,9 @@ class _Comparison:
     def row(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
         """What a row says of ``session`` while the calibration of ``force`` was in force."""
         row = _sizes("in_force", self.errors_mm(force, session, setup))
-        few = [each for each in (force, session) if _count(each.observations) < LEAST]
+        few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]
         if few:
-            what = f"fewer than {LEAST} configurations in {few[0].name}"
+            what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}"
             return row | {"verdict": OPEN, "reason": what}
         try:
             return row | self.moved(force, session, setup)
