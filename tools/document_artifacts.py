@@ -5,7 +5,16 @@ from __future__ import annotations
 from inspect import cleandoc
 from pathlib import Path
 
-from kinacc.artifacts.columns import Artefact, Column
+from kinacc.artifacts.columns import (
+    BY_POSES,
+    BY_ROW,
+    BY_STD,
+    BY_STD_ERROR,
+    SAME_AMONG,
+    SAME_WITHIN,
+    Artefact,
+    Column,
+)
 from kinacc.artifacts.contract import ARTEFACTS, METADATA_KEYS
 from kinacc.artifacts.digests import columns_digest
 from kinacc.workflow.catalogue import STAGES
@@ -50,8 +59,34 @@ chunk of PNG, `Keywords` in the Info of PDF, `kinacc:read:` in HTML.
 
 `records/<stage>.json` (`<stage>.<part>.json` of a stage in parts) is what a run of a stage leaves
 last: its name and part, the five marks, its `inputs_digests`, and for every file that it wrote the
-SHA-256 of its bytes and, of a table, its `columns_digest`. Files without a record that fits are
+SHA-256 of its bytes and, of a table, its `columns_digest`. It tells as well what two of the marks
+fold: `settings`, the configuration values of the stage (of files the names alone), which are
+`config_hash`; `code`, SHA-256 of every module and data file of the package that the stage depends
+on, and `versions` of the libraries and of Python, which are `code_hash`. Files without a record that fits are
 those of a run that did not come to its end, or were changed since: no stage reads them.
+
+## What is the same
+
+`kinacc gate --against` holds a run to the accepted one. Column *same within* says what a number may
+differ by, in its unit: rounding differs from machine to machine. Without a reason for another it is
+{same}.
+A pure number is held to as much as a radian, which is one too, and 1e-9 rad is 1e-6 mm at a
+metre. *{by_row}* is the one that the row states; {among:g} for pure numbers, which may be
+thousands there. Whole numbers and words are equal, and null is
+where null was. Rows belong together by their key, in which numbers count to nine digits.
+
+*{by_poses}*: where these columns differ by more than their unit allows, what counts is the pose
+of every measured target at the measured joints, by model and frames together: 1e-6 mm, and 1e-6 mrad
+where orientations were measured. So parameters that the poses do not tell apart may trade with each
+other. *{by_std}*: an entry of a covariance may differ as it does when both standard
+deviations differ by what their units allow. In `*_fit` the rows `undetermined_direction` (one basis of many of
+what the poses leave open), `gap` and `last_step` (both decided by rounding) are not compared.
+
+Simulations are equal where seed and repetitions are. Where one of these alone changed,
+`study_summary.mean_mm` is held to the standard errors of both runs, `{std_error}`:
+allowed are z standard errors of the difference, z from the normal distribution so that one in a
+thousand such tables is said to differ by chance alone, whatever its number of rows (Bonferroni).
+Single simulations, smallest and largest values and `histories` are not compared then.
 
 ## What a check computes again
 
@@ -79,6 +114,14 @@ def artifacts_markdown() -> str:
         digest=digest,
         relative=recomputation.RELATIVE,
         of_largest=recomputation.OF_LARGEST,
+        same=", ".join(
+            f"{within:g} {unit}" for unit, within in SAME_WITHIN.items() if len(unit) < 5
+        ),
+        by_row=BY_ROW,
+        among=SAME_AMONG["1"],
+        by_poses=BY_POSES,
+        by_std=BY_STD,
+        std_error=BY_STD_ERROR,
         again="\n".join(f"| {_tables(stage)} | {words} |" for stage, words in again),
     )
     return "\n".join([head, *map(_section, ARTEFACTS.values())])
@@ -100,8 +143,8 @@ def _section(artefact: Artefact) -> str:
         "",
         f"{artefact.meaning}{made} Key: {', '.join(f'`{name}`' for name in artefact.key)}.",
         "",
-        "| column | type | unit | allowed | meaning |",
-        "|---|---|---|---|---|",
+        "| column | type | unit | allowed | same within | meaning |",
+        "|---|---|---|---|---|---|",
         *map(_row, artefact.columns),
         "",
     ]
@@ -114,9 +157,15 @@ def _row(column: Column) -> str:
         column.kind,
         column.unit or "-",
         column.limits or "any",
+        _same(column),
         column.meaning,
     )
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _same(column: Column) -> str:
+    within = column.same_within
+    return within if isinstance(within, str) else f"{within:g}" if within else "equal"
 
 
 def main() -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.config.schema import Key, Section, settings
+from kinacc.config.validate import ROBOT, SERIES
 
 _WIDTH = 100
 _HEAD = """\
@@ -31,6 +32,7 @@ datasets:
     measurements:
       source: synthetic
 """
+_ALONE = "Keys of an entry under `datasets` that the top level has not ([series](history.md))."
 _TABLE_HEAD = """\
 # Configuration
 
@@ -52,10 +54,14 @@ def config_yaml() -> str:
 
 def configuration_markdown() -> str:
     """The text of docs/configuration.md: one table per section."""
-    parts = [_TABLE_HEAD, *_table("Top level", "", settings(), "")]
+    alone = Section("", "", (ROBOT, SERIES))
+    parts = [_TABLE_HEAD, *_table("A data set alone", _ALONE, alone, "")]
+    parts += _table("Top level", "", settings(), "")
     for entry in settings().entries:
         if isinstance(entry, Section):
             parts += _section_tables(entry, entry.name)
+        elif entry.variants:
+            parts += _variants(entry)
     return "\n".join(parts)
 
 
@@ -109,14 +115,28 @@ def _section_tables(section: Section, path: str) -> list[str]:
     return parts
 
 
+def _variants(key: Key) -> list[str]:
+    """The kinds of mappings that a list may hold, and the figures that they may name."""
+    kinds = ", ".join(f"`{each.name}`" for each in key.variants)
+    what = f"{key.about[0].upper()}{key.about[1:]}"
+    about = f"{what}: a list of mappings, each of the kind that one of {kinds} tells."
+    parts = _table(f"`{key.name}`", about, Section(key.name, "", key.fields), key.name)
+    figures: dict[str, tuple[str, str, str]] = {}
+    for kind in key.variants:
+        parts += _table(f"`{key.name}`, with `{kind.name}`", kind.about, kind, kind.name)
+        figures |= {m[0]: m for e in kind.entries if isinstance(e, Key) for m in e.meanings}
+    rows = [f"| `{name}` | {unit} | {about} |" for name, unit, about in figures.values()]
+    head = [f"## `{key.name}`: figures that may be named", "", "| figure | unit | meaning |"]
+    return [*parts, *head, "|---|---|---|", *rows, ""]
+
+
 def _table(title: str, about: str, section: Section, path: str) -> list[str]:
     keys = [entry for entry in section.entries if isinstance(entry, Key)]
     head = [f"## {title}", "", about, ""] if about else [f"## {title}", ""]
     if not keys:
         return head
     rows = [
-        f"| `{key.name}` | `{yaml_value(key.default)}` | {key.unit or '-'} | {key.allowed} "
-        f"| {key.about} |"
+        f"| `{key.name}` | {_default(key)} | {key.unit or '-'} | {_allowed(key)} | {key.about} |"
         for key in keys
     ]
     return [
@@ -126,6 +146,14 @@ def _table(title: str, about: str, section: Section, path: str) -> list[str]:
         *rows,
         "",
     ]
+
+
+def _default(key: Key) -> str:
+    return "to be given" if key.needed else f"`{yaml_value(key.default)}`"
+
+
+def _allowed(key: Key) -> str:
+    return "a figure, see below" if key.meanings else key.allowed
 
 
 def main() -> None:

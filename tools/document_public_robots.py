@@ -81,8 +81,8 @@ judged at the same readings.
 **Base and tool.** UR5: those of the fit to the grid, for each model its own; nothing is fitted to
 the {n} poses. UR10, within a series: those of fits without the share that is judged. UR10, from
 one series to the other: the tracker stood elsewhere, and D had another tool. So base and tool, 12
-numbers for each model, are fitted to four fifths of the readings of the judged series and judged
-at the fifth that was left out, in turn; the arm is not touched. `kinacc verify` does that.
+numbers for each model, are fitted to the readings of the judged series, hundreds of them; the arm
+is not touched. `kinacc verify` does that.
 
 **Left out.** Within a series, fifths of the configurations dealt out at random. Neighbours of a
 pose stay in the fit: such errors are about poses among those measured. For VEC on the UR5's grid

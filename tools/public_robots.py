@@ -33,9 +33,9 @@ ADDED = {"ur5_grid.csv": "published_grid.csv", "ur5_random.csv": "published_rand
 ROBOT = {"ur5_grid": "ur5.robot.yaml", "ur5_random": "ur5.robot.yaml"}  # ur10 is shipped
 FITTED = ("ur5_grid", "ur10_b", "ur10_d")
 VERIFIED = (
-    ("ur5_grid", "ur5_random", "fixed"),
-    ("ur10_b", "ur10_d", "estimated"),
-    ("ur10_d", "ur10_b", "estimated"),
+    ("ur5_grid", "ur5_random", "same"),
+    ("ur10_b", "ur10_d", "moved"),
+    ("ur10_d", "ur10_b", "moved"),
 )
 # What init writes of every file that is fitted, beside the description of its columns.
 SETTINGS = {
@@ -81,8 +81,18 @@ def commands() -> list[list[str]]:
     ]
     fits = [["kinacc", "calibrate", f"{each}.yaml"] for each in FITTED]
     held = [
-        ["kinacc", "verify", f"results/{fitted}", f"{judged}.yaml", "--base-and-tool", frames]
-        for fitted, judged, frames in VERIFIED
+        [
+            "kinacc",
+            "verify",
+            f"{judged}.yaml",
+            "--calibration",
+            f"results/{fitted}",
+            "--base",
+            setup,
+            "--tool",
+            setup,
+        ]
+        for fitted, judged, setup in VERIFIED
     ]
     return [*described, *fits, *held]
 

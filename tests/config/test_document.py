@@ -50,7 +50,7 @@ def test_every_key_is_documented_and_its_unit_is_in_its_name(path, key):
     endings = {"mm": "_mm", "kg": "_kg", "deg": "_deg", "mrad": "_mrad", "mm/rad": "_mm_per_rad"}
     endings["s"] = "_s"
     if key.unit and key.name != "joint_range":
-        assert key.name.endswith(endings[key.unit])
+        assert f"_{key.name}".endswith(endings[key.unit])
     if key.kind in NUMERIC:
         assert key.low is not None
         assert key.high is not None

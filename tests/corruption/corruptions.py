@@ -273,7 +273,7 @@ class Study:
         if store.columns_digest(new) == store.columns_digest(old):
             return None
         if case.level != "nothing":
-            new = _signed(new)
+            new = signed(new)
         return store.content_of(new)
 
     def _foreign(self, case: Case) -> Path:
@@ -322,7 +322,7 @@ def _says(name: str, content: bytes) -> object:
         return content
 
 
-def _signed(table: pa.Table) -> pa.Table:
+def signed(table: pa.Table) -> pa.Table:
     digest = {COLUMNS_DIGEST.encode(): store.columns_digest(table).encode()}
     return table.replace_schema_metadata({**(table.schema.metadata or {}), **digest})
 

@@ -15,14 +15,14 @@ from kinacc.calibration.observations import full_poses
 from kinacc.calibration.summary import of_errors
 from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
 from kinacc.deployment.predict import predict
-from kinacc.deployment.verify import with_frames_fitted, with_kept_frames
-from kinacc.errors import InputError
+from kinacc.deployment.verify import trials
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
 
 ELSEWHERE = Pose(exp_so3(np.array([1.2, 0.3, -0.8])), np.array([-700.0, 3100.0, 250.0]))
 LONGER = Pose(exp_so3(np.array([0.1, 1.0, 0.2])), np.array([-60.0, 45.0, 310.0]))
 NOISE_MM = 0.03
+SAME, MOVED = (("--base", each, "--tool", each) for each in ("same", "moved"))
 
 
 def readings(base: Pose, tool: Pose, part: float = 0.3, count: int = 60):
@@ -41,7 +41,7 @@ def rms_mm(trial, model: str) -> float:
 
 
 def test_where_nothing_moved_the_base_and_tool_of_the_calibration_serve():
-    (found,) = with_kept_frames(results("irb120"), robot.load("irb120"), readings(BASE, TOOL))
+    (found,) = trials(results("irb120"), robot.load("irb120"), readings(BASE, TOOL), (), WEIGHT)
     assert found.rows.all()
     assert rms_mm(found, "dh") < 2.5 * NOISE_MM  # three axes of noise are 1.7
     assert rms_mm(found, "nominal") > 5 * rms_mm(found, "dh")
@@ -49,28 +49,31 @@ def test_where_nothing_moved_the_base_and_tool_of_the_calibration_serve():
 
 def test_a_tracker_and_a_tool_that_stand_elsewhere_say_nothing_against_the_arm():
     arm, moved = robot.load("irb120"), readings(ELSEWHERE, LONGER)
-    (kept,) = with_kept_frames(results("irb120"), arm, moved)
-    (fitted,) = with_frames_fitted(results("irb120"), arm, moved, WEIGHT)
+    (kept,) = trials(results("irb120"), arm, moved, (), WEIGHT)
+    (fitted,) = trials(results("irb120"), arm, moved, ("base", "tool"), WEIGHT)
     assert rms_mm(kept, "dh") > 1000.0
-    (home,) = with_kept_frames(results("irb120"), arm, readings(BASE, TOOL))
+    (home,) = trials(results("irb120"), arm, readings(BASE, TOOL), (), WEIGHT)
     assert rms_mm(fitted, "dh") == pytest.approx(rms_mm(home, "dh"), rel=0.2)
     assert rms_mm(fitted, "vec") < rms_mm(fitted, "nominal")
 
 
-def test_base_and_tool_are_judged_at_readings_they_were_not_fitted_to():
-    """A reading that is a metre off spoils the base of the other shares, never its own error."""
-    arm, moved = robot.load("irb120"), readings(ELSEWHERE, LONGER)
-    wrong = moved.position_mm.copy()
-    wrong[3] += np.array([1000.0, 0.0, 0.0])
-    (found,) = with_frames_fitted(results("irb120"), arm, replace(moved, position_mm=wrong), WEIGHT)
-    off = np.linalg.norm(found.errors["dh"].position_mm, axis=1)
-    assert off[3] == pytest.approx(1000.0, abs=0.3)
-    assert off[moved.fold == moved.fold[3]].min() < 5 * NOISE_MM
+@pytest.mark.parametrize(
+    ("base", "tool", "moved"), [(ELSEWHERE, TOOL, ("base",)), (BASE, LONGER, ("tool",))]
+)
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_handful_places_the_one_that_moved_and_leaves_the_other(base, tool, moved, turned):
+    arm, few = robot.load("irb120"), readings(base, tool, count=5)
+    if not turned:
+        few = replace(few, rotation=np.full_like(few.rotation, np.nan))
+    (found,) = trials(results("irb120"), arm, few, moved, WEIGHT)
+    assert rms_mm(found, "dh") < 2.5 * NOISE_MM
+    (wrong,) = trials(results("irb120"), arm, few, {"base", "tool"} - set(moved), WEIGHT)
+    assert rms_mm(wrong, "dh") > 10.0
 
 
 def test_models_are_compared_where_each_says_something_and_the_others_at_all_readings_too():
     arm, wide = robot.load("irb120"), readings(BASE, TOOL, part=0.55)
-    common, everywhere = with_kept_frames(results("irb120"), arm, wide)
+    common, everywhere = trials(results("irb120"), arm, wide, (), WEIGHT)
     assert 0 < common.rows.sum() < len(wide) == everywhere.rows.sum()
     assert set(common.errors) == {"nominal", "dh", "vec"}
     assert set(everywhere.errors) == {"nominal", "dh"}
@@ -79,12 +82,6 @@ def test_models_are_compared_where_each_says_something_and_the_others_at_all_rea
     np.testing.assert_array_equal(
         everywhere.errors["dh"].position_mm[common.rows], common.errors["dh"].position_mm
     )
-
-
-def test_without_shares_there_is_nothing_to_judge_a_fitted_base_by():
-    undealt = replace(readings(BASE, TOOL), fold=np.full(60, -1))
-    with pytest.raises(InputError, match=r"measurements\.folds"):
-        with_frames_fitted(results("irb120"), robot.load("irb120"), undealt, WEIGHT)
 
 
 @pytest.fixture(scope="module")
@@ -115,11 +112,11 @@ def folder(tmp_path_factory):
 
 def test_the_command_says_what_it_fitted_and_how_far_each_model_is_off(folder):
     base, found = folder
-    done = call("verify", found, base / "moved.yaml", "--base-and-tool", "estimated")
+    done = call("verify", base / "moved.yaml", "--calibration", found, *MOVED)
     assert done.exit_code == 0, done.output
-    assert "fitted to these readings, 9 numbers for each model" in done.stdout
+    assert "base and tool fitted to these readings: 9 numbers for each model" in done.stdout
     said = json.loads(
-        call("verify", found, base / "moved.yaml", "--base-and-tool", "estimated", "--json").stdout
+        call("verify", base / "moved.yaml", "--calibration", found, *MOVED, "--json").stdout
     )
     rows = {row["model"]: row for row in said["rows"]}
     assert list(rows) == ["nominal", "DH", "VEC"]
@@ -130,13 +127,13 @@ def test_the_command_says_what_it_fitted_and_how_far_each_model_is_off(folder):
 
 def test_an_instrument_that_was_moved_is_noticed_where_it_should_not_have_been(folder):
     base, found = folder
-    done = call("verify", found, base / "moved.yaml", "--base-and-tool", "fixed")
-    assert "--base-and-tool estimated fits both anew" in done.stdout
+    done = call("verify", base / "moved.yaml", "--calibration", found, *SAME)
+    assert "--base moved --tool moved fits both anew" in done.stdout
 
 
 def test_readings_that_were_fitted_are_no_proof(folder):
     base, found = folder
-    done = call("verify", found, base / "same.yaml", "--base-and-tool", "fixed")
+    done = call("verify", base / "same.yaml", "--calibration", found, *SAME)
     assert done.exit_code == 0, done.output
     assert "are among those it was fitted to: they say nothing of new ones" in done.stdout
 
@@ -146,17 +143,17 @@ def test_another_robot_is_refused(folder, tmp_path):
     own = tmp_path / "other.yaml"
     own.write_text((base / "same.yaml").read_text().replace("mh180", "irb120"))
     (tmp_path / "same.csv").write_text((base / "same.csv").read_text())
-    done = call("verify", found, own, "--base-and-tool", "fixed")
+    done = call("verify", own, "--calibration", found, *SAME)
     assert done.exit_code == 2
     assert "another robot than" in done.output
 
 
 def test_another_target_than_the_calibrations_can_be_fitted_anew_and_not_be_kept(folder):
     base, found = folder
-    kept = call("verify", found, base / "other_target.yaml", "--base-and-tool", "fixed")
+    kept = call("verify", base / "other_target.yaml", "--calibration", found, *SAME)
     assert kept.exit_code == 2
     assert "no frame 'ball'" in kept.output
-    anew = call("verify", found, base / "other_target.yaml", "--base-and-tool", "estimated")
+    anew = call("verify", base / "other_target.yaml", "--calibration", found, *MOVED)
     assert anew.exit_code == 0, anew.output
 
 
@@ -194,26 +191,27 @@ def later(folder, tmp_path_factory):
 
 
 def asked(found, described, *more):
-    done = call("verify", found, described, "--base-and-tool", "fixed", *more)
+    done = call("verify", described, "--calibration", found, *SAME, *more)
     assert done.exit_code == 0, done.output
     return done.stdout
 
 
-def test_an_arm_that_did_not_change_is_as_good_as_at_its_held_out_poses(folder, later):
+@pytest.mark.parametrize("count", [12, 100])
+def test_an_arm_that_did_not_change_passes(folder, later, count):
     _, found = folder
-    file = later(1.0, 400)
-    told = asked(found, file)
-    assert "verdict: as good as at its held-out poses" in told
+    file = later(1.0, count)
+    assert "verdict: passes: where nothing has changed" in asked(found, file)
     said = json.loads(asked(found, file, "--json"))
-    assert said["verdict"] == "as good"
+    assert said["verdict"] == "passes"
     assert said["held_out"]["readings"] == 80
-    assert said["here"]["readings"] == said["like_measured"] > 100
-    assert said["difference_low_mm"] < said["difference_mm"] < said["difference_high_mm"]
+    assert said["here"]["readings"] <= said["like_measured"]
+    assert said["here"]["mean_mm"] < said["limit_mm"]
+    assert said["probability"] > said["level"] == 0.01
 
 
-def test_the_held_out_error_is_that_which_fitted_states(folder):
-    base, found = folder
-    said = json.loads(asked(found, base / "same.yaml", "--json"))
+def test_the_held_out_error_is_that_which_fitted_states(folder, later):
+    _, found = folder
+    said = json.loads(asked(found, later(1.0, 12), "--json"))
     tables = {"pose_errors": store.read(found / "pose_errors.parquet")}
     stated = {
         fact.statistic: fact.value
@@ -225,31 +223,50 @@ def test_the_held_out_error_is_that_which_fitted_states(folder):
     assert said["held_out"]["readings"] == stated["n"]
 
 
-def test_an_arm_that_changed_is_worse_and_the_next_command_tells_arm_from_set_up(folder, later):
+@pytest.mark.parametrize("count", [12, 100])
+def test_an_arm_that_changed_fails_and_the_next_command_tells_arm_from_set_up(folder, later, count):
     _, found = folder
-    file = later(3.0, 100)
+    file = later(3.0, count)
     told = asked(found, file)
-    assert "verdict: worse by" in told
-    assert told.rstrip().splitlines()[-1].endswith("--base-and-tool estimated")
-    assert json.loads(asked(found, file, "--json"))["difference_low_mm"] > 0.0
+    assert "verdict: fails: the mean error is" in told
+    assert told.rstrip().splitlines()[-1].endswith("--base moved --tool moved")
+    said = json.loads(asked(found, file, "--json"))
+    assert said["here"]["mean_mm"] > said["limit_mm"]
+    assert said["probability"] <= said["level"]
 
 
-def test_of_few_readings_where_it_was_measured_nothing_is_told_but_what_to_measure(folder, later):
+def test_too_few_that_are_no_worse_say_how_many_it_takes(folder, later):
     _, found = folder
-    told = asked(found, later(3.0, 12))
-    assert "verdict: cannot be told from these readings: too few readings" in told
-    assert "next: measure 60 new configurations near those of the calibration, 20 at least" in told
+    told = asked(found, later(1.0, 2))
+    assert "verdict: cannot be told from these readings: too few configurations" in told
+    least = json.loads(asked(found, later(1.0, 2), "--json"))["least_configurations"]
+    assert f"it takes {least} configurations to show errors 2 times as large" in told
+    assert f"next: measure {least} or more new configurations near those" in told
     below = told[told.index("VEC ") :].splitlines()
     assert "lie where the calibration was measured" in below[1]  # right after the table
 
 
+def test_more_poses_show_less_and_an_offset_along_the_base_is_not_seen(folder, later):
+    _, found = folder
+    kept = json.loads(asked(found, later(1.0, 12), "--json"))["seen_with"]
+    times = [each["errors_times"] for each in kept]
+    assert times == sorted(times, reverse=True)
+    done = call("verify", later(1.0, 12), "--calibration", found, *MOVED, "--json")
+    said = json.loads(done.stdout)
+    assert said["numbers_fitted"] == 9
+    assert said["seen"]["offsets_of_joints"][0] is None  # as the base turns
+    assert said["seen"]["errors_times"] > kept[2]["errors_times"]
+    assert said["verdict"] == "passes"
+
+
 def test_readings_of_one_configuration_are_not_many(folder, later):
     _, found = folder
-    file = later(1.0, 12)
+    file = later(1.0, 2)
     header, *rows = (file.parent / "today.csv").read_text().splitlines()
     (file.parent / "today.csv").write_text("\n".join([header, *rows * 5]) + "\n")
     said = json.loads(asked(found, file, "--json"))
-    assert said["here"]["readings"] == 5 * said["here"]["configurations"]
+    assert said["readings"] == 10
+    assert said["here"]["configurations"] <= 2
     assert said["verdict"] == "cannot be told"
 
 
@@ -269,17 +286,30 @@ def test_a_calibrated_model_that_is_worse_than_nominal_is_named(folder, later):
     assert f"{worst['model']} is worse than the nominal arm at" in asked(found, file)
 
 
-def test_a_file_of_readings_is_answered_with_the_command_that_describes_it(folder):
+def test_a_file_of_readings_is_read_as_those_of_the_calibration_were(folder, later):
+    """No .yaml of its own: the configuration beside the results says how."""
     base, found = folder
-    done = call("verify", found, base / "same.csv", "--base-and-tool", "fixed")
+    file = later(1.0, 12).with_suffix(".csv")
+    done = call("verify", file, "--calibration", found, *SAME)
     assert done.exit_code == 2
-    assert "holds readings" in done.output
-    assert f"kinacc init {base / 'same.csv'} writes it" in done.output
+    assert f"`kinacc init {file}` writes a .yaml that describes it" in done.output
+    own, text = found.parent.parent / "own.yaml", (base / "moved.yaml").read_text()
+    text = text.replace("{moved:", f"{{{found.name}:")
+    own.write_text(text.replace("moved.csv", str(base / "moved.csv")))
+    done = call("verify", file, "--calibration", found, *SAME, "--json")
+    own.unlink()
+    assert done.exit_code == 0, done.output
+    described = json.loads(asked(found, file.with_suffix(".yaml"), "--json"))
+    said = json.loads(done.stdout)
+    assert said["probability"] == described["probability"]
+    assert said["rows"] == described["rows"]
 
 
 def test_who_does_not_say_whether_something_was_moved_is_told_how_to_choose(folder):
     base, found = folder
-    done = call("verify", found, base / "same.yaml")
+    done = call("verify", base / "same.yaml", "--calibration", found)
     assert done.exit_code == 2
-    assert "give fixed where instrument and tool stand as they did" in done.output
-    assert "estimated where either stands anew" in done.output
+    for option in ("--base", "--tool"):
+        assert f"{option} (the " in done.output
+    assert "give same where it stands as it did" in done.output
+    assert "moved where it stands anew" in done.output

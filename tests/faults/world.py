@@ -39,7 +39,8 @@ COMMANDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("exported/own.csv", "exported/own.yaml"),
     ),
     "verify": (
-        ("verify", RESULTS, "own.yaml", "--base-and-tool", "fixed", "-o", "v.parquet"),
+        ("verify", "own.yaml", "--calibration", RESULTS, "--base", "same", "--tool", "same",
+         "-o", "v.parquet"),
         ("v.parquet",),
     ),
     "compare": (

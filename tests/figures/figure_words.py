@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from kinacc.figures import fig1, fig2, fig3, fig4, history, save
+from kinacc.figures import fig1, fig2, fig3, fig4, iterations, save
 from kinacc.kinematics import robot
 
 CYLINDER = {
@@ -27,13 +27,13 @@ def figures(dataset: str | None = None) -> dict[str, Figure]:
         "fig2": fig2.draw(arm, tables.joint_angles(), cylinder=CYLINDER, dataset=dataset),
         "fig3": fig3.draw(tables.accuracy_map(), dataset=dataset),
         "fig4": fig4.draw(tables.study_summary(), dataset=dataset),
-        "fig5": history.draw(
+        "fig5": iterations.draw(
             tables.history(0.834, seed=0),
             example="rejected",
             true_accuracy_mm=tables.TRUE_MM,
             dataset=dataset,
         ),
-        "fig6": history.draw(
+        "fig6": iterations.draw(
             tables.history(1.023, seed=5, example="not_rejected"),
             example="not_rejected",
             true_accuracy_mm=tables.TRUE_MM,

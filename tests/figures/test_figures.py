@@ -9,7 +9,7 @@ from figure_words import CYLINDER, boxes, figures, problems, said, words
 from scipy.special import gammainc
 
 from kinacc.errors import InputError
-from kinacc.figures import fig1, fig2, fig3, fig4, history, style, truth
+from kinacc.figures import fig1, fig2, fig3, fig4, iterations, style, truth
 from kinacc.kinematics import robot
 
 LONG_NAME = "laser tracker campaign of the second machining cell, spring, warm machine, series B "
@@ -219,7 +219,7 @@ def test_names_are_spread_evenly_and_stay_inside():
 
 def test_history_knows_resampling_by_the_point_and_not_by_the_count():
     point = np.array([4, 2, 2, 4, 7, 2])
-    assert list(history.resampled(point)) == [False, False, True, True, False, True]
+    assert list(iterations.resampled(point)) == [False, False, True, True, False, True]
 
 
 def test_history_says_what_came_of_it():
@@ -233,7 +233,7 @@ def test_history_says_what_came_of_it():
 def test_history_draws_each_measurement_once_as_first_or_as_average():
     table = tables.history(0.834, seed=0)
     lines = {line.get_label(): line.get_xydata() for line in draw(table).axes[0].lines}
-    again = history.resampled(table["point"])
+    again = iterations.resampled(table["point"])
     first, average = lines["first measurement"], lines["after resampling (average)"]
     assert np.array_equal(first[:, 1], table["measured_mm"][~again])
     assert np.array_equal(average[:, 1], table["averaged_mm"][again])
@@ -280,11 +280,11 @@ def test_history_draws_few_iterations(count):
 
 def test_history_without_the_example_says_which_there_are():
     with pytest.raises(InputError, match="found: rejected"):
-        history.draw(tables.history(), example="elsewhere")
+        iterations.draw(tables.history(), example="elsewhere")
 
 
 def draw(table, **settings):
-    return history.draw(table, example="rejected", **settings)
+    return iterations.draw(table, example="rejected", **settings)
 
 
 # The truth

@@ -7,6 +7,7 @@ import pytest
 from kinacc.calibration.summary import Fact
 from kinacc.report import first_screen, page
 from kinacc.report.first_screen import Answers
+from kinacc.report.plain_text import plain_text
 
 NOTHING = Answers({}, [], [], (), [], [], "kinacc fitted results/cell --all")
 
@@ -154,3 +155,18 @@ def test_a_name_that_looks_like_markup_is_a_name():
     text = page.html(page.Page(screen, ()), {}, {"summary": "0" * 64})
     assert "<b onclick" not in text
     assert "&lt;b onclick=&#39;x&#39;&gt;&amp;" in text
+
+
+def test_without_a_browser_the_same_words_stand_in_plain_text():
+    command = f"kinacc export results/cell --out {'a_long_name_' * 9}"
+    answers = Answers({}, ["map error: at most 1.290 mm"], ["a campaign bounds it:"], (),
+                      [command], ["study"], "")  # fmt: skip
+    remedies = ["line 534: measure it again"]
+    text = plain_text(first_screen.screen("cell", "ur10", facts(), remedies, answers))
+    shown = words(facts(), answers, remedies).replace(" remark ", " ", 1)  # read to the blind
+    assert sorted(re.findall(r"\w+", text)) == sorted(re.findall(r"\w+", shown))
+    lines = text.splitlines()
+    assert max(len(line) for line in lines if command not in line) <= 100
+    assert [line.strip() for line in lines].count(command) == 1
+    vec = next(line for line in lines if line.startswith("VEC "))
+    assert vec.split() == ["VEC", "0.24", "0.71", "2.11", "selected"]

@@ -20,6 +20,7 @@ from kinacc.artifacts.columns import (
     JOINTS,
     SLIDES,
     Artefact,
+    absent_if_unstated,
     error_vector,
     length,
     magnitude,
@@ -153,6 +154,9 @@ STUDY_SUMMARY = Artefact(
         *_SUMMARY,
         magnitude("rmse_mm", "mm", "root mean square of assessed minus true accuracy", ERROR_MM),
         whole("repetitions", "number of simulations", 1),
+        *absent_if_unstated(
+            magnitude("std_error_mm", "mm", "standard error of mean_mm and bias_mm", ERROR_MM)
+        ),
     ),
     ("assessor", "noise_mm"),
 )

@@ -13,6 +13,8 @@ from kinacc.artifacts.allowed import (
     UNITS_OF_RESIDUALS,
 )
 from kinacc.artifacts.columns import (
+    BY_POSES,
+    BY_ROW,
     ERROR_MRAD,
     JOINTS,
     JOINTS_MAX,
@@ -28,6 +30,7 @@ from kinacc.artifacts.columns import (
     length,
     magnitude,
     real,
+    same,
     text,
     unstated,
     whole,
@@ -60,7 +63,9 @@ _DH = tuple(
     for name, unit, meaning, limit in _DH_PARAMETERS
 )
 _DH_FITTED = tuple(
-    real(name, unit, meaning, -limit, limit) for name, unit, meaning, limit in _DH_PARAMETERS
+    each
+    for name, unit, meaning, limit in _DH_PARAMETERS
+    for each in same(BY_POSES, real(name, unit, meaning, -limit, limit))
 )
 _DH_STD = tuple(
     magnitude(f"std_{name}", unit, f"standard deviation of {name}, null if undetermined", 1e4, True)
@@ -74,8 +79,7 @@ _FRAME_COLUMNS = (
         "or the name of a target (in the flange frame)",
     ),
     *unstated((text("session", "session a base belongs to; null for one alone and for targets"),)),
-    *_position("the frame's origin"),
-    *_quaternion("the frame's orientation"),
+    *same(BY_POSES, *_position("the frame's origin"), *_quaternion("the frame's orientation")),
 )
 _FIT_COLUMNS = (
     text("quantity", "what the row states, e.g. rank, singular_value", pattern=IDENTIFIER_PATTERN),
@@ -134,6 +138,7 @@ MEASUREMENTS = Artefact(
     ),
     ("pose", "target", "repeat"),
 )
+_BY_ERROR = "mm for delta, rad for eps"
 VEC_MODEL = Artefact(
     "vec_model",
     "Volumetric error compensation model: Chebyshev coefficients over the nominal DH.",
@@ -148,11 +153,13 @@ VEC_MODEL = Artefact(
             choices=(-1, 0, 1),
         ),
         whole("order", "order of the Chebyshev polynomial, first kind", 0, 40),
-        real(
-            "coefficient", "mm for delta, rad for eps", "coefficient of the polynomial", -1e3, 1e3
+        *same(
+            BY_POSES,
+            real("coefficient", _BY_ERROR, "coefficient of the polynomial", -1e3, 1e3),
         ),
-        magnitude(
-            "std", "mm for delta, rad for eps", "standard deviation of the coefficient", 1e4, True
+        *same(
+            BY_ROW,
+            magnitude("std", _BY_ERROR, "standard deviation of the coefficient", 1e4, True),
         ),
         real("q_min_rad", "rad", f"joint position mapped to -1, {SLIDES}", -TRAVEL_MM, TRAVEL_MM),
         real("q_max_rad", "rad", f"joint position mapped to +1, {SLIDES}", -TRAVEL_MM, TRAVEL_MM),
@@ -270,11 +277,17 @@ def _body(mass: str, centre: str, of: str, nullable: bool = False) -> tuple[Colu
 
 
 _COEFFICIENTS = (
-    ("compliance_rad_per_nm", "rad/(N m)", "turn of the joint by a moment of gravity about it"),
+    (
+        "compliance_rad_per_nm",
+        "rad/(N m)",
+        "turn of the joint by a moment of gravity about it",
+        1e-11,  # 1e-9 rad by the 100 N m of a heavy arm
+    ),
     (
         "lever_coefficient_rad_per_mm",
         "rad/mm",
         "turn by the lever of the last origin: the product of a weight and the compliance",
+        1e-12,  # 1e-9 rad by a lever of a metre
     ),
 )
 COMPLIANCE_MODEL = Artefact(
@@ -285,15 +298,21 @@ COMPLIANCE_MODEL = Artefact(
         *DH_MODEL.columns,
         *(
             column
-            for name, unit, meaning in _COEFFICIENTS
+            for name, unit, meaning, within in _COEFFICIENTS
             for column in (
-                real(name, unit, f"{meaning}, null where not fitted", -1.0, 1.0, True),
-                magnitude(
-                    f"std_{name}",
-                    unit,
-                    f"standard deviation of {name}, null if undetermined or not fitted",
-                    1e4,
-                    True,
+                *same(
+                    BY_POSES,
+                    real(name, unit, f"{meaning}, null where not fitted", -1.0, 1.0, True),
+                ),
+                *same(
+                    within,
+                    magnitude(
+                        f"std_{name}",
+                        unit,
+                        f"standard deviation of {name}, null if undetermined or not fitted",
+                        1e4,
+                        True,
+                    ),
                 ),
             )
         ),

@@ -12,6 +12,21 @@ if TYPE_CHECKING:
 
 Columns = dict[str, "np.ndarray"]  # a table in memory: a null number is NaN, a null text None
 JOINTS_MIN, JOINTS_MAX = 4, 7
+# Two runs of one work may differ by so much, by the unit of a column: rounding differs from machine
+# to machine. What an arm is sure of begins at 1e-3 mm; 1e-9 rad is 1e-6 mm at a metre. Pure numbers
+# are held to as much as radians, which are pure numbers too.
+SAME_WITHIN = {
+    **{"mm": 1e-6, "mrad": 1e-6, "rad": 1e-9, "deg": 1e-7, "1": 1e-9, "mm^2": 1e-6},
+    # Statistics of claims: lengths in mm, shares and ratios.
+    **{"see statement": 1e-6, "see claims": 1e-6, "see factor": 1e-6},
+    **{"kg": 1e-6, "degC": 1e-6, "mm per mm or mrad": 1e-6, "mm or mrad": 1e-6},
+}
+# Among values of several units pure numbers may be as large as thousands of degrees of freedom.
+SAME_AMONG = {**SAME_WITHIN, "1": 1e-6}
+# Where a column is not held to its unit: what it is held to in its place.
+BY_ROW, BY_POSES, BY_STD = "the row's unit", "predicted poses", "standard deviations"
+# Means of simulations that were drawn anew, by another seed or number of them, are held to it.
+BY_STD_ERROR = "study_summary.std_error_mm"
 
 
 @dataclass(frozen=True)
@@ -21,7 +36,8 @@ class Column:
     ``kind`` is float, int, int8 or text. ``unit`` is empty for text and names, "1" for pure
     numbers. ``low`` and ``high`` bound what is physically possible, both included; ``choices`` or
     ``pattern`` bound what a text may say. An ``optional`` column is null throughout where a table
-    does not state it; one that ``may_be_absent`` is not in the file then.
+    does not state it; one that ``may_be_absent`` is not in the file then. ``same`` is what two runs
+    of one work may differ by where that is not as its unit says (SAME_WITHIN).
     """
 
     name: str
@@ -35,6 +51,16 @@ class Column:
     pattern: str = ""
     optional: bool = False
     may_be_absent: bool = False
+    same: float | str | None = None
+
+    @property
+    def same_within(self) -> float | str:
+        """What two runs of one work may differ by, or what the column is held to in its place."""
+        if self.kind != "float":
+            return 0.0
+        if self.same is not None:
+            return self.same
+        return BY_ROW if self.unit == "see unit" else SAME_WITHIN[self.unit]
 
     @property
     def per_joint(self) -> bool:
@@ -169,6 +195,11 @@ def unstated(columns: Iterable[Column]) -> tuple[Column, ...]:
 def absent_if_unstated(*columns: Column) -> tuple[Column, ...]:
     """The columns as ones that a file has only where a table states them."""
     return tuple(replace(column, may_be_absent=True) for column in unstated(columns))
+
+
+def same(within: float | str, *columns: Column) -> tuple[Column, ...]:
+    """The columns as ones of which two runs may differ by so much, or that are held to that."""
+    return tuple(replace(column, same=within) for column in columns)
 
 
 def length(name: str, meaning: str, limit: float, nullable: bool = False) -> Column:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.columns import Artefact, magnitude, real, text
+from kinacc.artifacts.columns import BY_STD, Artefact, magnitude, real, same, text
 
 _NAMES = (
     "base.x_mm .. base.rz_rad (base in the instrument's frame), tool.x_mm .. (target in the flange "
@@ -11,12 +11,17 @@ _NAMES = (
 _COLUMNS = (
     text("parameter", f"an estimated parameter: {_NAMES}"),
     text("other", "the same parameter (its variance) or one before it"),
-    real(
-        "covariance",
-        "product of the units of both",
-        "covariance; mm for lengths and delta, rad for angles and eps",
+    *same(
+        BY_STD,
+        real(
+            "covariance",
+            "product of the units of both",
+            "covariance; mm for lengths and delta, rad for angles and eps",
+        ),
+        real(
+            "correlation", "1", "correlation; null where one of both is undetermined", -1, 1, True
+        ),
     ),
-    real("correlation", "1", "correlation; null where one of both is undetermined", -1, 1, True),
 )
 VEC_COVARIANCE = Artefact(
     "vec_covariance",

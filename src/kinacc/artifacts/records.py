@@ -11,11 +11,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
+from kinacc.artifacts import provenance
 from kinacc.artifacts.atomic import replacing
 from kinacc.errors import InputError, Problem
 
 FOLDER = "records"
+_FOLDED = ("settings", "code", "versions")
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,10 @@ class Record:
     """One run of a stage, or of a part of one that is scattered.
 
     ``marks`` are those of its tables (PROVENANCE_KEYS), ``inputs_digests`` say by role what it
-    read; ``files`` are all it left, by their names in the folder of the data set.
+    read; ``files`` are all it left, by their names in the folder of the data set. What the marks
+    fold: ``settings`` are the configuration values of the stage without the folders of files,
+    ``code`` digests of its modules and data files, ``versions`` those of libraries and Python;
+    None in records of before they were told.
     """
 
     stage: str
@@ -44,10 +50,26 @@ class Record:
     marks: Mapping[str, str]
     inputs_digests: Mapping[str, str]
     files: Mapping[str, Written]
+    settings: Mapping[str, Any] | None = None
+    code: Mapping[str, str] | None = None
+    versions: Mapping[str, str] | None = None
 
     def content(self) -> bytes:
         """The record as JSON: the same bytes for the same record."""
-        return (json.dumps(asdict(self), sort_keys=True, indent=1) + "\n").encode()
+        told = {name: value for name, value in asdict(self).items() if name not in self._untold()}
+        return (json.dumps(told, sort_keys=True, indent=1) + "\n").encode()
+
+    def misfolded(self) -> list[str]:
+        """Marks that do not fold what the record tells of settings and code."""
+        folds = {}
+        if self.settings is not None:
+            folds["config_hash"] = provenance.config_hash(self.settings)
+        if self.code is not None and self.versions is not None:
+            folds["code_hash"] = provenance.Code(self.code, self.versions).folded()
+        return [key for key, hash_ in folds.items() if self.marks.get(key) != hash_]
+
+    def _untold(self) -> set[str]:
+        return {name for name in _FOLDED if getattr(self, name) is None}
 
 
 def place(folder: Path | str, stage: str, part: str | None = None) -> str:
@@ -84,8 +106,10 @@ def read(place: Path | str) -> Record:
         known = json.loads(Path(place).read_bytes())
         files = {name: Written(**told) for name, told in known.pop("files").items()}
         record = Record(**known, files=files)
-        if not (_texts(record.marks) and _texts(record.inputs_digests)):
+        texts = [record.marks, record.inputs_digests, record.code or {}, record.versions or {}]
+        if not (all(map(_texts, texts)) and isinstance(record.settings or {}, dict)):
             raise ValueError
+        record.misfolded()  # what cannot be folded is no record
     except FileNotFoundError:
         raise InputError(Problem(str(place), "no such file")) from None
     except OSError as error:

@@ -140,6 +140,11 @@ def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:
     return columns_in(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
 
 
+def digest_of(artefact: str, columns: Mapping[str, Any]) -> str:
+    """Digest that the columns of an artefact have in whatever file they are written to."""
+    return columns_digest(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
+
+
 def write(
     path: Path | str,
     artefact: str,

@@ -49,10 +49,10 @@ def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Err
     own base to the instrument, and from there to that base.
     """
     bases = {name: _bases(fit.frames, observations) for name, fit in fits.items()}
-    seen = {name: _seen(fit, bases[name], observations) for name, fit in fits.items()}
-    seen[MEASURED] = observations.measured
+    poses = {name: seen(fit, observations) for name, fit in fits.items()}
+    poses[MEASURED] = observations.measured
     return {
-        each.name: _difference(seen[each.reference], seen[each.model], bases[each.model])
+        each.name: _difference(poses[each.reference], poses[each.model], bases[each.model])
         for each in comparisons(fits)
     }
 
@@ -99,11 +99,13 @@ def statistics(vectors: np.ndarray) -> Statistics | None:
     )
 
 
-def _seen(fit: Fit, bases: Pose, observations: Observations) -> Pose:
+def seen(fit: Fit, observations: Observations) -> Pose:
+    """Poses (n, ...) of the targets in the instrument's frame, as a model predicts them."""
     targets = Pose(
         fit.frames.targets.rotation[observations.target],
         fit.frames.targets.position_mm[observations.target],
     )
+    bases = _bases(fit.frames, observations)
     return compose(bases, compose(fit.model.pose(observations.at), targets))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -110,6 +111,25 @@ def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> 
         recorded = max(opened.recorded, default="")
         return Sought(Assessed(place, state, said[0] if said else None, recorded), tuple(remarks))
     return Sought(None, tuple(remarks))
+
+
+def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
+    """Upper bound, mm, of the last campaign on a calibration's ``model`` that came to its end.
+
+    The last by the times of its journal, so that it is the same wherever its folder is copied to.
+    NaN where there is none; one that cannot be read is none.
+    """
+    ended = []
+    for place in places:
+        with suppress(InputError):
+            opened = folder.open_(place)
+            if opened.plan.about["model"] != model or not _is_of(opened.plan, tables):
+                continue
+            state = opened.state()
+            said = min(state.statements(), key=lambda each: _ORDER.index(each.target), default=None)
+            if state.asked is None and said is not None and np.isfinite(said.upper_mm):
+                ended.append((max(opened.recorded, default=""), said.upper_mm))
+    return max(ended, default=("", np.nan))[1]
 
 
 def _last_reading(place: Path) -> float:

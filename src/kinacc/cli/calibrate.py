@@ -59,7 +59,7 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     configs, plan = carried_out("calibration", words, cores, default=None)
     if plan is None:
         return
-    folders = {name: f"{plan.results}/{name}" for name in plan.datasets}
+    folders = {name: f"{plan.results}/{name}" for name in plan.told}
     if as_json:
         answers = {name: summary(folder) for name, folder in folders.items()}
         click.echo(json.dumps(answers, indent=2))

@@ -239,6 +239,7 @@ SECTIONS = {
         "check-data": "look for mistakes before anything is fitted",
         "plan-poses": "choose poses for a calibration, in a short order",
         "calibrate": "fit the models, and say what they are worth",
+        "add": "new readings of the same arm, to its series",
     },
     "The study": {
         "study": "everything beside: maps, the assessors under noise, claims",
@@ -261,6 +262,10 @@ SECTIONS = {
         "plan-campaign": "how many readings a wanted bound takes",
         "campaign": "measure: what next, what was read, what may be said",
         "tournament": "hold all assessors to errors that are known",
+    },
+    "In a pipeline": {
+        "gate": "hold results to what is good enough, and to the accepted run",
+        "accept": "make a run the accepted one, by a person",
     },
 }
 

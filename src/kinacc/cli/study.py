@@ -35,14 +35,14 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     if plan is None:
         return
     if as_json:
-        click.echo(json.dumps({"results": [f"{plan.results}/{name}" for name in plan.datasets]}))
+        click.echo(json.dumps({"results": [f"{plan.results}/{name}" for name in plan.told]}))
         return
     options = [word for name in configs for word in ("--config", name)]
     check = shlex.join(["kinacc", "check-results", plan.results, *options])
-    if len(plan.datasets) > FEW:
-        show_many([f"{plan.results}/{name}" for name in plan.datasets], [check])
+    if len(plan.told) > FEW:
+        show_many([f"{plan.results}/{name}" for name in plan.told], [check])
         return
-    for dataset in plan.datasets:
+    for dataset in plan.told:
         folder = f"{plan.results}/{dataset}"
         lines = answer(folder, read(folder), following=[check])
         click.echo("\n".join(["", *lines, f"tables and figures are in {folder}"]))

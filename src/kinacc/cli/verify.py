@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -17,39 +16,39 @@ if TYPE_CHECKING:
 
     from kinacc.calibration.observations import Observations
     from kinacc.cli.sheet import Sheet
-    from kinacc.deployment.verify import Level, Trial, Verdict
+    from kinacc.deployment.verify import Seen, Trial, Verdict
 
 _FAR_MM = 10.0
+_SETUP = click.Choice(["same", "moved"])
+_DESCRIPTIONS = (".yaml", ".yml")
 
 
 @click.command("verify")
-@click.argument("folder", type=click.Path())
-@click.argument("files", nargs=-1, required=True, type=click.Path(), metavar="FILE.yaml...")
-@click.option(
-    "--base-and-tool",
-    type=choice.values_of("calibration.base_and_tool"),
-    help="As they were fitted, or fitted anew to these readings.  [required]",
-)
-@click.option("--dataset", help="Data set of the files. [the only one]")
+@click.argument("readings", type=click.Path(), metavar="NEW")
+@click.option("--calibration", "folder", type=click.Path(), help="Its results folder.  [required]")
+@click.option("--base", type=_SETUP, help="Whether the instrument was moved.  [required]")
+@click.option("--tool", type=_SETUP, help="Whether the target or tool was moved.  [required]")
+@click.option("--dataset", help="Data set that is meant, where NEW is a .yaml. [the only one]")
 @answers(table=True)
-def verify(folder, files, base_and_tool, dataset, out) -> None:
-    """Hold a calibration to readings that it was not fitted to, and say how far it is off.
+def verify(readings, folder, base, tool, dataset, out) -> None:
+    """Hold a calibration to a few poses that it was not fitted to: does it still hold?
 
-    FOLDER is the results folder of a data set, FILE.yaml what `kinacc init` wrote of the other
-    readings, of the same arm. With --base-and-tool fixed nothing is fitted to them: right where
-    instrument and tool stand as they did. Where either stands anew, estimated fits base and tool
-    (twelve numbers, of positions alone nine) to these readings, for every model its own, and judges
-    it at the shares of the readings that were held out of that; the arm is not touched. All models
-    are compared at the same readings: those where each says something.
+    NEW is a file of readings in the form of those of the calibration, whose configuration is looked
+    for beside the results; or a .yaml that `kinacc init` wrote of readings in another form. 5 to 15
+    poses, spread as those of the calibration are, tell large changes; what they tell is said, and
+    what more would.
 
-    The verdict is on the selected model where the calibration was measured: whether its mean error
-    there is that of its held-out poses, by the 99 % interval of the difference. It is no bound on
-    the largest error.
+    What was moved is fitted anew to the readings (base 6 numbers, tool 3 or 6), for every model its
+    own, and so it is to the held-out poses that they are compared with. The arm is not touched. The
+    verdict is on the selected model where the calibration was measured: it fails where the mean
+    error is one that 1 % of such handfuls have where nothing has changed, passes otherwise, and
+    cannot be told where fewer poses than show errors doubled are no worse. It is no bound on the
+    largest error.
 
     \b
     Example:
-      kinacc verify results/ur10_b ur10_d.yaml --base-and-tool estimated
-      kinacc verify results/monday tuesday.yaml --base-and-tool fixed --json
+      kinacc verify today.csv --calibration results/tracker --base same --tool same
+      kinacc verify ur10_d.yaml --calibration results/ur10_b --base moved --tool moved --json
     """
     import warnings
 
@@ -59,117 +58,149 @@ def verify(folder, files, base_and_tool, dataset, out) -> None:
     from kinacc.deployment import folder as results
     from kinacc.deployment import shared_readings
     from kinacc.deployment.applicability import is_measured_there
-    from kinacc.deployment.verify import OPEN, verdict, with_frames_fitted, with_kept_frames
+    from kinacc.deployment.verify import BASE, OPEN, TOOL, Verdict, trials, verdict
     from kinacc.progress import reporting
     from kinacc.workflow.stages import measurements
 
-    _require_choice(base_and_tool)
-    name, config = _section(files, dataset)
+    _require_choices(folder, base, tool)
+    moved = [name for name, kind in ((BASE, base), (TOOL, tool)) if kind == "moved"]
+    name, config = _settings(readings, folder, dataset)
     tables = results.read_tables(folder, "pose_errors")
     arm = choice.robot_of(folder, config["robot"], ())
+    weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         columns = measurements.run({}, config)["measurements"]
         seen = from_columns(columns, arm)
-        if base_and_tool == "fixed":
-            trials = with_kept_frames(tables, arm, seen)
-        else:
-            weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
-            trials = with_frames_fitted(tables, arm, seen, weight)
+        tried = trials(tables, arm, seen, moved, weight)
         selected = results.selected_model(tables)
         known = results.calibration(tables, arm, selected)
         point = next((each for each in seen.target_names if each in known.targets), None)
         there = is_measured_there(known, seen.at, point)
-        found = verdict(tables, selected, trials, seen, there)
+        shared = 0
+        if "measurements" in tables:
+            shared = shared_readings.shared(tables["measurements"], columns, False).count
+        if shared:
+            found = Verdict(OPEN, _FITTED)
+        elif not moved and _far_off(tried):
+            found = Verdict(OPEN, _ELSEWHERE)
+        else:
+            found = verdict(tables, arm, selected, seen, there, moved, weight)
     for each in dict.fromkeys(str(warning.message) for warning in said):
         click.echo(f"{name}: {each}", err=True)
-    shared = 0
-    if "measurements" in tables:
-        shared = shared_readings.shared(tables["measurements"], columns, False).count
     facts = {
         "calibration": str(folder),
         "readings_of": name,
         "readings": len(seen),
-        "base_and_tool": base_and_tool,
-        "numbers_fitted": 0 if base_and_tool == "fixed" else _numbers(seen),
+        "base": base,
+        "tool": tool,
+        "numbers_fitted": _numbers(seen, moved),
         "selected": selected,
         "shared_readings": shared,
         "like_measured": int(np.sum(there)),
     }
-    if shared:
-        found = replace(found, says=OPEN, reason="some are among those it was fitted to")
-    elif base_and_tool == "fixed" and _far_off(trials):
-        found = replace(found, says=OPEN, reason="instrument or tool stands elsewhere")
-    step, command = _next(found, base_and_tool, folder, files, dataset)
+    step, command = _next(found, readings, folder, dataset, moved)
     facts |= _of_verdict(found) | {
         "worse_than_nominal": [
             {"model": kind, "readings": count, "mean_mm": mean, "nominal_mean_mm": plain}
-            for kind, count, mean, plain in _worse_than_nominal(trials)
+            for kind, count, mean, plain in _worse_than_nominal(tried)
         ],
         "next_step": step,
         "next": command,
     }
-    out.deliver(_sheet(facts, trials), _in_words(facts, trials, found))
+    units = ["mm" if slides else "mrad" for slides in arm.dh.prismatic]
+    out.deliver(_sheet(facts, tried), _in_words(facts, tried, found, moved, units))
 
 
-def _require_choice(base_and_tool: str | None) -> None:
-    """InputError, with how to choose, where nothing is said of base and tool."""
-    from kinacc.errors import InputError, Problem
+_FITTED = "some are among those it was fitted to"
+_ELSEWHERE = "instrument or tool stands elsewhere"
 
-    if base_and_tool is None:
-        fix = (
-            "give fixed where instrument and tool stand as they did when the calibration was "
-            "measured, estimated where either stands anew: both are then fitted to these readings"
-        )
-        what = "is not given, and only you know whether something was moved"
-        raise InputError(Problem("--base-and-tool", what, fix=fix))
+
+def _require_choices(folder: str | None, base: str | None, tool: str | None) -> None:
+    """InputError, with how to choose, where the calibration or what was moved is not given."""
+    from kinacc.errors import Problem, refuse
+
+    fix = (
+        "give same where it stands as it did when the calibration was measured, moved where it "
+        "stands anew: it is then fitted to these readings"
+    )
+    what = "is not given, and only you know whether it was moved"
+    options = ("--base (the instrument)", base), ("--tool (the tool or target)", tool)
+    problems = [Problem(option, what, fix=fix) for option, given in options if given is None]
+    if folder is None:
+        fix = "give the results folder that the readings are held to, such as results/tracker"
+        problems.insert(0, Problem("--calibration", "is not given", fix=fix))
+    refuse(problems)
+
+
+def _settings(readings: str, folder: str, dataset: str | None) -> tuple[str, Mapping]:
+    """Name and settings of the new readings: as described, or as those of the calibration."""
+    from pathlib import Path
+
+    from kinacc.workflow.described import like_those_of
+
+    path = Path(readings)
+    if path.suffix.lower() in _DESCRIPTIONS:
+        return _section([readings], dataset)
+    return path.stem, like_those_of(Path(folder), path)
 
 
 def _of_verdict(found: Verdict) -> dict[str, object]:
     """The verdict as facts."""
-    from kinacc.deployment.verify import AS_GOOD, CONFIDENCE, LEAST
+    from kinacc.deployment.handful import LEVEL, POWER
 
+    held = found.held
     return {
         "verdict": found.says,
         "verdict_reason": found.reason,
+        "level": LEVEL,
+        "power": POWER,
         "here": found.here and found.here._asdict(),
         "held_out": found.held_out and found.held_out._asdict(),
-        "difference_mm": found.difference_mm,
-        "difference_low_mm": found.low_mm,
-        "difference_high_mm": found.high_mm,
-        "difference_confidence": CONFIDENCE,
-        "as_good_up_to": AS_GOOD,
-        "least_configurations": LEAST,
+        "expected_mean_mm": held and held.expected_mm,
+        "limit_mm": held and held.limit_mm,
+        "probability": held and held.probability,
+        "least_configurations": found.least,
+        "seen": found.seen and _of_seen(found.seen),
+        "seen_with": [_of_seen(each) for each in found.table],
+    }
+
+
+def _of_seen(seen: Seen) -> dict[str, object]:
+    """What poses show, as facts: null what they do not."""
+    return {
+        "poses": seen.poses,
+        "errors_times": seen.factor,
+        "offsets_of_joints": [float(each) for each in seen.joints],
     }
 
 
 def _next(
-    found: Verdict, base_and_tool: str, folder: str, files: Sequence[str], dataset: str | None
+    found: Verdict, readings: str, folder: str, dataset: str | None, moved: Sequence[str]
 ) -> tuple[str, str]:
     """What to do after a verdict, and the command for it."""
-    from kinacc.deployment.verify import ENOUGH, GOOD, LEAST, OPEN
+    from kinacc.deployment.verify import FEW_HELD_OUT, OPEN, PASSES
 
-    more = [] if dataset is None else ["--dataset", dataset]
-    anew = shlex.join(["kinacc", "verify", folder, *files, *more, "--base-and-tool", "estimated"])
-    again = shlex.join(["kinacc", "calibrate", *files])
+    words = ["kinacc", "verify", readings, "--calibration", folder]
+    words += [] if dataset is None else ["--dataset", dataset]
+    anew = shlex.join([*words, "--base", "moved", "--tool", "moved"])
+    fitted = shlex.join(["kinacc", "fitted", folder])
     poses = shlex.join(["kinacc", "show", f"{folder}/measurements", "--columns", "pose,q*"])
-    if found.says == GOOD:
-        return "the calibration can be used on", shlex.join(["kinacc", "fitted", folder])
-    if found.says == OPEN:
-        if found.reason.startswith("instrument"):
-            return "fit base and tool to these readings", anew
-        if found.reason.startswith("too few held-out"):
-            step = "calibrate with folds (measurements.folds) and enough poses to hold some out"
-            return step, shlex.join(["kinacc", "fitted", folder])
-        step = (
-            f"measure {ENOUGH} new configurations near those of the calibration, {LEAST} at least"
-        )
-        if found.reason.startswith("the difference"):
-            step = f"measure {ENOUGH} new configurations or more near those of the calibration"
-        return f"{step}, and verify again; this lists those", poses
-    if base_and_tool == "fixed":
-        return "see whether the arm has changed, or only instrument or tool was moved", anew
-    return "calibrate anew with these readings", again
+    if found.says == PASSES:
+        return "the calibration can be used on", fitted
+    if found.says != OPEN:
+        if not moved:
+            step = "see whether the arm has changed, or only instrument or tool was moved"
+            return step, anew
+        return "measure as many poses as those of the calibration anew, and calibrate", poses
+    if found.reason == _ELSEWHERE:
+        return "fit base and tool to these readings", anew
+    if found.reason == FEW_HELD_OUT:
+        step = "calibrate with folds (measurements.folds) and enough poses to hold some out"
+        return step, fitted
+    some = "more" if found.least is None else f"{found.least} or more"
+    step = f"measure {some} new configurations near those of the calibration, and verify again"
+    return f"{step}; this lists those", poses
 
 
 def _section(files: Sequence[str], dataset: str | None) -> tuple[str, Mapping]:
@@ -187,12 +218,15 @@ def _section(files: Sequence[str], dataset: str | None) -> tuple[str, Mapping]:
     return name, full[name]
 
 
-def _numbers(seen: Observations) -> int:
-    """How many numbers base and tool of a single model are."""
+def _numbers(seen: Observations, moved: Sequence[str]) -> int:
+    """How many numbers what was moved is, of a single model."""
     import numpy as np
 
+    from kinacc.deployment.verify import BASE, TOOL
+
     turned = np.unique(seen.target[seen.has_rotation])
-    return 6 * len(seen.session_names) + 3 * len(seen.target_names) + 3 * len(turned)
+    base = 6 * len(seen.session_names) if BASE in moved else 0
+    return base + (3 * len(seen.target_names) + 3 * len(turned) if TOOL in moved else 0)
 
 
 def _sheet(facts: Mapping, trials: Sequence[Trial]) -> Sheet:
@@ -281,25 +315,32 @@ def _worse_than_nominal(trials: Sequence[Trial]) -> Iterator[tuple[str, int, flo
             yield model_name(kind), len(mean), float(mean.mean()), float(plain.mean())
 
 
-def _in_words(facts: Mapping, trials: Sequence[Trial], found: Verdict) -> str:
+def _in_words(
+    facts: Mapping,
+    tried: Sequence[Trial],
+    found: Verdict,
+    moved: Sequence[str],
+    units: Sequence[str],
+) -> str:
     """Where the readings lie, whether the calibration holds there, and what to do next."""
     from kinacc.artifacts.error_models import model_name
+    from kinacc.deployment.verify_words import of_verdict
 
     count, selected = facts["readings"], facts["selected"]
     lines = [
         f"{facts['like_measured']} of {count} readings lie where the calibration was measured; "
         "errors elsewhere may be larger than those held out"
     ]
-    if facts["base_and_tool"] == "fixed":
+    if moved:
         lines.append(
-            "base and tool are those of the calibration; nothing was fitted to these readings"
+            f"{' and '.join(moved)} fitted to these readings: {facts['numbers_fitted']} numbers "
+            "for each model, which take up a part of its errors; the arm was not touched"
         )
     else:
         lines.append(
-            f"base and tool were fitted to these readings, {facts['numbers_fitted']} numbers for "
-            "each model, and judged at readings held out of that; the arm was not touched"
+            "base and tool are those of the calibration; nothing was fitted to these readings"
         )
-    said = max((int(each.rows.sum()) for each in trials if selected in each.errors), default=0)
+    said = max((int(each.rows.sum()) for each in tried if selected in each.errors), default=0)
     if said < count:
         lines.append(
             f"{model_name(selected)}, the selected model, says nothing at {count - said} of "
@@ -307,58 +348,21 @@ def _in_words(facts: Mapping, trials: Sequence[Trial], found: Verdict) -> str:
         )
     else:
         lines.append(f"{model_name(selected)} is the selected model")
-    for name, number, mean, plain in _worse_than_nominal(trials):
+    for name, number, mean, plain in _worse_than_nominal(tried):
         lines.append(
             f"{name} is worse than the nominal arm at {number} readings: mean {mean:.4g} mm, "
             f"nominal {plain:.4g} mm"
         )
-    if found.reason.startswith("instrument"):
+    if found.reason == _ELSEWHERE:
         lines.append(
             "every model is off by centimetres or more: the instrument or the tool stands "
-            "elsewhere than it did; --base-and-tool estimated fits both anew"
+            "elsewhere than it did; --base moved --tool moved fits both anew"
         )
     if facts["shared_readings"]:
         lines.append(
             f"{facts['shared_readings']} of these readings are among those it was fitted to: they "
             "say nothing of new ones"
         )
-    lines.append(
-        f"{model_name(selected)} where it was measured: {_level(found.here)}; at its held-out "
-        f"poses: {_level(found.held_out)}"
-    )
-    lines += [_verdict(found), f"next: {facts['next_step']}", f"  {facts['next']}"]
+    lines += of_verdict(found, selected, moved, units)
+    lines += [f"next: {facts['next_step']}", f"  {facts['next']}"]
     return "\n".join(lines)
-
-
-def _level(level: Level | None) -> str:
-    """How large the errors are, in words."""
-    if level is None:
-        return "no errors known"
-    return (
-        f"mean {level.mean_mm:.4g} mm, 99 % at most {level.quantile_99_mm:.4g} mm "
-        f"({level.readings} readings of {level.configurations} configurations)"
-    )
-
-
-def _verdict(found: Verdict) -> str:
-    """The verdict as one sentence."""
-    from kinacc.deployment.verify import AS_GOOD, GOOD, LEAST, OPEN
-
-    interval = f"the mean differs by {found.low_mm:+.3g} to {found.high_mm:+.3g} mm (99 % interval)"
-    if found.says == GOOD:
-        return (
-            "verdict: as good as at its held-out poses, where it was measured: "
-            f"{interval}, less than {100 * AS_GOOD:.0f} % more"
-        )
-    if found.says == OPEN:
-        needed = (
-            f"; {LEAST} configurations are needed" if found.reason.startswith("too few") else ""
-        )
-        uncertain = f", {interval}" if found.reason.startswith("the difference") else ""
-        reason = f"{found.reason}{uncertain}{needed}"
-        return f"verdict: cannot be told from these readings: {reason}"
-    share = found.difference_mm / found.held_out.mean_mm
-    return (
-        f"verdict: worse by {found.difference_mm:.3g} mm ({100 * share:.0f} %) than at its "
-        f"held-out poses: {interval}"
-    )

@@ -10,7 +10,7 @@ from typing import Any
 
 DATASET_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]*"  # with - first it would read as an option
 KINDS: tuple[str, ...] = ("int", "float", "bool", "text", "ints", "floats", "texts", "pair")
-KINDS += ("pairs", "names", "parameters", "rows", "records")
+KINDS += ("pairs", "names", "parameters", "rows", "records", "series", "variants")
 NUMERIC = {
     "int": "a whole number",
     "float": "a number",
@@ -20,7 +20,8 @@ NUMERIC = {
     "pairs": "a list of pairs [smaller, larger]",
 }
 _KEY_FIELDS: tuple[str, ...] = ("kind", "default", "unit", "low", "high", "open_ends")
-_KEY_FIELDS += ("choices", "length", "behind", "fields", "nullable", "execution", "about")
+_KEY_FIELDS += ("choices", "length", "behind", "fields", "variants", "nullable", "execution")
+_KEY_FIELDS += ("about",)
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,15 @@ class Key:
     behind: tuple[str, ...] = ()
     length: tuple[int, int] = (0, 100_000)
     fields: tuple[Key, ...] = ()
+    variants: tuple[Section, ...] = ()
+    meanings: tuple[tuple[str, str, str], ...] = ()  # choices with unit and meaning
     nullable: bool = False
     execution: bool = False
+
+    @property
+    def needed(self) -> bool:
+        """Whether a mapping that has it as a field has to give it."""
+        return self.default is None and not self.nullable
 
     @property
     def allowed(self) -> str:
@@ -54,6 +62,11 @@ class Key:
                 f"a mapping of names ({names[self.choices[0]]}) to free, fixed or "
                 "{value_mm: .., prior_std_mm: ..}, with mm, mrad, rad or deg"
             )
+        elif self.kind == "series":
+            parts.append(
+                "a list of {path: .., date: 2026-03-01, base: same or moved, tool: same or moved}, "
+                "base and tool since the one before, the first without"
+            )
         elif self.kind == "rows":
             parts.append("a list of {lines: [8, 12], reason: ..}")
         elif self.kind == "texts" and self.choices:
@@ -61,6 +74,9 @@ class Key:
         elif self.kind == "records":
             inside = ", ".join(f"{each.name}: {each.allowed}" for each in self.fields)
             parts.append(f"a list of {{{inside}}}")
+        elif self.kind == "variants":
+            kinds = ", ".join(each.name for each in self.variants)
+            parts.append(f"a list of mappings, each with one of {kinds}")
         elif self.choices:
             parts.append(
                 ", ".join(repr(word) if not word.strip() else word for word in self.choices)
@@ -163,14 +179,26 @@ def _key(name: str, content: Mapping[str, Any]) -> Key:
             f"schema.yaml, {name}: {sorted(unknown) or content['kind']} not understood"
         )
     fields = dict(content)
+    if isinstance(fields.get("choices"), Mapping):
+        meant = fields["choices"].items()
+        fields["meanings"] = tuple((word, of["unit"], of["about"]) for word, of in meant)
     for each in ("choices", "behind", "length"):
         if each in fields:
             fields[each] = tuple(fields[each])
     if "fields" in fields:
-        inside = fields["fields"].items()
-        blank = {"default": None, "about": ""}
-        fields["fields"] = tuple(_key(each, blank | content) for each, content in inside)
+        fields["fields"] = _fields(fields["fields"])
+    if "variants" in fields:
+        fields["variants"] = tuple(
+            Section(kind, of["about"], _fields({k: v for k, v in of.items() if k != "about"}))
+            for kind, of in fields["variants"].items()
+        )
     return Key(name=name, **fields)
+
+
+def _fields(inside: Mapping[str, Mapping[str, Any]]) -> tuple[Key, ...]:
+    """Keys of a mapping that stands in a list."""
+    blank = {"default": None, "about": ""}
+    return tuple(_key(each, {**blank, **content}) for each, content in inside.items())
 
 
 def walk(section: Section, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Key]]:

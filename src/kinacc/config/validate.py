@@ -22,7 +22,9 @@ _MAPPINGS = (
     ("data_check", "accept"),
 )
 _MOST_UNKNOWN = 100  # in one section: nobody misspells more, and each is held against all names
+# Keys that a data set has and the top level has not.
 ROBOT = Key("robot", "text", None, "name of a shipped robot, or path of a robot file")
+SERIES = Key("series", "series", [], "measured files of one arm, a calibration each")
 
 
 def check_section(

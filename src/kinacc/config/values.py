@@ -311,6 +311,14 @@ def _records(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     return (INVALID if problems else items), problems
 
 
+def _variants(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
+    from kinacc.config import variants
+
+    found, problems = variants.variants(key, value, path, place)
+    problems = [each if each.allowed else replace(each, allowed=key.allowed) for each in problems]
+    return (INVALID if problems else found), problems
+
+
 def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
     from kinacc.config import parameter_rules
 
@@ -320,6 +328,13 @@ def _parameters(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
         return _refuse(key, path, place, f"has {len(value)} names, more than {_MOST_NAMES}")
     problems = parameter_rules.rules(value, key.choices[0], lambda name: place((*path, name)))[1]
     return (INVALID if problems else dict(value)), problems
+
+
+def _series(key: Key, value: Any, path: KeyPath, place: Place) -> Checked:
+    from kinacc.config import series
+
+    lines, problems = series.lines(value, path, place)
+    return (INVALID if problems else lines), problems
 
 
 _CHECKS: dict[str, Check] = {
@@ -336,4 +351,6 @@ _CHECKS: dict[str, Check] = {
     "parameters": _parameters,
     "rows": _rows,
     "records": _records,
+    "variants": _variants,
+    "series": _series,
 }

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 
-from kinacc.figures import history
+from kinacc.figures import iterations
 
-run = partial(history.run, example="rejected")
+run = partial(iterations.run, example="rejected")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import dataclass, field
 
 # "undecided": the data do not tell; the gate's own words say whether that is a failure.
 PASSED, WARNED, FAILED, UNDECIDED = "passed", "warned", "failed", "undecided"
@@ -68,7 +67,8 @@ class Outcome:
     ``kind`` is the kind of gate (value, change, campaign, claims, suspicions, history, results,
     accepted); ``says`` one sentence with the figures, ``fix`` what to do or look at where it did
     not pass. ``figures`` are the numbers by name with unit (``mean_mm``), ``differences`` those
-    from the accepted run.
+    from the accepted run. ``file`` is the one to open: the configuration that states the gate, or
+    the artefact that did not hold; empty where there is none.
     """
 
     dataset: str
@@ -77,8 +77,9 @@ class Outcome:
     verdict: str
     says: str
     fix: str = ""
-    figures: Mapping[str, float | int | str | None] = MappingProxyType({})
+    figures: Mapping[str, float | int | str | None] = field(default_factory=dict)
     differences: tuple[Difference, ...] = ()
+    file: str = ""
 
 
 @dataclass(frozen=True)

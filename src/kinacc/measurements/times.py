@@ -1,4 +1,4 @@
-"""Times of rows in seconds, where they are good enough to tell one pose from the next."""
+"""Times of rows in seconds, where they are good enough to tell one pose from the next; days."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ _ZONE = re.compile(r"(?:Z|[+-]\d{2}:?\d{2})$")
 # Numbers that can be no seconds of this century are milli-, micro- or nanoseconds.
 _LATEST_S = 4.2e9
 _OWN_UNITS = (("ms", 1e-3), ("us", 1e-6), ("µs", 1e-6), ("μs", 1e-6), ("ns", 1e-9))
+_DAY = re.compile(r"(\d{1,4}[-./]\d{1,2}[-./]\d{2,4})(?:[T ].*)?")
+_YEARS = (1990, 2100)  # of measurements; others are numbers that look like a day
 _FIX = "export the times again, with hours and seconds, as text or as a number of seconds"
 
 
@@ -45,6 +47,38 @@ def seconds(table: RawTable, column: str, problems: list[Problem]) -> np.ndarray
         if not problems:
             problems.append(Problem(where, "holds no times that differ", fix=_FIX))
     return np.full(len(cells), np.nan)
+
+
+def days(table: RawTable) -> list[str]:
+    """Days (ISO) that the columns of dates of a file hold, from the first to the last.
+
+    None where no column holds dates alone, or where they can be read as those of other days.
+    """
+    found: set[str] = set()
+    for cells in table.columns.values():
+        texts = [each if isinstance(each, datetime) else str(each).strip() for each in cells]
+        found |= _days({each for each in texts if each})
+    return sorted(found)
+
+
+def _days(cells: set) -> set[str]:
+    """Days (ISO) of the cells of a column of dates; none where it is none, or ambiguous."""
+    read = {each if isinstance(each, datetime) else _DAY.fullmatch(each) for each in cells}
+    if None in read:
+        return set()
+    stated = {each.date().isoformat() for each in read if isinstance(each, datetime)}
+    words = {each[1] for each in read if not isinstance(each, datetime)}
+    readings = []
+    for form in _DATES if words else ():
+        try:
+            given = [datetime.strptime(each, form) for each in words]
+        except ValueError:
+            continue
+        if all(_YEARS[0] <= each.year <= _YEARS[1] for each in given):
+            readings.append({each.date().isoformat() for each in given})
+    if words and (not readings or any(each != readings[0] for each in readings)):
+        return set()
+    return stated.union(*readings[:1])
 
 
 def _numbers(cells: list, column: str, decimal: str) -> np.ndarray | None:

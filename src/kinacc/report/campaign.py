@@ -15,6 +15,7 @@ from kinacc.campaign import consistency, marks, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.report import facts, grounds, head, read_above
 from kinacc.campaign.state import State
+from kinacc.report.campaign_answers import against, answers, leading, sentence
 from kinacc.report.campaign_course import course, mm, scatter
 from kinacc.report.campaign_points import points, readings
 from kinacc.report.page import ROBOT_ITSELF, FirstScreen, Page, Section, Table, Text
@@ -117,7 +118,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
     """The page of a campaign, by the state and the tables of ``campaign.report.tables``."""
     about, plan = state.plan.about, state.plan
     said = words.distinct(state)
-    lead = _leading(state, said)
+    lead = leading(state, said)
     visited = len({each.reading.point for each in state.told})
     candidates = len(plan.points) - len(state.left_out)
     first = FirstScreen(
@@ -134,22 +135,9 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
     return Page(first, (*_sections(state, tables), _grounds(opened, state)), made)
 
 
-def _leading(state: State, said: Sequence[Statement]) -> Statement:
-    """The statement a reader came for: with a bound, and on the target the campaign is for."""
-    return min(
-        said,
-        key=lambda each: (np.isnan(each.upper_mm), each.target != state.plan.limits.target),
-    )
-
-
-def _against(state: State, said: Sequence[Statement]) -> list[str]:
-    """Why the bounds cannot be relied on, a sentence each."""
-    return [_sentence(text) for text in words.against(said, state)]
-
-
 def _badge(state: State, said: Sequence[Statement], lead: Statement) -> tuple[str, bool]:
     tolerance = state.plan.limits.tolerance_mm
-    if _against(state, said):
+    if against(state, said):
         return "BOUND IN DOUBT", True
     if tolerance is not None and (verdict := decide(lead, tolerance).verdict) in _VERDICTS:
         return f"{_VERDICTS[verdict]} {tolerance:g} mm", verdict != ACCEPT
@@ -158,30 +146,9 @@ def _badge(state: State, said: Sequence[Statement], lead: Statement) -> tuple[st
     return ("tolerance: none set", False) if tolerance is None else ("UNDECIDED", True)
 
 
-def answers(state: State) -> tuple[str, ...]:
-    """What may be said of the largest error, the most important sentence first."""
-    said, tolerance = words.distinct(state), state.plan.limits.tolerance_mm
-    lead, lines = _leading(state, said), _against(state, said)
-    if lines:
-        by_noise = "The bounds of the campaign are what the readings give by the noise stated"
-        return (*lines, f"{by_noise}; they are no statement on the arm.")
-    lines.append(words.pledge(lead, state))
-    if np.isfinite(lead.upper_mm):
-        known = [f"estimated at {lead.value_mm:.3f} mm"] if np.isfinite(lead.value_mm) else []
-        if np.isfinite(lead.lower_mm):
-            known.append(f"at least {lead.lower_mm:.3f} mm, a bound that is right as often")
-        if known:
-            lines.append(f"The largest error among them is {', and '.join(known)}.")
-    if tolerance is not None:
-        found = decide(lead, tolerance)
-        why = words.reason(found.reason)
-        lines.append(_sentence(f"tolerance {tolerance:g} mm: {found.verdict}, {why}"))
-    return tuple(lines)
-
-
 def _statements(state: State, said: Sequence[Statement]) -> Table:
     tolerance = state.plan.limits.tolerance_mm
-    doubtful = _against(state, said)
+    doubtful = against(state, said)
     heads = ("of", "at most", "estimate", "at least", "each bound is right in")
     rows = []
     for each in said:
@@ -239,7 +206,7 @@ def _next(
 ) -> tuple[Text, ...]:
     """What to do now."""
     folder, limits = shlex.quote(str(opened.folder)), state.plan.limits
-    if _against(state, said):
+    if against(state, said):
         return _lines(
             [
                 "find out whether something moved or the noise was stated too small; then begin a "
@@ -278,13 +245,7 @@ def _next(
 
 
 def _lines(lines: Sequence[str]) -> tuple[Text, ...]:
-    return tuple(Text(_sentence(each)) for each in lines)
-
-
-def _sentence(line: str) -> str:
-    """A line with a capital at its begin and a stop at its end."""
-    end = "" if line.endswith((".", ":", "?")) else "."
-    return f"{line[:1].upper()}{line[1:]}{end}"
+    return tuple(Text(sentence(each)) for each in lines)
 
 
 def _grounds(opened: Opened, state: State) -> Section:
@@ -304,7 +265,7 @@ def _grounds(opened: Opened, state: State) -> Section:
             Table(
                 "How it was measured",
                 ("what was fixed, and what was taken",),
-                tuple((_sentence(each),) for each in facts(opened, state, str)),
+                tuple((sentence(each),) for each in facts(opened, state, str)),
             ),
         ),
     )

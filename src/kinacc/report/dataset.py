@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.artifacts.columns import Columns
 from kinacc.calibration.summary import Fact
 from kinacc.kinematics.robot import Robot
 from kinacc.report import (
     accuracy_map,
     data_check,
-    first_screen,
     histories,
     identifiability,
     paper,
     parameters,
     residuals,
+    robot_history,
     selection,
     study,
 )
-from kinacc.report.first_screen import Answers
-from kinacc.report.page import Page, Section
+from kinacc.report.page import FirstScreen, Page, Section
 
 # In the order of the page: what a section reads, and how it is made.
 _OF_THE_FIT: tuple[tuple[str, Callable[..., Section]], ...] = (
+    ("history", robot_history.section),
     ("pose_errors", residuals.section),
     ("accuracy_map", accuracy_map.section),
     ("measurements", data_check.section),
@@ -40,17 +39,15 @@ _OF_THE_STUDY: tuple[tuple[str, Callable[..., Section]], ...] = (
 
 
 def page(
-    name: str,
+    first: FirstScreen,
     tables: Mapping[str, Columns],
     robot: Robot,
     facts: Sequence[Fact],
-    answers: Answers,
     campaign: Section | None,
 ) -> Page:
     """The page on the tables of a data set; each section where there is what it reads."""
-    remedies = _remedies(tables.get("data_check"))
     return Page(
-        first_screen.screen(name, robot.name, facts, remedies, answers),
+        first,
         (
             *(make(tables, robot) for needed, make in _OF_THE_FIT if needed in tables),
             selection.section(tables, facts),
@@ -58,15 +55,3 @@ def page(
             *(make(tables, robot) for needed, make in _OF_THE_STUDY if needed in tables),
         ),
     )
-
-
-def _remedies(found: Columns | None) -> list[str]:
-    """What to do about findings of the data check that nobody accepted."""
-    if found is None:
-        return []
-    columns = (found[name] for name in ("level", "lines", "fix", "accepted"))
-    return [
-        ": ".join(str(each) for each in (lines, fix) if each)
-        for level, lines, fix, accepted in zip(*columns, strict=True)
-        if level not in (FINDING_LEVELS[-1], LEFT_OUT) and fix and not accepted
-    ]

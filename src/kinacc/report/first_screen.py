@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from kinacc.artifacts.allowed import FINDING_LEVELS
+from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
+from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
@@ -41,7 +42,7 @@ class Answers:
 
     ``claims`` on the paper by name, ``other`` errors of other populations, ``largest`` what there
     is to say of the largest error, ``campaign`` the sentences of a campaign, none without one;
-    ``outdated`` tables are not shown.
+    ``outdated`` tables are not shown; ``history`` is what a series says of the one in force.
     """
 
     claims: Mapping[str, Sequence[str]]
@@ -51,6 +52,7 @@ class Answers:
     following: Sequence[str]
     outdated: Sequence[str]
     more: str
+    history: str = ""
 
 
 def screen(
@@ -121,6 +123,8 @@ def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
         )
     else:
         lines.append("No pose was held out: errors at other poses are larger, and unknown.")
+    if answers.history:
+        lines.append(answers.history)
     if answers.campaign:
         first, *others = answers.campaign
         others.append(
@@ -225,3 +229,15 @@ def _text(words: str) -> Text:
     return Text(
         printed(words), code=words.startswith("kinacc ") and not words.startswith("kinacc check-r")
     )
+
+
+def remedies(found: Columns | None) -> list[str]:
+    """What to do about findings of the data check that nobody accepted."""
+    if found is None:
+        return []
+    columns = (found[name] for name in ("level", "lines", "fix", "accepted"))
+    return [
+        ": ".join(str(each) for each in (lines, fix) if each)
+        for level, lines, fix, accepted in zip(*columns, strict=True)
+        if level not in (FINDING_LEVELS[-1], LEFT_OUT) and fix and not accepted
+    ]

@@ -150,7 +150,7 @@ def readings(rows: Columns, true_mm: float) -> Columns:
     keep = np.array([bool(ASSESSORS[name].switches) for name in rows["assessor"]], bool)
     kept = {name: column[keep] for name, column in rows.items()}
     found = _statistics(kept, ("assessor", *SWITCHES, "noise_mm"), true_mm)
-    not_told = ("rmse_mm", "repetitions")
+    not_told = ("rmse_mm", "repetitions", "std_error_mm")
     return columns_of("readings", [{n: row[n] for n in row if n not in not_told} for row in found])
 
 
@@ -199,6 +199,11 @@ def _row(noise_mm: float, repetition: int, assessor: Assessor, world: World) -> 
     }
 
 
+def _std_error(sample: np.ndarray) -> float:
+    """Standard error of the mean of a sample; NaN of one value."""
+    return sample.std(ddof=1) / np.sqrt(sample.size) if sample.size > 1 else np.nan
+
+
 def _statistics(rows: Columns, keys: Sequence[str], true_mm: float) -> list[dict]:
     """Statistics of ``assessed_mm`` over the rows that agree in the key columns.
 
@@ -223,6 +228,7 @@ def _statistics(rows: Columns, keys: Sequence[str], true_mm: float) -> list[dict
                 "bias_mm": sample.mean() - true_mm,
                 "rmse_mm": np.sqrt(np.mean((sample - true_mm) ** 2)),
                 "repetitions": sample.size,
+                "std_error_mm": _std_error(sample),
             }
         )
     return found

@@ -19,6 +19,7 @@ from kinacc.campaign import journal, of_calibration, slips
 from kinacc.campaign.of_calibration import Sought
 from kinacc.campaign.words import one_of
 from kinacc.deployment import folder as results
+from kinacc.deployment.history_words import sentence
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import quaternion_from_rotation
@@ -30,7 +31,7 @@ from kinacc.workflow.catalogue import FIGURE_FOLDER, STAGES
 IF_THERE = (
     *(f"{kind}_model" for kind in ERROR_MODELS),
     *("summary", "data_check", "excluded_rows", "vec_orders", "accuracy_map"),
-    *("assessment_points", "claims"),
+    *("assessment_points", "claims", "history"),
 )
 _READINGS = 300  # for the 200 candidates that are drawn: bounds as wide as repeats make them
 _LEAST_RANGE, _METRE_MM = 1e-9, 1e3
@@ -123,6 +124,7 @@ def answer(
         *half_page(found.facts, more, whole),
         *paragraph("other errors", found.other),
         *paragraph("largest error", found.largest),
+        *paragraph("history", [sentence(tables["history"])] if "history" in tables else []),
         *paragraph("next", commands),
         *paragraph("page", [str(page)] if (page := folder / "report.html").is_file() else []),
     ]

@@ -37,6 +37,7 @@ class Stage:
     part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file;
     ``joint`` ones are about all data sets at once and have a folder of their own: they read the
     ``inputs`` of every data set (``measured_inputs`` where it is measured) and of joint stages;
+    those ``of_lines`` read the ``inputs`` of the data set of every line of the series;
     ``fits`` is the kind of error model a stage fits;
     ``shared`` ones take long enough to be kept for other folders (Snakemake's cache);
     ``leaves`` says what its files are: tables, a figure (see :func:`_figure`), a page.
@@ -56,6 +57,7 @@ class Stage:
     on_request: bool = False
     measured: bool = False
     joint: bool = False
+    of_lines: bool = False
     measured_inputs: tuple[str, ...] = ()
     shared: bool = False
     fits: str = ""
@@ -65,6 +67,11 @@ class Stage:
     def is_figure(self) -> bool:
         """Whether it draws a figure, once for every format."""
         return self.leaves == FIGURE
+
+    @property
+    def by_choice(self) -> bool:
+        """Whether data sets are without it by what they are or ask for: nobody need be told."""
+        return self.measured or bool(self.fits) or self.name in HISTORY
 
     @property
     def module(self) -> str:
@@ -82,7 +89,8 @@ class Stage:
         reads, where optional ones are among them.
         """
         found: dict[str, None] = {}
-        there = {*(self.inputs if inputs is None else inputs), *self.outputs}
+        read = self.inputs if inputs is None else (role.rpartition("/")[2] for role in inputs)
+        there = {*read, *self.outputs}
         models = [kind for kind in FITTED if f"{kind}_model" in there]
         settings = {**settings, "models": models, "fits": self.fits}
         for use in self.uses:
@@ -277,6 +285,22 @@ STAGES: dict[str, Stage] = {
             ),
         ),
         Stage(
+            "history",
+            "holding the calibrations of a series to one another",
+            ("measurements", "robot", *_MODELS, "pose_errors", "model_selection"),
+            ("history",),
+            ("seed", "series", "calibration", "tolerance.mm"),
+            uses=(_MODEL,),
+            optional=_FURTHER,
+            of_lines=True,
+        ),
+        _figure(
+            "history_over_time",
+            "drawing the history of the arm",
+            ("history",),
+            ("dataset",),
+        ),
+        Stage(
             "accuracy_map",
             "mapping the largest error over the slices of the evaluation space (Fig. 3)",
             _MODELS,
@@ -405,7 +429,7 @@ STAGES: dict[str, Stage] = {
             optional=(
                 *("data_check", "excluded_rows", "vec_orders", *_FURTHER, *_FITS_OF_ALL),
                 *("accuracy_map", "assessment_points", "study", "study_summary", "readings"),
-                *("histories", "claims"),
+                *("histories", "claims", "history"),
             ),
             leaves=PAGE,
         ),
@@ -495,6 +519,8 @@ STAGES: dict[str, Stage] = {
     )
 }
 
+# Of a data set with a series: what its calibrations say of one another.
+HISTORY = ("history", "history_over_time")
 # The stages of a calibration; maps, the study of assessors and the paper's claims go on from there.
 CALIBRATION = (
     "measurements",
@@ -504,6 +530,7 @@ CALIBRATION = (
     "residuals",
     "excluded_rows",
     "summary",
+    *HISTORY,
 )
 # Made on request beside the claims on further draws: Fig. 3 under every reading of it.
 MAP_READINGS = ("map_readings_chunk", "map_readings", "fig3_readings")

@@ -66,7 +66,7 @@ def group(plan: Plan, name: str, dataset: str) -> str | None:
     What is made from parts that have jobs of their own is a group of its own too: a job cannot wait
     for another one in its middle.
     """
-    if _is_alone(plan, name, dataset):
+    if _is_alone(plan, name, dataset) or STAGES[name].of_lines:  # lines have a job each
         return None
     if dataset == TOURNAMENT:  # it connects all data sets, which have a job each
         return TOURNAMENT

@@ -39,8 +39,8 @@ def words_read(values: object) -> object:
 def in_use(config: dict) -> dict:
     """The configuration without what it does not use.
 
-    That is the other source of measurements, models nobody asks for, and keys of files that are as
-    usual and came later than tables of results.
+    That is the other source of measurements, models nobody asks for, a tolerance that is not set,
+    and keys of files that are as usual and came later than tables of results.
     """
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     measurements = {k: v for k, v in config["measurements"].items() if k not in unused}
@@ -61,4 +61,7 @@ def in_use(config: dict) -> dict:
         for name, section in calibration.items()
         if name in asked or name not in ERROR_MODELS
     }
-    return {**config, "measurements": measurements, "calibration": calibration}
+    used = {**config, "measurements": measurements, "calibration": calibration}
+    if config["tolerance"]["mm"] is None:
+        del used["tolerance"]
+    return used

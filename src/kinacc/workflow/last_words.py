@@ -18,7 +18,7 @@ def last_words(plan: Plan, made: Collection[str]) -> list[str]:
     nobody reads so much of each: the command is named that says what they are worth.
     """
     lines: list[str] = []
-    told = [each for each in plan.datasets if plan.outputs("summary", each)["summary"] in made]
+    told = [each for each in plan.told if plan.outputs("summary", each)["summary"] in made]
     if len(told) > FEW:
         command = shlex.join(["kinacc", "summary", plan.results])
         return ["", f"{len(told):,} data sets: {command} says what each is worth"]
@@ -29,6 +29,6 @@ def last_words(plan: Plan, made: Collection[str]) -> list[str]:
             if plan.outputs("claims", dataset)["claims"] not in made:
                 tables.pop("claims", None)
             lines += ["", *answer(folder, tables)]
-        else:
+        elif dataset in plan.told:
             lines += plan.remarks(dataset)
     return lines

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, wraps
 from pathlib import Path
+from typing import Any
 
 from kinacc.artifacts import records
 from kinacc.artifacts.error_models import asked_for
@@ -21,7 +22,9 @@ from kinacc.campaign.journal import JOURNAL, PLAN, of_each
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.workflow.boundary import leading_out
 from kinacc.workflow.catalogue import (
+    CALIBRATION,
     FIGURE_FOLDER,
+    HISTORY,
     MAP_READINGS,
     PAGE,
     STAGES,
@@ -148,6 +151,16 @@ class Plan:
         own = {name: value for name, value in given.items() if value}
         return replace(self, tournament={**self.tournament, **own})
 
+    @cached_property
+    def told(self) -> list[str]:
+        """Data sets that a run tells of: all but those that are a line of another's series."""
+        return [name for name, config in self.datasets.items() if "line_of" not in config]
+
+    def lines(self, dataset: str) -> list[str]:
+        """Data sets of the lines of a data set's series, by date; none where it has no series."""
+        series: Any = self.datasets[dataset].get("series", ())
+        return [line["name"] for line in series]
+
     @_once
     def stages(self, dataset: str) -> dict[str, Stage]:
         """The stages a data set, or the tournament, goes through, in order."""
@@ -162,8 +175,14 @@ class Plan:
     def left_out(self, dataset: str) -> dict[str, str]:
         """Stages a data set cannot go through, each with the reason."""
         config = self.datasets[dataset]
+        whose = config.get("line_of")
         space = config["evaluation"]["space"]
-        reasons = {}
+        reasons: dict[str, str] = {}
+        if whose:
+            beyond = (name for name in STAGES if name not in CALIBRATION and not STAGES[name].fits)
+            reasons |= dict.fromkeys(beyond, f"a line of the series of {whose} is calibrated only")
+        if not self.lines(dataset):
+            reasons |= dict.fromkeys(HISTORY, "the data set has no series")
         if space != "cylinder":
             for name in ("accuracy_map", "fig3", *MAP_READINGS):
                 reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
@@ -205,8 +224,8 @@ class Plan:
         where ``on_request`` says that this run makes it.
         """
         stage = STAGES[name]
-        if stage.joint:
-            return self._joint_inputs(stage)
+        if stage.joint or stage.of_lines:
+            return self._inputs_of_others(stage, dataset)
         there = (each for each in stage.optional if self._is_there(each, dataset, on_request))
         found = {artefact: self._made(artefact, dataset) for artefact in (*stage.inputs, *there)}
         return found | self._files(stage, dataset)
@@ -231,7 +250,8 @@ class Plan:
 
         Those of the stages whose tables it reads are among them.
         """
-        stages = {} if STAGES[name].joint else self.stages(dataset)
+        of_others = STAGES[name].joint or STAGES[name].of_lines
+        stages = {} if of_others else self.stages(dataset)
         made = {each: stage for stage in stages.values() for each in stage.outputs}
         found: dict[str, None] = {}
         waiting, seen = [STAGES[name]], {name}
@@ -413,7 +433,8 @@ class Plan:
         config, chosen, stage = self._config(dataset), {}, STAGES[name]
         synthetic = not stage.joint and config["measurements"]["source"] == "synthetic"
         for path in (*stage.settings, *(stage.synthetic_settings if synthetic else ())):
-            _copy({**config, "dataset": dataset}, chosen, path.split("."))
+            if path == "dataset" or path.partition(".")[0] in config:  # else it is not in use
+                _copy({**config, "dataset": dataset}, chosen, path.split("."))
         return chosen
 
     def job(self, name: str, dataset: str, part: str | None = None) -> Job:
@@ -464,22 +485,28 @@ class Plan:
         return {
             "seed": next(iter(self.datasets.values()))["seed"],
             "size": self.tournament["size"],
-            "robots": {name: config["robot"] for name, config in self.datasets.items()},
+            "robots": {name: self.datasets[name]["robot"] for name in self.told},
             "study": defaults()["study"],  # of no data set: all are assessed alike
             **chosen,
         }
 
-    def _joint_inputs(self, stage: Stage) -> dict[str, str | list[str]]:
-        """Tables of every data set, ``<data set>/<artefact>``, its robot files, joint tables."""
+    def _others(self, stage: Stage, dataset: str) -> list[str]:
+        """Data sets that a stage reads which is not about one: all, or the lines of a series."""
+        return self.told if stage.joint else self.lines(dataset)
+
+    def _inputs_of_others(self, stage: Stage, dataset: str) -> dict[str, str | list[str]]:
+        """Tables of other data sets, ``<data set>/<artefact>``, their files, joint tables."""
         found: dict[str, str | list[str]] = {}
-        for dataset, config in self.datasets.items():
-            measured = config["measurements"]["source"] == "file"
-            for artefact in stage.measured_inputs if measured else stage.inputs:
+        for other in self._others(stage, dataset):
+            measured = self.datasets[other]["measurements"]["source"] == "file"
+            read = stage.measured_inputs if measured and stage.joint else stage.inputs
+            there = (each for each in stage.optional if self._is_there(each, other, False))
+            for artefact in (*read, *there):
                 if maker_of(artefact).joint:
                     found[artefact] = self._made(artefact, TOURNAMENT)
                 else:
-                    found[f"{dataset}/{artefact}"] = self._made(artefact, dataset)
-        return found | self._files(stage, TOURNAMENT)
+                    found[f"{other}/{artefact}"] = self._made(artefact, other)
+        return found | self._files(stage, dataset)
 
     def _made(self, artefact: str, dataset: str) -> str | list[str]:
         """File of a table, or files of the parts of one that is scattered."""
@@ -499,15 +526,20 @@ class Plan:
         return of_each(Path(self.results) / dataset for dataset in self.datasets)
 
     def _files(self, stage: Stage, dataset: str) -> dict[str, str]:
-        """Files from outside by role; for the tournament ``<data set>/<role>``."""
-        if dataset == TOURNAMENT:
-            return {
-                f"{name}/{role}": path
-                for name in self.datasets
-                for role, path in self._files(stage, name).items()
-            }
+        """Files from outside by role; of stages about several data sets ``<data set>/<role>``."""
+        if not (stage.joint or stage.of_lines):
+            return self._own_files(stage, dataset)
+        # Campaigns of a series may have been begun on what was the newest line then.
+        whose = self.told if stage.joint else [dataset, *self.lines(dataset)]
+        return {
+            f"{name}/{role}": path
+            for name in whose
+            for role, path in self._own_files(stage, name).items()
+        }
+
+    def _own_files(self, stage: Stage, dataset: str) -> dict[str, str]:
         config, found = self.datasets[dataset], {}
-        if stage.leaves == PAGE:
+        if stage.leaves == PAGE or stage.of_lines:
             found |= campaign_files(self._campaigns[Path(self.results) / dataset])
         for path in stage.files:
             value: object = config

@@ -36,10 +36,10 @@ class Job:
     artefact to its file, or a picture format to its file. ``settings`` are the configuration values
     of the stage, ``part`` which part of how many a scattered stage computes ("1-of-2"), ``uses``
     what its results depend on beside what its module imports, ``kind`` the error model it fits.
-    ``label`` begins what is said of faults, ``doing`` what is said of progress. ``code``: hash of
-    the code, where that is known already. ``record``: the file that the run of ``stage`` leaves
-    last; empty where its files stand in no folder of a data set. ``remake``: the command that makes
-    an input again, see :func:`kinacc.workflow.inputs.read_inputs`.
+    ``label`` begins what is said of faults, ``doing`` what is said of progress. ``record``: the
+    file that the run of ``stage`` leaves last; empty where its files stand in no folder of a data
+    set. ``remake``: the command that makes an input again, see
+    :func:`kinacc.workflow.inputs.read_inputs`.
     """
 
     module: str
@@ -53,7 +53,6 @@ class Job:
     log: str | None = None
     uses: tuple[str, ...] = ()
     kind: str = ""
-    code: str = ""
     stage: str = ""
     record: str = ""
     remake: str = ""
@@ -118,7 +117,7 @@ def stage_provenance(
     return {
         "kinacc_version": __version__,
         "config_hash": provenance.config_hash(job.settings),
-        "code_hash": job.code or provenance.stage_code_hash(job.module, job.uses),
+        "code_hash": provenance.stage_code_hash(job.module, job.uses),
         "inputs_hash": provenance.inputs_hash(found),
         "seed": job.seed,
         INPUTS_DIGESTS: pictures.as_text(found),
@@ -142,8 +141,17 @@ def _record(
     inputs_digests: Mapping[str, str],
     files: Mapping[str, records.Written] = MappingProxyType({}),
 ) -> records.Record:
-    told = {key: str(marks[key]) for key in PROVENANCE_KEYS}
-    return records.Record(job.stage, job.part, told, dict(inputs_digests), files)
+    code = provenance.stage_code(job.module, job.uses)
+    return records.Record(
+        job.stage,
+        job.part,
+        {key: str(marks[key]) for key in PROVENANCE_KEYS},
+        dict(inputs_digests),
+        files,
+        provenance.told_settings(job.settings),
+        code.files,
+        code.versions,
+    )
 
 
 def _written(

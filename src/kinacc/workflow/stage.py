@@ -44,7 +44,6 @@ def job_of(
     seed: int,
     log: str,
     record: str,
-    code: str = "",
 ) -> Job:
     """One run of a stage, with what the catalogue says of it; see :class:`Job`."""
     stage = STAGES[name]
@@ -60,7 +59,6 @@ def job_of(
         log=log,
         uses=stage.used(settings, inputs),
         kind=stage.fits,
-        code=code,
         stage=name,
         record=record,
     )
@@ -85,7 +83,11 @@ def to_text(
     seed: int,
     code: str,
 ) -> str:
-    """A job without its files; of inputs their roles and, where they are in parts, how many."""
+    """A job without its files; of inputs their roles and, where they are in parts, how many.
+
+    ``code`` is the hash of the code for Snakemake alone: who carries the job out works it out anew,
+    since another Python, as of a conda environment, has other libraries.
+    """
     reads = {role: 0 if isinstance(each, str) else len(each) for role, each in inputs.items()}
     told = {"stage": name, "dataset": dataset, "part": part, "reads": reads, "seed": seed}
     # The order of keys is kept: where settings are a list of things, they are done in that order.
@@ -110,8 +112,6 @@ def from_words(words: Sequence[str]) -> Job:
     }
     *outputs, record = given["--output"]
     roles = stage.outputs if stage.leaves == TABLES else [Path(each).suffix[1:] for each in outputs]
-    # Another Python, as of a conda environment, has other versions of libraries: it hashes anew.
-    planned_here = os.environ.get("KINACC_PYTHON") == sys.executable
     job = job_of(
         told["stage"],
         told["dataset"],
@@ -122,7 +122,6 @@ def from_words(words: Sequence[str]) -> Job:
         told["seed"],
         log,
         record,
-        told["code"] if planned_here else "",
     )
     return replace(job, remake=os.environ.get("KINACC_REMAKE", ""))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,9 +9,8 @@ from kinacc.campaign import folder, of_calibration, report
 from kinacc.campaign.of_calibration import Assessed
 from kinacc.kinematics import robot
 from kinacc.report import campaign, dataset
-from kinacc.report.first_screen import Answers
 from kinacc.report.page import Page, Section
-from kinacc.workflow.answer import told
+from kinacc.workflow.first_screen import first_screen
 
 
 def run(inputs: Mapping, settings: Mapping) -> Page:
@@ -28,19 +26,10 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
     bound = of_calibration.sought(name, tables, campaigns)
     place = Path(settings.get("folder", f"results/{name}"))
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    found = told(place, tables, bound, False, f"check_{name}", f"exported_{name}")
-    assessed = bound.assessed
-    answers = Answers(
-        claims=found.claims,
-        other=found.other,
-        largest=found.largest,
-        campaign=campaign.answers(assessed.state) if assessed else (),
-        following=found.following,
-        outdated=settings.get("outdated", ()),
-        more=shlex.join(["kinacc", "fitted", str(place), "--all"]),
-    )
-    section = _campaign(assessed) if assessed else None
-    return dataset.page(name, tables, arm, found.facts, answers, section)
+    outdated = settings.get("outdated", ())
+    first, found = first_screen(place, name, tables, bound, outdated)
+    section = _campaign(bound.assessed) if bound.assessed else None
+    return dataset.page(first, tables, arm, found.facts, section)
 
 
 def _campaign(assessed: Assessed) -> Section:

@@ -24,6 +24,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import (
     CALIBRATION,
     FIGURE_FOLDER,
+    HISTORY,
     PAGE,
     STAGES,
     TABLES,
@@ -36,7 +37,7 @@ from kinacc.workflow.verification.conformity import check_file
 from kinacc.workflow.verification.lineage import Found, check_lineage, made_without, parts, strays
 from kinacc.workflow.verification.mending import Doubt, Marks, remedy, workflow_command
 from kinacc.workflow.verification.pictures import check_picture
-from kinacc.workflow.verification.recomputation import computed_again
+from kinacc.workflow.verification.recomputation import Again, computed_again
 from kinacc.workflow.verification.recorded import Unit, check_records, folded, records_there
 from kinacc.workflow.verification.rules import contradictions
 
@@ -129,6 +130,7 @@ def check_results(
     configs: Sequence[str] = (),
     every: bool = False,
     expect: str | None = None,
+    again: bool = True,
 ) -> Report:
     """Check every data set's folder below ``results``.
 
@@ -136,12 +138,12 @@ def check_results(
     their limits, rows and tables consistent, inputs still those it was made from, claims readable,
     pictures whole. With a ``plan`` (the configuration, read from the files ``configs``) also that
     its data sets are all there and that the artefacts were made with these settings and files.
-    Numbers are computed again (see :mod:`recomputation`), with ``every`` in place of a sample.
+    Numbers are computed ``again`` (see :mod:`recomputation`), with ``every`` in place of a sample.
     ``expect``: the digest of all records as it was told before. Raises InUse while a run writes.
     """
     folder = Path(results)
-    with undisturbed(folder.parent if _is_dataset(folder) else folder):
-        report = _checked(folder, plan, configs, every)
+    with undisturbed(folder.parent if is_dataset(folder) else folder):
+        report = _checked(folder, plan, configs, every if again else None)
     if expect is not None and report.digest != expect:
         what = f"digest of all records is {report.digest or 'none: there are no records'}"
         fix = "the records were written anew since that digest was told, or are of another run"
@@ -150,7 +152,7 @@ def check_results(
     return report
 
 
-def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: bool) -> Report:
+def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: bool | None) -> Report:
     if not folder.name.strip("."):
         folder = Path(os.path.abspath(folder))
     if not folder.is_dir():
@@ -162,7 +164,7 @@ def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: boo
         return _advised(Report(str(folder), (check_campaign(folder),)), folder)
     if folder.name == TOURNAMENT:
         return _advised(Report(str(folder), (check_tournament(folder),)), folder)
-    if _is_dataset(folder):
+    if is_dataset(folder):
         if plan is not None and folder.name not in plan.datasets:
             allowed = ", ".join(plan.datasets)
             problem = Problem(str(folder), "no data set of the configuration", allowed)
@@ -208,13 +210,18 @@ def _advised(
     return replace(report, advice="\n".join(said))
 
 
-def _is_dataset(folder: Path) -> bool:
+def is_dataset(folder: Path) -> bool:
     """Whether the folder is that of one data set, given in place of the folder of all of them."""
     return any((folder / artefact.file_name).is_file() for artefact in ARTEFACTS.values())
 
 
-def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -> DatasetReport:
-    """Check the folder of one data set; see :func:`check_results`."""
+def check_dataset(
+    folder: Path, plan: Plan | None = None, every: bool | None = False
+) -> DatasetReport:
+    """Check the folder of one data set; see :func:`check_results`.
+
+    ``every``: None where no number is computed again.
+    """
     checked, found, tables, marks, of_parts = [], [], {}, {}, {}
     behind = _left_behind(folder, plan)
     for name, path in _tables_there(folder):
@@ -234,10 +241,11 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
             marks[f"{name}/{path.stem}" if is_part else name] = store.read_metadata(path)
     left_out = _left_out(folder, marks, tables, plan)
     unmade = _not_studied(folder)
+    is_line = plan is not None and folder.name not in plan.told
     told = {
         name: reason
         for name, reason in left_out.items()
-        if not (STAGES[name].measured or STAGES[name].fits or name in unmade)
+        if not (STAGES[name].by_choice or name in unmade or is_line)
     }
     notes = [
         f"{folder}: {', '.join(name for name in left_out if left_out[name] == reason)} left out, "
@@ -245,7 +253,7 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         for reason in dict.fromkeys(told.values())
     ]
     notes += [f"{folder / name}.parquet: left from before, {why}" for name, why in behind.items()]
-    if unmade:
+    if unmade and not is_line:
         notes.append(f"{folder}: no study was made: kinacc study FILE.yaml makes one")
     absent = {*left_out, *unmade}
     found += _missing(folder, absent)
@@ -268,14 +276,11 @@ def check_dataset(folder: Path, plan: Plan | None = None, every: bool = False) -
         found.append((_placed(folder, problem), doubts))
     of_lineage, said = check_lineage(folder, marks, plan)
     found += [*of_lineage, *strays(folder, marks)]
-    again = computed_again(
-        folder,
-        tables | _joined(folder, of_parts),
-        marks,
-        {doubt.stage for _, doubts in found for doubt in doubts},
-        plan,
-        every,
-    )
+    in_doubt = {doubt.stage for _, doubts in found for doubt in doubts}
+    again = Again((), [], [])
+    if every is not None:
+        joined = tables | _joined(folder, of_parts)
+        again = computed_again(folder, joined, marks, in_doubt, plan, every)
     found += again.found
     leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
     return DatasetReport(
@@ -397,7 +402,7 @@ def _left_out(folder: Path, marks: dict, tables: dict, plan: Plan | None) -> dic
         return dict(plan.left_out(folder.name))
     own = _of_paper_alone(folder)
     without = _without_file(folder, tables) | own | _without_map(folder, marks, "claims" in own)
-    return without | _without_models(folder, tables)
+    return without | _without_models(folder, tables) | _without_series(folder)
 
 
 def _without_file(folder: Path, tables: dict) -> dict[str, str]:
@@ -420,6 +425,12 @@ def _without_models(folder: Path, tables: dict) -> dict[str, str]:
         if stage.fits and stage.fits not in (*ALWAYS, *known)
         if not any((folder / f"{each}.parquet").exists() for each in stage.outputs)
     }
+
+
+def _without_series(folder: Path) -> dict[str, str]:
+    """Stages of a series, where nothing here is of one."""
+    there = any(path.exists() for name in HISTORY for path in _files(folder, STAGES[name]))
+    return {} if there else dict.fromkeys(HISTORY, "no history of a series is here")
 
 
 def _without_map(folder: Path, marks: dict, no_claims: bool) -> dict[str, str]:

@@ -110,21 +110,26 @@ def digests_read(own: Mapping[str, str]) -> dict[str, str]:
 
 
 class _Now(dict[str, tuple[str, ...]]):
-    """Digests of artefacts as they are now; of one in parts that of every whole set of these."""
+    """Digests of artefacts as they are now; of one in parts that of every whole set of these.
+
+    Those of another data set, ``<data set>/<artefact>``, stand in its folder beside this one.
+    """
 
     def __init__(self, folder: Path) -> None:
         super().__init__()
         self.folder = folder
 
-    def __missing__(self, artefact: str) -> tuple[str, ...]:
-        path = self.folder / f"{artefact}.parquet"
+    def __missing__(self, role: str) -> tuple[str, ...]:
+        whose, _, artefact = role.rpartition("/")
+        folder = self.folder.parent / whose if whose else self.folder
+        path = folder / f"{artefact}.parquet"
         sets: Sequence[str | Sequence[str]] = [str(path)] if path.is_file() else []
         found = []
-        for own in sets or parts(self.folder, artefact):
+        for own in sets or parts(folder, artefact):
             with suppress(InputError, OSError):
-                found.append(digests({artefact: own})[artefact])
-        self[artefact] = tuple(found)
-        return self[artefact]
+                found.append(digests({role: own})[role])
+        self[role] = tuple(found)
+        return self[role]
 
 
 def strays(folder: Path, marks: Marks) -> Iterator[Found]:
@@ -232,9 +237,13 @@ def _held_to_inputs(
     read, problems = digests_read(own), []
     if provenance.inputs_hash(read) != own.get("inputs_hash"):
         problems.append(Problem(where, f"inputs_hash is not that of its {INPUTS_DIGESTS}"))
-    known = {*stage.inputs, *stage.optional}
+    whose = ("",)  # what stands before the names of tables: of lines theirs
+    if stage.of_lines:
+        whose = tuple(dict.fromkeys(f"{each.partition('/')[0]}/" for each in read if "/" in each))
+    known = {f"{each}{name}" for each in whose for name in (*stage.inputs, *stage.optional)}
     unknown = [each for each in read if each not in known and not each.endswith("_file")]
-    lacking = [each for each in stage.inputs if each not in read]
+    needed = [f"{each}{name}" for each in whose for name in stage.inputs]
+    lacking = [each for each in needed if each not in read]
     if unknown or lacking:
         said = ", ".join((*unknown, *lacking))
         allowed = f"exactly what stage {stage.name} reads"
@@ -248,7 +257,7 @@ def _held_to_inputs(
     if plan is not None and stage.name in plan.stages(folder.name):
         settings = plan.settings(stage.name, folder.name)
         problems += _held_to_plan(where, stage, own, settings, plan.seed(folder.name))
-        if stage.leaves != PAGE:
+        if stage.leaves != PAGE and not stage.of_lines:  # campaigns go on after those are made
             other |= _other_files(plan, stage, folder.name, read)
         outside = set()
     if other:
@@ -256,7 +265,8 @@ def _held_to_inputs(
         problems.insert(0, Problem(where, what, "made from what is now there"))
     vouched = set() if problems else tables
     is_current = own.get("code_hash") in _codes(stage, settings, read)
-    return _Held(problems, vouched, other & known, is_current, outside)
+    in_doubt = {each for each in other & known if "/" not in each}  # others are told of elsewhere
+    return _Held(problems, vouched, in_doubt, is_current, outside)
 
 
 def _held_to_plan(

@@ -16,10 +16,8 @@ from typing import NamedTuple
 from kinacc.artifacts.provenance import config_hash
 from kinacc.errors import InputError
 from kinacc.workflow.catalogue import CALIBRATION, PAGE, STAGES, maker_of
+from kinacc.workflow.described import CONFIG
 from kinacc.workflow.plan import RESULTS, SNAKEFILE, Plan, planned
-
-CONFIG = "config.yaml"
-
 
 Marks = Mapping[str, Mapping[str, str]]
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from itertools import product
@@ -21,7 +20,7 @@ import numpy as np
 from kinacc.artifacts import store
 from kinacc.artifacts.allowed import COVARIANCES, DISTANCES, OUTLIER_RULES, SEARCHES
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.provenance import config_hash
+from kinacc.artifacts.provenance import config_hash, file_hash
 from kinacc.config.schema import defaults, without_execution_keys
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot
@@ -29,15 +28,15 @@ from kinacc.study import monte_carlo
 from kinacc.workflow import cost
 from kinacc.workflow.catalogue import STAGES, TABLES, Stage
 from kinacc.workflow.configured import in_use
-from kinacc.workflow.plan import Plan, planned
+from kinacc.workflow.described import beside
+from kinacc.workflow.plan import Plan
 from kinacc.workflow.verification.lineage import Found, digests_read
-from kinacc.workflow.verification.mending import CONFIG, Doubt, Marks, above
+from kinacc.workflow.verification.mending import Doubt, Marks, above
 
 # A number may differ from the one computed by this share of itself, and by this share of the
 # largest one of its column: other processors and libraries move last digits, and fits amplify it.
 RELATIVE, OF_LARGEST = 1e-6, 1e-9
 WORK_S = 1.0  # of a stage, as is foreseen; more without --all would make a check slow
-_FILES = 20  # beside results, looked through for a configuration
 _DIRECTION, _EXACT = "undetermined_direction", 1e9
 REPETITIONS, CELLS, ROWS = 5, 500, 5000  # computed again without --all
 NOT_AGAIN = {
@@ -96,7 +95,10 @@ def computed_again(
     plans = (
         [plan]
         if plan
-        else [*_beside(folder.parent, folder.name), *_assumed(folder.name, tables, marks)]
+        else [
+            *(found for _, found in beside(folder.parent, folder.name)),
+            *_assumed(folder.name, tables, marks),
+        ]
     )
     doubted, found, done, unknown = set(in_doubt), [], [], []
     large: list[str] = []
@@ -106,10 +108,10 @@ def computed_again(
         made = [each for each in stage.outputs if each in tables and each in of_parts]
         if not made or stage.leaves != TABLES or name in NOT_AGAIN:
             continue
-        if name in doubted or above(name) & doubted:
+        if name in doubted or (above(name) & doubted and not stage.of_lines):
             continue
-        inputs = {each: tables[each] for each in _read(stage, of_parts[made[0]], tables)}
-        if not set(stage.inputs) <= set(inputs):
+        inputs = _inputs(stage, folder, of_parts[made[0]], tables, plans)
+        if inputs is None:
             continue
         settings, work_s = _settings(
             stage, folder.name, of_parts[made[0]].get("config_hash"), plans
@@ -139,7 +141,7 @@ def _differing(
     folder: Path,
     stage: Stage,
     tables: Mapping[str, Columns],
-    inputs: Mapping[str, Columns],
+    inputs: Mapping[str, object],
     settings: Mapping[str, object],
     every: bool,
 ) -> Iterator[Problem]:
@@ -259,9 +261,29 @@ def _cells(settings: Mapping, tables: Mapping[str, Columns]) -> tuple[Chosen, di
 _SAMPLES = {"study_chunk": _repetitions, "accuracy_map": _cells}
 
 
-def _read(stage: Stage, own: Mapping[str, str], tables: Collection[str]) -> list[str]:
-    """Artefacts that a stage read."""
-    return [each for each in digests_read(own) if each in tables]
+def _inputs(
+    stage: Stage,
+    folder: Path,
+    own: Mapping[str, str],
+    tables: Mapping[str, Columns],
+    plans: Sequence[Plan],
+) -> dict[str, object] | None:
+    """What a stage read, of the ``tables`` or of lines beside; None where it is not all there."""
+    read = digests_read(own)
+    if not stage.of_lines:
+        found = {each: tables[each] for each in read if each in tables}
+        return found if set(stage.inputs) <= set(found) else None
+    inputs: dict[str, object] = {}
+    files = next((_of_outside(each, stage, folder.name) for each in plans), {})
+    for role, digest in read.items():
+        try:
+            if not role.endswith("_file"):
+                inputs[role] = store.read(folder.parent / f"{role}.parquet")
+            elif file_hash(files[role]) == digest:  # else the campaign went on
+                inputs[role] = Path(files[role])
+        except (InputError, KeyError, OSError):
+            return None
+    return inputs if len(inputs) == len(read) else None
 
 
 def _rows(tables: Mapping[str, Columns]) -> int:
@@ -278,29 +300,20 @@ def _settings(
         if dataset not in plan.datasets or stage.name not in plan.stages(dataset):
             continue
         found = plan.settings(stage.name, dataset)
-        if config_hash(found) == wanted and all(map(os.path.isfile, _files(plan, stage, dataset))):
+        files = _of_outside(plan, stage, dataset).values()
+        if config_hash(found) == wanted and all(map(os.path.isfile, files)):
             return found, cost.of_stage(stage.name, plan.datasets[dataset]).seconds
     if stage.name == "study":  # few enough to be tried
         return _readings().get(wanted or ""), 0.0
     return None, 0.0
 
 
-def _files(plan: Plan, stage: Stage, dataset: str) -> list[str]:
+def _of_outside(plan: Plan, stage: Stage, dataset: str) -> dict[str, str]:
+    """Files from outside of a stage by role; none where the data set has no such stage."""
+    if dataset not in plan.datasets or stage.name not in plan.stages(dataset):
+        return {}
     given = plan.inputs(stage.name, dataset)
-    return [str(path) for role, path in given.items() if role.endswith("_file")]
-
-
-def _beside(results: Path, dataset: str) -> Iterator[Plan]:
-    """Plans of configurations beside the folder of all results that name a data set."""
-    for path in sorted((results / "..").glob("*.yaml"))[:_FILES]:
-        with suppress(InputError, OSError):
-            if path.name == CONFIG or dataset.encode() in path.read_bytes():
-                yield _planned(str(path), path.stat().st_mtime_ns)
-
-
-@cache
-def _planned(path: str, changed_ns: int) -> Plan:
-    return planned([path])
+    return {role: str(path) for role, path in given.items() if role.endswith("_file")}
 
 
 def _assumed(dataset: str, tables: Mapping[str, Columns], marks: Marks) -> Iterator[Plan]:

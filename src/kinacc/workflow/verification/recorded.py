@@ -102,6 +102,8 @@ def _held(
     folder: Path, place: Path, record: Record, there: Collection[Path], in_doubt: Collection[str]
 ) -> Iterator[Problem]:
     stage = STAGES[record.stage]
+    if other := record.misfolded():
+        yield Problem(str(place), f"{', '.join(other)} is not that of what it tells")
     names = {path.relative_to(folder).as_posix() for path in there}
     may = {
         f"{stage.name}.html"

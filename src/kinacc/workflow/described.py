@@ -1,0 +1,64 @@
+"""Settings of a data set whose results are there, from the configurations beside these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from kinacc.errors import InputError, Problem
+from kinacc.workflow.contradictions import load
+from kinacc.workflow.plan import Plan, planned
+
+CONFIG = "config.yaml"
+_FILES = 20  # beside results, looked through for a configuration
+
+
+def beside(results: Path, dataset: str) -> Iterator[tuple[Path, Plan]]:
+    """Configurations beside the folder of all results that name a data set, and their plans."""
+    for path in sorted((results / "..").glob("*.yaml"))[:_FILES]:
+        with suppress(InputError, OSError):
+            if path.name == CONFIG or dataset.encode() in path.read_bytes():
+                yield path, _planned(str(path), path.stat().st_mtime_ns)
+
+
+@cache
+def _planned(path: str, changed_ns: int) -> Plan:
+    return planned([path])
+
+
+def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
+    """Settings by which a file of ``readings`` is read as those of the results in ``folder`` were.
+
+    Nothing is left out of it and nothing held out. Raises InputError where the configuration of the
+    results is not found, several are, or it names more than one file.
+    """
+    folder = folder.resolve()
+    found: dict[str, dict[str, Any]] = {}
+    for path, plan in beside(folder.parent, folder.name):
+        if folder.name in plan.datasets:
+            own = _of_file(load([path])[folder.name], readings)
+            if own is not None and own not in found.values():
+                found[path.name] = own
+    one = next(iter(found.values()), None)
+    if one is not None and len(found) == 1 and not one["measurements"]["file"]["joints"]["path"]:
+        return one
+    what = "is in a form that is not known: no configuration beside the results says how "
+    what += f"the readings of {folder.name} were read"
+    if len(found) > 1:
+        what = f"could be read in several ways: {', '.join(found)} describe {folder.name}"
+    elif one is not None:
+        what = f"has no joints of its own: those of {folder.name} stand in a second file"
+    fix = f"`kinacc init {readings}` writes a .yaml that describes it: give that in its place"
+    raise InputError(Problem(str(readings), what, fix=fix))
+
+
+def _of_file(settings: Mapping[str, Any], readings: Path) -> dict[str, Any] | None:
+    """The settings of a data set with another file; None where its poses are from none."""
+    measurements = settings["measurements"]
+    if measurements["source"] != "file":
+        return None
+    file = {**measurements["file"], "path": str(readings), "source": None, "exclude": []}
+    return {**settings, "measurements": {**measurements, "folds": None, "file": file}}
