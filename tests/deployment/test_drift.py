@@ -11,7 +11,8 @@ import shared_data
 
 from kinacc.artifacts.columns import Columns
 from kinacc.calibration import dh_fit
-from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
+from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment import drift
 from kinacc.deployment.drift import MOVED, SAME, Session
@@ -63,7 +64,15 @@ def session(seen: Observations, date: str, base: str = SAME, name: str = "mh180"
     arm = robots.load(name)
     seen = replace(seen, fold=assign(seen.pose, 5, 0))
     free = free_parameters(arm.dh.joints, parallel_joints(arm.dh))
-    fit = dh_fit.fit(seen, arm.dh, free=free, rotation_weight_mm_per_rad=WEIGHT, threshold=1e-4)
+    terms = frame_terms(seen, known(arm.base, robots.carried(arm)))
+    fit = dh_fit.fit(
+        seen,
+        arm.dh,
+        free=free,
+        rotation_weight_mm_per_rad=WEIGHT,
+        threshold=1e-4,
+        frame_terms=terms,
+    )
     model: DHModel = fit.model
     calibration = Calibration(date, arm, "dh", model, fit.frames.base, {"tool": fit.frames.tool})
     at = compose(fit.frames.base, compose(model.pose(seen.at), fit.frames.tool))
