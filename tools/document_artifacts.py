@@ -10,6 +10,7 @@ from kinacc.artifacts.columns import (
     BY_ROW,
     BY_STD,
     BY_STD_ERROR,
+    SAME_AMONG,
     SAME_WITHIN,
     Artefact,
     Column,
@@ -70,7 +71,8 @@ those of a run that did not come to its end, or were changed since: no stage rea
 differ by, in its unit: rounding differs from machine to machine. Without a reason for another it is
 {same}.
 A pure number is held to as much as a radian, which is one too, and 1e-9 rad is 1e-6 mm at a
-metre. *{by_row}* is the one that the row states. Whole numbers and words are equal, and null is
+metre. *{by_row}* is the one that the row states; {among:g} for pure numbers, which may be
+thousands there. Whole numbers and words are equal, and null is
 where null was. Rows belong together by their key, in which numbers count to nine digits.
 
 *{by_poses}*: where these columns differ by more than their unit allows, what counts is the pose
@@ -116,6 +118,7 @@ def artifacts_markdown() -> str:
             f"{within:g} {unit}" for unit, within in SAME_WITHIN.items() if len(unit) < 5
         ),
         by_row=BY_ROW,
+        among=SAME_AMONG["1"],
         by_poses=BY_POSES,
         by_std=BY_STD,
         std_error=BY_STD_ERROR,

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from recorded import MARKS
 
-from kinacc.artifacts import records, store
+from kinacc.artifacts import provenance, records, store
 from kinacc.artifacts.pictures import inputs_digests
 from kinacc.errors import InputError
 
@@ -191,6 +192,50 @@ def test_a_record_says_which_of_its_files_is_another_one(tmp_path):
     assert "is not the file that stage dh wrote" in told[0]
     assert told[1].endswith("b.parquet: missing")
     assert json.loads(Path(place).read_bytes())["files"].keys() == {"a.parquet", "b.parquet"}
+
+
+def told_record() -> records.Record:
+    """A record that tells what its marks fold."""
+    code = provenance.Code({"kinacc.a": "ab" * 32}, {"python": "3.12", "numpy": "2.1"})
+    settings = {"robot": "arm.yaml", "calibration": {"dh": {"truncation": 0.01}}}
+    marks = {"config_hash": provenance.config_hash(settings), "code_hash": code.folded()}
+    return records.Record("dh", None, marks, {}, {}, settings, code.files, code.versions)
+
+
+def test_a_record_tells_settings_and_code_and_reads_as_it_was_written(tmp_path):
+    place, record = records.place(tmp_path, "dh"), told_record()
+    records.leave(place, record, {str(tmp_path / "a.parquet"): (b"a", None)})
+    read = records.read(place)
+    assert read.misfolded() == []
+    assert (read.settings, read.code, read.versions) == (
+        record.settings,
+        record.code,
+        record.versions,
+    )
+    assert read.content() == Path(place).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("what", "other", "mark"),
+    [
+        ("settings", {"calibration": {"dh": {"truncation": 0.1}}}, "config_hash"),
+        ("code", {"kinacc.a": "cd" * 32}, "code_hash"),
+        ("versions", {"python": "3.12", "numpy": "2.2"}, "code_hash"),
+    ],
+)
+def test_a_record_whose_settings_or_code_were_edited_does_not_fold(what, other, mark):
+    assert replace(told_record(), **{what: other}).misfolded() == [mark]
+
+
+def test_a_record_of_before_settings_and_code_were_told_reads_as_it_did(tmp_path):
+    place = Path(records.place(tmp_path, "dh"))
+    records.leave(place, records.Record("dh", None, {"seed": "1"}, {}, {}), {})
+    assert json.loads(place.read_bytes()).keys() == {
+        *("stage", "part", "marks", "inputs_digests", "files")
+    }
+    read = records.read(place)
+    assert (read.settings, read.misfolded()) == (None, [])
+    assert read.content() == place.read_bytes()
 
 
 def test_a_run_that_ends_between_two_files_leaves_no_record(tmp_path, monkeypatch):

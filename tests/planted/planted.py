@@ -70,7 +70,7 @@ class Trials:
             if isinstance(case, Change):
                 faults = self._judged(case, work, done)
             else:
-                faults = _judged_unchanged(done)
+                faults = _judged_unchanged(done, case.action != "fresh")
         finally:
             shutil.rmtree(work)
         found = {"name": case.name, "family": case.family, "faults": faults}
@@ -92,8 +92,8 @@ class Trials:
             return broken
         after = work / "again" / "results"
         truth = judged.differing(self.base.results, after, case.random)
-        answer = judged.Answer.of(done["told"])
         touched = case.action in changes.AFTERWARDS
+        answer = judged.Answer.of(done["told"], touched)
         faults = judged.faults_of(answer, truth, case.causes, touched, case.only)
         if case.family.endswith("no numbers") and judged.YES in truth.values():
             faults.append("the harness: numbers differ, and were not meant to")
@@ -127,11 +127,11 @@ def _broken(done: dict) -> list[str]:
     return []
 
 
-def _judged_unchanged(done: dict) -> list[str]:
+def _judged_unchanged(done: dict, whole: bool) -> list[str]:
     if broken := _broken(done):
         return broken
-    answer, faults = judged.Answer.of(done["told"]), []
-    if done["code"] or answer.failed:
+    answer, faults = judged.Answer.of(done["told"], whole), []
+    if (whole and done["code"]) or answer.failed:
         faults.append(f"failed although nothing changed: {'; '.join(answer.failed)[:300]}")
     if answer.differences:
         names = {f"{each.dataset}/{each.artefact}" for each in answer.differences}

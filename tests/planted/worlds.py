@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +22,7 @@ from kinacc.artifacts import provenance
 from kinacc.cli.group import main
 from kinacc.config.validate import overlay
 from kinacc.workflow import runner
-from kinacc.workflow.catalogue import TABLES
+from kinacc.workflow.catalogue import FIGURE, PAGE, TABLES
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.runner import is_done, perform
 
@@ -146,17 +146,19 @@ def write_world(folder: Path, poses: int = 40, settings: str = SETTINGS) -> Worl
     return World(folder)
 
 
-def finished(folder: Path, **given: object) -> World:
-    """A world whose study has been run."""
-    world = write_world(folder, **given)
-    rerun(world.plan())
+def finished(folder: Path) -> World:
+    """A world whose study has been run, pictures and pages too."""
+    world = write_world(folder)
+    rerun(world.plan(), leaves=(TABLES, FIGURE, PAGE))
     return world
 
 
 def rerun(
-    plan: Plan, datasets: Sequence[str] = (), draw: np.random.Generator | None = None
+    plan: Plan, draw: np.random.Generator | None = None, leaves: Collection[str] = (TABLES,)
 ) -> list[str]:
     """Run what the records do not say is done, and name it; by ``draw`` in a drawn order.
+
+    ``leaves``: what is made, tables alone to spare the time of pictures that show them.
 
     As the workflow does: what was made of other settings, code, versions or inputs, and what was
     made from what is made anew, as far as that says something else.
@@ -164,9 +166,9 @@ def rerun(
     made = []
     waiting = [
         (dataset, name)
-        for dataset in datasets or plan.datasets
+        for dataset in plan.datasets
         for name, stage in plan.stages(dataset).items()
-        if stage.leaves == TABLES and not stage.on_request
+        if stage.leaves in leaves and not stage.on_request
     ]
     while waiting:
         dataset, name = _next(plan, waiting, draw)

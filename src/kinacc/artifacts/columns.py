@@ -21,6 +21,8 @@ SAME_WITHIN = {
     **{"see statement": 1e-6, "see claims": 1e-6, "see factor": 1e-6},
     **{"kg": 1e-6, "degC": 1e-6, "mm per mm or mrad": 1e-6, "mm or mrad": 1e-6},
 }
+# Among values of several units pure numbers may be as large as thousands of degrees of freedom.
+SAME_AMONG = {**SAME_WITHIN, "1": 1e-6}
 # Where a column is not held to its unit: what it is held to in its place.
 BY_ROW, BY_POSES, BY_STD = "the row's unit", "predicted poses", "standard deviations"
 # Means of simulations that were drawn anew, by another seed or number of them, are held to it.

@@ -1,19 +1,22 @@
 """What moved between two series of one arm, and how much of that chance alone shows.
 
-The null hypothesis. Between two series nothing happened at the arm; that does not make them alike.
-(1) A model is wrong in ways that depend on the pose, the same ways in both series: two series at the
-same configurations share that misfit, and it cancels; two pose sets do not, and fits to them differ
-however small the noise. The misfit is taken as errors in front of every joint that change smoothly
-with that joint, of a size that the two series themselves show, joint by joint (variance components
-by the evidence), and beside these whatever differs from configuration to configuration. (2) The arm
-warms up, each time differently: what changes with the order of measuring inside the series is a
-state of the arm that a series may be in as a whole. (3) Visits repeat within limits, and the
-instrument has noise.
+The null hypothesis: between two series nothing happened at the arm. That does not make them alike.
 
-The change is estimated together with all of these, by least squares under their variances. Chance
-of (1), smooth, and (2) is drawn from these; all else is drawn by resampling configurations (the wild
-bootstrap: the share of every configuration in the change, computed from residuals of a fit without
-it, with random factors), whatever it is made of: readings of one configuration go together, in both
+1. A model is wrong in ways that depend on the pose, the same ways in both series. Two series at the
+   same configurations share that misfit, and it cancels; two pose sets do not, and fits to them
+   differ however small the noise is. Misfit is taken as errors in front of every joint that change
+   smoothly with that joint, of a size that both series show, joint by joint (variance components by
+   the evidence), and beside these whatever differs from configuration to configuration. Misfit may
+   go further from one part of the joints to another than that: how much, halves of one series say,
+   between which nothing happened either (``understated``).
+2. The arm warms up, each time differently. What changes with the order of measuring inside the
+   series is a state of the arm in which a series may be as a whole.
+3. Visits repeat within limits, and the instrument has noise.
+
+The change is estimated together with all of these, by least squares under their variances. Smooth
+misfit and states are drawn from their variances. All else is drawn by resampling configurations
+(wild bootstrap: the share of every configuration in the change, from residuals of a fit without it,
+times a random factor), whatever it is made of; readings of one configuration go together, in both
 series.
 """
 
@@ -28,8 +31,9 @@ import scipy
 from kinacc.deployment.drift_pairs import Pair
 
 DRAWS = 4000
+UNITS = (1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3)  # of joint errors: what counts as much as one mm
 _SEEN = 1e-3  # of the best seen movement; what moves less is no direction of the arm
-_ROUNDS, _SETTLED = 30, 0.05  # of the variances; relative change
+_ROUNDS, _SETTLED = 15, 0.1  # of the variances; relative change
 _FIRM = 1e-9  # of the largest diagonal: what base, tool and joints share stays where it is
 _LEAST_MM = 1e-4  # standard deviation of misfit: less is none
 _START_MM = 0.1
@@ -46,6 +50,11 @@ class Moved(NamedTuple):
     directions: np.ndarray
     change: np.ndarray
     chance: np.ndarray
+
+    def along(self, constant: np.ndarray) -> np.ndarray:
+        """What joint errors (6k, n) in mm and rad are in mm along the directions, (d, n)."""
+        units = np.tile(UNITS, constant.shape[0] // 6)[:, None]
+        return np.linalg.pinv(self.directions.T / units) @ (constant / units)
 
     @property
     def moved_mm(self) -> float:
@@ -108,15 +117,13 @@ def moved(pair: Pair, misfit: float, rng: np.random.Generator) -> Moved:
     changes = slice(split - count, split)
     scores = _shares(pair, columns, found, inverse, changes)
     blurred = (inverse[changes] @ gram[:, split:]) * np.sqrt(prior[group])
-    # Between two series a state may differ by both their states.
-    state = np.sqrt(2.0 * prior[warming]) * np.eye(count)
     both = np.intersect1d(pair.cluster[pair.second], pair.cluster[~pair.second])
     alone = ~np.isin(np.unique(pair.cluster), both)
     scores[alone] *= misfit
-    blurred *= misfit
-    chance = sum(
-        rng.standard_normal((DRAWS, len(part))) @ part for part in (scores, blurred.T, state)
-    )
+    # Between two series a state may differ by both their states.
+    smooth = misfit**2 * blurred @ blurred.T + 2.0 * prior[warming] * np.eye(count)
+    chance = rng.standard_normal((DRAWS, len(scores))) @ scores
+    chance += rng.standard_normal((DRAWS, count)) @ np.linalg.cholesky(smooth).T
     return Moved(directions, found[changes], chance)
 
 
@@ -133,7 +140,7 @@ def seen_directions(pair: Pair) -> np.ndarray:
         left = left[:, values > _FIRM * values[0]]
         constant = constant - left @ (left.T @ constant)
     at = constant[pair.position[rows]]
-    units = np.tile([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3], at.shape[1] // 6)
+    units = np.tile(UNITS, at.shape[1] // 6)
     _, values, right = np.linalg.svd(at * units, full_matrices=False)
     kept = values > _SEEN * values[0]
     return right[kept] * units / values[kept, None] * np.sqrt(len(at) / 3.0)
@@ -143,7 +150,8 @@ def _variances(
     gram: np.ndarray, seen: np.ndarray, pair: Pair, split: int, group: np.ndarray
 ) -> tuple[float, np.ndarray]:
     """Variance of noise, and of every group of random effects, by the evidence (MacKay 1992)."""
-    free = np.linalg.solve(gram[:split, :split], np.column_stack([gram[:split, split:], seen[:split]]))
+    beside = np.column_stack([gram[:split, split:], seen[:split]])
+    free = np.linalg.solve(gram[:split, :split], beside)
     inner = gram[split:, split:] - gram[split:, :split] @ free[:, :-1]
     right = seen[split:] - gram[split:, :split] @ free[:, -1]
     square = float(pair.residual @ pair.residual - seen[:split] @ free[:, -1])
@@ -152,15 +160,18 @@ def _variances(
     sizes = np.bincount(group)
     for _ in range(_ROUNDS):
         held = noise / prior[group]
-        inverse = _inverse(inner + np.diag(held))
-        found = inverse @ right
-        informed = 1.0 - held * inverse.diagonal()
+        lower, _ = scipy.linalg.lapack.dpotrf(inner + np.diag(held), lower=1)
+        found, _ = scipy.linalg.lapack.dpotrs(lower, right, lower=1)
+        spread, _ = scipy.linalg.lapack.dpotri(lower, lower=1, overwrite_c=1)
+        informed = 1.0 - held * spread.diagonal()
         unexplained = square - 2.0 * found @ right + found @ inner @ found
         noise = unexplained / (left - informed.sum())
         told = np.bincount(group, informed, len(sizes))
         new = np.bincount(group, found**2, len(sizes)) / np.maximum(told, np.finfo(float).tiny)
         new = np.maximum(new, _LEAST_MM**2)
-        change = np.abs(np.log(new / prior)).max()
+        # What is no more than a hundredth of the noise settles nothing.
+        counts = np.maximum(new, prior) > 1e-4 * noise
+        change = np.abs(np.log(new / prior))[counts].max(initial=0.0)
         prior = new
         if change < _SETTLED:
             break
@@ -169,7 +180,7 @@ def _variances(
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric, positive definite matrix."""
-    lower, _ = scipy.linalg.lapack.dpotrf(matrix, lower=1, overwrite_a=0)
+    lower, _ = scipy.linalg.lapack.dpotrf(matrix, lower=1)
     half, _ = scipy.linalg.lapack.dpotri(lower, lower=1)
     return np.tril(half) + np.tril(half, -1).T
 

@@ -21,7 +21,7 @@ from kinacc.kinematics.vec import ERRORS
 from kinacc.measurements.folds import configurations
 
 ORDER = 8  # of the polynomials of the misfit; finer misfit differs between configurations
-CUTS = 4  # of one series into halves
+CUTS = 2  # of one series into halves, across the widest directions of its joints
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
 _TRUNCATION = 1e-4
 _NARROW_RAD = 1e-3
@@ -39,11 +39,12 @@ class Pair:
     """m residual components (mm) of two series about one DH model, and what may explain them.
 
     ``frames`` (m, F): motions of bases and targets, ``is_base`` (F,) says which; ``own`` (F,) marks
-    those only the second series has. ``constant`` (m, 6k): errors in front of every joint, ``ERRORS`` joint by joint in mm and
-    rad. ``misfit`` (m, Q): the same growing with the joints, of prior proportions; ``joint`` (Q,)
-    says of which (0-based). ``residual`` (m,) is measured minus model. ``second``, ``position``
-    (m,): of the second series, of a position. ``cluster`` (m,): configuration, alike in both.
-    ``late`` (m,): order of measuring within a series, of mean 0 and variance 1.
+    those only the second series has. ``constant`` (m, 6k): errors in front of every joint,
+    ``ERRORS`` joint by joint in mm and rad. ``misfit`` (m, Q): the same growing with the joints, of
+    prior proportions; ``joint`` (Q,) says of which (0-based; one more: by travel direction).
+    ``residual`` (m,) is measured minus model. ``second``, ``position`` (m,): of the second series,
+    of a position. ``cluster`` (m,): configuration, alike in both. ``late`` (m,): order of measuring
+    within a series, of mean 0 and variance 1.
     """
 
     frames: np.ndarray
@@ -140,15 +141,21 @@ def about(
         own=~np.any(of_frames[~second] != 0.0, axis=0),
         constant=errors[:, :polynomials][:, order == 0],
         misfit=np.concatenate([growing, travelling], axis=1),
-        joint=np.concatenate(
-            [joint[order > 0], np.full(travelling.shape[1], model.joints)]
-        ).astype(int),
+        joint=np.concatenate([joint[order > 0], np.full(travelling.shape[1], model.joints)]).astype(
+            int
+        ),
         residual=residual,
         second=second,
         position=~both.is_rotation,
         cluster=configurations(both.pose, both.q_rad)[row],
         late=late[row],
     )
+
+
+def all_shared(pair: Pair) -> bool:
+    """Whether all configurations of both series are the same."""
+    one, other = (np.unique(pair.cluster[pair.second == each]) for each in (False, True))
+    return np.array_equal(one, other)
 
 
 def halves(series: Pair, q_rad: np.ndarray, setup: Setup) -> Iterator[Pair]:
@@ -196,7 +203,7 @@ def joined(first: Observations, second: Observations, setup: Setup) -> Observati
 
 
 def within_a_turn(q_rad: np.ndarray, prismatic: np.ndarray) -> np.ndarray:
-    """Joints (n, k), those that turned by more than a turn taken back into one: the arm is there."""
+    """Joints (n, k), those that turn by more than a turn taken back into one: the arm is alike."""
     turns = (np.ptp(q_rad, axis=0) > 2.0 * np.pi) & ~prismatic
     return np.where(turns, np.mod(q_rad + np.pi, 2.0 * np.pi) - np.pi, q_rad)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from kinacc.artifacts.provenance import PYTHON
 from kinacc.artifacts.records import Record
-from kinacc.gate.made import Made
+from kinacc.gate.made import Made, made
 from kinacc.gate.outcome import (
     CODE,
     CONFIGURATION,
@@ -37,6 +37,7 @@ class Causes:
     before: Made
     now: Made
     known: dict[str, tuple[Cause, ...]] = field(default_factory=dict, init=False, repr=False)
+    others: dict[str, Causes] = field(default_factory=dict, init=False, repr=False)
 
     def of_stage(self, name: str) -> tuple[Cause, ...]:
         """Why the tables of a stage may differ: its own changes, and those of what it read.
@@ -61,12 +62,21 @@ class Causes:
         return tuple(found) or (Cause(UNEXPLAINED, name),)
 
     def _read(self, role: str, was: str, is_: str) -> Iterable[Cause]:
-        """Causes of another table that was read."""
+        """Causes of another table that was read, of this data set or of another."""
         whose, _, artefact = role.rpartition("/")
-        maker = maker_of(artefact).name
-        if not whose and self.before.record(maker) and self.now.record(maker):
-            return self.of_stage(maker)
-        return [Cause(INPUT, role, was[:16] or "not read", is_[:16] or "not read")]
+        maker, own = maker_of(artefact).name, self._of_dataset(whose)
+        if was and is_ and own.before.record(maker) and own.now.record(maker):
+            return own.of_stage(maker)
+        where = whose or artefact
+        return [Cause(INPUT, where, "read" if was else "not read", "read" if is_ else "not read")]
+
+    def _of_dataset(self, name: str) -> Causes:
+        if not name:
+            return self
+        if name not in self.others:
+            folders = (each.folder.parent / name for each in (self.before, self.now))
+            self.others[name] = Causes(*map(made, folders))
+        return self.others[name]
 
     def _made_from_others(self, name: str, new: Record) -> Iterator[Cause]:
         """Inputs that are not those now in the folder: the file comes from another run."""
@@ -74,7 +84,8 @@ class Causes:
             if _is_file(role) or "/" in role:
                 continue
             maker = maker_of(role)
-            there = self.now.digest(role, maker) if self.now.record(maker.name) else ""
+            digest_of = self.now.joined if maker.scattered else self.now.digest
+            there = digest_of(role, maker) if self.now.record(maker.name) else ""
             if there and there != digest:
                 yield Cause(UNEXPLAINED, name, f"made from {role} {there[:16]}", digest[:16])
 

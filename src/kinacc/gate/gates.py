@@ -2,35 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kinacc.config.gate_rules import LIMITS, limited
-from kinacc.errors import InputError
+import numpy as np
+
+from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
+from kinacc.assess.conformity import ACCEPT, REJECT
+from kinacc.assess.conformity import UNDECIDED as OPEN
+from kinacc.config.gate_rules import LIMITS, limit_key, limited
+from kinacc.config.values import nearest
+from kinacc.errors import InputError, first_few
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
-from kinacc.gate.run_tables import Absent, RunTables
-from kinacc.gate.values import figure
+from kinacc.gate.run_tables import SELECTED, RunTables
+from kinacc.gate.values import Compared, Figure, change_of, figure
 
 Gate = Mapping[str, Any]
+_ROUNDING = 1e-9
+_DECIDED = {ACCEPT: PASSED, REJECT: FAILED, OPEN: UNDECIDED}
+_OF_HISTORY = {"first": PASSED, "holds": PASSED, "recalibrate": FAILED}
 # What a configuration calls a verdict, and the verdict.
 _MEANT = {"fail": FAILED, "warn": WARNED, "pass": UNDECIDED}
 
 
 def judged(
-    results: Path, configurations: Mapping[str, Mapping[str, Any]], accepted: Path | None
+    results: Path,
+    configurations: Mapping[str, Mapping[str, Any]],
+    accepted: Path | None,
+    broken: Collection[str] = (),
 ) -> tuple[Outcome, ...]:
     """The outcome of every gate of every data set, in the order of the configuration.
 
     ``configurations``: full settings by data set, whose results stand in folders of their names
-    below ``results``, as those of the accepted run do below ``accepted`` (None without one).
+    below ``results``, as those of the accepted run do below ``accepted`` (None without one). Gates
+    of data sets that are ``broken``, whose results do not hold, are not looked at.
     """
-    return tuple(
-        of_gate(gate, name, RunTables(results / name), full["tolerance"], _beside(accepted, name))
-        for name, full in configurations.items()
-        for gate in full["gates"]
-    )
+    found = []
+    for name, full in configurations.items():
+        tables = RunTables(results / name)
+        for gate in full["gates"]:
+            if name in broken:
+                says = "undecided: not looked at, since the results do not hold"
+                found.append(_outcome(gate, name, UNDECIDED, says, f"first mend results of {name}"))
+            else:
+                found.append(
+                    of_gate(gate, name, tables, full["tolerance"], _beside(accepted, name))
+                )
+    return tuple(found)
 
 
 def _beside(accepted: Path | None, dataset: str) -> RunTables | None:
@@ -49,7 +69,7 @@ def of_gate(
         found = _KINDS[gate["kind"]](gate, dataset, tables, tolerance, accepted)
     except InputError as error:
         first = error.problems[0]
-        says = f"{first.where} {first.what}" if isinstance(error, Absent) else str(first)
+        says = f"{first.where} {first.what}"
         found = _outcome(gate, dataset, FAILED, says, first.fix)
     verdict = found.verdict
     if verdict == UNDECIDED:
@@ -96,4 +116,166 @@ def _value(
     return _outcome(gate, dataset, PASSED if held else FAILED, says, fix, figures)
 
 
-_KINDS = {"value": _value}
+def _change(
+    gate: Gate,
+    dataset: str,
+    tables: RunTables,
+    _: Mapping[str, Any],
+    accepted: RunTables | None,
+) -> Outcome:
+    if accepted is None or not accepted.folder.is_dir():
+        says = f"there is no accepted run of {dataset} to hold it against"
+        fix = 'a person accepts one: kinacc accept RESULTS --reason ".."'
+        return _outcome(gate, dataset, FAILED, says, fix)
+    now, before = figure(gate["value"], tables, gate), figure(gate["value"], accepted, gate)
+    asked = gate["beyond_chance"]
+    found = change_of(gate["value"], tables, accepted, gate, asked)
+    allowed = gate[limit_key("allow", gate)]
+    figures = {
+        f"value{now.key}": now.size,
+        f"accepted{now.key}": before.size,
+        f"worse_by{now.key}": found.difference,
+        f"worse_by_at_least{now.key}": found.least,
+        f"allowed{now.key}": allowed,
+        "beyond_chance": asked,
+        "of": now.called,
+        "paired": int(found.paired),
+        "accepted_rows": before.about["rows"],
+        **now.about,
+    }
+    worse = "worse" if found.difference >= 0.0 else "better"
+    by = "as" if found.difference == 0.0 else f"{now.worded(abs(found.difference))} {worse} than"
+    says = (
+        f"{now.called} is {now.worded(now.size)}, {by} the accepted run's "
+        f"{before.worded(before.size)}; {now.worded(allowed)} worse is allowed"
+    )
+    if found.open:
+        return _outcome(gate, dataset, UNDECIDED, f"undecided: {says}; {found.open}", "", figures)
+    if found.difference:
+        says += f"; with {100.0 * asked:g} % confidence {_at_least(now, found)}, {found.drawn}"
+    failed = found.least > allowed
+    fix = "look at what changed: kinacc gate --against names it"
+    return _outcome(gate, dataset, FAILED if failed else PASSED, says, fix, figures)
+
+
+def _at_least(now: Figure, found: Compared) -> str:
+    if found.least > 0.0:
+        return f"it is at least {now.worded(found.least)} worse"
+    return f"it may as well be {now.worded(-found.least)} better"
+
+
+def _campaign(
+    gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[str, Any], _: object
+) -> Outcome:
+    from kinacc.campaign import of_calibration
+    from kinacc.campaign.folder import open_
+    from kinacc.deployment import folder
+    from kinacc.workflow.fleet import BOUND, Standing
+
+    place = Path(gate["campaign"])
+    open_(place)  # says what is wrong with it
+    known = folder.read_tables(tables.folder, "robot")
+    sought = of_calibration.sought(dataset, known, [place])
+    if sought.assessed is None:
+        says = "; ".join(sought.remarks)
+        fix = f"begin one on it: kinacc campaign start FOLDER --calibration {tables.folder}"
+        return _outcome(gate, dataset, FAILED, says, fix)
+    allowed = tolerance["mm"] if gate["tolerance_mm"] is None else gate["tolerance_mm"]
+    standing = Standing(tables.folder, model=tables.model(SELECTED), campaigns=sought)
+    judged_as, bound = standing.verdict(BOUND, allowed), standing.bound()
+    assert judged_as is not None  # a tolerance is given
+    figures = {"tolerance_mm": allowed, **bound}
+    says = f"campaign {place}: {judged_as.says}, {judged_as.because}"
+    if "bound_mm" in bound:
+        says += (
+            f"; the largest error is at most {bound['bound_mm']:.3f} mm with "
+            f"{bound['confidence']:.0%} confidence, {allowed:g} mm allowed"
+        )
+        if gate["confidence"] is not None and bound["confidence"] < gate["confidence"] - _ROUNDING:
+            says = (
+                f"campaign {place} bounds with {bound['confidence']:.0%} confidence, and "
+                f"{gate['confidence']:.0%} is asked for"
+            )
+            fix = "begin a campaign with that confidence, or ask for what this one has"
+            return _outcome(gate, dataset, FAILED, says, fix, figures)
+    says = "; ".join([says, *standing.doubts()])
+    fix = f"kinacc campaign status {place}"
+    return _outcome(gate, dataset, _DECIDED[judged_as.says], says, fix, figures)
+
+
+def _claims(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome:
+    table = tables["claims"]
+    verdict = dict(zip(map(str, table["claim"]), map(str, table["verdict"]), strict=True))
+    excepted = gate["except"]
+    unknown = [each for each in excepted if each not in verdict]
+    if unknown:
+        close = [near for each in unknown if (near := nearest(each, tuple(verdict)))]
+        fix = f"did you mean {first_few(close)}?" if close else "kinacc show RESULTS claims has all"
+        says = f"except names {first_few(unknown)}, which no claim is called"
+        return _outcome(gate, dataset, FAILED, says, fix)
+    differ = [each for each in verdict if verdict[each] == "differs"]
+    left = [each for each in differ if each not in excepted]
+    without = [each for each in verdict if verdict[each] not in ("agrees", "differs")]
+    count = sum(each == "agrees" for each in verdict.values())
+    says = f"{count} of {len(verdict)} claims agree"
+    if left:
+        says += f"; these differ and are not excepted: {first_few(left)}"
+    if differ and not left:
+        says += f"; those that differ are excepted: {first_few(differ)}"
+    if without:
+        says += f"; not comparable: {first_few(without)}"
+    if agree := [each for each in excepted if verdict[each] == "agrees"]:
+        says += f"; excepted, though they agree: {first_few(agree)}"
+    figures = {"claims": len(verdict), "agree": count, "differ": len(differ)}
+    figures |= {"differ_not_excepted": len(left)}
+    fix = f"kinacc show {tables.folder} claims says what was found"
+    return _outcome(gate, dataset, FAILED if left else PASSED, says, fix, figures)
+
+
+def _suspicions(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome:
+    rows = np.asarray(tables["measurements"].get("row", [np.nan]), dtype=float)
+    if not np.isfinite(rows).any():
+        says = "the measurements are of a synthetic arm: there is no file to suspect"
+        return _outcome(gate, dataset, PASSED, says, figures={"suspicions": 0})
+    table = tables["data_check"]
+    found = [
+        (str(kind), str(what), reason)
+        for kind, level, what, reason in zip(
+            *(table[each] for each in ("finding", "level", "what", "accepted")), strict=True
+        )
+        if kind != LEFT_OUT and level != FINDING_LEVELS[-1]
+    ]
+    known = [each for each in found if each[2]]
+    left = found if gate["suspicions"] == "none" else [each for each in found if not each[2]]
+    figures = {"suspicions": len(found), "accepted": len(known)}
+    if not found:
+        return _outcome(gate, dataset, PASSED, "the check found nothing suspicious", "", figures)
+    told = first_few([f"{kind}: {what}" for kind, what, _ in left], 3)
+    said = "suspicion" if len(left) == 1 else "suspicions"
+    says = f"{len(left)} {said}: {told}" if left else f"{len(known)} suspicions, all accepted"
+    fix = "mend the file, or say in data_check.accept why to go on"
+    if known and left:
+        fix += "; suspicions: known lets pass what is accepted there"
+    return _outcome(gate, dataset, FAILED if left else PASSED, says, fix, figures)
+
+
+def _history(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome:
+    table = tables["history"]
+    last = {name: values[-1] for name, values in table.items()}
+    verdict = str(last["verdict"])
+    numbers = ("moved_mm", "chance_mm", "beyond_mm", "probability")
+    figures = {name: float(last[name]) for name in numbers} | {"lines": len(table["verdict"])}
+    says = f"{last['series']}: {verdict}"
+    says += f", {last['reason']}" if last["reason"] else ""
+    fix = "calibrate the arm anew, or find out what moved: docs/history.md"
+    return _outcome(gate, dataset, _OF_HISTORY.get(verdict, UNDECIDED), says, fix, figures)
+
+
+_KINDS = {
+    "value": _value,
+    "against": _change,
+    "campaign": _campaign,
+    "claims": _claims,
+    "suspicions": _suspicions,
+    "history": _history,
+}

@@ -75,9 +75,14 @@ class _Comparison:
         return apart(self.before, self.now)
 
     @cached_property
-    def drawn_anew(self) -> bool:
-        """Whether the study differs by its seed or repetitions alone."""
-        why = self.causes.of_stage(STAGES["study_chunk"].name)
+    def is_drawn_anew(self) -> bool:
+        """Whether the study differs, by its seed or repetitions alone."""
+        stage = STAGES["study_chunk"]
+        if not (self.before.record(stage.name) and self.now.record(stage.name)):
+            return False
+        if self.before.digest(stage.name, stage) == self.now.digest(stage.name, stage):
+            return False
+        why = self.causes.of_stage(stage.name)
         only = {(SEED, "seed"), (CONFIGURATION, _REPETITIONS)}
         return {(each.kind, each.where) for each in why} <= only and not self.of_table(
             "assessment_points", STAGES["assessment_points"]
@@ -91,9 +96,9 @@ class _Comparison:
 
     def of_table(self, artefact: str, stage: Stage) -> list[Found]:
         """What differs in one table."""
-        if not self.before.record(stage.name):
+        if not self.before.has(artefact, stage):
             return [Found("", "is not in the accepted run", 0, 0)]
-        if not self.now.record(stage.name):
+        if not self.now.has(artefact, stage):
             return [Found("", "is in the accepted run and not here", 0, 0)]
         edited = self.edited(artefact, stage)
         if not edited and self.before.digest(artefact, stage) == self.now.digest(artefact, stage):
@@ -102,8 +107,10 @@ class _Comparison:
             tables = [_table(each, artefact, stage) for each in (self.before, self.now)]
         except InputError as error:
             return [Found("", error.problems[0].what, 0, 0)]
-        if artefact in _RANDOM and not edited and self.drawn_anew:
+        if artefact in _RANDOM and not edited and self.is_drawn_anew:
             return within_chance(ARTEFACTS[artefact], *tables)
+        if artefact == "claims" and self.is_drawn_anew:
+            tables = [_without_simulations(each) for each in tables]
         found = self._by_poses(artefact, differences(ARTEFACTS[artefact], *tables))
         if edited and not found:
             found = [Found("", "is not the file that its stage left", 0, 0)]
@@ -136,6 +143,13 @@ def _table(made_: Made, artefact: str, stage: Stage) -> pa.Table:
     return pa.concat_tables([store.read_table(path) for path in made_.paths(artefact, stage)])
 
 
+def _without_simulations(claims: pa.Table) -> pa.Table:
+    """The claims that rest on other tables than those of simulations."""
+    names = {f"{name}.parquet" for name in _RANDOM}
+    rests = [names.isdisjoint(each.split(", ")) for each in claims["evidence"].to_pylist()]
+    return claims.filter(pa.array(rests))
+
+
 def _differences(name: str, both: _Comparison, exact: bool) -> Iterator[Difference]:
     for problem in both.now.problems:
         place = Path(problem.where).name
@@ -143,7 +157,7 @@ def _differences(name: str, both: _Comparison, exact: bool) -> Iterator[Differen
     for artefact, stage in both.stages().items():
         found = both.of_table(artefact, stage)
         why = both.causes.of_stage(stage.name) if found else ()
-        if found and both.now.record(stage.name) and both.edited(artefact, stage):
+        if found and both.now.has(artefact, stage) and both.edited(artefact, stage):
             why = (Cause(UNEXPLAINED, artefact),)
         for each in found:
             yield Difference(
@@ -195,7 +209,9 @@ def _outcome(name: str, both: _Comparison, exact: bool) -> Outcome:
     count = len(both.stages())
     artefacts = [*dict.fromkeys(each.artefact for each in found)]
     figures = {"tables": count, "artefacts_that_differ": len(artefacts)}
-    anew = _drawn_anew(both)
+    anew = ""
+    if both.is_drawn_anew:
+        anew = f" (the study is drawn anew: its means are held to {BY_STD_ERROR}, no single run is)"
     if not found:
         says = f"{count} tables are as in the accepted run{' to the byte' if exact else ''}{anew}"
         if changed := both.causes.own():
@@ -214,18 +230,6 @@ def _outcome(name: str, both: _Comparison, exact: bool) -> Outcome:
     if unknown:
         fix = f"kinacc check-results {results / name} says what is not as its stage left it"
     return Outcome(name, NAME, KIND, FAILED, "; ".join(parts) + anew, fix, figures, found)
-
-
-def _drawn_anew(both: _Comparison) -> str:
-    record = both.now.record("study_chunk")
-    if record is None or both.before.record("study_chunk") is None:
-        return ""
-    same = both.before.digest("study_chunk", STAGES["study_chunk"]) == both.now.digest(
-        "study_chunk", STAGES["study_chunk"]
-    )
-    if same or not both.drawn_anew:
-        return ""
-    return f" (the study is drawn anew: its means are held to {BY_STD_ERROR}, single runs are not)"
 
 
 def _named(artefacts: Sequence[str]) -> str:

@@ -38,7 +38,13 @@ class Made:
         """Every table that a record tells of, with the stage that made it."""
         for stage in self.stages():
             if stage.leaves == TABLES:
-                yield from ((artefact, stage) for artefact in stage.outputs)
+                yield from ((name, stage) for name in stage.outputs if self.has(name, stage))
+
+    def has(self, artefact: str, stage: Stage) -> bool:
+        """Whether the records tell of a table."""
+        files = [name for record in self.by_stage.get(stage.name, ()) for name in record.files]
+        ending = f"{artefact}/" if stage.scattered else f"{artefact}.parquet"
+        return any(name.startswith(ending) for name in files)
 
     def paths(self, artefact: str, stage: Stage) -> list[Path]:
         """The files of a table that its records name, one or its parts in their order."""
@@ -54,7 +60,7 @@ class Made:
         of parts does not count.
         """
         if stage.scattered:
-            return self._gathered.get(artefact) or self._joined(artefact, stage)
+            return self._gathered.get(artefact) or self.joined(artefact, stage)
         record = self.record(stage.name)
         written = record.files.get(f"{artefact}.parquet") if record else None
         return (written.columns_digest if written else None) or ""
@@ -64,7 +70,8 @@ class Made:
         all_ = [each for found in self.by_stage.values() for each in found]
         return {role: digest for each in all_ for role, digest in each.inputs_digests.items()}
 
-    def _joined(self, artefact: str, stage: Stage) -> str:
+    def joined(self, artefact: str, stage: Stage) -> str:
+        """The digest of the parts of a table that are there, which are read; empty without."""
         try:
             return digests({artefact: [str(path) for path in self.paths(artefact, stage)]})[
                 artefact

@@ -13,6 +13,7 @@ from kinacc.artifacts.columns import (
     BY_POSES,
     BY_ROW,
     BY_STD,
+    SAME_AMONG,
     SAME_WITHIN,
     Artefact,
     Column,
@@ -224,7 +225,7 @@ def _allowed(column: Column, old: Columns, new: Columns) -> np.ndarray | float:
     if within == BY_STD:
         return _of_covariance(column.name, old, new)
     units = _units(column, new, len(old[column.name]))
-    return np.array([SAME_WITHIN.get(unit, _OF_ANY_UNIT) for unit in units])
+    return np.array([SAME_AMONG.get(unit, _OF_ANY_UNIT) for unit in units])
 
 
 def _units(column: Column, columns: Columns, count: int) -> list[str]:

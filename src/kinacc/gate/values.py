@@ -5,17 +5,20 @@ Their names, units and meanings stand in the schema of the configuration.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from kinacc.artifacts.error_models import model_name
+from kinacc.artifacts.store import stated_digest
 from kinacc.config.gate_rules import COMPARED, units
-from kinacc.distributions import gamma99
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem
+from kinacc.gate import chance
+from kinacc.gate.chance import STATISTICS
 from kinacc.gate.run_tables import Absent, RunTables, errors_of
+from kinacc.measurements.folds import configurations_of
 
 _AT = {
     "held_out": "held out",
@@ -24,21 +27,6 @@ _AT = {
 }
 
 
-def _gamma(sizes: np.ndarray) -> float:
-    try:
-        return gamma99(sizes)
-    except InputError:  # an error of exactly zero
-        return float("nan")
-
-
-# Statistics of magnitudes (n,), by the last word of a figure's name, with what they are called.
-STATISTICS: Mapping[str, tuple[Callable[[np.ndarray], float], str]] = {
-    "mean": (lambda sizes: float(sizes.mean()), "mean"),
-    "rms": (lambda sizes: float(np.sqrt(np.mean(sizes**2))), "root mean square"),
-    "p99": (lambda sizes: float(np.quantile(sizes, 0.99)), "empirical 99 % quantile"),
-    "p99_gamma": (_gamma, "99 % gamma quantile"),
-    "largest": (lambda sizes: float(sizes.max()), "largest"),
-}
 FEWEST_OF_QUANTILE = 100  # rows of which 1 % is one: with fewer, the 99 % quantile is the largest
 
 
@@ -88,6 +76,45 @@ def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     if np.isnan(size):
         why = "an error is exactly zero, to which no gamma distribution can be fitted"
     return Figure(size, units()[name], f"{called} ({model_name(model)} model)", about, why)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """How a figure of errors differs from that of another run: see :class:`chance.Change`.
+
+    ``paired``: both were held out at the same measurements; ``drawn`` says what was resampled.
+    """
+
+    difference: float
+    least: float
+    paired: bool
+    drawn: str
+    open: str
+
+
+def change_of(
+    name: str, now: RunTables, before: RunTables, gate: Mapping[str, Any], confidence: float
+) -> Compared:
+    """How a figure of errors in one run differs from that in another, and what chance makes."""
+    statistic = name.rpartition(".")[2]
+    samples = [_sample(each, name, gate) for each in (now, before)]
+    paired = _digest(now) == _digest(before) is not None
+    found = chance.change(statistic, samples[0], samples[1], paired, confidence)
+    one, other = (each.count for each in samples)
+    drawn = f"by resampling {one} poses of the same measurements"
+    if not paired:
+        drawn = f"by resampling {one} poses and the accepted run's {other}"
+    return Compared(found.difference, found.least, paired, drawn, found.open)
+
+
+def _digest(tables: RunTables) -> str | None:
+    return stated_digest(tables.folder / "measurements.parquet")
+
+
+def _sample(tables: RunTables, name: str, gate: Mapping[str, Any]) -> chance.Sample:
+    quantity = name.split(".")[1]
+    sizes, rows = errors_of(tables, tables.model(gate["model"]), gate["at"], quantity)
+    return chance.Sample(sizes, configurations_of(tables["measurements"])[rows])
 
 
 def _of_data(word: str, tables: RunTables, unit: str) -> Figure:

@@ -142,7 +142,7 @@ def check_results(
     ``expect``: the digest of all records as it was told before. Raises InUse while a run writes.
     """
     folder = Path(results)
-    with undisturbed(folder.parent if _is_dataset(folder) else folder):
+    with undisturbed(folder.parent if is_dataset(folder) else folder):
         report = _checked(folder, plan, configs, every if again else None)
     if expect is not None and report.digest != expect:
         what = f"digest of all records is {report.digest or 'none: there are no records'}"
@@ -164,7 +164,7 @@ def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: boo
         return _advised(Report(str(folder), (check_campaign(folder),)), folder)
     if folder.name == TOURNAMENT:
         return _advised(Report(str(folder), (check_tournament(folder),)), folder)
-    if _is_dataset(folder):
+    if is_dataset(folder):
         if plan is not None and folder.name not in plan.datasets:
             allowed = ", ".join(plan.datasets)
             problem = Problem(str(folder), "no data set of the configuration", allowed)
@@ -210,7 +210,7 @@ def _advised(
     return replace(report, advice="\n".join(said))
 
 
-def _is_dataset(folder: Path) -> bool:
+def is_dataset(folder: Path) -> bool:
     """Whether the folder is that of one data set, given in place of the folder of all of them."""
     return any((folder / artefact.file_name).is_file() for artefact in ARTEFACTS.values())
 
