@@ -4,6 +4,7 @@ include: "workflow/Snakefile"
 
 # What an included file calls its default target does not count.
 rule everything:
+    """what a plain `snakemake` makes: all"""
     default_target: True
     input:
         rules.all.input,

@@ -7,8 +7,8 @@
 # Exit codes are those of `kinacc gate`. For commits of people you trust: what they say is run.
 set -eu
 repository=$1 commit=$2
-study=${STUDY:-study.yaml}
-run=${RUN:-study} # or calibrate: the models alone
+study=${STUDY:-tracker.yaml}
+run=${RUN:-calibrate} # the models; or study: maps, assessors and figures as well
 kept=${KEPT:-$HOME/.cache/kinacc-pipeline} # of one repository; remove it to begin with nothing
 export CI=true SNAKEMAKE_OUTPUT_CACHE="$kept/fits"
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.artifacts import allowed, records, store
 from kinacc.artifacts.contract import PROVENANCE_KEYS
-from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.catalogue import HISTORY, STAGES
 from kinacc.workflow.plan import Plan
 from kinacc.workflow.runner import Job, stage_provenance
 
@@ -35,7 +35,7 @@ class SmallResults:
         self.tables = small_tables()
         for name, stage in STAGES.items():
             if stage.leaves != "tables":
-                if not stage.on_request:
+                if not (stage.on_request or name in HISTORY):
                     self.leave(name)
             elif not stage.on_request and all(each in self.tables for each in stage.outputs):
                 self.save(name)
@@ -106,7 +106,7 @@ class SmallResults:
         self.tables[artefact] = self.tables[artefact] | columns
         names = list(STAGES)
         for name in names[names.index(stage_name) :]:
-            if STAGES[name].on_request or STAGES[name].measured:
+            if STAGES[name].on_request or STAGES[name].measured or name in HISTORY:
                 continue
             if STAGES[name].leaves != "tables":
                 self.leave(name)

@@ -26,7 +26,7 @@ ON_EVERY_RUN = [
     name
     for stage in STAGES.values()
     if stage.leaves == "tables"
-    and not (stage.scattered or stage.on_request or stage.measured)
+    and not (stage.scattered or stage.on_request or stage.measured or stage.of_lines)
     and stage.fits in ("", *ALWAYS)
     for name in stage.outputs
 ]

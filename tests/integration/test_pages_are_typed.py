@@ -59,6 +59,7 @@ ASSUMED = {
         cp src/kinacc/kinematics/robots/ur10.yaml my_robot.yaml
         head -300 examples/data/ur10_tmac/series_D.csv | cut -d, -f1-6 > reachable.csv
     """,
+    "docs/history.md": "head -120 ../../clone/examples/data/ur10_tmac/series_B.csv > june.csv",
     "docs/questions.md": "cp -r ../../clone/results/ur10_b results/march",
     "docs/using-a-calibration.md": """
         head -5 examples/data/ur10_tmac/series_B.csv | cut -d, -f1-6 > plan.csv

@@ -13,7 +13,7 @@ import typed_commands
 from build_servers import Ended, Server, on_github, on_gitlab, on_one_machine
 from whole_project import write_poses
 
-# Models alone: a whole study takes its time, and the steps are the same.
+# Models alone, as the recipes have it.
 STUDY = """\
 datasets:
   cell:
@@ -24,7 +24,6 @@ datasets:
 gates:
   - {name: held out, value: residuals.position.p99, at_most_mm: 2.0}
 """
-MODELS = {"RUN": "calibrate"}
 RUNS = {"github": on_github, "gitlab": on_gitlab, "pipeline": on_one_machine}
 
 
@@ -72,7 +71,7 @@ def team(tmp_path_factory, shell) -> Team:
         where = [team.repository] if "init" in words else [team.repository, team.clone]
         subprocess.run(["git", *words, *where], check=True, capture_output=True)
     write_poses(team.clone / "poses.csv")
-    (team.clone / "study.yaml").write_text(STUDY)
+    (team.clone / "tracker.yaml").write_text(STUDY)
     (team.clone / ".gitignore").write_text("results/\n.snakemake/\n.cache/\n.venv/\ngate.*\n")
     (team.clone / "requirements").mkdir()
     shutil.copy(typed_commands.ROOT / "requirements" / "run.txt", team.clone / "requirements")
@@ -97,9 +96,9 @@ def new_server(tmp_path_factory, team):
 def first(team, new_server) -> tuple[Server, Ended]:
     """The first push, on a server of GitHub; a person then accepts what the pipeline left."""
     server = new_server()
-    ended = on_github(server, **MODELS)
-    pass  # ACCEPT
-    pass  # PUSH
+    ended = on_github(server)
+    team.types(f"kinacc accept {str(ended.left / 'results')!r} --reason 'first run of the cell'")
+    team.push("Accept the first run")
     return server, ended
 
 
@@ -108,10 +107,10 @@ def test_nothing_is_computed_again_from_what_was_kept(name, first, new_server):
     run = RUNS[name]
     server = first[0] if name == "github" else new_server()
     if name != "github":
-        cold = run(server, **MODELS)
+        cold = run(server)
         assert cold.passed, cold.text
         assert len(cold.computed) == 6
-    warm = run(server, **MODELS)
+    warm = run(server)
     assert warm.passed, warm.text
     assert warm.computed == []
     assert (warm.left / "gate.xml").is_file()

@@ -45,7 +45,7 @@ seed: 11
 
 
 def test_every_setting_a_stage_names_is_in_the_configuration():
-    known = defaults() | {"dataset": "", "robot": ""}
+    known = defaults() | {"dataset": "", "robot": "", "series": []}
     for stage in STAGES.values():
         if stage.joint:
             continue

@@ -11,7 +11,11 @@ environment = "../envs/kinacc.yaml"
 if not {"{", "}"}.isdisjoint(here := str(workflow.current_basedir)):
     environment = re.sub(r"([{}])", r"\1\1", os.path.join(here, environment))
 
+gone_through = {name for dataset in [*plan.datasets, TOURNAMENT] for name in plan.stages(dataset)}
+
 for stage in STAGES.values():
+    if stage.name not in gone_through:
+        continue
     part = "{part}" if stage.scattered else None
     folder = TOURNAMENT if stage.joint else whose
 
@@ -86,25 +90,27 @@ for stage in STAGES.values():
         shell:
             COMMAND
 
+    listed_as(stage.message)
 
-# The whole study and the claims on further draws, whose shares go into claims.parquet.
+
 rule robustness:
+    """the whole study, and the claims on further draws, whose shares go into claims.parquet"""
     input:
         [plan.targets(dataset, also=["robustness_table"]) for dataset in plan.datasets],
     message:
         "every table and figure is up to date, and robustness.parquet with the claims on further draws"
 
 
-# Fig. 3 under every reading of it, each over arms drawn anew.
 rule readings_of_maps:
+    """the sentences on Fig. 3 under every reading of it, each over arms drawn anew"""
     input:
         [plan.targets(dataset, only=(), also=MAP_READINGS) for dataset in plan.datasets],
     message:
         "the sentences on Fig. 3 under every reading of it are in map_readings.parquet"
 
 
-# The claims over every choice that the paper leaves open: each alone, and all at once.
 rule choices:
+    """the claims over every choice that the paper leaves open: each alone, and all at once"""
     input:
         [plan.targets(dataset, only=(), also=CHOICES) for dataset in plan.datasets],
     message:
@@ -112,6 +118,7 @@ rule choices:
 
 
 rule tournament:
+    """the verdicts on every assessor, over the arms of the paper and of the tournament"""
     input:
         list(plan.outputs("tournament_tables", TOURNAMENT).values()),
     message:

@@ -15,6 +15,7 @@ from kinacc.report import (
     paper,
     parameters,
     residuals,
+    robot_history,
     selection,
     study,
 )
@@ -22,6 +23,7 @@ from kinacc.report.page import FirstScreen, Page, Section
 
 # In the order of the page: what a section reads, and how it is made.
 _OF_THE_FIT: tuple[tuple[str, Callable[..., Section]], ...] = (
+    ("history", robot_history.section),
     ("pose_errors", residuals.section),
     ("accuracy_map", accuracy_map.section),
     ("measurements", data_check.section),

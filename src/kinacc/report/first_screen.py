@@ -42,7 +42,7 @@ class Answers:
 
     ``claims`` on the paper by name, ``other`` errors of other populations, ``largest`` what there
     is to say of the largest error, ``campaign`` the sentences of a campaign, none without one;
-    ``outdated`` tables are not shown.
+    ``outdated`` tables are not shown; ``history`` is what a series says of the one in force.
     """
 
     claims: Mapping[str, Sequence[str]]
@@ -52,6 +52,7 @@ class Answers:
     following: Sequence[str]
     outdated: Sequence[str]
     more: str
+    history: str = ""
 
 
 def screen(
@@ -122,6 +123,8 @@ def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
         )
     else:
         lines.append("No pose was held out: errors at other poses are larger, and unknown.")
+    if answers.history:
+        lines.append(answers.history)
     if answers.campaign:
         first, *others = answers.campaign
         others.append(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kinacc.campaign.of_calibration import Sought
+from kinacc.deployment.history_words import first_words
 from kinacc.kinematics import robot
 from kinacc.report.campaign_answers import answers
 from kinacc.report.first_screen import Answers, remedies, screen
@@ -30,6 +31,7 @@ def first_screen(
         following=found.following,
         outdated=outdated,
         more=shlex.join(["kinacc", "fitted", str(folder), "--all"]),
+        history=first_words(tables["history"]) if "history" in tables else "",
     )
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     to_do = remedies(tables.get("data_check"))

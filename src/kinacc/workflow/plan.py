@@ -433,7 +433,8 @@ class Plan:
         config, chosen, stage = self._config(dataset), {}, STAGES[name]
         synthetic = not stage.joint and config["measurements"]["source"] == "synthetic"
         for path in (*stage.settings, *(stage.synthetic_settings if synthetic else ())):
-            _copy({**config, "dataset": dataset}, chosen, path.split("."))
+            if path == "dataset" or path.partition(".")[0] in config:  # else it is not in use
+                _copy({**config, "dataset": dataset}, chosen, path.split("."))
         return chosen
 
     def job(self, name: str, dataset: str, part: str | None = None) -> Job:

@@ -24,7 +24,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
 
 
 def _sessions(inputs: Mapping, settings: Mapping) -> Iterator[drift.Session]:
-    tolerance_mm = settings["tolerance"]["mm"]
+    tolerance_mm = settings.get("tolerance", {}).get("mm", np.nan)  # left out where none is set
     campaigns = [each.parent for role, each in sorted(inputs.items()) if "/campaign_" in role]
     for line in settings["series"]:
         tables = {
@@ -46,7 +46,7 @@ def _sessions(inputs: Mapping, settings: Mapping) -> Iterator[drift.Session]:
             held_out_mm=_held_out_mm(tables["pose_errors"], calibration.choice),
             temperature_c=_mean(measured.get("temperature_c", ())),
             bound_mm=of_calibration.finished(tables, calibration.choice, campaigns),
-            tolerance_mm=np.nan if tolerance_mm is None else tolerance_mm,
+            tolerance_mm=tolerance_mm,
         )
 
 

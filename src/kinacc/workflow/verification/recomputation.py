@@ -108,7 +108,7 @@ def computed_again(
         made = [each for each in stage.outputs if each in tables and each in of_parts]
         if not made or stage.leaves != TABLES or name in NOT_AGAIN:
             continue
-        if name in doubted or above(name) & doubted:
+        if name in doubted or (above(name) & doubted and not stage.of_lines):
             continue
         inputs = _inputs(stage, folder, of_parts[made[0]], tables, plans)
         if inputs is None:

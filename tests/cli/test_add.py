@@ -1,0 +1,206 @@
+"""``kinacc add``: new readings become a line of the series, or it is said why not."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+from command_line import call
+
+from kinacc.config.series_text import with_line
+from kinacc.workflow.contradictions import load
+
+ROOT = Path(__file__).parents[2]
+MEASURED = ROOT / "examples" / "data" / "ur10_tmac" / "series_B.csv"
+HERE = """\
+# One arm, measured with a tracker.
+datasets:
+  tracker:
+    robot: ur10   # in cell 3
+    measurements:
+      source: file
+      file:
+        path: data/march.csv  # the first
+        joint_unit: deg
+        orientation: {kind: euler, convention: XYZ}
+      folds: 2
+
+    # what is fitted
+    calibration:
+      base_and_tool: estimated
+      vec: {order: 1}
+      dh: {fit_to: measurements, hayati_joints: [2, 3]}
+    evaluation: {space: measured}
+"""
+JUNE = ("--date", "2026-06-02", "--base", "moved", "--tool", "same")
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch):
+    """A folder with a configuration and some files of the same arm, called from."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "data").mkdir()
+    names, *rows = MEASURED.read_text().splitlines()
+    for number, name in enumerate(("data/march", "june", "may")):
+        part = [names, *rows[60 * number : 60 * number + 60]]
+        Path(f"{name}.csv").write_text("\n".join(part) + "\n")
+    Path("tracker.yaml").write_text(HERE)
+    return tmp_path
+
+
+def added(*words: str):
+    return call("add", *words, "--to", "tracker.yaml")
+
+
+def test_a_second_file_makes_a_series_of_the_first_and_comments_stay(cell):
+    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
+    assert done.exit_code == 0, done.output
+    assert "next: kinacc calibrate tracker.yaml" in done.output
+    text = Path("tracker.yaml").read_text()
+    assert text == HERE.replace("        path: data/march.csv  # the first\n", "").replace(
+        "      folds: 2\n",
+        "      folds: 2\n"
+        "    series: # the first\n"
+        "      - {path: data/march.csv, date: 2026-03-01}\n"
+        "      - {path: june.csv, date: 2026-06-02, base: moved, tool: same}\n",
+    )
+    assert [*load(["tracker.yaml"])] == ["tracker", "tracker-2026-03-01", "tracker-2026-06-02"]
+
+
+def test_a_third_file_is_one_more_line_and_nothing_else_changes(cell):
+    assert added("june.csv", *JUNE, "--first-date", "2026-03-01").exit_code == 0
+    before = Path("tracker.yaml").read_text().splitlines()
+    os.chmod("tracker.yaml", 0o640)
+    done = added("may.csv", "--date", "2026-05-04", "--base", "same", "--tool", "same", "--json")
+    assert done.exit_code == 0, done.output
+    (line,) = json.loads(done.output)["written"]
+    after = Path("tracker.yaml").read_text().splitlines()
+    assert [each for each in after if each not in before] == [f"      - {line}"]
+    assert len(after) == len(before) + 1
+    assert os.stat("tracker.yaml").st_mode & 0o777 == 0o640
+
+
+def test_paths_are_as_seen_from_the_configuration(cell, monkeypatch):
+    monkeypatch.chdir(cell / "data")
+    done = call(
+        "add", "../june.csv", "--to", "../tracker.yaml", *JUNE, "--first-date", "2026-03-01"
+    )
+    assert done.exit_code == 0, done.output
+    assert "{path: june.csv, date: 2026-06-02" in (cell / "tracker.yaml").read_text()
+
+
+def test_without_a_terminal_all_that_is_not_said_is_named_at_once(cell):
+    done = added("june.csv")
+    assert done.exit_code == 2
+    for option in ("--first-date", "--date"):
+        assert f"{option}: is not given" in done.output
+    done = added("june.csv", "--date", "2026-06-02", "--first-date", "2026-03-01")
+    for option in ("--base", "--tool"):
+        assert f"{option}: is not given: whether" in done.output
+    assert Path("tracker.yaml").read_text() == HERE
+
+
+def test_the_day_is_that_of_the_files_own_times(cell):
+    names, *rows = Path("june.csv").read_text().splitlines()
+    times = [f"2026-06-02 10:07:{number % 60:02}" for number in range(len(rows))]
+    stamped = [f"{row},{time}" for row, time in zip(rows, times, strict=True)]
+    stamped = [f"{names},measured_at", *stamped]
+    Path("june.csv").write_text("\n".join(stamped))
+    done = added("june.csv", *JUNE[2:], "--first-date", "2026-03-01")
+    assert done.exit_code == 0, done.output
+    assert "date: 2026-06-02" in Path("tracker.yaml").read_text()
+
+
+@pytest.mark.parametrize("cells", [("2026-06-02", "2026-06-03"), ("02/06/2026", "02/06/2026")])
+def test_times_of_two_days_or_of_two_readings_leave_the_day_to_a_person(cell, cells):
+    names, *rows = Path("june.csv").read_text().splitlines()
+    half = len(rows) // 2
+    days = [cells[0]] * half + [cells[1]] * (len(rows) - half)
+    dated = [f"{row},{day}" for row, day in zip(rows, days, strict=True)]
+    Path("june.csv").write_text("\n".join([f"{names},day", *dated]))
+    done = added("june.csv", *JUNE[2:], "--first-date", "2026-03-01")
+    assert done.exit_code == 2
+    assert "--date: is not given: on which day june.csv was measured" in done.output
+
+
+def test_the_same_readings_twice_are_no_new_line(cell):
+    again = Path("data/march.csv").read_text()
+    Path("copy.csv").write_text(again.replace("\n", "\r\n"))
+    done = added("copy.csv", *JUNE, "--first-date", "2026-03-01")
+    assert done.exit_code == 2
+    assert "holds the readings of data/march.csv" in done.output
+    assert Path("tracker.yaml").read_text() == HERE
+
+
+def test_a_file_that_cannot_be_read_so_is_refused_with_all_other_problems(cell):
+    text = Path("june.csv").read_text().replace("q6_deg", "wrist")
+    Path("june.csv").write_text(text)
+    done = added("june.csv", *JUNE)
+    assert done.exit_code == 2
+    assert "q6" in done.output
+    assert "--first-date" in done.output
+    assert Path("tracker.yaml").read_text() == HERE
+
+
+def test_another_target_is_refused_where_the_tool_is_the_same(cell):
+    text = Path("june.csv").read_text()
+    for name in ("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"):
+        text = text.replace(name, f"probe_{name}")
+    Path("june.csv").write_text(text)
+    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
+    assert done.exit_code == 2
+    assert "has target probe" in done.output
+    moved = added("june.csv", *JUNE[:4], "--tool", "moved", "--first-date", "2026-03-01")
+    assert moved.exit_code == 0, moved.output
+
+
+def test_a_line_that_makes_another_one_wrong_is_not_written(cell):
+    assert added("june.csv", *JUNE, "--first-date", "2026-03-01").exit_code == 0
+    text = Path("tracker.yaml").read_text()
+    done = added("may.csv", "--date", "2026-05-04", "--base", "same", "--tool", "moved")
+    assert done.exit_code == 2
+    assert "line of 2026-06-02: says tool: same since the line before" in done.output
+    done = added("may.csv", "--date", "2026-01-04")
+    assert "would follow 2026-01-04, and does not say whether" in done.output
+    done = added("may.csv", "--date", "2026-06-02", "--base", "same", "--tool", "same")
+    assert "the date of a line already" in done.output
+    assert Path("tracker.yaml").read_text() == text
+
+
+def test_a_file_that_cannot_be_changed_safely_is_left_and_the_line_is_told(cell):
+    text = HERE.replace("measurements:\n", "measurements: &how\n")
+    text += "  other:\n    robot: ur10\n    measurements: *how\n    evaluation: {space: measured}\n"
+    Path("tracker.yaml").write_text(text)
+    done = added("june.csv", *JUNE, "--first-date", "2026-03-01", "--dataset", "tracker")
+    assert done.exit_code == 2
+    assert "cannot be changed safely" in done.output
+    assert "- {path: june.csv, date: 2026-06-02, base: moved, tool: same}" in done.output
+    assert Path("tracker.yaml").read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (
+            "datasets: {t: {series: [{path: a.csv, date: 2026-03-01}]}}\n",
+            "datasets: {t: {series: [{path: a.csv, date: 2026-03-01}, NEW]}}\n",
+        ),
+        (
+            "datasets:\r\n  t:\r\n    series:\r\n    - path: a.csv\r\n      date: 2026-03-01 #\r\n"
+            "    # end\r\n    seed: 1\r\n",
+            "datasets:\r\n  t:\r\n    series:\r\n    - path: a.csv\r\n      date: 2026-03-01 #\r\n"
+            "    - NEW\r\n    # end\r\n    seed: 1\r\n",
+        ),
+        (
+            "datasets:\n  t:\n    series:\n      - {path: a.csv, date: 2026-03-01}",
+            "datasets:\n  t:\n    series:\n      - {path: a.csv, date: 2026-03-01}\n      - NEW\n",
+        ),
+        ("datasets:\n  t: &t\n    series: [{path: a.csv}]\n  u: *t\n", None),
+    ],
+)
+def test_a_line_goes_where_the_others_stand_however_they_are_written(before, after):
+    new = {"path": "june 2.csv", "date": "2026-06-02", "base": "same", "tool": "moved"}
+    told = '{path: "june 2.csv", date: 2026-06-02, base: same, tool: moved}'
+    assert with_line(before, "t", [new]) == (after and after.replace("NEW", told))

@@ -1,0 +1,152 @@
+"""A series of files of one arm in the configuration: a data set for each, and what is ambiguous."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from kinacc.errors import InputError
+from kinacc.workflow.contradictions import load
+from kinacc.workflow.plan import planned
+
+MARCH, MAY, JUNE = (f"tracker-2026-0{month}" for month in ("3-01", "5-04", "6-02"))
+SERIES = """\
+      - {path: june.csv, date: 2026-06-02, base: moved, tool: same}
+      - {path: march.csv, date: '2026-03-01'}
+      - {path: may.csv, date: 2026-05-04, base: same, tool: same}
+"""
+
+
+@pytest.fixture
+def written(tmp_path, monkeypatch):
+    """Write a configuration of one arm with these lines of a series, and call from its folder."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("march", "may", "june"):
+        (tmp_path / f"{name}.csv").write_text("q1_deg,x_mm\n")
+
+    def write(series: str, own: str = "", top: str = "", more: str = "") -> str:
+        text = f"""\
+        {top}
+        datasets:
+          tracker:
+            robot: ur10
+            measurements: {{source: file, file: {{joint_unit: deg}}}}
+            evaluation: {{space: measured}}
+            {own}
+            series:
+        """
+        text = textwrap.dedent(text) + series + more
+        Path("tracker.yaml").write_text(text)
+        return "tracker.yaml"
+
+    return write
+
+
+def complaints(path) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        load([path])
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_every_line_is_a_data_set_and_the_arm_is_its_newest(written):
+    loaded = load([written(SERIES)])
+    assert sorted(loaded) == ["tracker", MARCH, MAY, JUNE]
+    paths = {name: each["measurements"]["file"]["path"] for name, each in loaded.items()}
+    assert paths == {
+        "tracker": "june.csv",
+        MARCH: "march.csv",
+        MAY: "may.csv",
+        JUNE: "june.csv",
+    }
+    flags = [(line["name"], line["base"], line["tool"]) for line in loaded["tracker"]["series"]]
+    assert flags == [(MARCH, None, None), (MAY, "same", "same"), (JUNE, "moved", "same")]
+
+
+def test_lines_are_calibrated_only_and_the_arm_has_a_history(written):
+    plan = planned([written(SERIES)])
+    assert plan.told == ["tracker"]
+    for line in plan.lines("tracker"):
+        assert {"vec", "dh", "residuals", "summary"} <= set(plan.stages(line))
+        assert not {"history", "study", "report", "fig2", "claims"} & set(plan.stages(line))
+    assert {"history", "history_over_time", "study", "report"} <= set(plan.stages("tracker"))
+    read = plan.inputs("history", "tracker")
+    assert read[f"{MAY}/frames"] == f"results/{MAY}/frames.parquet"
+    assert not any(role.startswith("tracker/") for role in read)
+
+
+def test_the_settings_of_a_line_do_not_depend_on_the_other_lines(written):
+    every = planned([written(SERIES)])
+    without_june = SERIES.split("\n", 1)[1]
+    before = planned([written(without_june)])
+    for line in (MARCH, MAY):
+        for stage in before.stages(line):
+            assert before.job(stage, line) == every.job(stage, line)
+            assert before.job_text(stage, line) == every.job_text(stage, line)
+
+
+def test_files_are_sought_beside_the_configuration(written, tmp_path, monkeypatch):
+    written(SERIES)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    loaded = load(["../tracker.yaml"])
+    assert loaded[MAY]["measurements"]["file"]["path"] == "../may.csv"
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("{path: may.csv, date: 2026-05-04, tool: same}", "how"),
+        ("{path: may.csv, date: 2026-05-04, base: same}", "how"),
+        ("{path: may.csv}", "has no date"),
+        ("{path: may.csv, date: 4.5.2026, base: same, tool: same}", "'4.5.2026' is no day"),
+        ("{path: may.csv, date: 2026-02-30, base: same, tool: same}", "'2026-02-30' is no day"),
+        ("{path: may.csv, date: 2026-03-01, base: same, tool: same}", "the date of two lines"),
+        ("{path: march.csv, date: 2026-05-04, base: same, tool: same}", "stands in two lines"),
+        ("{path: gone.csv, date: 2026-05-04, base: same, tool: same}", "does not exist"),
+        ("{path: may.csv, date: 2026-05-04, base: shifted, tool: same}", "'shifted' is neither"),
+        ("{path: may.csv, date: 2026-05-04, bas: same, tool: same, base: same}", "mean base?"),
+        ("{date: 2026-05-04, base: same, tool: same}", "names no file"),
+        ("may.csv", "is not a line of a series"),
+    ],
+)
+def test_what_a_line_leaves_open_or_says_wrongly_is_told_with_its_place(written, line, told):
+    first = "      - {path: march.csv, date: 2026-03-01}\n"
+    (found,) = complaints(written(f"{first}      - {line}\n"))
+    assert told.replace("how", "does not say whether") in found
+    assert "datasets.tracker.series[1]" in found
+    assert found.startswith("tracker.yaml:10")
+
+
+def test_a_series_beside_what_is_of_one_file_is_a_contradiction(written):
+    series = "      - {path: march.csv, date: 2026-03-01}\n"
+    own = "calibration: {base_and_tool: estimated}"
+    top = "measurements: {file: {path: march.csv, exclude: [{lines: 2, reason: bumped}]}}"
+    found = complaints(written(series, own, top))
+    assert sum("and the data set has a series" in each for each in found) == 2
+
+
+def test_a_series_of_a_synthetic_arm_is_refused(written):
+    path = written("      - {path: march.csv, date: 2026-03-01}\n")
+    text = Path(path).read_text().replace("source: file, ", "")
+    Path(path).write_text(text)
+    assert any("a series is of measured files" in each for each in complaints(path))
+
+
+def test_a_line_and_a_data_set_of_one_name_are_told_apart_by_a_person(written):
+    more = f"""\
+  {JUNE}:
+    robot: ur10
+    measurements: {{source: file, file: {{path: may.csv}}}}
+    evaluation: {{space: measured}}
+"""
+    (found,) = complaints(written(SERIES, more=more))
+    assert "has the name of a line of the series of tracker" in found
+
+
+def test_a_series_given_in_two_files_is_refused(written, tmp_path):
+    path = written(SERIES)
+    (tmp_path / "other.yaml").write_text(Path(path).read_text())
+    with pytest.raises(InputError, match="given in two files"):
+        load([path, "other.yaml"])
