@@ -21,6 +21,7 @@ from kinacc.campaign.plan import Limits
 from kinacc.campaign.state import readings_in
 from kinacc.cli import campaigns_answers as answers
 from kinacc.cli import choice
+from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import Output
 from kinacc.errors import InputError, Problem, gathered, refuse
 
@@ -251,7 +252,7 @@ def verify(path: str, head: str | None, readings: int | None, out: Output) -> No
     }
     out.say(facts, "\n".join(lines))
     if problems:
-        raise SystemExit(1)
+        raise SystemExit(AGAINST)
 
 
 def say_doubts(opened: folders.Opened) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.artifacts.columns import texts
+from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import Output, answers
 from kinacc.cli.show import Answer, at_odds
 from kinacc.errors import InputError, Problem, first_few, refuse
@@ -89,7 +90,7 @@ def summary(
     else:
         show(found, verdicts, by)
     if any(each.problem for each in found) or _counted(verdicts).keys() - {"accept"}:
-        sys.exit(1)
+        sys.exit(AGAINST)
 
 
 def show(
