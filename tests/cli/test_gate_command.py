@@ -79,7 +79,7 @@ def test_an_edited_table_fails_before_any_gate_looks_at_it(cell):
     told = gate(code=1)
     assert "failed mh180, results" in told
     assert "pose_errors.parquet" in told
-    assert "failed mh180, mean: undecided: not looked at, since the results do not hold" in told
+    assert "undecided mh180, mean: not looked at: the results do not hold" in told
 
 
 def test_a_record_that_is_lost_fails(cell):

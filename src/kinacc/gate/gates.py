@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
+from kinacc.artifacts.history_tables import FIRST, HOLDS, RECALIBRATE
 from kinacc.assess.conformity import ACCEPT, REJECT
 from kinacc.assess.conformity import UNDECIDED as OPEN
 from kinacc.config.gate_rules import LIMITS, limit_key, limited
@@ -22,7 +23,7 @@ from kinacc.gate.values import Compared, Figure, change_of, figure
 Gate = Mapping[str, Any]
 _ROUNDING = 1e-9
 _DECIDED = {ACCEPT: PASSED, REJECT: FAILED, OPEN: UNDECIDED}
-_OF_HISTORY = {"first": PASSED, "holds": PASSED, "recalibrate": FAILED}
+_OF_HISTORY = {FIRST: PASSED, HOLDS: PASSED, RECALIBRATE: FAILED}
 # What a configuration calls a verdict, and the verdict.
 _MEANT = {"fail": FAILED, "warn": WARNED, "pass": UNDECIDED}
 
@@ -44,7 +45,7 @@ def judged(
         tables = RunTables(results / name)
         for gate in full["gates"]:
             if name in broken:
-                says = "undecided: not looked at, since the results do not hold"
+                says = "not looked at: the results do not hold"
                 found.append(_outcome(gate, name, UNDECIDED, says, f"first mend results of {name}"))
             else:
                 found.append(
