@@ -258,22 +258,29 @@ def test_suspicions_are_none_or_known_and_notes_are_none(tmp_path, asked, accept
 
 
 @pytest.mark.parametrize(
-    ("verdict", "becomes"),
-    [("first", PASSED), ("holds", PASSED), ("recalibrate", FAILED), ("cannot be told", WARNED)],
+    ("verdict", "becomes", "says"),
+    [
+        ("first", PASSED, "the first line of its series"),
+        ("holds", PASSED, "the last calibration still holds"),
+        ("recalibrate", FAILED, "recalibrate: 0.30 mm beyond chance, joint 4"),
+        ("cannot be told", WARNED, "whether the calibration of 2026-03-01 still holds cannot"),
+    ],
 )
-def test_the_newest_line_of_a_history_decides(tmp_path, verdict, becomes):
+def test_the_newest_line_of_a_history_decides(tmp_path, verdict, becomes, says):
     tables = RunTables(tmp_path)
     names = ("moved_mm", "chance_mm", "beyond_mm", "probability")
-    numbers = {name: [np.nan, 0.3] for name in names}
     tables["history"] = {
         "series": ["arm-2026-03-01", "arm-2026-06-02"],
+        "date": ["2026-03-01", "2026-06-02"],
+        "in_force": [None, "arm-2026-03-01"],
+        "joint": [np.nan, 4],
         "verdict": ["recalibrate", verdict],
-        "reason": [None, "too few poses" if becomes == WARNED else None],
-        **numbers,
+        "reason": [None, "too few poses"],
+        **{name: [np.nan, 0.3] for name in names},
     }
     found = judged(tmp_path, "history: holds, undecided: warn", tables)
     assert found.verdict == becomes
-    assert f"arm-2026-06-02: {verdict}" in found.says
-    assert ("too few poses" in found.says) == (becomes == WARNED)
+    assert f"arm-2026-06-02: {says}" in found.says
+    assert found.figures["moved_mm"] == 0.3
     moved = judged(tmp_path, "value: history.moved, at_most_mm: 0.2", tables)
     assert moved.verdict == FAILED

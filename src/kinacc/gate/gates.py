@@ -15,6 +15,7 @@ from kinacc.assess.conformity import ACCEPT, REJECT
 from kinacc.assess.conformity import UNDECIDED as OPEN
 from kinacc.config.gate_rules import LIMITS, limit_key, limited
 from kinacc.config.values import nearest
+from kinacc.deployment.history_words import sentence
 from kinacc.errors import InputError, first_few
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.run_tables import SELECTED, RunTables
@@ -267,8 +268,7 @@ def _history(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome
     verdict = str(last["verdict"])
     numbers = ("moved_mm", "chance_mm", "beyond_mm", "probability")
     figures = {name: float(last[name]) for name in numbers} | {"lines": len(table["verdict"])}
-    says = f"{last['series']}: {verdict}"
-    says += f", {last['reason']}" if last["reason"] else ""
+    says = f"{last['series']}: {sentence(table)}"
     fix = "calibrate the arm anew, or find out what moved: docs/history.md"
     return _outcome(gate, dataset, _OF_HISTORY.get(verdict, UNDECIDED), says, fix, figures)
 
