@@ -23,6 +23,7 @@ from kinacc.gate.values import Compared, Figure, change_of, figure
 
 Gate = Mapping[str, Any]
 _ROUNDING = 1e-9
+_MORE = "measure more poses; undecided: warn says that what cannot be told fails nothing"
 _DECIDED = {ACCEPT: PASSED, REJECT: FAILED, OPEN: UNDECIDED}
 _OF_HISTORY = {FIRST: PASSED, HOLDS: PASSED, RECALIBRATE: FAILED}
 # What a configuration calls a verdict, and the verdict.
@@ -73,12 +74,12 @@ def of_gate(
         first = error.problems[0]
         says = f"{first.where} {first.what}"
         found = _outcome(gate, dataset, FAILED, says, first.fix)
-    verdict = found.verdict
+    verdict, fix = found.verdict, found.fix
     if verdict == UNDECIDED:
-        verdict = _MEANT[gate["undecided"]]
+        verdict, fix = _MEANT[gate["undecided"]], fix or _MORE
     if verdict == FAILED:
         verdict = _MEANT[gate["on_fail"]]
-    return replace(found, verdict=verdict)
+    return replace(found, verdict=verdict, fix=fix)
 
 
 def _outcome(
@@ -269,8 +270,9 @@ def _history(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome
     numbers = ("moved_mm", "chance_mm", "beyond_mm", "probability")
     figures = {name: float(last[name]) for name in numbers} | {"lines": len(table["verdict"])}
     says = f"{last['series']}: {sentence(table)}"
-    fix = "calibrate the arm anew, or find out what moved: docs/history.md"
-    return _outcome(gate, dataset, _OF_HISTORY.get(verdict, UNDECIDED), says, fix, figures)
+    becomes = _OF_HISTORY.get(verdict, UNDECIDED)
+    fix = "" if becomes == UNDECIDED else "calibrate the arm anew, or find out what moved"
+    return _outcome(gate, dataset, becomes, says, fix, figures)
 
 
 _KINDS = {
