@@ -4,9 +4,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.catalogue import HISTORY, STAGES
 
 FIGURES = {stage.name for stage in STAGES.values() if stage.is_figure and not stage.on_request}
+FIGURES -= {*HISTORY}  # of data sets that have a series
 AFTER_POINTS = {"study_chunk", "study", "histories", "claims", "report"} | (
     FIGURES - {"fig1", "fig3"}
 )
