@@ -75,7 +75,7 @@ def team(tmp_path_factory, shell) -> Team:
     (team.clone / ".gitignore").write_text("results/\n.snakemake/\n.cache/\n.venv/\ngate.*\n")
     (team.clone / "requirements").mkdir()
     shutil.copy(typed_commands.ROOT / "requirements" / "run.txt", team.clone / "requirements")
-    (team.clone / "requirements" / "kinacc.txt").write_text("./wheels/kinacc.whl --hash=sha256:0\n")
+    (team.clone / "requirements" / "wheel.txt").write_text("./wheels/kinacc.whl --hash=sha256:0\n")
     team.push("The study")
     return team
 
