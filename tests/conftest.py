@@ -67,6 +67,7 @@ SLOW = (
     "deployment/test_applicability.py",
     "deployment/test_compare.py",
     "deployment/test_compensate.py",
+    "deployment/test_drift.py",
     "deployment/test_poses_unlike_the_measured.py",
     "deployment/test_predict.py",
     "faults",
