@@ -55,6 +55,7 @@ SLOW = (
     "campaign/test_report_above_its_bounds.py",
     "campaign/test_state.py",
     "checks/test_advice_on_misread_files.py",
+    "gate/test_golden_runs.py",
     "cli/test_answer_at_the_end.py",
     "cli/test_check_data.py",
     "cli/test_init.py",

@@ -12,9 +12,6 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "corruption")]
 
 
-import sitefallback  # noqa
-
-
 @pytest.fixture(scope="module")
 def base(tmp_path_factory):
     from worlds import finished

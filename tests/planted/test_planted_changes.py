@@ -1,4 +1,4 @@
-"""A few of the changes that `tools/planted` plants: each is told, and explained by what was done."""
+"""A few of the changes that `tools/planted` plants: each is told and explained rightly."""
 
 from __future__ import annotations
 

@@ -26,6 +26,7 @@ from kinacc.workflow.catalogue import FIGURE, PAGE, TABLES
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.runner import is_done, perform
 
+ALL = (TABLES, FIGURE, PAGE)
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = Path(kinacc.__file__).parent
 SETTINGS = """\
@@ -149,7 +150,7 @@ def write_world(folder: Path, poses: int = 40, settings: str = SETTINGS) -> Worl
 def finished(folder: Path) -> World:
     """A world whose study has been run, pictures and pages too."""
     world = write_world(folder)
-    rerun(world.plan(), leaves=(TABLES, FIGURE, PAGE))
+    rerun(world.plan(), leaves=ALL)
     return world
 
 

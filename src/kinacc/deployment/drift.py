@@ -108,9 +108,9 @@ class _Comparison:
         row: dict[str, Any] = {}
         try:
             row |= _sizes("in_force", self.errors_mm(force, session, setup))
-            few = [each for each in (force, session) if _count(each.observations) < LEAST]
+            few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]
             if few:
-                what = f"fewer than {LEAST} configurations in {few[0].name}"
+                what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}"
                 return row | {"verdict": OPEN, "reason": what}
             return row | self.moved(force, session, setup)
         except (FitError, InputError) as problem:
