@@ -22,6 +22,7 @@ from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.deployment import drift_chance, drift_pairs
 from kinacc.deployment.drift_joint import joint_of
 from kinacc.deployment.drift_pairs import Setup
+from kinacc.deployment.handful import LEAST_HELD_OUT
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.verify import frames_under, says_there
 from kinacc.errors import FitError, InputError
