@@ -109,7 +109,8 @@ class Trials:
             return
         name, old, new = code
         path = tree / "kinacc" / name
-        before, times = path.read_text(), path.stat()
+        right = SOURCE / name  # a run that was killed leaves the tree changed
+        before, times = right.read_text(), right.stat()
         try:
             path.write_text(before.replace(old, new, 1) if old else before + new)
             if old and old not in before:
