@@ -2,6 +2,8 @@
 
     python tools/history_years.py --same 600 --other 400 --out docs/history
 
+Without a number of years the picture alone is drawn.
+
 A simulated year: one physical arm (the geometry and the sizes of effects of an accepted draw, all
 effects drawn anew), calibrated twelve times with POSES poses of the synthetic calibration plan: the
 same every month, or others every month. Each time the tracker is set up anew, its noise and the
@@ -18,7 +20,9 @@ says as well which sizes of a change would have been seen in it.
 from __future__ import annotations
 
 import argparse
-import time
+import csv
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -80,14 +84,17 @@ class Arm:
 
 # Names of DH parameters by the error they are: (of this joint or the next, place among ERRORS).
 PARAMETERS = {"theta": (0, 5), "d": (0, 2), "a": (1, 0), "alpha": (1, 3)}
+JOINTS = 6
+CHANGES = [(joint, name) for joint in range(JOINTS) for name in PARAMETERS]
+UNSEEN_MM = 1e-3  # what base and tool take up
 SIZES_MM = np.arange(0.0, 1.001, 0.02)
 
 
 def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
-    """Decisions; how often sizes (24, SIZES) were seen; rms mm (24,) by one mm or mrad."""
+    """Decisions; how often CHANGES of SIZES_MM were seen; rms mm of CHANGES by one mm or mrad."""
     force = arm.series()
     wide = arm.understated(force)
-    decisions, seen, size = [], np.zeros((24, len(SIZES_MM))), []
+    decisions, seen, size = [], np.zeros((len(CHANGES), len(SIZES_MM))), []
     for month in range(1, MONTHS):
         series = arm.series()
         own = arm.understated(series)
@@ -108,62 +115,111 @@ def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
 
 
 def _seen(found: drift_chance.Moved, chance_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    units = np.zeros((36, 24))
-    for number, (joint, name) in enumerate((j, n) for j in range(6) for n in PARAMETERS):
+    units = np.zeros((36, len(CHANGES)))
+    for number, (joint, name) in enumerate(CHANGES):
         after, error = PARAMETERS[name]
-        if joint + after < 6:
-            units[6 * (joint + after) + error, number] = 1e-3 if error > 2 else 1.0
+        if joint + after < JOINTS:
+            units[6 * (joint + after) + error, number] = drift_chance.UNITS[error]
     along = found.along(units)
     size = np.linalg.norm(along, axis=0)
-    unit = along / np.where(size > 1e-3, size, np.inf)
+    unit = along / np.where(size > UNSEEN_MM, size, np.inf)
     square = found.moved_mm**2 + 2.0 * np.outer(found.change @ unit, SIZES_MM) + SIZES_MM**2
     return square > chance_mm**2, size
 
 
+def run(same: int, other: int, out: Path) -> None:
+    """Simulate years of each kind, evenly mixed; tables are written now and again."""
+    pool = plan.configurations(robots.load("mh180"), POOL)
+    years = [
+        (number / count, plans, number)
+        for plans, count in ((SAME, same), (OTHER, other))
+        for number in range(count)
+    ]
+    decisions: list[dict] = []
+    seen, size, count = {}, {}, Counter()
+    for done, (_, plans, number) in enumerate(sorted(years), 1):
+        found, hits, per_unit = year(Arm(number, plans, pool))
+        decisions += [{"year": number} | each for each in found]
+        seen[plans] = seen.get(plans, 0) + hits
+        size[plans] = size.get(plans, 0) + per_unit
+        count[plans] += 1
+        if done % 20 == 0 or done == len(years):
+            _write(out / "decisions.csv", decisions)
+            _write(out / "power.csv", [*_power(seen, size, count)])
+            alarms = {each: _with_alarm(decisions, each) for each in count}
+            print(f"years with a false alarm: {alarms} of {dict(count)}", flush=True)
+
+
+def _with_alarm(decisions: list[dict], plans: str) -> int:
+    return len({each["year"] for each in decisions if each["alarm"] and each["plans"] == plans})
+
+
+def _power(seen: dict, size: dict, count: Counter) -> Iterator[dict]:
+    """How often a change of each size was seen, of those the readings can show."""
+    for plans, hits in seen.items():
+        for number, (joint, name) in enumerate(CHANGES):
+            per_unit = size[plans][number] / count[plans]
+            if per_unit <= UNSEEN_MM:
+                continue
+            for at, size_mm in enumerate(SIZES_MM):
+                yield {
+                    "plans": plans,
+                    "joint": joint + 1,
+                    "parameter": name,
+                    "mm_per_unit": per_unit,
+                    "moved_mm": size_mm,
+                    "seen": hits[number, at] / (count[plans] * (MONTHS - 1)),
+                }
+
+
+def _write(path: Path, rows: list[dict]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
+        writer.writeheader()
+        for row in rows:
+            writer.writerow({
+                name: f"{value:.5g}" if isinstance(value, float) else value
+                for name, value in row.items()
+            })  # fmt: skip
+
+
+def draw(out: Path) -> None:
+    """``power.png`` from ``power.csv``: offsets of joints, one panel for each kind of plan."""
+    from matplotlib.figure import Figure
+
+    with (out / "power.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["parameter"] == "theta"]
+    figure = Figure(figsize=(8.0, 3.4), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    titles = {SAME: "the same poses every month", OTHER: "other poses every month"}
+    for panel, plans in zip(panels, titles, strict=True):
+        for joint in range(2, JOINTS + 1):
+            ours = [r for r in rows if r["plans"] == plans and int(r["joint"]) == joint]
+            if not ours:
+                continue
+            per_mrad = float(ours[0]["mm_per_unit"])
+            sizes = np.array([float(r["moved_mm"]) for r in ours]) / per_mrad
+            shown = 100.0 * np.array([float(r["seen"]) for r in ours])
+            label = f"joint {joint} ({per_mrad:.2f} mm per mrad)"
+            panel.plot(sizes, shown, label=label)
+        panel.axhline(80.0, color="0.6", linewidth=0.8)
+        panel.set(title=titles[plans], xlabel="change of one joint's offset, mrad")
+        panel.set(xlim=(0.0, 1.0 if plans == SAME else 4.0), ylim=(0.0, 102.0))
+    panels[0].set_ylabel("months that say recalibrate, %")
+    panels[1].legend(fontsize=8, loc="lower right")
+    figure.savefig(out / "power.png", dpi=150)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--same", type=int, required=True, help="years of the same poses")
-    parser.add_argument("--other", type=int, required=True, help="years of other poses each month")
-    parser.add_argument("--out", type=Path, required=True, help="folder of the tables")
+    parser.add_argument("--same", type=int, default=0, help="years of the same poses")
+    parser.add_argument("--other", type=int, default=0, help="years of other poses each month")
+    parser.add_argument("--out", type=Path, required=True, help="folder of tables and picture")
     asked = parser.parse_args()
-    pool = plan.configurations(robots.load("mh180"), POOL)
-    years = [(n / max(asked.same, 1), SAME, n) for n in range(asked.same)]
-    years += [(n / max(asked.other, 1), OTHER, n) for n in range(asked.other)]
-    done, seen, size = [], {}, {}
-    begin = time.process_time()
-    for _, plans, number in sorted(years):
-        decisions, hits, per_unit = year(Arm(number, plans, pool))
-        done += [{"year": number} | each for each in decisions]
-        seen[plans] = seen.get(plans, 0) + hits
-        size.setdefault(plans, []).append(per_unit)
-        if len(done) % (20 * (MONTHS - 1)) == 0:
-            _write(asked.out, done, seen, size)
-            alarms = {
-                p: len({d["year"] for d in done if d["alarm"] and d["plans"] == p}) for p in seen
-            }
-            of = {p: len(size[p]) for p in seen}
-            print(
-                f"{time.process_time() - begin:.0f} s of CPU: years with an alarm {alarms} of {of}",
-                flush=True,
-            )
-    _write(asked.out, done, seen, size)
-
-
-def _write(folder: Path, done: list[dict], seen: dict, size: dict) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    np.savez(
-        folder / "power.npz",
-        **{f"seen_{p}": seen[p] for p in seen},
-        **{f"size_{p}": np.mean(size[p], axis=0) for p in size},
-        **{f"of_{p}": len(size[p]) * (MONTHS - 1) for p in size},
-    )
-    with open(folder / "decisions.csv", "w") as file:
-        file.write(",".join(done[0]) + "\n")
-        for each in done:
-            file.write(
-                ",".join(f"{v:.5g}" if isinstance(v, float) else str(v) for v in each.values())
-                + "\n"
-            )
+    if asked.same or asked.other:
+        run(asked.same, asked.other, asked.out)
+    draw(asked.out)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import jsonschema
 import pytest
+from command_line import call
 
 from kinacc.errors import InputError
 from kinacc.gate import outcome
@@ -181,6 +182,7 @@ def test_the_schema_that_is_published_is_the_one_that_is_installed():
     """`kinacc gate --schema > docs/schemas/gate-1.schema.json` writes it."""
     published = Path(__file__).parents[2] / "docs" / "schemas" / "gate-1.schema.json"
     assert published.read_text(encoding="utf-8") == schema_text()
+    assert call("gate", "--schema").output == schema_text()
 
 
 def test_a_build_server_counts_gates_as_tests():

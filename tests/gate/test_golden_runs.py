@@ -10,8 +10,11 @@ import pyarrow.parquet as pq
 import pytest
 from runs_by_hand import KEYS, Run, put_in
 
+from kinacc.artifacts import records
 from kinacc.errors import InputError
+from kinacc.gate.causes import Causes
 from kinacc.gate.golden import compared
+from kinacc.gate.made import made
 from kinacc.gate.outcome import (
     CODE,
     CONFIGURATION,
@@ -22,6 +25,7 @@ from kinacc.gate.outcome import (
     UNEXPLAINED,
     VERSION,
 )
+from kinacc.workflow.catalogue import STAGES
 
 
 @pytest.fixture
@@ -346,6 +350,23 @@ def test_exact_asks_for_bytes_and_says_why_they_are_others(held):
     assert "dh_model.parquet" in artefacts(outcome)
     causes = {cause for each in outcome.differences for cause in each.causes}
     assert {(each.kind, each.where) for each in causes} == {(CODE, "kinacc.calibration.dh_fit")}
+
+
+def test_a_table_of_several_data_sets_is_explained_by_what_changed_in_them(tmp_path):
+    runs = {"accepted": Run(), "now": changed(replace(Run(), data="june"), ALL)}
+    for name, run in runs.items():
+        run.write(tmp_path / name)
+        digest = made(tmp_path / name / "arm").digest("residuals", STAGES["residuals"])
+        read = {"arm/residuals": digest}
+        if name == "now":
+            read["new/residuals"] = digest
+        record = records.Record("history", None, {}, read, {}, {}, {}, {"python": "3.12"})
+        records.leave(records.place(tmp_path / name / "tracker", "history"), record, {})
+    both = Causes(made(tmp_path / "accepted" / "tracker"), made(tmp_path / "now" / "tracker"))
+    assert {(each.kind, each.where, each.before) for each in both.of_stage("history")} == {
+        (INPUT, "measurements.file.path (march.csv)", both.of_stage("history")[0].before),
+        (INPUT, "new", "not read"),
+    }
 
 
 def test_a_data_set_of_one_run_alone(tmp_path):

@@ -82,7 +82,7 @@ def gate(
     from kinacc.gate import outputs
 
     if schema:
-        click.echo(outputs.schema_text())
+        click.echo(outputs.schema_text(), nl=False)
         return
     _refuse(against, exact, as_json, annotations, files)
     verdicts = _verdicts(results, config, datasets, against, exact)

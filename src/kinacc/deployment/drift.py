@@ -15,18 +15,17 @@ from typing import Any
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.calibration import dh_fit, robust
 from kinacc.calibration.constraints import frame_terms
 from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.solve import FitError
 from kinacc.calibration.summary import LARGE_SHARE
-from kinacc.calibration.system import FlangeModel
 from kinacc.deployment import drift_chance, drift_pairs
 from kinacc.deployment.drift_joint import joint_of
 from kinacc.deployment.drift_pairs import Setup
+from kinacc.deployment.handful import LEAST_HELD_OUT
 from kinacc.deployment.record import Calibration
-from kinacc.deployment.verify import LEAST, says_there
+from kinacc.deployment.verify import frames_under, says_there
+from kinacc.errors import FitError, InputError
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import configurations
@@ -34,6 +33,7 @@ from kinacc.measurements.folds import configurations
 SAME, MOVED = "same", "moved"
 FIRST, HOLDS, RECALIBRATE, OPEN = "first", "holds", "recalibrate", "cannot be told"
 LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
+LEAST = 20  # configurations of a series that chance is resampled from
 _TEXT = ("series", "date", "digest", "base", "tool", "model", "in_force", "verdict", "reason")
 _WHOLE = ("rows", "configurations")
 
@@ -106,14 +106,15 @@ class _Comparison:
 
     def row(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
         """What a row says of ``session`` while the calibration of ``force`` was in force."""
-        row = _sizes("in_force", self.errors_mm(force, session, setup))
-        few = [each for each in (force, session) if _count(each.observations) < LEAST]
-        if few:
-            what = f"fewer than {LEAST} configurations in {few[0].name}"
-            return row | {"verdict": OPEN, "reason": what}
+        row: dict[str, Any] = {}
         try:
+            row |= _sizes("in_force", self.errors_mm(force, session, setup))
+            few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]
+            if few:
+                what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}"
+                return row | {"verdict": OPEN, "reason": what}
             return row | self.moved(force, session, setup)
-        except FitError as problem:
+        except (FitError, InputError) as problem:
             return row | {"verdict": OPEN, "reason": str(problem)}
 
     def moved(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
@@ -121,7 +122,7 @@ class _Comparison:
         robot = session.calibration.robot
         first, second = force.observations, session.observations
         pair = drift_pairs.of_observations(
-            first, second, setup, robot, self.rotation_weight_mm_per_rad
+            first, second, setup, force.calibration, self.rotation_weight_mm_per_rad
         )
         misfit = 1.0
         if not drift_pairs.all_shared(pair):
@@ -154,7 +155,7 @@ class _Comparison:
             cuts = drift_pairs.cut(
                 session.observations,
                 setup,
-                session.calibration.robot,
+                session.calibration,
                 self.rotation_weight_mm_per_rad,
             )
             self.known[key] = drift_chance.understated(cuts, self._rng(session.name))
@@ -192,19 +193,8 @@ class _Comparison:
         free = np.array([name.rpartition(".")[0] not in kept for name in terms.names])
         if not free.any():
             return stated
-        nothing, held = np.zeros(0), FlangeModel(0, lambda x, at: calibration.model.pose(at))
-        unknowns = dh_fit.Unknowns("fit of base and tool", held, nothing, nothing, nothing, nothing)
-        coordinates, solution, _ = dh_fit.solved(
-            seen,
-            unknowns,
-            calibration.model.dh,
-            rotation_weight_mm_per_rad=self.rotation_weight_mm_per_rad,
-            threshold=0.0,
-            frames=None,
-            frame_terms=replace(terms, free=free),
-            loss=robust.SQUARES,
-        )
-        return coordinates.frames(solution.x)
+        weight = self.rotation_weight_mm_per_rad
+        return frames_under(calibration.model, seen, replace(terms, free=free), weight)
 
     def _rng(self, *names: str) -> np.random.Generator:
         words = hashlib.sha256("\n".join(names).encode()).digest()

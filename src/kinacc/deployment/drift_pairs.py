@@ -9,21 +9,21 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.calibration import dh_fit, vec_fit
-from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
+from kinacc.calibration.constraints import frame_terms
 from kinacc.calibration.frames import Frames, coordinates, known
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.system import PoseSystem
+from kinacc.deployment.record import Calibration
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.robot import Robot, carried
+from kinacc.kinematics.robot import carried
 from kinacc.kinematics.vec import ERRORS
 from kinacc.measurements.folds import configurations
 
 ORDER = 8  # of the polynomials of the misfit; finer misfit differs between configurations
 CUTS = 2  # of one series into halves, across the widest directions of its joints
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
-_TRUNCATION = 1e-4
 _NARROW_RAD = 1e-3
 
 
@@ -65,45 +65,42 @@ def of_observations(
     first: Observations,
     second: Observations,
     setup: Setup,
-    robot: Robot,
+    calibration: Calibration,
     rotation_weight_mm_per_rad: float,
 ) -> Pair:
-    """The pair about the DH model of both together. Raises FitError and InputError as fits do."""
+    """The pair about the DH model of a ``calibration`` of the arm. Raises FitError."""
     first, second = thinned(first), thinned(second)
     both = joined(first, second, setup)
-    return about(
-        *_fitted(both, robot, rotation_weight_mm_per_rad),
-        both,
-        len(first),
-        rotation_weight_mm_per_rad,
-    )
+    frames = _frames(both, calibration, rotation_weight_mm_per_rad)
+    model = calibration.plainest.model.dh
+    return about(model, frames, both, len(first), rotation_weight_mm_per_rad)
 
 
 @one_thread
 def cut(
-    series: Observations, setup: Setup, robot: Robot, rotation_weight_mm_per_rad: float
+    series: Observations, setup: Setup, calibration: Calibration, rotation_weight_mm_per_rad: float
 ) -> list[Pair]:
     """One series as pairs of ``halves``, between which nothing happened at the arm."""
     series = thinned(series)
-    fitted = _fitted(series, robot, rotation_weight_mm_per_rad)
-    alone = about(*fitted, series, len(series), rotation_weight_mm_per_rad)
+    frames = _frames(series, calibration, rotation_weight_mm_per_rad)
+    model = calibration.plainest.model.dh
+    alone = about(model, frames, series, len(series), rotation_weight_mm_per_rad)
     row = np.repeat(np.arange(len(series)), 3 + 3 * series.has_rotation)
     return [*halves(alone, series.q_rad[row], setup)]
 
 
-def _fitted(
-    observations: Observations, robot: Robot, rotation_weight_mm_per_rad: float
-) -> tuple[DHModel, Frames]:
+def _frames(
+    observations: Observations, calibration: Calibration, rotation_weight_mm_per_rad: float
+) -> Frames:
+    """Base and targets of observations, the arm as calibrated."""
+    robot = calibration.robot
     counts = len(observations.session_names), len(observations.target_names)
-    fit = dh_fit.fit(
+    return dh_fit.fit_frames(
         observations,
-        robot.dh,
-        free=free_parameters(robot.dh.joints, parallel_joints(robot.dh)),
+        calibration.plainest.model.dh,
         rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
-        threshold=_TRUNCATION,
         frame_terms=frame_terms(observations, known(robot.base, carried(robot), *counts)),
-    )
-    return fit.model, fit.frames
+    ).frames
 
 
 def about(

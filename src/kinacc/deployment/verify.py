@@ -16,6 +16,7 @@ import numpy as np
 
 from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.calibration import dh_fit, robust
+from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.constraints import frame_terms
 from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, known, stacked
 from kinacc.calibration.models import Fit
@@ -290,11 +291,18 @@ def frames_at(
         stated = replace(stated, targets=stacked(kept))
     if not moved:
         return stated
-    nothing, held = np.zeros(0), FlangeModel(0, lambda x, at: model.pose(at))
-    unknowns = dh_fit.Unknowns("fit of base and tool", held, nothing, nothing, nothing, nothing)
     terms = frame_terms(seen, stated)
     of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(sessions)  # these stand first
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
+    return frames_under(model, seen, terms, rotation_weight_mm_per_rad)
+
+
+def frames_under(
+    model: ErrorModel, seen: Observations, terms: FrameTerms, rotation_weight_mm_per_rad: float
+) -> Frames:
+    """Base and targets of ``seen`` under ``terms``, the arm held at ``model``, of whatever kind."""
+    nothing, held = np.zeros(0), FlangeModel(0, lambda x, at: model.pose(at))
+    unknowns = dh_fit.Unknowns("fit of base and tool", held, nothing, nothing, nothing, nothing)
     coordinates, solution, _ = dh_fit.solved(
         seen,
         unknowns,

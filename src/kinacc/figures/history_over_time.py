@@ -151,8 +151,11 @@ def _dates(ax: Axes, date: np.ndarray) -> None:
     """Days as a reader writes them, with room at both ends."""
     room = max(0.03 * float(np.ptp(date)), _ROOM_DAYS if len(date) == 1 else 1.0)
     ax.set_xlim(date.min() - room, date.max() + room)
+    days = date.astype("datetime64[D]").astype(str)
+    if len(date) == 1 or np.diff(date).min() > _DAYS_APART * np.ptp(date):
+        ax.set_xticks(date, days)
+        return
     locator = AutoDateLocator(minticks=3, maxticks=9)
     ax.xaxis.set_major_locator(locator)
-    ax.xaxis.set_major_formatter(ConciseDateFormatter(locator))
-    if len(date) == 1 or np.diff(date).min() > _DAYS_APART * np.ptp(date):
-        ax.set_xticks(date, date.astype("datetime64[D]").astype(str))
+    ax.xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
+    ax.set_xlabel(f"{days[0]} to {days[-1]}")

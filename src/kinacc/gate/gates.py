@@ -198,7 +198,8 @@ def _campaign(
             )
             fix = "begin a campaign with that confidence, or ask for what this one has"
             return _outcome(gate, dataset, FAILED, says, fix, figures)
-    says = "; ".join([says, *standing.doubts()])
+    more = standing.doubts() if "bound_mm" in bound else sought.remarks
+    says = "; ".join([says, *more])
     fix = f"kinacc campaign status {place}"
     return _outcome(gate, dataset, _DECIDED[judged_as.says], says, fix, figures)
 
