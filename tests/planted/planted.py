@@ -45,7 +45,8 @@ class Trials:
         self.folder = folder
         self.base, self.older = World(folder / "base"), World(folder / "older")
         if not (folder / "ready").exists():
-            shutil.rmtree(folder, ignore_errors=True)
+            for each in ("base", "older", "tree"):
+                shutil.rmtree(folder / each, ignore_errors=True)
             finished(self.base.folder).accept()
             older = write_world(self.older.folder)
             older.configure(OTHER_RUN)
