@@ -80,6 +80,7 @@ SLOW = (
     "measurements/test_what_files_hold.py",
     "mutation",
     "report/test_in_a_browser.py",
+    "report/test_tolerance_on_the_first_screen.py",
     "study/tournament/test_tournament.py",
     "synthetic/test_accepted.py",
     "test_accuracy_map.py",
