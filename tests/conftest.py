@@ -23,6 +23,7 @@ SLOW = (
     "integration/test_shared_cache.py",
     "integration/test_same_bytes.py",
     "integration/test_real_arm.py",
+    "integration/test_recipes.py",
     "integration",
     "integration_oracle",
     "fuzz",
