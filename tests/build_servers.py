@@ -52,16 +52,22 @@ class Ended:
     left: Path
 
     @property
-    def computed(self) -> list[str]:
-        """The stages that ran, without those that were taken from Snakemake's shared cache."""
-        jobs = re.split(r"^Job \d+: ", self.text, flags=re.MULTILINE)[1:]
-        ran = [job for job in jobs if re.match(r"\w+: ", job) and "from cache." not in job]
-        return [job.partition("\n")[0] for job in ran]
+    def jobs(self) -> list[tuple[str, bool]]:
+        """What each stage said, and whether it was taken from Snakemake's shared cache."""
+        said = re.split(r"^Job \d+: (?=\w+: )", self.text, flags=re.MULTILINE)[1:]
+        # What is computed is moved to the cache first, and linked then.
+        return [(job, "from cache." in job and "Moving output file" not in job) for job in said]
 
     @property
-    def from_cache(self) -> set[str]:
+    def computed(self) -> list[str]:
+        """The stages that were computed."""
+        return [job.partition("\n")[0] for job, taken in self.jobs if not taken]
+
+    @property
+    def taken(self) -> set[str]:
         """Tables that were taken from Snakemake's shared cache."""
-        return set(re.findall(r"Symlinking output file \S+/(\w+).parquet from cache", self.text))
+        tables = re.compile(r"Symlinking output file \S.*/(\w+).parquet from cache")
+        return {name for job, taken in self.jobs if taken for name in tables.findall(job)}
 
 
 @dataclass

@@ -186,6 +186,12 @@ def test_the_list_of_commands_is_what_their_help_says():
     )
 
 
+def test_exit_codes_on_the_page_are_those_of_the_commands():
+    written = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert written == document_commands.commands_markdown(), "run python tools/document_commands.py"
+    assert "| 143 | stopped by the system" in written
+
+
 PUBLIC = re.findall(r"^- `(kinacc\.[\w.]+)`$", (ROOT / "docs/api.md").read_text(), re.MULTILINE)
 
 

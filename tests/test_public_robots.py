@@ -51,8 +51,14 @@ def test_both_files_of_series_d_hold_the_same_readings():
 
 
 def test_base_and_tool_fitted_elsewhere_are_judged_as_those_of_a_run_are(rows):
-    """Of the nominal arm nothing but base and tool is fitted: both ways lead to the same errors."""
+    """Of the nominal arm nothing but base and tool is fitted: to all readings, or all but a fifth.
+
+    Twelve numbers take hardly anything off hundreds of readings.
+    """
     for fitted, judged in (("ur10_b", "ur10_d"), ("ur10_d", "ur10_b")):
         elsewhere = rows[fitted, judged, "all", "nominal"]
         home = rows[judged, judged, "all", "nominal"]
-        assert elsewhere[6:11] == home[6:11]
+        assert elsewhere.readings == home.readings
+        for name in ("mean_mm", "rms_mm"):
+            seen, held_out = getattr(elsewhere, name), getattr(home, name)
+            assert 0.99 * held_out < seen < held_out

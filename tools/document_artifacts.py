@@ -62,13 +62,14 @@ last: its name and part, the five marks, its `inputs_digests`, and for every fil
 SHA-256 of its bytes and, of a table, its `columns_digest`. It tells as well what two of the marks
 fold: `settings`, the configuration values of the stage (of files the names alone), which are
 `config_hash`; `code`, SHA-256 of every module and data file of the package that the stage depends
-on, and `versions` of the libraries and of Python, which are `code_hash`. Files without a record that fits are
-those of a run that did not come to its end, or were changed since: no stage reads them.
+on, and `versions` of the libraries and of Python, which are `code_hash`. Files without a record
+that fits are those of a run that did not come to its end, or were changed since: no stage reads
+them.
 
 ## What is the same
 
-`kinacc gate --against` holds a run to the accepted one. Column *same within* says what a number may
-differ by, in its unit: rounding differs from machine to machine. Without a reason for another it is
+`kinacc gate --against` holds a run to the accepted one. Column *same within* says what a number
+may differ by, in its unit: rounding differs from machine to machine. Without a reason for another:
 {same}.
 A pure number is held to as much as a radian, which is one too, and 1e-9 rad is 1e-6 mm at a
 metre. *{by_row}* is the one that the row states; {among:g} for pure numbers, which may be
@@ -76,17 +77,19 @@ thousands there. Whole numbers and words are equal, and null is
 where null was. Rows belong together by their key, in which numbers count to nine digits.
 
 *{by_poses}*: where these columns differ by more than their unit allows, what counts is the pose
-of every measured target at the measured joints, by model and frames together: 1e-6 mm, and 1e-6 mrad
-where orientations were measured. So parameters that the poses do not tell apart may trade with each
-other. *{by_std}*: an entry of a covariance may differ as it does when both standard
-deviations differ by what their units allow. In `*_fit` the rows `undetermined_direction` (one basis of many of
+of every measured target at the measured joints, by model and frames together: 1e-6 mm, and 1e-6
+mrad where orientations were measured. So parameters that the poses do not tell apart may trade with
+each other. *{by_std}*: an entry of a covariance may differ as it does when both standard deviations
+differ by what their units allow. In `*_fit` the rows `undetermined_direction` (one basis of many of
 what the poses leave open), `gap` and `last_step` (both decided by rounding) are not compared.
 
-Simulations are equal where seed and repetitions are. Where one of these alone changed,
-`study_summary.mean_mm` is held to the standard errors of both runs, `{std_error}`:
-allowed are z standard errors of the difference, z from the normal distribution so that one in a
-thousand such tables is said to differ by chance alone, whatever its number of rows (Bonferroni).
-Single simulations, smallest and largest values and `histories` are not compared then.
+Simulations are equal where seed and repetitions are. Where these changed, and neither other
+settings of the study nor its points, `study_summary.mean_mm` is held to the standard errors of both
+runs, `{std_error}`: allowed are t standard errors of the difference, t of
+Student's distribution (degrees of freedom of the mean of fewer repetitions) so that one in a
+thousand such tables is said to differ by chance alone, whatever its number of rows (Bonferroni):
+4.2 standard errors with 18 rows of 100 repetitions. Single simulations, smallest and largest
+values, `histories` and the claims on these are not compared then; nor is a study of one repetition.
 
 ## What a check computes again
 

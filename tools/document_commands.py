@@ -1,15 +1,22 @@
-"""Write docs/command-line.md from the commands' own help: ``python tools/document_commands.py``."""
+"""Write what pages say of commands from the commands: ``python tools/document_commands.py``.
+
+docs/command-line.md from their help, and the tables of exit codes in docs/commands.md.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from copy import copy
 from pathlib import Path
 
 import click
 
+from kinacc.cli.exit_codes import EXIT_CODES, OF_COMMANDS
 from kinacc.cli.group import main
 
+DOCS = Path(__file__).parents[1] / "docs"
+_TABLES = re.compile("(?<=<!-- exit codes -->\n).*(?=<!-- end of exit codes -->)", re.DOTALL)
 _HEAD = """\
 # Commands and their options
 
@@ -48,6 +55,26 @@ def _entry(words: str, command: click.Command) -> str:
     return f"### kinacc {words}\n\n```text\n{plain.get_help(context)}\n```\n"
 
 
+def commands_markdown() -> str:
+    """The text of docs/commands.md, with the tables of exit codes as the commands have them."""
+    every = [
+        _row("exit code", "meaning", "a build server shows"),
+        _row(*["---"] * 3),
+        *(_row(str(code), *words) for code, words in EXIT_CODES.items()),
+    ]
+    by_command = [
+        _row("command", "0", "1", "2"),
+        _row(*["---"] * 4),
+        *(_row(f"`kinacc {name}`", *words) for name, words in OF_COMMANDS.items()),
+    ]
+    tables = "\n".join(["", *every, "", *by_command, "", ""])
+    return _TABLES.sub(lambda _: tables, (DOCS / "commands.md").read_text(encoding="utf-8"))
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |".replace("|  |", "| |")
+
+
 if __name__ == "__main__":
-    path = Path(__file__).parents[1] / "docs" / "command-line.md"
-    path.write_text(command_line_markdown(), encoding="utf-8")
+    (DOCS / "command-line.md").write_text(command_line_markdown(), encoding="utf-8")
+    (DOCS / "commands.md").write_text(commands_markdown(), encoding="utf-8")

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 import os
 import re
 import shutil
@@ -15,6 +16,9 @@ import yaml
 from command_line import call, small_study
 
 from kinacc.artifacts import store
+from kinacc.campaign import of_calibration
+from kinacc.campaign.journal import JOURNAL
+from kinacc.workflow import answer
 from kinacc.workflow.last_words import last_words
 from kinacc.workflow.plan import SNAKEFILE, planned
 
@@ -109,6 +113,20 @@ def test_readings_that_contradict_the_noise_accept_nothing(fleet):
     row = rows("--tolerance-mm", 50, code=1)["line_a"]
     assert row["verdict"] == "undecided"
     assert "noise is stated too large" in row["remarks"]
+
+
+def test_a_history_takes_the_bound_of_a_campaign_that_came_to_its_end(fleet):
+    tables = answer.read("results/line_a")
+    campaign("line_a")
+    campaign("line_b", readings=7)
+    ended, going = (Path(f"check_{name}") for name in ("line_a", "line_b"))
+    # Both have the same tables: a campaign is known by the model it judges, not by a name.
+    bound_mm = rows()["line_a"]["bound_mm"]
+    assert of_calibration.finished(tables, "dh", [going, ended]) == bound_mm
+    assert math.isnan(of_calibration.finished(tables, "dh", [going]))
+    assert math.isnan(of_calibration.finished(tables, "vec", [ended]))
+    (ended / JOURNAL).write_text("no journal")
+    assert math.isnan(of_calibration.finished(tables, "dh", [ended]))
 
 
 def test_the_tolerance_of_a_campaign_counts_where_no_other_is_given(fleet):

@@ -99,6 +99,14 @@ def test_results_that_do_not_hold_are_not_accepted(results, tmp_path):
     assert not (tmp_path / "accepted").exists()
 
 
+def test_a_record_that_tells_other_settings_than_its_mark_is_not_accepted(results, tmp_path):
+    place = results / "arm" / "records" / "dh.json"
+    place.write_text(place.read_text().replace('"truncation": 0.01', '"truncation": 0.1'))
+    done = call("accept", results, "--reason", "fine", "--to", tmp_path / "accepted")
+    assert done.exit_code == 2
+    assert "dh.json: config_hash is not that of what it tells" in done.output
+
+
 @pytest.mark.parametrize("to", ["results", "results/arm", "."])
 def test_an_accepted_run_stands_beside_the_results(results, tmp_path, monkeypatch, to):
     monkeypatch.chdir(tmp_path)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from runs_by_hand import KEYS, Run, put_in
 
+from kinacc.artifacts import records, store
+from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.errors import InputError
+from kinacc.gate.causes import Causes
 from kinacc.gate.golden import compared
+from kinacc.gate.made import made
 from kinacc.gate.outcome import (
     CODE,
     CONFIGURATION,
@@ -22,6 +27,8 @@ from kinacc.gate.outcome import (
     UNEXPLAINED,
     VERSION,
 )
+from kinacc.gate.table_comparison import within_chance
+from kinacc.workflow.catalogue import STAGES
 
 
 @pytest.fixture
@@ -286,6 +293,23 @@ def test_a_study_drawn_anew_is_held_to_its_standard_errors(held, seed, repetitio
     assert "held to study_summary.std_error_mm" in outcome.says
 
 
+def test_a_study_of_three_repetitions_drawn_anew_raises_no_alarm():
+    from runs_by_hand import _study
+
+    artefact = ARTEFACTS["study_summary"]
+    marks = dict.fromkeys(store.PROVENANCE_KEYS, "-")
+    drawn_anew = [
+        store.to_table(artefact.name, _study(seed, 3)[artefact.name], marks) for seed in range(60)
+    ]
+    # Held to a normal distribution several would be told.
+    assert not any(within_chance(artefact, *pair) for pair in pairwise(drawn_anew))
+
+
+def test_a_release_beside_more_repetitions_is_no_reason_to_ask_for_the_same_simulations(held):
+    outcome = held(Run(), drawn(1, 90).with_code("study_chunk", "kinacc.study.monte_carlo"))
+    assert outcome.verdict == PASSED
+
+
 def test_a_study_drawn_anew_whose_means_are_others_is_told(held, monkeypatch):
     import runs_by_hand
 
@@ -346,6 +370,23 @@ def test_exact_asks_for_bytes_and_says_why_they_are_others(held):
     assert "dh_model.parquet" in artefacts(outcome)
     causes = {cause for each in outcome.differences for cause in each.causes}
     assert {(each.kind, each.where) for each in causes} == {(CODE, "kinacc.calibration.dh_fit")}
+
+
+def test_a_table_of_several_data_sets_is_explained_by_what_changed_in_them(tmp_path):
+    runs = {"accepted": Run(), "now": changed(replace(Run(), data="june"), ALL)}
+    for name, run in runs.items():
+        run.write(tmp_path / name)
+        digest = made(tmp_path / name / "arm").digest("residuals", STAGES["residuals"])
+        read = {"arm/residuals": digest}
+        if name == "now":
+            read["new/residuals"] = digest
+        record = records.Record("history", None, {}, read, {}, {}, {}, {"python": "3.12"})
+        records.leave(records.place(tmp_path / name / "tracker", "history"), record, {})
+    both = Causes(made(tmp_path / "accepted" / "tracker"), made(tmp_path / "now" / "tracker"))
+    assert {(each.kind, each.where, each.before) for each in both.of_stage("history")} == {
+        (INPUT, "measurements.file.path (march.csv)", both.of_stage("history")[0].before),
+        (INPUT, "new", "not read"),
+    }
 
 
 def test_a_data_set_of_one_run_alone(tmp_path):

@@ -15,9 +15,12 @@ from pathlib import Path
 
 import numpy as np
 from code_changes import COMMENTED, DATA_FILES, SCALED, STAGES, WRAPPED
-from worlds import SOURCE, World, other_numbers, other_version, rerun
+from worlds import ALL, SOURCE, World, other_numbers, other_version, rerun
+
+from kinacc.workflow.catalogue import TABLES
 
 OWN, PAPER = "own", "mh180"
+WORSE = "worse calibration"
 
 
 @dataclass(frozen=True)
@@ -307,15 +310,15 @@ def _machine() -> Iterator[Change]:
 def _worse(draw: np.random.Generator) -> Iterator[Change]:
     for noise in (0.5, 1.0, 2.0, 3.0):
         given = {"noise_mm": noise, "draw": int(draw.integers(1000))}
-        yield Change(f"worse: {noise:g} mm of noise", "worse calibration", "noise", given, POSES)
+        yield Change(f"worse: {noise:g} mm of noise", WORSE, "noise", given, POSES)
     for rows in (34, 28, 24):
-        yield Change(f"worse: {rows} poses", "worse calibration", "fewer", {"rows": rows}, POSES)
+        yield Change(f"worse: {rows} poses", WORSE, "fewer", {"rows": rows}, POSES)
     for share in (0.3, 0.6, 0.9):
         yield configured(
             f"worse: truncation {share:g}",
             {"calibration": {"dh": {"truncation": share}}},
             r"calibration\.dh\.truncation",
-            "worse calibration",
+            WORSE,
         )
 
 
@@ -361,7 +364,10 @@ def carried_out(change: Change, world: World, older: World, scratch: Path) -> li
             again(world, given["dataset"], given["stage"])
             return rerun(world.plan())
         ACTIONS[change.action](world, older, **given)
-        return [] if change.action in AFTERWARDS else rerun(world.plan())
+        if change.action in AFTERWARDS:
+            return []
+        # Gates of the configuration are asked where all results hold, pictures too.
+        return rerun(world.plan(), leaves=ALL if change.family == WORSE else (TABLES,))
 
 
 @contextmanager

@@ -146,6 +146,7 @@ class Answer:
     differences: tuple[Said, ...]
     failed: tuple[str, ...]  # what failed outcomes say
     words: str  # what all outcomes of the comparison say
+    worse: Mapping[str, str]  # verdict on a change for the worse, by data set
 
     @classmethod
     def of(cls, told: object, sound: bool = False) -> Answer:
@@ -172,6 +173,7 @@ class Answer:
             differences,
             tuple(f"{each['kind']} {each['says']} {_deep(each)}" for each in failed),
             " ".join(_deep(each) for each in compared),
+            {each["dataset"]: each["verdict"] for each in outcomes if each["kind"] == "change"},
         )
 
 
@@ -234,6 +236,33 @@ def faults_of(
     if wrong:
         found.append(f"explained wrongly ({len(wrong)}): {'; '.join(wrong[:3])}")
     return found
+
+
+ALLOWED_MM = 0.02
+
+
+def faults_on_worse(answer: Answer, before: Path, after: Path) -> list[str]:
+    """What is wrong with the gate that allows a mean error ALLOWED_MM larger, beyond chance.
+
+    Far beyond chance it has to fail, and where no more than that is found it must not.
+    """
+    faults = []
+    for dataset, verdict in answer.worse.items():
+        old, new = (_held_out_mm(side / dataset) for side in (before, after))
+        found = new.mean() - old.mean()
+        error = np.hypot(*(each.std(ddof=1) / np.sqrt(len(each)) for each in (old, new)))
+        said = f"{dataset} is {found:.3f} mm worse, of {error:.3f} mm by chance: {verdict}"
+        if found > ALLOWED_MM + 6.0 * error and verdict != "failed":
+            faults.append(said)
+        if found < ALLOWED_MM and verdict == "failed":
+            faults.append(said)
+    return faults if answer.worse else ["no gate on a change for the worse"]
+
+
+def _held_out_mm(folder: Path) -> np.ndarray:
+    table = pq.read_table(folder / "pose_errors.parquet").to_pandas()
+    rows = (table["comparison"] == "dh_vs_measured") & (table["estimate"] == "cross_validated")
+    return np.sqrt((table.loc[rows, ["ex_mm", "ey_mm", "ez_mm"]] ** 2).sum(axis=1)).to_numpy()
 
 
 def _all_fit(said: Said, causes: Sequence[tuple[str, str]], only: Sequence) -> bool:

@@ -21,7 +21,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import sitefallback  # noqa
 import changes
 import judged
 import unchanged
@@ -46,7 +45,8 @@ class Trials:
         self.folder = folder
         self.base, self.older = World(folder / "base"), World(folder / "older")
         if not (folder / "ready").exists():
-            shutil.rmtree(folder, ignore_errors=True)
+            for each in ("base", "older", "tree"):
+                shutil.rmtree(folder / each, ignore_errors=True)
             finished(self.base.folder).accept()
             older = write_world(self.older.folder)
             older.configure(OTHER_RUN)
@@ -95,6 +95,8 @@ class Trials:
         touched = case.action in changes.AFTERWARDS
         answer = judged.Answer.of(done["told"], touched)
         faults = judged.faults_of(answer, truth, case.causes, touched, case.only)
+        if case.family == changes.WORSE:
+            faults += judged.faults_on_worse(answer, self.base.results, after)
         if case.family.endswith("no numbers") and judged.YES in truth.values():
             faults.append("the harness: numbers differ, and were not meant to")
         return faults
@@ -108,7 +110,8 @@ class Trials:
             return
         name, old, new = code
         path = tree / "kinacc" / name
-        before, times = path.read_text(), path.stat()
+        right = SOURCE / name  # a run that was killed leaves the tree changed
+        before, times = right.read_text(), right.stat()
         try:
             path.write_text(before.replace(old, new, 1) if old else before + new)
             if old and old not in before:
@@ -184,8 +187,12 @@ def _tell(do: Callable[[], dict], said: Path) -> None:
 
 
 def cases() -> list[Change | Rerun]:
-    """All that is planted, and all reruns without a change."""
-    return [*changes.everything(), *unchanged.everything()]
+    """All that is planted and all reruns without a change, families in turn."""
+    found: dict[str, list[Change | Rerun]] = {}
+    for each in (*changes.everything(), *unchanged.everything()):
+        found.setdefault(each.family, []).append(each)
+    turns = [(place / len(own), each) for own in found.values() for place, each in enumerate(own)]
+    return [each for _, each in sorted(turns, key=lambda turn: turn[0])]
 
 
 def table(found: Sequence[dict]) -> Iterator[str]:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from unittest.mock import patch
@@ -26,6 +27,7 @@ from kinacc.workflow.catalogue import FIGURE, PAGE, TABLES
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.runner import is_done, perform
 
+ALL = (TABLES, FIGURE, PAGE)
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = Path(kinacc.__file__).parent
 SETTINGS = """\
@@ -149,7 +151,7 @@ def write_world(folder: Path, poses: int = 40, settings: str = SETTINGS) -> Worl
 def finished(folder: Path) -> World:
     """A world whose study has been run, pictures and pages too."""
     world = write_world(folder)
-    rerun(world.plan(), leaves=(TABLES, FIGURE, PAGE))
+    rerun(world.plan(), leaves=ALL)
     return world
 
 
@@ -267,7 +269,7 @@ def other_numbers(module: str, function: str, factor: float) -> Iterator[None]:
 
     As a library of another version may round otherwise, or a machine that makes mistakes.
     """
-    right = getattr(sys.modules[module], function)
+    right = getattr(import_module(module), function)
 
     def wrong(*given: object, **named: object) -> object:
         return right(*given, **named) * factor

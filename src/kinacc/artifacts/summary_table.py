@@ -22,6 +22,7 @@ TOPICS = (
     "one_way",
     "undetermined",
     "bending",
+    "tolerance",
 )
 SUMMARY = Artefact(
     "summary",

@@ -77,6 +77,37 @@ def facts(tables: Mapping[str, Columns], robot: Robot, like_measured: float = np
     ]
 
 
+# What the tolerance of the configuration is of, in words.
+TOLERANCE_OF = {
+    "mean": "the mean error held out",
+    "quantile_99": "the empirical 99 % quantile of the errors held out",
+    "bound": "the upper bound of a campaign",
+}
+
+
+class Tolerance(NamedTuple):
+    """Largest position error allowed, and of what that is said: a key of TOLERANCE_OF."""
+
+    mm: float
+    of: str
+
+    def __str__(self) -> str:
+        return f"{self.mm:g} mm for {TOLERANCE_OF[self.of]}"
+
+
+def of_tolerance(section: Mapping | None) -> list[Fact]:
+    """The configuration's section ``tolerance`` as facts; none where it sets none."""
+    if not section or section["mm"] is None:
+        return []
+    return [Fact("tolerance", section["of"], "allowed", float(section["mm"]), "mm")]
+
+
+def tolerance(found: Iterable[Fact]) -> Tolerance | None:
+    """The tolerance of the configuration; None where it sets none."""
+    stated = [each for each in found if each.topic == "tolerance"]
+    return Tolerance(float(stated[0].value), str(stated[0].item)) if stated else None
+
+
 def facts_in(table: Mapping[str, np.ndarray]) -> list[Fact]:
     """The facts that a table ``summary`` holds."""
     return [Fact(*row) for row in zip(*(table[name] for name in Fact._fields), strict=True)]

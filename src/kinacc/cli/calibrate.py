@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.cli.choice import CONFIG
+from kinacc.cli.exit_codes import STOPPED, TERMINATED
 
 if TYPE_CHECKING:
     from kinacc.workflow.plan import Plan
@@ -150,7 +151,8 @@ def _carried_out(command: Sequence[str], environment: Mapping[str, str]) -> int:
             with suppress(KeyboardInterrupt):
                 started.terminate()
                 if started.wait() > 0:  # and it has said so
-                    raise SystemExit(143 if isinstance(stop, Terminated) else 130) from None
+                    code = TERMINATED if isinstance(stop, Terminated) else STOPPED
+                    raise SystemExit(code) from None
             raise
 
 

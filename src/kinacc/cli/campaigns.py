@@ -11,7 +11,9 @@ import click
 import numpy as np
 
 from kinacc import __version__
+from kinacc.artifacts import store
 from kinacc.assess.conformity import decide
+from kinacc.calibration import summary
 from kinacc.campaign import folder as folders
 from kinacc.campaign import marks, words
 from kinacc.campaign.folder import open_
@@ -19,6 +21,7 @@ from kinacc.campaign.plan import Limits
 from kinacc.campaign.state import readings_in
 from kinacc.cli import campaigns_answers as answers
 from kinacc.cli import choice
+from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import Output
 from kinacc.errors import InputError, Problem, gathered, refuse
 
@@ -54,10 +57,11 @@ def start(given: Mapping, out: Output) -> None:
         joints_now = rows.of_arguments(
             (given["from_deg"],), "deg", calibration.robot, "--from-deg"
         )[0]
+    tolerance_mm, whose = _tolerance_mm(given["tolerance_mm"], Path(given["calibration"]))
     limits = Limits(
         math.radians(given["joint_tolerance_deg"]),
         given["implausible_mm"] or begin.plausible_mm(calibration, instruments),
-        given["tolerance_mm"],
+        tolerance_mm,
         given["width_mm"],
         given["target"],
     )
@@ -84,7 +88,7 @@ def start(given: Mapping, out: Output) -> None:
     if not given["sure"]:
         refuse(problems, "The campaign was not begun")
     begun = replace(begun, overruled=tuple(f"{each.where}: {each.what}" for each in problems))
-    for line in [] if unsure is None else unsure.in_words():
+    for line in [*whose, *([] if unsure is None else unsure.in_words())]:
         click.echo(line, err=True)
     folders.start(given["folder"], begun)
     out.say(
@@ -93,6 +97,18 @@ def start(given: Mapping, out: Output) -> None:
             given["folder"], begun, len(found.joints) - len(points), [*calibration.targets]
         ),
     )
+
+
+def _tolerance_mm(given: float | None, results: Path) -> tuple[float | None, list[str]]:
+    """The tolerance given, or the one of the calibration's configuration; what to say of that."""
+    path = results / "summary.parquet"
+    if given is not None or not path.is_file():
+        return given, []
+    stated = summary.tolerance(summary.facts_in(store.read(path)))
+    if stated is None or stated.of != "bound":
+        return None, []
+    words = f"tolerance {stated.mm:g} mm: that of the configuration of {results}"
+    return stated.mm, [f"{words}; --tolerance-mm names another"]
 
 
 def next_(path: str, every: bool, out: Output) -> None:
@@ -236,7 +252,7 @@ def verify(path: str, head: str | None, readings: int | None, out: Output) -> No
     }
     out.say(facts, "\n".join(lines))
     if problems:
-        raise SystemExit(1)
+        raise SystemExit(AGAINST)
 
 
 def say_doubts(opened: folders.Opened) -> None:

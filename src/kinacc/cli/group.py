@@ -16,7 +16,7 @@ from typing import NoReturn
 import click
 
 from kinacc import __version__
-from kinacc.cli.process import NOBODY_READS, STOPPED
+from kinacc.cli.exit_codes import AGAINST, NOBODY_READS, STOPPED, TERMINATED, UNUSABLE
 from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
 from kinacc.starting import ONE_THREAD, without_tools_of_numpy
 
@@ -190,24 +190,25 @@ def _ending(error: BaseException, came: Sequence[int]) -> tuple[int, str, Sequen
     ``came``: signals to stop. A library that one finds at work may raise an error of its own.
     """
     if signal.SIGTERM in came:
-        return 143, "stopped by the system; what was finished is kept", ()
+        return TERMINATED, "stopped by the system; what was finished is kept", ()
     if came or isinstance(error, KeyboardInterrupt):
         return STOPPED, "stopped", ()
     if isinstance(error, MemoryError):
-        return 1, f"there is not enough memory for this: {error or 'ask for less'}", ()
+        return AGAINST, f"there is not enough memory for this: {error or 'ask for less'}", ()
     if isinstance(error, RecursionError):
-        return 1, "something given to this command is nested too deeply to be read", ()
+        return AGAINST, "something given to this command is nested too deeply to be read", ()
     if isinstance(error, BrokenPipeError):
         return NOBODY_READS, "", ()
     if isinstance(error, OSError):
         error = refused(error)
     if isinstance(error, click.UsageError):
         place = error.ctx.command_path if error.ctx else ""
-        return 2, "", (Problem(place, error.format_message()),)
+        return UNUSABLE, "", (Problem(place, error.format_message()),)
     if isinstance(error, InputError):
-        return 1 if isinstance(error, MachineError) else 2, str(error), error.problems
+        code = AGAINST if isinstance(error, MachineError) else UNUSABLE
+        return code, str(error), error.problems
     if isinstance(error, KinaccError):
-        return 1, str(error), ()
+        return AGAINST, str(error), ()
     raise error
 
 

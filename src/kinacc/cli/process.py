@@ -9,7 +9,7 @@ from io import BufferedWriter, FileIO, TextIOWrapper
 from types import FrameType
 from typing import NoReturn
 
-STOPPED, NOBODY_READS = 130, 141  # exit codes, as a shell has them of signals
+from kinacc.cli.exit_codes import DONE, STOPPED
 
 
 def main(prog_name: str = "kinacc") -> NoReturn:
@@ -22,7 +22,7 @@ def main(prog_name: str = "kinacc") -> NoReturn:
     from kinacc.cli.group import main as commands
 
     commands(prog_name=prog_name)
-    raise SystemExit(0)
+    raise SystemExit(DONE)
 
 
 class _Standard(FileIO):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
+from kinacc.cli.exit_codes import AGAINST
 from kinacc.config import json_files
 from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few, refuse
@@ -364,4 +365,4 @@ def end_where_missing(answers: np.ndarray, what: str) -> None:
     missing = int(np.isnan(answers).any(axis=1).sum())
     if missing:
         click.echo(f"{missing} of {len(answers)} rows without {what}: status says why", err=True)
-        raise SystemExit(1)
+        raise SystemExit(AGAINST)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.artifacts.columns import texts
+from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import Output, answers
 from kinacc.cli.show import Answer, at_odds
 from kinacc.errors import InputError, Problem, first_few, refuse
@@ -43,7 +44,7 @@ _OF_VERDICTS = ("verdict", "tolerance_mm", "because")
 @click.option(
     "--tolerance-mm",
     type=click.FloatRange(0.0, min_open=True),
-    help="Hold every robot to it.  [that of its campaign]",
+    help="Hold every robot to it.  [that of its campaign, or of its configuration]",
 )
 @click.option(
     "--by",
@@ -79,17 +80,17 @@ def summary(
     from kinacc.workflow.fleet import data_sets, standings
 
     refuse(at_odds({"--csv": as_csv, "--json": out.as_json, "--out": out.table is not None}))
-    if by == _HELD_OUT and tolerance_mm is None:
-        what = "is not given, and errors held out have no tolerance of their own"
-        raise InputError(Problem("--tolerance-mm", what, "a number, in mm"))
     found = standings(data_sets(folders or (Path(RESULTS),)))
     verdicts = [each.verdict(by, tolerance_mm) for each in found]
+    if by == _HELD_OUT and not any(verdicts):
+        what = "is not given, and no configuration has a tolerance of quantile_99"
+        raise InputError(Problem("--tolerance-mm", what, "a number, in mm"))
     if out.as_json or out.table is not None or as_csv:
         Answer(out, as_csv).give(sheet(found, verdicts, by), None)
     else:
         show(found, verdicts, by)
     if any(each.problem for each in found) or _counted(verdicts).keys() - {"accept"}:
-        sys.exit(1)
+        sys.exit(AGAINST)
 
 
 def show(
@@ -184,7 +185,9 @@ def below(found: Sequence[Standing], verdicts: Sequence[Verdict | None]) -> list
         if "bound_if" in bound:
             lines.insert(0, f"the bound is on {bound['bound_of']}, if {bound['bound_if']}")
         if verdict is not None:
-            lines.append(f"{verdict.says} by {verdict.tolerance_mm:g} mm: {verdict.because}")
+            whose = f" ({verdict.whose} tolerance)" if verdict.whose else ""
+            allowed = f"{verdict.tolerance_mm:g} mm{whose}"
+            lines.append(f"{verdict.says} by {allowed}: {verdict.because}")
         for line in lines:
             said.setdefault(line, []).append(each.name)
     return [f"{_named(names, len(found))}: {line}" for line, names in said.items()]

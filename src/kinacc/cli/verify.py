@@ -40,10 +40,10 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
 
     What was moved is fitted anew to the readings (base 6 numbers, tool 3 or 6), for every model its
     own, and so it is to the held-out poses that they are compared with. The arm is not touched. The
-    verdict is on the selected model where the calibration was measured: it fails where the mean
-    error is one that 1 % of such handfuls have where nothing has changed, passes otherwise, and
-    cannot be told where fewer poses than show errors doubled are no worse. It is no bound on the
-    largest error.
+    verdict is on the selected model where the calibration was measured: it fails where errors are
+    as large, or look as much like offsets of joints, as in 1 % of such handfuls where nothing has
+    changed; passes otherwise; and cannot be told where fewer poses than show errors doubled are no
+    worse. It is no bound on the largest error.
 
     \b
     Example:
@@ -159,6 +159,10 @@ def _of_verdict(found: Verdict) -> dict[str, object]:
         "held_out": found.held_out and found.held_out._asdict(),
         "expected_mean_mm": held and held.expected_mm,
         "limit_mm": held and held.limit_mm,
+        "offsets_mm": held and held.offsets_mm,
+        "offsets_limit_mm": held and held.offsets_limit_mm,
+        "most_like_offset_of_joint": held and held.joint,
+        "most_like_offset": held and held.offset,
         "probability": held and held.probability,
         "least_configurations": found.least,
         "seen": found.seen and _of_seen(found.seen),

@@ -23,6 +23,7 @@ from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.deployment import drift_chance, drift_pairs
 from kinacc.deployment.drift_joint import joint_of
 from kinacc.deployment.drift_pairs import Setup
+from kinacc.deployment.handful import LEAST_HELD_OUT
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.verify import frames_under, says_there
 from kinacc.errors import FitError, InputError
@@ -110,9 +111,9 @@ class _Comparison:
         row: dict[str, Any] = {}
         try:
             row |= _sizes("in_force", self.errors_mm(force, session, setup))
-            few = [each for each in (force, session) if _count(each.observations) < LEAST]
+            few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]
             if few:
-                what = f"fewer than {LEAST} configurations in {few[0].name}"
+                what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}"
                 return row | {"verdict": OPEN, "reason": what}
             return row | self.moved(force, session, setup)
         except (FitError, InputError) as problem:

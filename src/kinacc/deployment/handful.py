@@ -1,17 +1,20 @@
 """A few new poses held to the poses that a calibration was held out at.
 
 A test by permutation, which assumes nothing of how errors are spread: where nothing changed, new
-configurations are a random handful of all, new and held out, and their mean error is beyond that of
-99 % of such handfuls in ``LEVEL`` of the cases. Where base or tool stands anew it is fitted to the
-new poses, which takes up a part of their errors, so it is fitted to every handful as well: a step
-of least squares, as errors are small beside the arm. New configurations are taken to lie among
-those of the calibration; of one that is read again the first reading counts.
+configurations are a random handful of all, new and held out, and their errors are beyond those of
+99 % of such handfuls in ``LEVEL`` of the cases. Two sizes of errors are held to it, each at half of
+the level: their mean, and what offsets of the joints would explain of them, which shows a joint
+that lost its zero while that is small beside all errors. Where base or tool stands anew it is
+fitted to the new poses, which takes up a part of their errors, so it is fitted to every handful as
+well: a step of least squares, as errors are small beside the arm. New configurations are taken to
+lie among those of the calibration; of one that is read again the first reading counts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +33,7 @@ _SAMPLES, _STEPS, _TOO_LARGE = 8, 3, 20.0  # of larger errors, and how often the
 _SMALLEST, _TOO_FAR, _HALVED = 1e-3, 50.0, 8  # mrad, mm, and how finely offsets are sought
 _MOST = 4_000_000  # numbers in memory at once
 _SINGULAR = 1e-9  # of the largest squared singular value: nothing is seen of such a direction
+_HARDLY_MM = 0.05  # rms: joints that 1 mrad of moves less, base and tool fitted, are not looked at
 _MRAD = 1e-3
 
 
@@ -56,7 +60,7 @@ class Places:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HeldOut:
     """Errors (N, K, c), in the units of ``slopes``, of readings at ``places``."""
 
@@ -91,16 +95,41 @@ class Seen(NamedTuple):
 
 
 class Held(NamedTuple):
-    """The mean error of a handful beside those of handfuls where nothing changed, mm.
+    """New configurations beside handfuls of all, mm: their mean error, and the rms of what offsets
+    of the joints would explain of it.
 
-    ``limit_mm`` is passed by all but ``LEVEL`` of them; ``probability``: of a mean of at least
-    ``mean_mm``. ``expected_mm`` is their mean.
+    Both limits are kept by all but half of ``LEVEL`` of handfuls where nothing has changed;
+    ``probability``: of either as large there. ``expected_mm`` is the mean of their mean errors,
+    ``joint`` (from 1) the one whose ``offset``, mrad or mm, explains most.
     """
 
     mean_mm: float
     expected_mm: float
     limit_mm: float
+    offsets_mm: float
+    offsets_limit_mm: float
     probability: float
+    joint: int
+    offset: float
+
+
+class Parts(NamedTuple):
+    """What is left of m handfuls after the fit of base and tool.
+
+    ``means`` (m,) position errors; ``squares`` (m,) of all errors that offsets of the joints would
+    explain; ``along`` (m, k) errors along what an offset by 1 mrad leaves, and ``of`` (m, k, k)
+    products of these, all for one reading.
+    """
+
+    means: np.ndarray
+    squares: np.ndarray
+    along: np.ndarray
+    of: np.ndarray
+
+    def limits(self) -> tuple[float, float]:
+        """Mean and squares that all but half of ``LEVEL`` keep, each."""
+        share = 1.0 - 0.5 * LEVEL
+        return float(np.quantile(self.means, share)), float(np.quantile(self.squares, share))
 
 
 def places(
@@ -148,26 +177,37 @@ def _both(position: list[np.ndarray], turn: list[np.ndarray], weight: float | No
 
 
 def held_to(held_out: HeldOut, new: HeldOut) -> Held:
-    """Hold the mean error of ``new`` configurations to that of handfuls of all there are.
+    """Hold the errors of ``new`` configurations to those of handfuls of all there are.
 
     ``new.errors`` are those that the fit of base and tool leaves. Where nothing has changed, the
     new configurations are a handful of all like any other: the level is exact where nothing is
     fitted, for any distribution of errors and any number of them. Where something is, what the fit
     took off the new ones on the whole is put back before they are dealt out.
     """
-    mean_mm = float(_sizes(new.errors).mean())
+    own = _apart(new.errors[None], new.places.slopes[None], new.places.joints[None])
     left = 1.0 - new.places.unknowns / (new.numbers * len(new))
-    among = _together(held_out, new.times(1.0 / np.sqrt(left)))
-    means = chance(among, len(new))
-    beyond = (1 + int(np.sum(means >= mean_mm))) / (1 + len(means))
-    return Held(mean_mm, float(means.mean()), _limit(means), beyond)
+    dealt = chance(_together(held_out, new.times(1.0 / np.sqrt(left))), len(new))
+    mean_limit, squares_limit = dealt.limits()
+    beyond = min(np.sum(dealt.means >= own.means), np.sum(dealt.squares >= own.squares))
+    products, shown = np.diagonal(own.of[0]), np.diagonal(own.of[0]) > _HARDLY_MM**2
+    offsets = np.divide(own.along[0], products, out=np.zeros_like(products), where=shown)
+    joint = int(np.argmax(offsets * own.along[0]))
+    return Held(
+        float(own.means[0]),
+        float(dealt.means.mean()),
+        mean_limit,
+        float(np.sqrt(own.squares[0])),
+        float(np.sqrt(squares_limit)),
+        float(min(2.0 * (1 + beyond) / (1 + len(dealt.means)), 1.0)),
+        joint + 1,
+        float(offsets[joint]),
+    )
 
 
-def chance(among: HeldOut, poses: int, times: int = _DRAWN) -> np.ndarray:
-    """Mean errors (m,) of handfuls of ``poses`` configurations, base and tool fitted to each."""
+def chance(among: HeldOut, poses: int, times: int = _DRAWN) -> Parts:
+    """Handfuls of ``poses`` configurations, base and tool fitted to each."""
     times = int(np.clip(_DRAWN_READINGS / poses, min(times, _LEAST_DRAWN), times))
-    drawn = _drawn(len(among), poses, times)
-    return np.concatenate([each.mean(axis=(1, 2)) for each in _left(among, drawn)])
+    return _left(among, _drawn(len(among), poses, times))
 
 
 def least(held_out: HeldOut) -> int | None:
@@ -179,62 +219,59 @@ def least(held_out: HeldOut) -> int | None:
     return None
 
 
-def factor(held_out: HeldOut, poses: int) -> tuple[float, float]:
-    """How many times as large errors are seen in four of five, and the limit that they exceed, mm.
+@lru_cache(maxsize=32)
+def factor(held_out: HeldOut, poses: int) -> tuple[float, tuple[float, float]]:
+    """How many times as large errors are seen in four of five, and the limits that they exceed.
 
-    The new configurations are among those that they are held to, so that they raise the limit.
+    The new configurations are among those that they are held to, so that they raise the limits.
     """
-    means = chance(held_out, poses, _DRAWN_LARGER)
-    small, limit = float(np.quantile(means, 1.0 - POWER)), _limit(means)
-    for _ in range(_STEPS):
-        times = limit / small if small > 0.0 else np.inf
-        if times > _TOO_LARGE:
-            return np.inf, np.inf
-        drawn = _drawn(len(held_out), poses, _SAMPLES)
-        some = (_together(held_out, held_out.select(each).times(times)) for each in drawn)
-        limit = _limit(
-            np.concatenate([chance(each, poses, _DRAWN_LARGER // _SAMPLES) for each in some])
-        )
-    return limit / small, limit
+    dealt = chance(held_out, poses, _DRAWN_LARGER)
+    limits, times = dealt.limits(), np.inf
+    for step in range(_STEPS + 1):
+        with np.errstate(divide="ignore"):
+            needed = [limits[0] / dealt.means, np.sqrt(limits[1] / dealt.squares)]
+        times = float(np.quantile(np.minimum(*needed), POWER))
+        if not times <= _TOO_LARGE:
+            return np.inf, (np.inf, np.inf)
+        if step < _STEPS:
+            drawn = _drawn(len(held_out), poses, _SAMPLES)
+            some = [_together(held_out, held_out.select(each).times(times)) for each in drawn]
+            parts = [chance(each, poses, _DRAWN_LARGER // _SAMPLES) for each in some]
+            limits = Parts(*map(np.concatenate, zip(*parts, strict=True))).limits()
+    return times, limits
 
 
 def seen(held_out: HeldOut, poses: int, new: Places | None = None) -> Seen:
     """What ``poses`` show: those at ``new``, or as many spread as those of the calibration are."""
-    times, limit = factor(held_out, poses)
+    times, limits = factor(held_out, poses)
     index = _drawn(len(held_out), poses, max(_DRAWN_MOVED // max(poses // 50, 1), 100))
     own = held_out.places
     slopes = own.slopes[index] if new is None else new.slopes[None]
-    by = own.joints[index] if new is None else new.joints[None]
-    still = _without(held_out.errors[index][..., None], slopes)[..., 0]
-    moved = _without(by, slopes)
-    offsets = [_offset(still, moved[..., each], limit) for each in range(by.shape[-1])]
+    joints = own.joints[index] if new is None else new.joints[None]
+    errors = held_out.errors[index]
+    parts = _apart(errors, slopes, joints)
+    still = _without(errors[..., None], slopes)[..., :3, 0]
+    moved = _without(joints, slopes)[..., :3, :]
+    offsets = []
+    for joint in range(joints.shape[-1]):
+        along, own_square = parts.along[:, joint], parts.of[:, joint, joint]
+
+        def share(
+            offset: float,
+            moved: np.ndarray = moved[..., joint],
+            along: np.ndarray = along,
+            own_square: np.ndarray = own_square,
+        ) -> float:
+            means = np.linalg.norm(still + offset * moved, axis=-1).mean(axis=(1, 2))
+            squares = parts.squares + 2.0 * offset * along + offset**2 * own_square
+            return float(np.mean((means > limits[0]) | (squares > limits[1])))
+
+        offsets.append(_smallest(share))
     return Seen(poses, times, np.array(offsets))
 
 
-def _together(one: HeldOut, other: HeldOut) -> HeldOut:
-    pairs = ((one.errors, other.errors), (one.places.slopes, other.places.slopes))
-    errors, slopes = (np.concatenate(pair) for pair in pairs)
-    return HeldOut(errors, Places(slopes, np.zeros((*errors.shape, 0))))
-
-
-def _sizes(errors: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(errors[..., :3], axis=-1)
-
-
-def _limit(means: np.ndarray) -> float:
-    return float(np.quantile(means, 1.0 - LEVEL))
-
-
-def _offset(still: np.ndarray, moved: np.ndarray, limit: float) -> float:
-    """Smallest multiple of ``moved`` (1 or m, n, K, 3) that takes four of five beyond ``limit``.
-
-    ``still`` (m, n, K, 3) are errors without it. inf where none of any arm would.
-    """
-
-    def share(times: float) -> float:
-        sizes = np.linalg.norm(still + times * moved, axis=-1)
-        return float(np.mean(sizes.mean(axis=(1, 2)) > limit))
-
+def _smallest(share: Callable[[float], float]) -> float:
+    """The smallest offset, mrad or mm, whose ``share`` of cases seen is four of five; else inf."""
     high = _SMALLEST
     while share(high) < POWER:
         high *= 2.0
@@ -245,6 +282,16 @@ def _offset(still: np.ndarray, moved: np.ndarray, limit: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if share(middle) >= POWER else (middle, high)
     return high
+
+
+def _together(one: HeldOut, other: HeldOut) -> HeldOut:
+    pairs = (
+        (one.errors, other.errors),
+        (one.places.slopes, other.places.slopes),
+        (one.places.joints, other.places.joints),
+    )
+    errors, slopes, joints = (np.concatenate(pair) for pair in pairs)
+    return HeldOut(errors, Places(slopes, joints))
 
 
 def _drawn(count: int, size: int, times: int) -> np.ndarray:
@@ -260,28 +307,46 @@ def _drawn(count: int, size: int, times: int) -> np.ndarray:
     return index
 
 
-def _left(held_out: HeldOut, index: np.ndarray) -> Iterator[np.ndarray]:
-    """Sizes (m, n, K) of position errors of handfuls ``index`` (M, n) after the fit, by blocks."""
-    slopes = held_out.places.slopes
-    block = max(_MOST // (max(int(np.prod(slopes.shape[1:])), 1) * index.shape[1]), 1)
+def _left(held_out: HeldOut, index: np.ndarray) -> Parts:
+    """Parts of the handfuls ``index`` (m, n), by blocks."""
+    places = held_out.places
+    numbers = places.slopes[0].size + places.joints[0].size
+    block = max(_MOST // (numbers * index.shape[1]), 1)
+    parts = []
     for first in range(0, len(index), block):
-        part = index[first : first + block]
-        left = _without(held_out.errors[part][..., None], slopes[part])
-        yield np.linalg.norm(left[..., 0], axis=-1)
+        own = index[first : first + block]
+        parts.append(_apart(held_out.errors[own], places.slopes[own], places.joints[own]))
+    return Parts(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _apart(errors: np.ndarray, slopes: np.ndarray, joints: np.ndarray) -> Parts:
+    """Parts of ``errors`` (m, n, K, c), with ``slopes`` and ``joints`` (1 or m, n, K, c, p)."""
+    left = _without(errors[..., None], slopes)
+    moved = _without(joints, slopes)
+    readings = errors.shape[1] * errors.shape[2]
+    flat = moved.reshape(len(moved), -1, moved.shape[-1])
+    turned = np.swapaxes(flat, 1, 2)
+    along = (turned @ left.reshape(len(left), -1, 1))[..., 0] / readings
+    of = turned @ flat / readings
+    found = (_inverse(of, _HARDLY_MM**2) @ along[..., None])[..., 0]
+    means = np.linalg.norm(left[..., :3, 0], axis=-1).mean(axis=(1, 2))
+    squares = np.sum(found * along, axis=1)
+    return Parts(means, squares, along, np.broadcast_to(of, (len(left), *of.shape[1:])))
 
 
 def _without(values: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Positions (m, n, K, 3, r) of ``values`` (m, n, K, c, r) less what ``slopes`` take up.
-
-    ``slopes`` (1 or m, n, K, c, p).
-    """
+    """``values`` (m, n, K, c, r) less what ``slopes`` (1 or m, n, K, c, p) take up of them."""
     if not slopes.shape[-1]:
-        return values[..., :3, :]
+        return values
     flat = slopes.reshape(len(slopes), -1, slopes.shape[-1])
     turned = np.swapaxes(flat, 1, 2)
-    own, vectors = np.linalg.eigh(turned @ flat)
-    kept = own > _SINGULAR * own[:, -1:]
-    inverse = np.where(kept, 1.0 / np.where(kept, own, 1.0), 0.0)
     along = turned @ values.reshape(len(values), flat.shape[1], -1)
-    found = vectors @ (inverse[..., None] * (np.swapaxes(vectors, 1, 2) @ along))
-    return (values - (flat @ found).reshape(values.shape))[..., :3, :]
+    return values - (flat @ (_inverse(turned @ flat) @ along)).reshape(values.shape)
+
+
+def _inverse(gram: np.ndarray, hardly: float = 0.0) -> np.ndarray:
+    """Inverses (m, p, p) of symmetric matrices, nothing along what is ``hardly`` or not seen."""
+    own, vectors = np.linalg.eigh(gram)
+    kept = own > np.maximum(_SINGULAR * own[:, -1:], hardly)
+    inverse = np.where(kept, 1.0 / np.where(kept, own, 1.0), 0.0)
+    return (vectors * inverse[:, None]) @ np.swapaxes(vectors, 1, 2)

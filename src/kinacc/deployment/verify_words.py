@@ -10,10 +10,12 @@ from kinacc.artifacts.error_models import model_name
 from kinacc.deployment.handful import DOUBLED, LEAST_HELD_OUT, LEVEL
 from kinacc.deployment.verify import FAILS, FEW_HELD_OUT, OPEN, Level, Verdict
 
+_KEPT = f"{100.0 * (1.0 - 0.5 * LEVEL):g} %"  # by each of the two sizes that are held
+
 
 def of_verdict(found: Verdict, model: str, moved: Sequence[str], units: Sequence[str]) -> list[str]:
     """Errors and their limit, what these poses and others show, and the verdict; ``units`` (k,)."""
-    return [*_beside_chance(found, model, moved), _verdict(found), *_power(found, units)]
+    return [*_beside_chance(found, model, moved), _verdict(found, units), *_power(found, units)]
 
 
 def _beside_chance(found: Verdict, model: str, moved: Sequence[str]) -> Iterator[str]:
@@ -23,12 +25,16 @@ def _beside_chance(found: Verdict, model: str, moved: Sequence[str]) -> Iterator
         if found.held_out is not None:
             yield f"at its held-out poses: {_level(found.held_out)}"
         return
-    fitted = f", after a fit of {' and '.join(moved)} to each" if moved else ""
+    fitted = f", {' and '.join(moved)} fitted to each" if moved else ""
     yield (
         f"where nothing has changed, {_poses(found.here.configurations)} have a mean of "
-        f"{found.held.expected_mm:.4g} mm, and of 100 such handfuls {_passing()} have at most "
+        f"{found.held.expected_mm:.4g} mm, and {_KEPT} of such handfuls at most "
         f"{found.held.limit_mm:.4g} mm ({found.held_out.configurations} held-out configurations, "
         f"dealt out at random{fitted})"
+    )
+    yield (
+        f"offsets of the joints would explain {found.held.offsets_mm:.4g} mm rms of their errors; "
+        f"of {_KEPT} of such handfuls at most {found.held.offsets_limit_mm:.4g} mm"
     )
 
 
@@ -51,7 +57,7 @@ def _power(found: Verdict, units: Sequence[str]) -> Iterator[str]:
         yield "  - : moves the target little, or as what is fitted anew does"
 
 
-def _verdict(found: Verdict) -> str:
+def _verdict(found: Verdict, units: Sequence[str]) -> str:
     """The verdict as one sentence."""
     if found.says == OPEN:
         needed = ""
@@ -60,21 +66,24 @@ def _verdict(found: Verdict) -> str:
         if found.reason == FEW_HELD_OUT:
             needed = f"; it takes {_poses(LEAST_HELD_OUT)}"
         return f"verdict: cannot be told from these readings: {found.reason}{needed}"
-    share = found.held.probability
+    held = found.held
+    chance = f"{100.0 * held.probability:.2g} %"
     if found.says == FAILS:
-        times = found.held.mean_mm / found.held.expected_mm
+        why = []
+        if held.mean_mm > held.limit_mm:
+            why.append(f"the mean error is {held.mean_mm / held.expected_mm:.3g} times as large")
+        if held.offsets_mm > held.offsets_limit_mm:
+            unit = units[held.joint - 1]
+            looks = f"an offset of joint {held.joint} by {held.offset:+.2g} {unit}"
+            why.append(f"the errors look most like {looks}")
         return (
-            f"verdict: fails: the mean error is {times:.3g} times that of poses where nothing has "
-            f"changed, of which {100 * share:.2g} % have as much; below {100 * LEVEL:g} % it fails"
+            f"verdict: fails: {', and '.join(why) or 'the errors are larger'}; where nothing has "
+            f"changed {chance} of such handfuls go as far, and it fails at {100.0 * LEVEL:g} %"
         )
     return (
-        f"verdict: passes: where nothing has changed {100 * share:.2g} % of such handfuls have as "
-        f"much; below {100 * LEVEL:g} % it fails"
+        f"verdict: passes: where nothing has changed {chance} of such handfuls go as far, and it "
+        f"fails at {100.0 * LEVEL:g} %"
     )
-
-
-def _passing() -> str:
-    return f"{100 * (1.0 - LEVEL):.0f}"
 
 
 def _poses(count: int | None) -> str:

@@ -62,7 +62,11 @@ def facts_of(tables: Tables) -> list[Fact]:
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     known = tables.get("summary", {"topic": [], "value": []})
     share = np.asarray(known["value"])[np.asarray(known["topic"]) == "like_measured"]
-    return summary.facts(tables, arm, float(share[0]) if len(share) else np.nan)
+    found = summary.facts(tables, arm, float(share[0]) if len(share) else np.nan)
+    if "summary" in tables:  # no other table holds it
+        told = summary.facts_in(tables["summary"])
+        found += [each for each in told if each.topic == "tolerance"]
+    return found
 
 
 def campaign_of(folder: Path | str, tables: Tables) -> Sought:

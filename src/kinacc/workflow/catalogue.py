@@ -276,7 +276,7 @@ STAGES: dict[str, Stage] = {
                 "model_selection",
             ),
             ("summary",),
-            ("robot",),
+            ("robot", "tolerance"),
             files=("robot",),
             uses=(_ROBOT, _MODEL),
             optional=(

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 ALONE_S = 60.0  # a part of scattered work that takes longer has a job of its own
 _MARGIN = 4.0  # slower nodes, a shared file system, kernels compiled at first use
 _MEMORY_MB = 600  # measured: 100 to 280 in a stage, 150 in the Snakemake of its job
-# The first three grow with the poses: 100,000 of them fit.
-_MORE_MEMORY_MB = dict.fromkeys(("vec", "compliance", "residuals", "choices_chunk"), 1000)
+# The first four grow with the poses: 100,000 of them fit.
+_MORE_MEMORY_MB = dict.fromkeys(
+    ("vec", "compliance", "residuals", "history", "choices_chunk"), 1000
+)
 _STAGE_S = 3.0
 
 

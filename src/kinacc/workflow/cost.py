@@ -97,6 +97,12 @@ def _residuals(config: Mapping) -> Cost:
     return Cost(seconds, vec.bytes, ("measurements.folds", *vec.keys))
 
 
+def _history(config: Mapping) -> Cost:
+    """Every line held to the one in force; of lines as long as the newest."""
+    lines, poses = len(config.get("series", ())), _poses(config)
+    return Cost(1.4e-3 * lines * poses, _PROCESS_B + 2e5 * poses, ("series",))
+
+
 def cells(config: Mapping) -> float:
     """Places of the grid of all slices of the map."""
     space, grid_mm = _at(config, "evaluation.cylinder"), _at(config, "map.grid_mm")
@@ -171,6 +177,7 @@ _STAGES: Mapping[str, Callable[[Mapping], Cost]] = {
     "vec": _vec,
     "dh": _dh,
     "residuals": _residuals,
+    "history": _history,
     "accuracy_map": _map,
     "assessment_points": _assessment_points,
     "study_chunk": _study_chunk,

@@ -10,10 +10,11 @@ from pathlib import Path
 
 from kinacc.artifacts import store
 from kinacc.artifacts.error_models import model_name
-from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.conformity import UNDECIDED
 from kinacc.assess.statement import CANDIDATES, Statement
-from kinacc.calibration.summary import LARGE_SHARE, facts_in, of
-from kinacc.campaign import journal, of_calibration, words
+from kinacc.calibration.summary import Tolerance, facts_in, of
+from kinacc.calibration.summary import tolerance as tolerance_in
+from kinacc.campaign import journal, of_calibration, tolerance, words
 from kinacc.campaign.of_calibration import Sought
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem
@@ -22,18 +23,22 @@ from kinacc.workflow.verification.lineage import made_of_these, outdated
 
 FEW = 4  # data sets of which each is told of at the end of a run
 BOUND, HELD_OUT = "bound", "held-out"
+_TOLERANCE_OF = {BOUND: "bound", HELD_OUT: "quantile_99"}
 _SUMMARY = STAGES["summary"]
 _DAY = 10  # characters of a time
-_FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an error is within a tolerance: ``accept``, ``reject`` or ``undecided``, and why."""
+    """Whether an error is within a tolerance: ``accept``, ``reject`` or ``undecided``, and why.
+
+    ``whose`` says where the tolerance stands; empty where it was asked for.
+    """
 
     says: str
     because: str
     tolerance_mm: float
+    whose: str = ""
 
 
 @dataclass(frozen=True)
@@ -42,8 +47,9 @@ class Standing:
 
     ``model`` is the error model that is selected, ``held_out`` its errors at poses that no fit has
     seen: ``n``, ``mean``, ``quantile_99`` and ``largest`` in mm, empty where none are held out.
-    ``written``: day on which the file of its summary was written, by the file's time. ``problem``
-    is why nothing is known; None where something is.
+    ``written``: day on which the file of its summary was written, by the file's time;
+    ``tolerance``: that of its configuration. ``problem`` is why nothing is known; None where
+    something is.
     """
 
     folder: Path
@@ -52,6 +58,7 @@ class Standing:
     held_out: Mapping[str, float] = field(default_factory=dict)
     campaigns: Sought = field(default_factory=lambda: Sought(None))
     written: str | None = None
+    tolerance: Tolerance | None = None
     problem: Problem | None = None
 
     @property
@@ -101,37 +108,28 @@ class Standing:
     def verdict(self, by: str, tolerance_mm: float | None) -> Verdict | None:
         """The verdict ``by`` the bound of its campaign, or by errors held out.
 
-        Where no tolerance is given, the campaign's own counts; None where it has none.
+        Where no tolerance is given, the campaign's own counts, then that of the configuration
+        where it is of the same; None where there is none.
         """
-        found = self.campaigns.assessed
-        if tolerance_mm is None and found is not None:
-            tolerance_mm = found.state.plan.limits.tolerance_mm
+        found, whose = self.campaigns.assessed, ""
+        if tolerance_mm is None and found is not None and by == BOUND:
+            tolerance_mm, whose = found.state.plan.limits.tolerance_mm, tolerance.OF_CAMPAIGN
+        if tolerance_mm is None and self.tolerance and self.tolerance.of == _TOLERANCE_OF[by]:
+            tolerance_mm, whose = self.tolerance.mm, tolerance.OF_CONFIGURATION
         if tolerance_mm is None:
             return None
-        says, because = UNDECIDED, "no campaign bounds it"
+        says, because = UNDECIDED, ""
         if self.problem is not None:
             because = "there are no results to go by"
         elif by == HELD_OUT:
-            says, because = self._held_out_within(tolerance_mm)
-        elif _against(self.campaigns):
-            because = "its bound cannot be relied on"
-        elif found is not None and found.said is None:
+            of = Tolerance(tolerance_mm, _TOLERANCE_OF[by])
+            says, because = tolerance.by_held_out(of, self.held_out)
+        elif found is not None and found.said is None and not _against(self.campaigns):
             because = "its campaign says nothing yet"
-        elif found is not None and found.said is not None:
-            decided = decide(found.said, tolerance_mm)
-            says, because = decided.verdict, words.reason(decided.reason) or ""
-        return Verdict(says, because, tolerance_mm)
-
-    def _held_out_within(self, tolerance_mm: float) -> tuple[str, str]:
-        known = self.held_out
-        if not known:
-            return UNDECIDED, "no error is held out"
-        if known["quantile_99"] > tolerance_mm:
-            return REJECT, "more than 1 % of the errors held out are beyond the tolerance"
-        if known["n"] < _FEWEST:
-            few = f"{known['n']:.0f} errors are held out, too few to tell of 1 % of them"
-            return UNDECIDED, few
-        return ACCEPT, "99 % of the errors held out are within the tolerance"
+        else:
+            said = None if found is None else found.said
+            says, because = tolerance.by_bound(tolerance_mm, said, bool(_against(self.campaigns)))
+        return Verdict(says, because, tolerance_mm, whose)
 
 
 def _against(campaigns: Sought) -> list[str]:
@@ -186,7 +184,7 @@ def _standing(folder: Path, campaigns: Sequence[Path]) -> Standing:
     if not path.is_file():
         fix = "kinacc calibrate FILE.yaml, with the file of this data set, makes one"
         raise InputError(Problem(str(folder), "holds no summary.parquet", fix=fix))
-    robot, model, held_out = _told(path)
+    robot, model, held_out, tolerance = _told(path)
     # The quick question first; a robot file of one's own, which is not here, takes the longer one.
     own = store.read_metadata(path)
     if not made_of_these(folder, _SUMMARY, own) and outdated(folder, _SUMMARY.outputs):
@@ -195,18 +193,19 @@ def _standing(folder: Path, campaigns: Sequence[Path]) -> Standing:
     tables = results.read_tables(folder, "robot") if campaigns else {}
     sought = of_calibration.sought(folder.resolve().name, tables, campaigns)
     written = datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
-    return Standing(folder, robot, model, held_out, sought, written)
+    return Standing(folder, robot, model, held_out, sought, written, tolerance)
 
 
-def _told(path: Path) -> tuple[str, str, dict[str, float]]:
-    """Of a summary the robot, the model selected, and its errors held out."""
+def _told(path: Path) -> tuple[str, str, dict[str, float], Tolerance | None]:
+    """Of a summary the robot, the model selected, its errors held out, and the tolerance."""
     try:
         facts = facts_in(store.read(path))
         (robot,) = [str(each.text) for each in facts if each[:3:2] == ("robot", "name")]
         chosen = of(facts, "selection").items()
         (model,) = [item for item, known in chosen if known["selected"].value]
         held_out = of(facts, "held_out_error").get(model, {})
-        return robot, model, {name: float(each.value) for name, each in held_out.items()}
+        known = {name: float(each.value) for name, each in held_out.items()}
+        return robot, model, known, tolerance_in(facts)
     except (LookupError, TypeError, ValueError):
         what = "does not say which robot it is about, or which model is selected"
         raise InputError(Problem(str(path), what, fix=store.remake(path))) from None

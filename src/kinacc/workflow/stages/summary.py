@@ -16,4 +16,6 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     arm = robot.of_text(str(inputs["robot"]["description"][0]), "robot.parquet")
     selected = folder.calibration(inputs, arm)
     share = applicability.share_of_box(selected, *summary.covered(inputs["measurements"], arm))
-    return {"summary": columns_of("summary", summary.facts(inputs, arm, share))}
+    found = summary.facts(inputs, arm, share)
+    found += summary.of_tolerance(settings.get("tolerance"))  # left out where none is set
+    return {"summary": columns_of("summary", found)}

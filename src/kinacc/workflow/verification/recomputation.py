@@ -46,7 +46,7 @@ NOT_AGAIN = {
     "tournament_chunk": "every cell is hundreds of campaigns",
     "tournament_tables": "is about all data sets",
 }
-_FITTED_ROWS = ("vec", "dh", "compliance", "residuals", "data_check", "summary")
+_FITTED_ROWS = ("vec", "dh", "compliance", "residuals", "data_check", "summary", "history")
 
 
 def described() -> dict[str, str]:

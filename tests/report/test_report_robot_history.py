@@ -1,0 +1,55 @@
+"""The section on a robot's history, and its sentence on the first screen."""
+
+from __future__ import annotations
+
+import numpy as np
+from made_up_history import history
+
+from kinacc.deployment.history_words import first_words
+from kinacc.kinematics import robot
+from kinacc.report import robot_history
+from kinacc.report.page import FirstScreen, Page, Picture, Table, Text, html
+
+ARM = robot.load("mh180")
+
+
+def section_of(table):
+    return robot_history.section({"history": table}, ARM)
+
+
+def test_every_line_has_a_row_with_its_verdict_first():
+    found = section_of(history(6, changed=3, open_=4))
+    (table,) = (each for each in found.blocks if isinstance(each, Table))
+    assert [row[:3] for row in table.rows[2:5]] == [
+        ("2026-03-16", "holds", ""),
+        ("2026-04-15", "recalibrate", "4"),
+        ("2026-05-15", "cannot be told", ""),
+    ]
+    assert table.marked == {4: "too few poses"}
+
+
+def test_pictures_show_each_line_and_say_what_it_means():
+    found = section_of(history(6, changed=3))
+    errors, moved = (each for each in found.blocks if isinstance(each, Picture))
+    assert errors.plot.x_range is moved.plot.x_range
+    (data,) = {each.data_source for each in moved.plot.renderers if each.data_source.name}
+    np.testing.assert_allclose(data.data["moved_mm"][3], 0.45, rtol=1e-6)
+    assert data.data["joint_said"][3] == "joint 4"
+    page = html(Page(FirstScreen("a", "b", ("c", False), ("d",), (), ()), (found,)))
+    assert "Recalibrate: 0.30 mm beyond chance, joint 4" not in page  # the last line still holds
+    assert "The last calibration still holds, that of 2026-04-15" in page
+
+
+def test_a_first_line_has_nothing_to_be_held_to():
+    found = section_of(history(1))
+    assert sum(isinstance(each, Picture) for each in found.blocks) == 1
+    (words,) = (each.words for each in found.blocks if isinstance(each, Text))
+    assert words.startswith("The first line of its series")
+
+
+def test_the_first_screen_says_what_the_last_line_says():
+    assert first_words(history(4, changed=3)) == (
+        "History, 4 lines: recalibrate: 0.30 mm beyond chance, joint 4, since the calibration of "
+        "2026-01-15."
+    )
+    assert first_words(history(3)).startswith("History, 3 lines: the last calibration still holds")

@@ -1,0 +1,134 @@
+"""How often `kinacc verify` fails an arm that did not change: python tools/verify_level.py [ARMS]
+
+The physical synthetic arm (mh180) is measured at 2,000 poses; a calibration is fitted to 80 of them
+drawn at random, held out in five shares, and held to handfuls of the others, as the command does
+it: base kept, or moved elsewhere and fitted, or base and tool. Where the arm is to have changed, an
+offset of a joint is added to the reported joints of the handful.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from kinacc import synthetic
+from kinacc.artifacts.error_models import MEASURED, Comparison
+from kinacc.calibration import dh_fit
+from kinacc.calibration.models import Fit
+from kinacc.calibration.observations import Observations, from_columns
+from kinacc.calibration.residuals import cross_validated, errors
+from kinacc.config.schema import defaults
+from kinacc.deployment import handful, verify
+from kinacc.deployment.handful import BASE, TOOL, HeldOut
+from kinacc.geometry import exp_so3
+from kinacc.kinematics import robot
+from kinacc.measurements import folds
+
+POSES, FITTED, ARMS, SIZES = 2000, 80, 150, (5, 8, 12)
+SETUPS: tuple[tuple[str, ...], ...] = ((), (BASE,), (BASE, TOOL))
+WEIGHT = 500.0
+MODEL = Comparison(MEASURED, "dh").name
+
+
+def everything(arm: robot.Robot) -> Observations:
+    """All poses of the physical arm."""
+    settings = defaults()["measurements"]["synthetic"] | {"poses": POSES}
+    columns = synthetic.measure(arm, settings)
+    none = {name: np.full(POSES, np.nan) for name in ("fold",)}
+    columns = {"repeat": np.zeros(POSES), **columns, **none}
+    return from_columns(columns, arm)
+
+
+def fitted(seen: Observations, arm: robot.Robot) -> tuple[Fit, HeldOut, dict]:
+    """A calibration, its errors at poses held out, and places by what was moved."""
+    free = dh_fit.free_parameters(arm.dh.joints)
+
+    def fit(part: Observations, _fold: int = 0) -> dict[str, Fit]:
+        found = dh_fit.fit(
+            part, arm.dh, free=free, rotation_weight_mm_per_rad=WEIGHT, threshold=1e-3
+        )
+        return {"dh": Fit(found.model, found.frames)}
+
+    own = fit(seen)
+    held = cross_validated(seen, fit, range(5), own)[0][MODEL]
+    return own["dh"], held, own
+
+
+def held_out(fit: Fit, held, seen: Observations, moved: tuple[str, ...]) -> HeldOut:
+    """Its held-out errors where ``moved`` is fitted to handfuls."""
+    vectors = held.position_mm[:, None]
+    weight = None
+    if moved:
+        vectors = np.concatenate([vectors, WEIGHT * held.rotation_rad[:, None]], axis=2)
+        weight = WEIGHT
+    return HeldOut(vectors, verify._places(fit.model, seen, fit.frames.targets, moved, weight))
+
+
+def probabilities(
+    fit: Fit, held: HeldOut, rest: Observations, moved: tuple[str, ...], arm, rng, joint, offset
+) -> Iterator[tuple[int, float]]:
+    """Of handfuls of every size, elsewhere where they were moved."""
+    for size in SIZES:
+        few = rest.select(rng.permutation(len(rest))[:size])
+        turn, shift = exp_so3(rng.normal(0.0, 0.5, 3)), rng.normal(0.0, 500.0, 3)
+        if BASE in moved:
+            few = replace(
+                few,
+                position_mm=few.position_mm @ turn.T + shift,
+                rotation=turn @ few.rotation,
+            )
+        q_rad = few.q_rad.copy()
+        q_rad[:, joint] += 1e-3 * offset
+        few = replace(few, q_rad=q_rad)
+        frames = fit.frames
+        if moved:
+            kept = tables_of(fit)
+            frames = verify.frames_at(kept, "dh", fit.model, few, arm, moved, WEIGHT)
+        off = errors({"dh": Fit(fit.model, frames)}, few)[MODEL]
+        vectors = off.position_mm[:, None]
+        if moved:
+            vectors = np.concatenate([vectors, WEIGHT * off.rotation_rad[:, None]], axis=2)
+        weight = WEIGHT if moved else None
+        places = verify._places(fit.model, few, frames.targets, moved, weight)
+        yield size, handful.held_to(held, HeldOut(vectors, places)).probability
+
+
+def tables_of(fit: Fit) -> dict:
+    """The table ``frames`` of a fit."""
+    from kinacc.calibration.tables import frames_columns
+
+    return {"frames": frames_columns({"dh": fit.frames}, ("tool",))}
+
+
+def main(arms: int, joint: int = 0, offset: float = 0.0) -> None:
+    """Print the share of handfuls that fail, by size and by what was moved."""
+    arm = robot.load("mh180")
+    seen, rng = everything(arm), np.random.default_rng(1)
+    found: dict[tuple, list[float]] = {}
+    for _ in range(arms):
+        order = rng.permutation(POSES)
+        own = seen.select(order[:FITTED])
+        own = replace(own, fold=folds.assign(np.arange(FITTED), 5, 0))
+        fit, errors_held, _ = fitted(own, arm)
+        rest = seen.select(order[FITTED:])
+        for moved in SETUPS:
+            held = held_out(fit, errors_held, own, moved)
+            for _ in range(3):
+                told = probabilities(fit, held, rest, moved, arm, rng, joint, offset)
+                for size, probability in told:
+                    found.setdefault((moved, size), []).append(probability)
+    print(f"{arms} calibrations of {FITTED} poses; share that fails at {100 * handful.LEVEL:g} %")
+    for (moved, size), told in found.items():
+        share = 100.0 * np.mean(np.array(told) <= handful.LEVEL)
+        what = " and ".join(moved) or "nothing"
+        print(f"{what} moved, {size} poses: {share:.2f} % of {len(told)}")
+    every = np.concatenate([*found.values()])
+    print(f"all: {100.0 * np.mean(every <= handful.LEVEL):.2f} % of {len(every)}")
+
+
+if __name__ == "__main__":
+    given = [float(each) for each in sys.argv[1:]]
+    main(int(given[0]) if given else ARMS, *((int(given[1]) - 1, given[2]) if given[2:] else ()))
