@@ -69,6 +69,7 @@ SLOW = (
     "deployment/planning/test_exchange.py",
     "deployment/test_applicability.py",
     "deployment/test_compare.py",
+    "deployment/test_verify.py",
     "deployment/test_compensate.py",
     "deployment/test_drift.py",
     "deployment/test_poses_unlike_the_measured.py",
