@@ -58,6 +58,7 @@ SLOW = (
     "gate/test_golden_runs.py",
     "cli/test_answer_at_the_end.py",
     "cli/test_check_data.py",
+    "cli/test_gate_command.py",
     "cli/test_init.py",
     "cli/test_init_readings.py",
     "cli/test_init_robots.py",

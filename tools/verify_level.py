@@ -23,7 +23,7 @@ from kinacc.calibration.residuals import cross_validated, errors
 from kinacc.config.schema import defaults
 from kinacc.deployment import handful, verify
 from kinacc.deployment.handful import BASE, TOOL, HeldOut
-from kinacc.geometry import Pose, exp_so3
+from kinacc.geometry import exp_so3
 from kinacc.kinematics import robot
 from kinacc.measurements import folds
 

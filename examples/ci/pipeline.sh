@@ -30,7 +30,7 @@ environment=$kept/environment-$version-$(cat requirements/*.txt | sha256sum | cu
 if ! test -e "$environment/ready"; then
   python3 -m venv --clear "$environment"
   "$environment/bin/python" -m pip install -q --require-hashes --no-deps \
-    -r requirements/run.txt -r requirements/kinacc.txt
+    -r requirements/run.txt -r requirements/wheel.txt
   "$environment/bin/python" -m kinacc.workflow.warm_up
   touch "$environment/ready"
 fi

@@ -146,7 +146,8 @@ def _verdicts(
         meant = list(datasets) and list(plan.datasets if plan else datasets)
         outcomes += golden.compared(results, against, meant, exact)
     names = list(full) or [each.name for each in report.datasets]
-    screens = first_screens(results, [each for each in names if (results / each).is_dir()])
+    screens = first_screens(results, [each for each in names if each not in broken])
+    screens |= dict.fromkeys(broken, "The results do not hold: nothing is told of them.\n")
     shown = "" if accepted is None else str(accepted)
     return Verdicts(str(results), shown, report.digest, tuple(outcomes), screens)
 

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
+from kinacc.artifacts.history_tables import FIRST, HOLDS, RECALIBRATE
 from kinacc.assess.conformity import ACCEPT, REJECT
 from kinacc.assess.conformity import UNDECIDED as OPEN
 from kinacc.config.gate_rules import LIMITS, limit_key, limited
 from kinacc.config.values import nearest
+from kinacc.deployment.history_words import sentence
 from kinacc.errors import InputError, first_few
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.run_tables import SELECTED, RunTables
@@ -21,8 +23,9 @@ from kinacc.gate.values import Compared, Figure, change_of, figure
 
 Gate = Mapping[str, Any]
 _ROUNDING = 1e-9
+_MORE = "measure more poses; undecided: warn says that what cannot be told fails nothing"
 _DECIDED = {ACCEPT: PASSED, REJECT: FAILED, OPEN: UNDECIDED}
-_OF_HISTORY = {"first": PASSED, "holds": PASSED, "recalibrate": FAILED}
+_OF_HISTORY = {FIRST: PASSED, HOLDS: PASSED, RECALIBRATE: FAILED}
 # What a configuration calls a verdict, and the verdict.
 _MEANT = {"fail": FAILED, "warn": WARNED, "pass": UNDECIDED}
 
@@ -44,7 +47,7 @@ def judged(
         tables = RunTables(results / name)
         for gate in full["gates"]:
             if name in broken:
-                says = "undecided: not looked at, since the results do not hold"
+                says = "not looked at: the results do not hold"
                 found.append(_outcome(gate, name, UNDECIDED, says, f"first mend results of {name}"))
             else:
                 found.append(
@@ -71,12 +74,12 @@ def of_gate(
         first = error.problems[0]
         says = f"{first.where} {first.what}"
         found = _outcome(gate, dataset, FAILED, says, first.fix)
-    verdict = found.verdict
+    verdict, fix = found.verdict, found.fix
     if verdict == UNDECIDED:
-        verdict = _MEANT[gate["undecided"]]
+        verdict, fix = _MEANT[gate["undecided"]], fix or _MORE
     if verdict == FAILED:
         verdict = _MEANT[gate["on_fail"]]
-    return replace(found, verdict=verdict)
+    return replace(found, verdict=verdict, fix=fix)
 
 
 def _outcome(
@@ -266,10 +269,10 @@ def _history(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome
     verdict = str(last["verdict"])
     numbers = ("moved_mm", "chance_mm", "beyond_mm", "probability")
     figures = {name: float(last[name]) for name in numbers} | {"lines": len(table["verdict"])}
-    says = f"{last['series']}: {verdict}"
-    says += f", {last['reason']}" if last["reason"] else ""
-    fix = "calibrate the arm anew, or find out what moved: docs/history.md"
-    return _outcome(gate, dataset, _OF_HISTORY.get(verdict, UNDECIDED), says, fix, figures)
+    says = f"{last['series']}: {sentence(table)}"
+    becomes = _OF_HISTORY.get(verdict, UNDECIDED)
+    fix = "" if becomes == UNDECIDED else "calibrate the arm anew, or find out what moved"
+    return _outcome(gate, dataset, becomes, says, fix, figures)
 
 
 _KINDS = {

@@ -18,11 +18,13 @@ from kinacc.gate.accepted import held
 from kinacc.gate.causes import Causes, in_words
 from kinacc.gate.made import Made, datasets_in, made
 from kinacc.gate.outcome import (
+    CODE,
     CONFIGURATION,
     FAILED,
     PASSED,
     SEED,
     UNEXPLAINED,
+    VERSION,
     Cause,
     Difference,
     Outcome,
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 NAME, KIND = "accepted run", "accepted"
 # What simulations leave: other numbers by another seed, or by more of them.
 _RANDOM = ("study_chunk", "study", "study_summary", "readings", "histories")
-_REPETITIONS = "study.repetitions"
+_DRAWN_BY = ((SEED, "seed"), (CONFIGURATION, "study.repetitions"))
 
 
 def compared(
@@ -76,17 +78,20 @@ class _Comparison:
 
     @cached_property
     def is_drawn_anew(self) -> bool:
-        """Whether the study differs, by its seed or repetitions alone."""
+        """Whether the study differs and was drawn anew, by another seed or number of repetitions.
+
+        Other code or versions beside these do not count, other settings and points do.
+        """
         stage = STAGES["study_chunk"]
         if not (self.before.record(stage.name) and self.now.record(stage.name)):
             return False
         if self.before.digest(stage.name, stage) == self.now.digest(stage.name, stage):
             return False
         why = self.causes.of_stage(stage.name)
-        only = {(SEED, "seed"), (CONFIGURATION, _REPETITIONS)}
-        return {(each.kind, each.where) for each in why} <= only and not self.of_table(
-            "assessment_points", STAGES["assessment_points"]
-        )
+        drawn = [each for each in why if (each.kind, each.where) in _DRAWN_BY]
+        others = {each.kind for each in why if each not in drawn}
+        points = STAGES["assessment_points"]
+        return bool(drawn) and others <= {CODE, VERSION} and not self.of_table(points.name, points)
 
     def stages(self) -> dict[str, Stage]:
         """Every table of either run with the stage that makes it, in the order they follow."""

@@ -44,7 +44,7 @@ class RunTables(dict[str, Columns]):
 def maker_of_table(artefact: str) -> str:
     """The command that makes a table, in words."""
     if artefact == "history":
-        return "give the data set a series of measured files, of which it is the history"
+        return "give the data set a series (docs/history.md) and calibrate it"
     stage = maker_of(artefact)
     calibrated = stage.name in CALIBRATION or stage.fits
     command = shlex.join(["kinacc", "calibrate" if calibrated else "study", "FILE.yaml"])
