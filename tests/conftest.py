@@ -79,6 +79,7 @@ SLOW = (
     "kinematics/inverse/test_any_arm.py",
     "measurements/test_what_files_hold.py",
     "mutation",
+    "planted",
     "report/test_in_a_browser.py",
     "study/tournament/test_tournament.py",
     "synthetic/test_accepted.py",
