@@ -83,11 +83,13 @@ each other. *{by_std}*: an entry of a covariance may differ as it does when both
 differ by what their units allow. In `*_fit` the rows `undetermined_direction` (one basis of many of
 what the poses leave open), `gap` and `last_step` (both decided by rounding) are not compared.
 
-Simulations are equal where seed and repetitions are. Where one of these alone changed,
-`study_summary.mean_mm` is held to the standard errors of both runs, `{std_error}`:
-allowed are z standard errors of the difference, z from the normal distribution so that one in a
-thousand such tables is said to differ by chance alone, whatever its number of rows (Bonferroni).
-Single simulations, smallest and largest values and `histories` are not compared then.
+Simulations are equal where seed and repetitions are. Where these changed, and neither other
+settings of the study nor its points, `study_summary.mean_mm` is held to the standard errors of both
+runs, `{std_error}`: allowed are t standard errors of the difference, t of
+Student's distribution (degrees of freedom of the mean of fewer repetitions) so that one in a
+thousand such tables is said to differ by chance alone, whatever its number of rows (Bonferroni):
+4.2 standard errors with 18 rows of 100 repetitions. Single simulations, smallest and largest
+values, `histories` and the claims on these are not compared then; nor is a study of one repetition.
 
 ## What a check computes again
 

@@ -144,7 +144,7 @@ def run(same: int, other: int, out: Path) -> None:
         size[plans] = size.get(plans, 0) + per_unit
         count[plans] += 1
         if done % 20 == 0 or done == len(years):
-            _write(out / "decisions.csv", decisions)
+            _write(out / "years.csv", [*_years(decisions)])
             _write(out / "power.csv", [*_power(seen, size, count)])
             alarms = {each: _with_alarm(decisions, each) for each in count}
             print(f"years with a false alarm: {alarms} of {dict(count)}", flush=True)
@@ -152,6 +152,21 @@ def run(same: int, other: int, out: Path) -> None:
 
 def _with_alarm(decisions: list[dict], plans: str) -> int:
     return len({each["year"] for each in decisions if each["alarm"] and each["plans"] == plans})
+
+
+def _years(decisions: list[dict]) -> Iterator[dict]:
+    """A row a year: how many of its decisions were false alarms, and how near the others came."""
+    for plans, number in dict.fromkeys((each["plans"], each["year"]) for each in decisions):
+        ours = [each for each in decisions if (each["plans"], each["year"]) == (plans, number)]
+        yield {
+            "plans": plans,
+            "year": number,
+            "decisions": len(ours),
+            "false_alarms": sum(each["alarm"] for each in ours),
+            "least_probability": min(each["probability"] for each in ours),
+            "median_moved_mm": float(np.median([each["moved_mm"] for each in ours])),
+            "median_chance_mm": float(np.median([each["chance_mm"] for each in ours])),
+        }
 
 
 def _power(seen: dict, size: dict, count: Counter) -> Iterator[dict]:
@@ -190,7 +205,7 @@ def draw(out: Path) -> None:
 
     with (out / "power.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["parameter"] == "theta"]
-    figure = Figure(figsize=(8.0, 3.4), layout="constrained")
+    figure = Figure(figsize=(8.0, 3.9), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     titles = {SAME: "the same poses every month", OTHER: "other poses every month"}
     for panel, plans in zip(panels, titles, strict=True):
@@ -207,7 +222,7 @@ def draw(out: Path) -> None:
         panel.set(title=titles[plans], xlabel="change of one joint's offset, mrad")
         panel.set(xlim=(0.0, 1.0 if plans == SAME else 4.0), ylim=(0.0, 102.0))
     panels[0].set_ylabel("months that say recalibrate, %")
-    panels[1].legend(fontsize=8, loc="lower right")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     figure.savefig(out / "power.png", dpi=150)
 
 

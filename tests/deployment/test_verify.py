@@ -14,6 +14,7 @@ from kinacc.artifacts import store
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.summary import of_errors
 from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
+from kinacc.deployment.handful import HeldOut, Places, held_to
 from kinacc.deployment.predict import predict
 from kinacc.deployment.verify import trials
 from kinacc.geometry import Pose, compose, exp_so3
@@ -234,6 +235,35 @@ def test_an_arm_that_changed_fails_and_the_next_command_tells_arm_from_set_up(fo
     said = json.loads(asked(found, file, "--json"))
     assert said["here"]["mean_mm"] > said["limit_mm"]
     assert said["probability"] <= said["level"]
+
+
+def test_a_joint_that_lost_its_zero_is_named(folder, later):
+    """Where nothing but joint 3 is off, by less than would double the errors."""
+    _, found = folder
+    file = later(1.0, 12)
+    header, *rows = (file.parent / "today.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    moved = [[*row[:2], f"{float(row[2]) + 1.5e-3:.17g}", *row[3:]] for row in cells]
+    (file.parent / "today.csv").write_text("\n".join([header, *map(",".join, moved)]) + "\n")
+    told = asked(found, file)
+    assert "the errors look most like an offset of joint 3 by" in told
+    said = json.loads(asked(found, file, "--json"))
+    assert said["offsets_mm"] > said["offsets_limit_mm"]
+    assert said["most_like_offset_of_joint"] == 3
+    assert abs(said["most_like_offset"]) == pytest.approx(1.5, rel=0.4)
+
+
+def test_the_level_does_not_rest_on_how_errors_are_spread():
+    """Of arms that did not change as many fail as is said, though some errors are huge."""
+    rng, told = np.random.default_rng(4), []
+    for _ in range(100):
+        sizes = rng.lognormal(0.0, 1.0, (46, 1, 1)) * rng.normal(size=(46, 1, 3))
+        slopes, joints = np.zeros((46, 1, 3, 0)), rng.normal(size=(46, 1, 3, 2))
+        every = HeldOut(sizes, Places(slopes, joints))
+        found = held_to(every.select(np.arange(6, 46)), every.select(np.arange(6)))
+        told.append(found.probability)
+    assert np.mean(np.array(told) <= 0.1) == pytest.approx(0.1, abs=0.05)
+    assert 0.2 < np.mean(np.array(told) <= 0.5) <= 0.5  # of two that go together, each at half
 
 
 def test_too_few_that_are_no_worse_say_how_many_it_takes(folder, later):

@@ -95,7 +95,7 @@ def in_lines_of_a_log(text: str) -> list[str]:
 
 def test_a_person_at_a_terminal_sees_what_failed_first_and_what_to_do():
     lines = as_text(VERDICTS, 80).splitlines()
-    verdicts = [line.split()[0] for line in lines if line[0] != " "]
+    verdicts = [line.split()[0] for line in lines if line and line[0] != " "]
     assert verdicts[:4] == ["failed", "undecided", "warned", "passed"]
     assert lines[0] == "failed     cell, accepted: 2 tables differ from the accepted run"
     assert "results: failed (1 failed, 1 undecided, 1 warned, 1 passed of 4 gates)" in lines
@@ -220,7 +220,22 @@ def test_gates_of_several_robots_are_suites_of_their_own():
 def test_github_shows_what_did_not_pass_beside_its_file():
     lines = annotations(VERDICTS, "github")
     assert lines[0].startswith("::error file=config.yaml,title=cell%2C accepted::2 tables differ")
+    assert lines[1].startswith("::warning file=results,title=cell%2C march::neither")
     assert [line.split(" ")[0] for line in lines] == ["::error", "::warning", "::warning"]
+
+
+def test_a_gate_without_a_file_is_shown_at_the_table_that_differs():
+    unnamed = replace(VERDICTS, outcomes=(replace(VERDICTS.outcomes[3], file=""),))
+    (line,) = annotations(unnamed, "plain")
+    assert line.startswith("results/cell/residuals.parquet:1: error: cell, accepted: 2 tables")
+
+
+def test_a_verdict_is_said_once():
+    says = "undecided: 12 poses are too few"
+    cannot = replace(VERDICTS, outcomes=(replace(VERDICTS.outcomes[2], says=says),))
+    assert as_text(cannot, 200).startswith("undecided  cell, march: 12 poses are too few")
+    (case,) = ElementTree.fromstring(as_junit(cannot)).iter("testcase")
+    assert case.find("skipped").get("message") == says
 
 
 def test_gitlab_shows_it_as_code_quality():

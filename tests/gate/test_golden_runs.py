@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from runs_by_hand import KEYS, Run, put_in
 
-from kinacc.artifacts import records
+from kinacc.artifacts import records, store
+from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.errors import InputError
 from kinacc.gate.causes import Causes
 from kinacc.gate.golden import compared
@@ -25,6 +27,7 @@ from kinacc.gate.outcome import (
     UNEXPLAINED,
     VERSION,
 )
+from kinacc.gate.table_comparison import within_chance
 from kinacc.workflow.catalogue import STAGES
 
 
@@ -290,6 +293,23 @@ def test_a_study_drawn_anew_is_held_to_its_standard_errors(held, seed, repetitio
     assert "held to study_summary.std_error_mm" in outcome.says
 
 
+def test_a_study_of_three_repetitions_drawn_anew_raises_no_alarm():
+    from runs_by_hand import _study
+
+    artefact = ARTEFACTS["study_summary"]
+    marks = dict.fromkeys(store.PROVENANCE_KEYS, "-")
+    drawn_anew = [
+        store.to_table(artefact.name, _study(seed, 3)[artefact.name], marks) for seed in range(60)
+    ]
+    # Held to a normal distribution several would be told.
+    assert not any(within_chance(artefact, *pair) for pair in pairwise(drawn_anew))
+
+
+def test_a_release_beside_more_repetitions_is_no_reason_to_ask_for_the_same_simulations(held):
+    outcome = held(Run(), drawn(1, 90).with_code("study_chunk", "kinacc.study.monte_carlo"))
+    assert outcome.verdict == PASSED
+
+
 def test_a_study_drawn_anew_whose_means_are_others_is_told(held, monkeypatch):
     import runs_by_hand
 
@@ -337,6 +357,16 @@ def test_claims_on_a_study_drawn_anew_are_left_aside_and_others_are_not(tmp_path
         "verdict",
         "claim=table_3.mean",
     )
+
+
+def test_another_setting_of_a_stage_beside_more_repetitions_is_compared_by_numbers(held):
+    now = drawn(1, 90).with_keys("study", study={"search": "bisection"})
+    found = told(held(Run(), now))
+    assert {name for name, _ in found} == {"study", "study_summary", "claims"}
+    assert {where for _, where in found["study_summary", "mean_mm"]} == {
+        "study.repetitions",
+        "study.search",
+    }
 
 
 def test_a_study_of_other_points_is_compared_number_by_number(held):

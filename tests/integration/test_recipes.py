@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import typed_commands
-from build_servers import Ended, Server, on_github, on_gitlab, on_one_machine
+from build_servers import RECIPES, Ended, Server, on_github, on_gitlab, on_one_machine
 from whole_project import write_poses
+
+from kinacc.workflow.contradictions import load
 
 # Models alone, as the recipes have it.
 STUDY = """\
@@ -75,7 +78,7 @@ def team(tmp_path_factory, shell) -> Team:
     (team.clone / ".gitignore").write_text("results/\n.snakemake/\n.cache/\n.venv/\ngate.*\n")
     (team.clone / "requirements").mkdir()
     shutil.copy(typed_commands.ROOT / "requirements" / "run.txt", team.clone / "requirements")
-    (team.clone / "requirements" / "kinacc.txt").write_text("./wheels/kinacc.whl --hash=sha256:0\n")
+    (team.clone / "requirements" / "wheel.txt").write_text("./wheels/kinacc.whl --hash=sha256:0\n")
     team.push("The study")
     return team
 
@@ -172,3 +175,28 @@ def passed_without_computing(server: Server, warm: Ended) -> None:
     assert not report.is_symlink()
     (installed,) = server.asked.read_text().splitlines()
     assert "--require-hashes" in installed
+
+
+def test_the_small_study_of_the_paper_is_smaller_in_what_it_says_alone():
+    def flat(section: Mapping, place: str = "") -> dict[str, object]:
+        found: dict[str, object] = {}
+        for key, value in section.items():
+            deep = isinstance(value, Mapping) and value
+            found |= flat(value, f"{place}{key}.") if deep else {f"{place}{key}": value}
+        return found
+
+    small, whole = (
+        flat(load([str(path)])["mh180"])
+        for path in (RECIPES / "paper-small.yaml", typed_commands.ROOT / "config.yaml")
+    )
+    other = {key for key in small.keys() | whole.keys() if small.get(key) != whole.get(key)}
+    said = {"map.grid_mm", "study.noise_mm", "study.repetitions", "figures.formats"}
+    assert other == said | {"gates"}
+
+
+def test_recipes_pin_what_they_use_and_leave_accepting_to_people():
+    for path in RECIPES.iterdir():
+        text = path.read_text()
+        assert "kinacc accept" not in text
+        for used in re.findall(r"uses: (.*)", text):
+            assert re.fullmatch(r"[\w/-]+@v\d+\.\d+\.\d+", used), used

@@ -1,4 +1,4 @@
-"""A finished study with an accepted run, to be changed and brought back."""
+"""A finished study with an accepted run, made once; each file of tests has a copy to change."""
 
 from __future__ import annotations
 
@@ -7,18 +7,25 @@ import sys
 from pathlib import Path
 
 import pytest
+import shared_work
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "corruption")]
 
 
-@pytest.fixture(scope="module")
-def base(tmp_path_factory):
-    from worlds import finished
+@pytest.fixture(scope="session")
+def made(tmp_path_factory) -> Path:
+    """Folder of the trials, which nobody changes."""
+    from planted import Trials
 
-    world = finished(tmp_path_factory.mktemp("planted") / "base")
-    world.accept()
-    return world
+    return shared_work.once(tmp_path_factory, "planted trials", Trials)
+
+
+@pytest.fixture(scope="module")
+def base(made, tmp_path_factory):
+    from worlds import World
+
+    return World(made / "base").copied(tmp_path_factory.mktemp("planted") / "base")
 
 
 @pytest.fixture

@@ -45,7 +45,8 @@ class Trials:
         self.folder = folder
         self.base, self.older = World(folder / "base"), World(folder / "older")
         if not (folder / "ready").exists():
-            shutil.rmtree(folder, ignore_errors=True)
+            for each in ("base", "older", "tree"):
+                shutil.rmtree(folder / each, ignore_errors=True)
             finished(self.base.folder).accept()
             older = write_world(self.older.folder)
             older.configure(OTHER_RUN)
@@ -109,7 +110,8 @@ class Trials:
             return
         name, old, new = code
         path = tree / "kinacc" / name
-        before, times = path.read_text(), path.stat()
+        right = SOURCE / name  # a run that was killed leaves the tree changed
+        before, times = right.read_text(), right.stat()
         try:
             path.write_text(before.replace(old, new, 1) if old else before + new)
             if old and old not in before:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import judged
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -11,6 +10,8 @@ import tampered
 from worlds import World
 
 from kinacc.artifacts import store
+from kinacc.gate import golden
+from kinacc.gate.outcome import Difference
 
 
 def changed(world: World, dataset: str, artefact: str, change, renewed: bool = True) -> None:
@@ -24,21 +25,12 @@ def changed(world: World, dataset: str, artefact: str, change, renewed: bool = T
     tampered.write(world, dataset, artefact, new, renewed)
 
 
-def compared(world: World, *options: str) -> tuple[str, list[dict]]:
-    """Verdict of the worst comparison with the accepted run, and all differences it names."""
-    told = world.gate(*options).told
-    outcomes = [each for each in judged.mappings(told) if each.get("kind") == "accepted"]
-    assert outcomes, told
-    found = [
-        each
-        for outcome in outcomes
-        for each in judged.mappings(outcome)
-        if {"artefact", "causes"} <= each.keys()
-    ]
-    verdicts = {each["verdict"] for each in outcomes}
-    return (
-        "failed" if "failed" in verdicts else "passed" if verdicts == {"passed"} else "?"
-    ), found
+def compared(world: World, exact: bool = False) -> tuple[str, list[Difference]]:
+    """The worst verdict on both data sets, and all differences that are named."""
+    outcomes = golden.compared(world.results, world.accepted, ["mh180", "own"], exact)
+    verdicts = {each.verdict for each in outcomes}
+    found = [each for outcome in outcomes for each in outcome.differences]
+    return (verdicts.pop() if len(verdicts) == 1 else "failed"), found
 
 
 def plus(column: str, row: int, by: float):
@@ -73,12 +65,12 @@ def test_a_number_off_by_less_or_more_than_its_unit_allows(
     said, found = compared(world)
     assert said == verdict, found
     if verdict == "failed":
-        (one,) = [each for each in found if each["artefact"] == artefact]
-        assert (one["dataset"], one["column"]) == (dataset, column)
-        assert one["rows"] == 1
-        assert one["largest"] == pytest.approx(times * within, rel=0.05)
-        assert [cause["kind"] for cause in one["causes"]] == ["unexplained"]
-        assert {each["artefact"] for each in found} == {artefact}
+        (one,) = [each for each in found if each.artefact == artefact]
+        assert (one.dataset, one.column) == (dataset, column)
+        assert one.rows == 1
+        assert one.largest == pytest.approx(times * within, rel=0.05)
+        assert [cause.kind for cause in one.causes] == ["unexplained"]
+        assert {each.artefact for each in found} == {artefact}
 
 
 def swapped_words(columns: dict) -> dict:
@@ -124,7 +116,7 @@ def test_words_whole_numbers_nulls_and_rows_are_held_to_be_equal(world, artefact
     changed(world, "mh180", artefact, change)
     said, found = compared(world)
     assert said == "failed"
-    assert {(each["dataset"], each["artefact"]) for each in found} == {("mh180", artefact)}
+    assert {(each.dataset, each.artefact) for each in found} == {("mh180", artefact)}
 
 
 def test_rows_in_another_order_are_matched_by_their_key(world):
@@ -168,14 +160,14 @@ def test_parameters_that_predict_other_poses_are_told(world, base_mm, d_mm):
     along_first_axis(world, base_mm, d_mm)
     said, found = compared(world)
     assert said == "failed"
-    assert {each["artefact"] for each in found} <= {"frames", "dh_model"}
+    assert {each.artefact for each in found} <= {"frames", "dh_model"}
 
 
 def test_a_table_that_is_gone_and_one_that_is_new_are_named(world):
     (world.results / "mh180" / "claims.parquet").unlink()
     said, found = compared(world)
     assert said == "failed"
-    assert ("mh180", "claims") in {(each["dataset"], each["artefact"]) for each in found}
+    assert ("mh180", "claims") in {(each.dataset, each.artefact) for each in found}
 
 
 def test_bytes_are_compared_where_that_is_asked_for(world):
@@ -185,7 +177,7 @@ def test_bytes_are_compared_where_that_is_asked_for(world):
     tampered.write(world, "own", "pose_errors", table.replace_schema_metadata(more), True)
     assert store.columns_digest(pq.read_table(path)) == store.columns_digest(table)
     assert compared(world) == ("passed", [])
-    said, found = compared(world, "--exact")
+    said, found = compared(world, exact=True)
     assert said == "failed"
     (one,) = found
-    assert (one["dataset"], one["artefact"].removesuffix(".parquet")) == ("own", "pose_errors")
+    assert (one.dataset, one.artefact.removesuffix(".parquet")) == ("own", "pose_errors")

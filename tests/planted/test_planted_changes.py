@@ -9,24 +9,21 @@ import unchanged
 from planted import Trials
 
 PLANTED = (
-    "input: row 33, x_mm by 1e-09",
-    "code: kinacc.workflow.stages.accuracy_map, position_max_mm of accuracy_map",
-    "comment: kinacc.study.histories",
+    "input: row 33, x_mm by 1e-9",
+    "code: kinacc.workflow.stages.claims, reproduced of claims",
     "version: scipy",
-    "version: numpy, gamma99 times 1.001",
-    "calibration.dh.truncation: 0.002",
+    "map.grid_mm: 200.0",
     "repetitions: 3",
     "swapped: own/pose_errors, digests renewed",
     "edited: mh180/accuracy_map",
     "not the same twice: own, gamma99",
-    "worse: 2 mm of noise",
 )
-UNCHANGED = ("other folder: two words", "chunks: 3", "restored 2", "order 5")
+UNCHANGED = ("chunks in place: 3", "restored 2")
 
 
 @pytest.fixture(scope="module")
-def trials(tmp_path_factory) -> Trials:
-    return Trials(tmp_path_factory.mktemp("planted") / "trials")
+def trials(made) -> Trials:
+    return Trials(made)
 
 
 @pytest.mark.parametrize("name", PLANTED)

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from unittest.mock import patch
@@ -268,7 +269,7 @@ def other_numbers(module: str, function: str, factor: float) -> Iterator[None]:
 
     As a library of another version may round otherwise, or a machine that makes mistakes.
     """
-    right = getattr(sys.modules[module], function)
+    right = getattr(import_module(module), function)
 
     def wrong(*given: object, **named: object) -> object:
         return right(*given, **named) * factor

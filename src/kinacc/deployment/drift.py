@@ -2,7 +2,8 @@
 
 The last calibration holds unless the arm moved, over the poses of a later series, by more than an
 arm shows that did not change: see ``drift_chance`` for what that is taken to be. The level is that
-of a year of monthly calibrations.
+of a year of monthly calibrations. Where most of the later series lies outside the joint ranges of
+the one in force, that is no test of the arm but of the model, and nothing can be told.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ SAME, MOVED = "same", "moved"
 FIRST, HOLDS, RECALIBRATE, OPEN = "first", "holds", "recalibrate", "cannot be told"
 LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
 LEAST = 20  # configurations of a series that chance is resampled from
+ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
 _TEXT = ("series", "date", "digest", "base", "tool", "model", "in_force", "verdict", "reason")
 _WHOLE = ("rows", "configurations")
 
@@ -136,6 +138,13 @@ class _Comparison:
             "probability": found.probability,
             "verdict": HOLDS,
         }
+        there = drift_pairs.share_inside(second.q_rad, first.q_rad, robot.dh.prismatic)
+        if there < ENOUGH:
+            what = (
+                f"only {there:.0%} of the readings lie in the joint ranges of {force.name}: what "
+                "a calibration says where nothing was measured tells of no change"
+            )
+            return row | {"verdict": OPEN, "reason": what}
         if moved_mm > chance_mm:
             joint = joint_of(found, robot.dh.prismatic)
             return row | {"verdict": RECALIBRATE, "joint": np.nan if joint is None else joint}

@@ -165,7 +165,7 @@ def _variances(
         spread, _ = scipy.linalg.lapack.dpotri(lower, lower=1, overwrite_c=1)
         informed = 1.0 - held * spread.diagonal()
         unexplained = square - 2.0 * found @ right + found @ inner @ found
-        noise = unexplained / (left - informed.sum())
+        noise = unexplained / max(left - informed.sum(), 1.0)
         told = np.bincount(group, informed, len(sizes))
         new = np.bincount(group, found**2, len(sizes)) / np.maximum(told, np.finfo(float).tiny)
         new = np.maximum(new, _LEAST_MM**2)

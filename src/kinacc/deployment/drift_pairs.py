@@ -19,7 +19,7 @@ from kinacc.kinematics import vec
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.robot import carried
 from kinacc.kinematics.vec import ERRORS
-from kinacc.measurements.folds import configurations
+from kinacc.measurements.folds import SAME_CONFIGURATION_RAD, configurations
 
 ORDER = 8  # of the polynomials of the misfit; finer misfit differs between configurations
 CUTS = 2  # of one series into halves, across the widest directions of its joints
@@ -153,6 +153,15 @@ def all_shared(pair: Pair) -> bool:
     """Whether all configurations of both series are the same."""
     one, other = (np.unique(pair.cluster[pair.second == each]) for each in (False, True))
     return np.array_equal(one, other)
+
+
+def share_inside(q_rad: np.ndarray, ranged_rad: np.ndarray, prismatic: np.ndarray) -> float:
+    """Share of joints (n, k) that lie in the ranges of others (m, k), but for full turns."""
+    low = ranged_rad.min(axis=0) - SAME_CONFIGURATION_RAD
+    above = q_rad - low
+    above = np.where(prismatic, above, np.mod(above, 2.0 * np.pi))
+    wide = ranged_rad.max(axis=0) + SAME_CONFIGURATION_RAD - low
+    return float(np.mean(np.all((above >= 0.0) & (above <= wide), axis=1)))
 
 
 def halves(series: Pair, q_rad: np.ndarray, setup: Setup) -> Iterator[Pair]:

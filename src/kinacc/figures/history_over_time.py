@@ -29,6 +29,7 @@ VERDICTS = {
 _STATISTICS = (("mean", "-", 1.3), ("quantile_99", (0, (4, 1.5)), 1.0), ("largest", "", 0.0))
 _MANY = 24  # lines: markers get smaller
 _ROOM_DAYS = 20.0  # beside a history of one line
+_LEAST_SPAN_C = 1.0  # either way: less is no change worth a look
 _DAYS_APART = 0.14  # of the history, where every day has room for its own label
 
 
@@ -59,7 +60,9 @@ def draw(history: Columns, *, dataset: str | None = None) -> Figure:
             size = 3.0 if len(date) <= _MANY else 1.5
             panels[2].plot(date, warm, "o-", color=style.PURPLE, ms=size, lw=0.9)
             panels[2].set_ylabel("°C")
-            panels[2].margins(y=0.2)
+            middle = 0.5 * (np.nanmin(warm) + np.nanmax(warm))
+            half = max(0.6 * float(np.ptp(warm[np.isfinite(warm)])), _LEAST_SPAN_C)
+            panels[2].set_ylim(middle - half, middle + half)
         for panel in panels:
             for day in date[verdicts == RECALIBRATE]:
                 panel.axvline(day, color=style.VERMILION, lw=0.7, ls=(0, (1, 1.5)), zorder=0.5)

@@ -21,6 +21,7 @@ from kinacc.gate.outcome import (
 from kinacc.workflow.catalogue import maker_of
 
 _PACKAGE = "kinacc"
+_KINDS = (UNEXPLAINED, INPUT, CONFIGURATION, SEED, VERSION, CODE)
 # Keys of the configuration that name the file of a role.
 _KEYS = {
     "measurements_file": "measurements.file.path",
@@ -59,7 +60,7 @@ class Causes:
             if was != is_ and not _is_file(role):
                 found |= dict.fromkeys(self._read(role, was, is_))
         found |= dict.fromkeys(self._made_from_others(name, new))
-        return tuple(found) or (Cause(UNEXPLAINED, name),)
+        return _in_order(found) or (Cause(UNEXPLAINED, name),)
 
     def _read(self, role: str, was: str, is_: str) -> Iterable[Cause]:
         """Causes of another table that was read, of this data set or of another."""
@@ -98,11 +99,11 @@ class Causes:
             for cause in changes(old, new)
             if cause.kind == CONFIGURATION
         }
-        return tuple(found) or (Cause(UNEXPLAINED, name),)
+        return _in_order(found) or (Cause(UNEXPLAINED, name),)
 
     def own(self) -> tuple[Cause, ...]:
         """All that changed, whether anything differs for it or not."""
-        return tuple(
+        return _in_order(
             dict.fromkeys(
                 cause
                 for stage in self.now.stages()
@@ -160,6 +161,11 @@ def _unequal(
     for key in sorted({**old, **new}):
         if old.get(key) != new.get(key):
             yield key, old.get(key), new.get(key)
+
+
+def _in_order(causes: Iterable[Cause]) -> tuple[Cause, ...]:
+    """Causes by kind, what a person decides on first, and by name."""
+    return tuple(sorted(causes, key=lambda each: (_KINDS.index(each.kind), each.where)))
 
 
 def _files(old: Record, new: Record) -> Iterator[Cause]:

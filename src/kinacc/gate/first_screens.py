@@ -28,5 +28,5 @@ def _one(folder: Path, name: str) -> str:
         kept = {role: table for role, table in tables.items() if role not in old}
         screen, _ = first_screen(folder, name, kept, campaign_of(folder, kept), sorted(old))
     except InputError as error:
-        return f"{error}\n"
+        return "".join(f"not told: {each}\n" for each in error.problems)
     return plain_text(screen)

@@ -18,11 +18,13 @@ from kinacc.gate.accepted import held
 from kinacc.gate.causes import Causes, in_words
 from kinacc.gate.made import Made, datasets_in, made
 from kinacc.gate.outcome import (
+    CODE,
     CONFIGURATION,
     FAILED,
     PASSED,
     SEED,
     UNEXPLAINED,
+    VERSION,
     Cause,
     Difference,
     Outcome,
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 NAME, KIND = "accepted run", "accepted"
 # What simulations leave: other numbers by another seed, or by more of them.
 _RANDOM = ("study_chunk", "study", "study_summary", "readings", "histories")
-_REPETITIONS = "study.repetitions"
+_DRAWN_BY = ((SEED, "seed"), (CONFIGURATION, "study.repetitions"))
 
 
 def compared(
@@ -74,19 +76,20 @@ class _Comparison:
 
         return apart(self.before, self.now)
 
-    @cached_property
-    def is_drawn_anew(self) -> bool:
-        """Whether the study differs, by its seed or repetitions alone."""
-        stage = STAGES["study_chunk"]
-        if not (self.before.record(stage.name) and self.now.record(stage.name)):
-            return False
-        if self.before.digest(stage.name, stage) == self.now.digest(stage.name, stage):
-            return False
+    def is_drawn_anew(self, stage: Stage) -> bool:
+        """Whether simulations are others by their seed or number.
+
+        Other code or versions beside these do not count, other settings and points do.
+        """
         why = self.causes.of_stage(stage.name)
-        only = {(SEED, "seed"), (CONFIGURATION, _REPETITIONS)}
-        return {(each.kind, each.where) for each in why} <= only and not self.of_table(
-            "assessment_points", STAGES["assessment_points"]
-        )
+        drawn = [each for each in why if (each.kind, each.where) in _DRAWN_BY]
+        others = {each.kind for each in why if each not in drawn}
+        return bool(drawn) and others <= {CODE, VERSION} and self._has_the_same_points
+
+    @cached_property
+    def _has_the_same_points(self) -> bool:
+        points = STAGES["assessment_points"]
+        return not self.of_table(points.name, points)
 
     def stages(self) -> dict[str, Stage]:
         """Every table of either run with the stage that makes it, in the order they follow."""
@@ -107,9 +110,9 @@ class _Comparison:
             tables = [_table(each, artefact, stage) for each in (self.before, self.now)]
         except InputError as error:
             return [Found("", error.problems[0].what, 0, 0)]
-        if artefact in _RANDOM and not edited and self.is_drawn_anew:
+        if artefact in _RANDOM and not edited and self.is_drawn_anew(stage):
             return within_chance(ARTEFACTS[artefact], *tables)
-        if artefact == "claims" and self.is_drawn_anew:
+        if artefact == "claims" and self.is_drawn_anew(stage):
             tables = [_without_simulations(each) for each in tables]
         found = self._by_poses(artefact, differences(ARTEFACTS[artefact], *tables))
         if edited and not found:
@@ -210,7 +213,9 @@ def _outcome(name: str, both: _Comparison, exact: bool) -> Outcome:
     artefacts = [*dict.fromkeys(each.artefact for each in found)]
     figures = {"tables": count, "artefacts_that_differ": len(artefacts)}
     anew = ""
-    if both.is_drawn_anew:
+    study = STAGES["study_chunk"]
+    there = both.before.record(study.name) and both.now.record(study.name)
+    if there and both.is_drawn_anew(study):
         anew = f" (the study is drawn anew: its means are held to {BY_STD_ERROR}, no single run is)"
     if not found:
         says = f"{count} tables are as in the accepted run{' to the byte' if exact else ''}{anew}"

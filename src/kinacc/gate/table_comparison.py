@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 
 import numpy as np
 import pyarrow as pa
@@ -28,7 +27,7 @@ _OF_ANY_UNIT = 1e-9
 # value that counts is above one that is zero but for rounding.
 _ROUNDING = ("last_step", "gap")
 _DIRECTION = "undetermined_direction"
-_MEAN, _STD_ERROR = "mean_mm", "std_error_mm"
+_MEAN, _STD_ERROR, _REPETITIONS = "mean_mm", "std_error_mm", "repetitions"
 _ALARM = 1e-3
 
 
@@ -75,28 +74,41 @@ def differences(artefact: Artefact, before: pa.Table, now: pa.Table) -> list[Fou
 def within_chance(artefact: Artefact, before: pa.Table, now: pa.Table) -> list[Found]:
     """What differs of a table of simulations drawn anew beyond chance: means with standard errors.
 
-    Two means differ beyond chance where they are further apart than z standard errors of their
-    difference, z of a normal distribution such that one of a thousand tables in which nothing
-    changed is said to differ, whatever the number of its means (Bonferroni). Other columns, single
-    simulations, smallest and largest values, are not compared.
+    Two means differ beyond chance where they are further apart than t standard errors of their
+    difference, t of Student's distribution with as many degrees of freedom as the mean of fewer
+    simulations has, such that one of a thousand tables in which nothing changed is said to differ,
+    whatever the number of its means (Bonferroni). Of one simulation there is no standard error,
+    and nothing is told. Other columns, single simulations, smallest and largest values, are not
+    compared; nor are tables that have no means.
     """
+    import scipy
+
     old, new = columns_in(before), columns_in(now)
-    if _STD_ERROR not in old or _STD_ERROR not in new:
+    if not {_MEAN, "rmse_mm"} <= old.keys() & new.keys():
         return []
     key = [*artefact.key]
     rows = aligned([old[name] for name in key], [new[name] for name in key])
     found = _rows(key, old, rows.only_before, "fewer") + _rows(key, new, rows.only_now, "more")
     old = {name: values[rows.before] for name, values in old.items()}
     new = {name: values[rows.now] for name, values in new.items()}
-    count = max(len(rows.now), 1)
-    z = NormalDist().inv_cdf(1.0 - _ALARM / (2.0 * count))
-    allowed = z * np.hypot(old[_STD_ERROR], new[_STD_ERROR])
+    freedom = np.minimum(old[_REPETITIONS], new[_REPETITIONS]) - 1.0
+    t = scipy.special.stdtrit(freedom, 1.0 - _ALARM / (2.0 * max(len(freedom), 1)))
+    allowed = t * np.hypot(_std_errors(old), _std_errors(new))
     column = next(each for each in artefact.columns if each.name == _MEAN)
     difference = _of_numbers(column, old, new, key, allowed)
     if difference:
-        words = f"; {z:.2f} standard errors (study_summary.{_STD_ERROR}) are allowed"
+        words = f"; {t.max():.2f} standard errors (study_summary.{_STD_ERROR}) are allowed"
         found.append(replace(difference, what=difference.what + words))
     return found
+
+
+def _std_errors(summary: Columns) -> np.ndarray:
+    """Standard errors of the means; by other columns where a summary does not state them."""
+    if _STD_ERROR in summary:
+        return summary[_STD_ERROR]
+    variance = np.maximum(summary["rmse_mm"] ** 2 - summary["bias_mm"] ** 2, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sqrt(variance / (summary[_REPETITIONS] - 1.0))
 
 
 def _whole(artefact: Artefact, table: pa.Table) -> Columns:
@@ -240,7 +252,7 @@ def _units(column: Column, columns: Columns, count: int) -> list[str]:
 def _unit(column: Column, columns: Columns, row: int) -> str:
     if column.same_within in (BY_ROW, BY_POSES):
         return _units(column, columns, row + 1)[row]
-    return column.unit
+    return "" if column.unit == "1" else column.unit
 
 
 def _of_covariance(name: str, old: Columns, new: Columns) -> np.ndarray:

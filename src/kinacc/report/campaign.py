@@ -127,7 +127,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
         f"{len(state.told)} of {plan.assessor.measurements} readings, at {visited} of {candidates} "
         "candidates",
         _badge(state, said, lead),
-        (*answers(state), _MODEL_ERROR),
+        (*answers(state, None), _MODEL_ERROR),
         (_statements(state, said),),
         _notes(opened, state, tables, said, lead),
     )

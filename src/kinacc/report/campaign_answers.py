@@ -6,19 +6,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinacc.assess.conformity import decide
 from kinacc.assess.statement import Statement
-from kinacc.campaign import words
+from kinacc.calibration.summary import Tolerance
+from kinacc.campaign import tolerance, words
 from kinacc.campaign.state import State
 
 
-def answers(state: State) -> tuple[str, ...]:
-    """What may be said of the largest error, the most important sentence first."""
-    said, tolerance = words.distinct(state), state.plan.limits.tolerance_mm
+def answers(state: State, stated: Tolerance | None) -> tuple[str, ...]:
+    """What may be said of the largest error, the most important sentence first.
+
+    ``stated``: the tolerance of the configuration, if it has one.
+    """
+    said = words.distinct(state)
     lead, lines = leading(state, said), against(state, said)
+    kept = _kept(state, lead, bool(lines), stated)
     if lines:
         by_noise = "The bounds of the campaign are what the readings give by the noise stated"
-        return (*lines, f"{by_noise}; they are no statement on the arm.")
+        return (*lines, f"{by_noise}; they are no statement on the arm.", *kept)
     lines.append(words.pledge(lead, state))
     if np.isfinite(lead.upper_mm):
         known = [f"estimated at {lead.value_mm:.3f} mm"] if np.isfinite(lead.value_mm) else []
@@ -26,11 +30,22 @@ def answers(state: State) -> tuple[str, ...]:
             known.append(f"at least {lead.lower_mm:.3f} mm, a bound that is right as often")
         if known:
             lines.append(f"The largest error among them is {', and '.join(known)}.")
-    if tolerance is not None:
-        found = decide(lead, tolerance)
-        why = words.reason(found.reason)
-        lines.append(sentence(f"tolerance {tolerance:g} mm: {found.verdict}, {why}"))
-    return tuple(lines)
+    return (*lines, *kept)
+
+
+def _kept(state: State, lead: Statement, in_doubt: bool, stated: Tolerance | None) -> list[str]:
+    """Whether the campaign's tolerance is kept, and the configuration's where it is of a bound."""
+    limits, own = {}, state.plan.limits.tolerance_mm
+    if own is not None:
+        limits[own] = tolerance.OF_CAMPAIGN
+    if stated is not None and stated.of == tolerance.BOUND:
+        limits[stated.mm] = tolerance.OF_BOTH if stated.mm == own else tolerance.OF_CONFIGURATION
+    return [
+        tolerance.in_words(
+            Tolerance(mm, tolerance.BOUND), whose, tolerance.by_bound(mm, lead, in_doubt)
+        )
+        for mm, whose in limits.items()
+    ]
 
 
 def leading(state: State, said: Sequence[Statement]) -> Statement:

@@ -12,6 +12,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
+from kinacc.campaign.tolerance import NONE_SET
 from kinacc.report.page import ROBOT_ITSELF, FirstScreen, Table, Text, printed
 
 _FIGURES = {
@@ -42,7 +43,8 @@ class Answers:
 
     ``claims`` on the paper by name, ``other`` errors of other populations, ``largest`` what there
     is to say of the largest error, ``campaign`` the sentences of a campaign, none without one;
-    ``outdated`` tables are not shown; ``history`` is what a series says of the one in force.
+    ``outdated`` tables are not shown; ``tolerance`` says whether that of the configuration is kept,
+    where the campaign does not; ``history`` is what a series says of the one in force.
     """
 
     claims: Mapping[str, Sequence[str]]
@@ -52,6 +54,7 @@ class Answers:
     following: Sequence[str]
     outdated: Sequence[str]
     more: str
+    tolerance: str = ""
     history: str = ""
 
 
@@ -125,14 +128,20 @@ def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
         lines.append("No pose was held out: errors at other poses are larger, and unknown.")
     if answers.history:
         lines.append(answers.history)
+    tolerance = [answers.tolerance] if answers.tolerance else []
     if answers.campaign:
         first, *others = answers.campaign
         others.append(
             f"That is about the campaign's own poses: among the {rows} up to "
             f"{size['largest']:.{digits}f} mm was seen."
         )
-        return [*lines, f"Largest error, by a campaign at poses of its own: {first}", *others]
-    return [*lines, f"{_NO_CAMPAIGN} {size['largest']:.{digits}f} mm.", "Tolerance: none set."]
+        return [
+            *lines,
+            f"Largest error, by a campaign at poses of its own: {first}",
+            *others,
+            *tolerance,
+        ]
+    return [*lines, f"{_NO_CAMPAIGN} {size['largest']:.{digits}f} mm.", *(tolerance or [NONE_SET])]
 
 
 def _errors(facts: Sequence[Fact]) -> tuple[Table, ...]:

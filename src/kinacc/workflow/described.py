@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache
@@ -13,14 +14,19 @@ from kinacc.workflow.contradictions import load
 from kinacc.workflow.plan import Plan, planned
 
 CONFIG = "config.yaml"
+_OF_A_LINE = re.compile(r"-\d{4}-\d{2}-\d{2}$")
 _FILES = 20  # beside results, looked through for a configuration
 
 
 def beside(results: Path, dataset: str) -> Iterator[tuple[Path, Plan]]:
-    """Configurations beside the folder of all results that name a data set, and their plans."""
+    """Configurations beside the folder of all results that name a data set, and their plans.
+
+    That of a line of a series stands there by the name of the series.
+    """
+    series = _OF_A_LINE.sub("", dataset)
     for path in sorted((results / "..").glob("*.yaml"))[:_FILES]:
         with suppress(InputError, OSError):
-            if path.name == CONFIG or dataset.encode() in path.read_bytes():
+            if path.name == CONFIG or series.encode() in path.read_bytes():
                 yield path, _planned(str(path), path.stat().st_mtime_ns)
 
 

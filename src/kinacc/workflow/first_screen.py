@@ -6,6 +6,9 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+from kinacc.calibration import summary
+from kinacc.calibration.summary import Fact, Tolerance, of
+from kinacc.campaign import tolerance
 from kinacc.campaign.of_calibration import Sought
 from kinacc.deployment.history_words import first_words
 from kinacc.kinematics import robot
@@ -23,16 +26,32 @@ def first_screen(
     ``outdated`` tables were made from others than are there, and are not among ``tables``.
     """
     found = told(folder, tables, bound, False, f"check_{name}", f"exported_{name}")
+    stated = summary.tolerance(found.facts)
     said = Answers(
         claims=found.claims,
         other=found.other,
         largest=found.largest,
-        campaign=answers(bound.assessed.state) if bound.assessed else (),
+        campaign=answers(bound.assessed.state, stated) if bound.assessed else (),
         following=found.following,
         outdated=outdated,
         more=shlex.join(["kinacc", "fitted", str(folder), "--all"]),
+        tolerance=_kept(stated, found.facts, bound),
         history=first_words(tables["history"]) if "history" in tables else "",
     )
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     to_do = remedies(tables.get("data_check"))
     return screen(name, arm.name, found.facts, to_do, said), found
+
+
+def _kept(stated: Tolerance | None, facts: Sequence[Fact], bound: Sought) -> str:
+    """Whether the tolerance of the configuration is kept; empty where its campaign says so."""
+    if stated is None or (stated.of == tolerance.BOUND and bound.assessed):
+        return ""
+    if stated.of == tolerance.BOUND:
+        judged = tolerance.by_bound(stated.mm, None, False)
+    else:
+        chosen = of(facts, "selection").items()
+        best = next(model for model, known in chosen if known["selected"].value)
+        known = of(facts, "held_out_error").get(best, {})
+        judged = tolerance.by_held_out(stated, {name: each.value for name, each in known.items()})
+    return tolerance.in_words(stated, tolerance.OF_CONFIGURATION, judged)

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from kinacc.artifacts import store
 from kinacc.artifacts.error_models import model_name
-from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.conformity import UNDECIDED
 from kinacc.assess.statement import CANDIDATES, Statement
-from kinacc.calibration.summary import LARGE_SHARE, Tolerance, facts_in, of
+from kinacc.calibration.summary import Tolerance, facts_in, of
 from kinacc.calibration.summary import tolerance as tolerance_in
-from kinacc.campaign import journal, of_calibration, words
+from kinacc.campaign import journal, of_calibration, tolerance, words
 from kinacc.campaign.of_calibration import Sought
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem
@@ -26,7 +26,6 @@ BOUND, HELD_OUT = "bound", "held-out"
 _TOLERANCE_OF = {BOUND: "bound", HELD_OUT: "quantile_99"}
 _SUMMARY = STAGES["summary"]
 _DAY = 10  # characters of a time
-_FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all
 
 
 @dataclass(frozen=True)
@@ -114,35 +113,23 @@ class Standing:
         """
         found, whose = self.campaigns.assessed, ""
         if tolerance_mm is None and found is not None and by == BOUND:
-            tolerance_mm, whose = found.state.plan.limits.tolerance_mm, "the campaign's"
+            tolerance_mm, whose = found.state.plan.limits.tolerance_mm, tolerance.OF_CAMPAIGN
         if tolerance_mm is None and self.tolerance and self.tolerance.of == _TOLERANCE_OF[by]:
-            tolerance_mm, whose = self.tolerance.mm, "the configuration's"
+            tolerance_mm, whose = self.tolerance.mm, tolerance.OF_CONFIGURATION
         if tolerance_mm is None:
             return None
-        says, because = UNDECIDED, "no campaign bounds it"
+        says, because = UNDECIDED, ""
         if self.problem is not None:
             because = "there are no results to go by"
         elif by == HELD_OUT:
-            says, because = self._held_out_within(tolerance_mm)
-        elif _against(self.campaigns):
-            because = "its bound cannot be relied on"
-        elif found is not None and found.said is None:
+            of = Tolerance(tolerance_mm, _TOLERANCE_OF[by])
+            says, because = tolerance.by_held_out(of, self.held_out)
+        elif found is not None and found.said is None and not _against(self.campaigns):
             because = "its campaign says nothing yet"
-        elif found is not None and found.said is not None:
-            decided = decide(found.said, tolerance_mm)
-            says, because = decided.verdict, words.reason(decided.reason) or ""
+        else:
+            said = None if found is None else found.said
+            says, because = tolerance.by_bound(tolerance_mm, said, bool(_against(self.campaigns)))
         return Verdict(says, because, tolerance_mm, whose)
-
-    def _held_out_within(self, tolerance_mm: float) -> tuple[str, str]:
-        known = self.held_out
-        if not known:
-            return UNDECIDED, "no error is held out"
-        if known["quantile_99"] > tolerance_mm:
-            return REJECT, "more than 1 % of the errors held out are beyond the tolerance"
-        if known["n"] < _FEWEST:
-            few = f"{known['n']:.0f} errors are held out, too few to tell of 1 % of them"
-            return UNDECIDED, few
-        return ACCEPT, "99 % of the errors held out are within the tolerance"
 
 
 def _against(campaigns: Sought) -> list[str]:

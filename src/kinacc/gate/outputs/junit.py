@@ -57,7 +57,7 @@ def _case(suite: ElementTree.Element, dataset: str, outcome: Outcome) -> None:
         failure = {"message": told.line(outcome.says), "type": told.line(outcome.kind)}
         ElementTree.SubElement(case, "failure", failure).text = _body(outcome)
     else:
-        message = told.line(f"{outcome.verdict}: {outcome.says}")
+        message = told.line(f"{outcome.verdict}: {told.said(outcome)}")
         ElementTree.SubElement(case, "skipped", {"message": message}).text = _body(outcome)
 
 

@@ -46,7 +46,7 @@ def _table(verdicts: Verdicts) -> Iterator[str]:
         if passed > told.MOST_PASSED:
             continue
         verdict = each.verdict if each.verdict == PASSED else f"**{each.verdict}**"
-        said = _text(each.says)
+        said = _text(told.said(each))
         if each.fix and each.verdict != PASSED:
             said += f"<br>What to do: {_text(each.fix)}"
         yield f"| {verdict} | {_text(each.dataset)} | {_text(each.name)} | {said} |"

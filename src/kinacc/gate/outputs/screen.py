@@ -27,7 +27,7 @@ def as_text(verdicts: Verdicts, width: int | None = None) -> str:
             lines += _of_one(each, width)
     if passed > told.MOST_PASSED:
         lines.append(f"{PASSED:{_MARGIN}}and {passed - told.MOST_PASSED} more")
-    lines += _wrapped(told.headline(verdicts), width, "", "")
+    lines += ["", *_wrapped(told.headline(verdicts), width, "", "")]
     if verdicts.digest:
         lines += _wrapped(f"digest of all records: {verdicts.digest}", width, "", "")
     return "\n".join(lines)
@@ -35,7 +35,7 @@ def as_text(verdicts: Verdicts, width: int | None = None) -> str:
 
 def _of_one(outcome: Outcome, width: int) -> Iterator[str]:
     margin = " " * _MARGIN
-    words = f"{told.title(outcome)}: {outcome.says}"
+    words = f"{told.title(outcome)}: {told.said(outcome)}"
     yield from _wrapped(words, width, f"{outcome.verdict:{_MARGIN}}", margin)
     for cause, differences in told.by_cause(outcome.differences):
         yield from _wrapped(cause, width, margin, margin)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from kinacc.gate.outcome import FAILED, PASSED, Outcome, Verdicts
 from kinacc.gate.outputs import told
@@ -18,7 +19,11 @@ def annotated(verdicts: Verdicts, dialect: str) -> list[str]:
 
     ``dialect``: one of DIALECTS. That of GitLab is a file (Code Quality), in one line.
     """
-    found = [each for each in told.ordered(verdicts.outcomes) if each.verdict != PASSED]
+    found = [
+        replace(each, file=told.line(told.file_of(each, verdicts)))
+        for each in told.ordered(verdicts.outcomes)
+        if each.verdict != PASSED
+    ]
     return DIALECTS[dialect](found)
 
 
@@ -43,10 +48,8 @@ def _github(outcomes: Sequence[Outcome]) -> list[str]:
     """Workflow commands of GitHub Actions."""
     lines = []
     for each in outcomes[:_MOST]:
-        about = {"file": each.file, "title": told.title(each)}
-        told_of = ",".join(
-            f"{name}={_escaped(told.line(value), ':,')}" for name, value in about.items() if value
-        )
+        about = {"file": each.file, "title": told.line(told.title(each))}
+        told_of = ",".join(f"{name}={_escaped(value, ':,')}" for name, value in about.items())
         lines.append(f"::{_level(each)} {told_of}::{_escaped(_message(each), '')}")
     return lines
 
@@ -55,9 +58,9 @@ def _azure(outcomes: Sequence[Outcome]) -> list[str]:
     """Logging commands of Azure Pipelines."""
     lines = []
     for each in outcomes[:_MOST]:
-        source = f";sourcepath={_of_azure(told.line(each.file))}" if each.file else ""
         words = told.line(f"{told.title(each)}: {_message(each)}")
-        lines.append(f"##vso[task.logissue type={_level(each)}{source}]{_of_azure(words)}")
+        about = f"type={_level(each)};sourcepath={_of_azure(each.file)}"
+        lines.append(f"##vso[task.logissue {about}]{_of_azure(words)}")
     return lines
 
 
@@ -76,7 +79,7 @@ def _gitlab(outcomes: Sequence[Outcome]) -> list[str]:
                 "\0".join((each.dataset, each.name, each.kind)).encode("utf-8", "backslashreplace")
             ).hexdigest(),
             "severity": "major" if each.verdict == FAILED else "minor",
-            "location": {"path": told.line(each.file) or "kinacc", "lines": {"begin": 1}},
+            "location": {"path": each.file, "lines": {"begin": 1}},
         }
         for each in outcomes
     ]
@@ -86,8 +89,7 @@ def _gitlab(outcomes: Sequence[Outcome]) -> list[str]:
 def _plain(outcomes: Sequence[Outcome]) -> list[str]:
     """``file:1: error: words``, as compilers write it: Jenkins (Warnings) and editors read it."""
     return [
-        f"{told.line(each.file) or 'kinacc'}:1: {_level(each)}: "
-        f"{told.line(told.title(each))}: {_message(each)}"
+        f"{each.file}:1: {_level(each)}: {told.line(told.title(each))}: {_message(each)}"
         for each in outcomes
     ]
 

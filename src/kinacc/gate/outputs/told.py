@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from pathlib import PurePath
 
 from kinacc.errors import and_more, as_seen
 from kinacc.gate.outcome import (
@@ -59,6 +60,21 @@ def headline(verdicts: Verdicts) -> str:
 def title(outcome: Outcome) -> str:
     """Which gate of which data set."""
     return ", ".join(filter(None, [outcome.dataset, outcome.name]))
+
+
+def said(outcome: Outcome) -> str:
+    """What the gate says, for a place where the verdict stands before it."""
+    return outcome.says.removeprefix(f"{outcome.verdict}: ")
+
+
+def file_of(outcome: Outcome, verdicts: Verdicts) -> str:
+    """The file to open: the outcome's own, else the first artefact that differs, else results."""
+    if outcome.file or not outcome.differences:
+        return outcome.file or verdicts.results
+    first = outcome.differences[0]
+    name = PurePath(first.artefact)
+    ending = "" if name.suffix else ".parquet"
+    return f"{verdicts.results}/{first.dataset}/{name}{ending}"
 
 
 def cause_in_words(cause: Cause) -> str:

@@ -1,0 +1,50 @@
+"""Whether a tolerance is kept, and whose it is: one verdict, one sentence, wherever it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.statement import Statement
+from kinacc.calibration.summary import LARGE_SHARE, Tolerance
+from kinacc.campaign import words
+
+BOUND, MEAN = "bound", "mean"
+NONE_SET = "Tolerance: none set."
+OF_CONFIGURATION, OF_CAMPAIGN = "the configuration's", "the campaign's"
+OF_BOTH = f"{OF_CONFIGURATION} and {OF_CAMPAIGN}"
+_FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all
+
+
+def by_held_out(tolerance: Tolerance, held_out: Mapping[str, float]) -> tuple[str, str]:
+    """Verdict and why, by errors held out: ``n``, ``mean`` and ``quantile_99``, mm; maybe empty."""
+    if not held_out:
+        return UNDECIDED, "no error is held out"
+    if tolerance.of == MEAN:
+        says = ACCEPT if held_out["mean"] <= tolerance.mm else REJECT
+        return says, f"the mean error held out is {held_out['mean']:.3f} mm"
+    if held_out["quantile_99"] > tolerance.mm:
+        return REJECT, "more than 1 % of the errors held out are beyond the tolerance"
+    if held_out["n"] < _FEWEST:
+        few = f"{held_out['n']:.0f} errors are held out, too few to tell of 1 % of them"
+        return UNDECIDED, few
+    return ACCEPT, "99 % of the errors held out are within the tolerance"
+
+
+def by_bound(tolerance_mm: float, said: Statement | None, in_doubt: bool) -> tuple[str, str]:
+    """Verdict and why, by what a campaign says; None without a campaign.
+
+    ``in_doubt``: something speaks against its bounds.
+    """
+    if in_doubt:
+        return UNDECIDED, "its bound cannot be relied on"
+    if said is None:
+        return UNDECIDED, "no campaign bounds it"
+    decided = decide(said, tolerance_mm)
+    return decided.verdict, words.reason(decided.reason) or ""
+
+
+def in_words(tolerance: Tolerance, whose: str, judged: tuple[str, str]) -> str:
+    """The tolerance, whose it is, and whether it is kept."""
+    says, because = judged
+    return f"Tolerance {tolerance} ({whose}): {says}, {because}."
