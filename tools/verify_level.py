@@ -19,7 +19,8 @@ from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.calibration import dh_fit
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
-from kinacc.calibration.residuals import cross_validated, errors
+from kinacc.calibration.residuals import Errors, cross_validated, errors
+from kinacc.calibration.tables import frames_columns
 from kinacc.config.schema import defaults
 from kinacc.deployment import handful, verify
 from kinacc.deployment.handful import BASE, TOOL, HeldOut
@@ -37,13 +38,11 @@ def everything(arm: robot.Robot) -> Observations:
     """All poses of the physical arm."""
     settings = defaults()["measurements"]["synthetic"] | {"poses": POSES}
     columns = synthetic.measure(arm, settings)
-    none = {name: np.full(POSES, np.nan) for name in ("fold",)}
-    columns = {"repeat": np.zeros(POSES), **columns, **none}
-    return from_columns(columns, arm)
+    return from_columns({"repeat": np.zeros(POSES), **columns, "fold": np.full(POSES, np.nan)}, arm)
 
 
-def fitted(seen: Observations, arm: robot.Robot) -> tuple[Fit, HeldOut, dict]:
-    """A calibration, its errors at poses held out, and places by what was moved."""
+def fitted(seen: Observations, arm: robot.Robot) -> tuple[Fit, Errors]:
+    """A calibration, and its errors at poses held out."""
     free = dh_fit.free_parameters(arm.dh.joints)
 
     def fit(part: Observations, _fold: int = 0) -> dict[str, Fit]:
@@ -53,17 +52,14 @@ def fitted(seen: Observations, arm: robot.Robot) -> tuple[Fit, HeldOut, dict]:
         return {"dh": Fit(found.model, found.frames)}
 
     own = fit(seen)
-    held = cross_validated(seen, fit, range(5), own)[0][MODEL]
-    return own["dh"], held, own
+    return own["dh"], cross_validated(seen, fit, range(5), own)[0][MODEL]
 
 
-def held_out(fit: Fit, held, seen: Observations, moved: tuple[str, ...]) -> HeldOut:
-    """Its held-out errors where ``moved`` is fitted to handfuls."""
-    vectors = held.position_mm[:, None]
-    weight = None
+def with_places(fit: Fit, off: Errors, seen: Observations, moved: tuple[str, ...]) -> HeldOut:
+    """Errors at what was ``seen``, where ``moved`` is fitted to handfuls of it."""
+    vectors, weight = off.position_mm[:, None], WEIGHT if moved else None
     if moved:
-        vectors = np.concatenate([vectors, WEIGHT * held.rotation_rad[:, None]], axis=2)
-        weight = WEIGHT
+        vectors = np.concatenate([vectors, WEIGHT * off.rotation_rad[:, None]], axis=2)
     return HeldOut(vectors, verify._places(fit.model, seen, fit.frames.targets, moved, weight))
 
 
@@ -80,27 +76,16 @@ def probabilities(
                 position_mm=few.position_mm @ turn.T + shift,
                 rotation=turn @ few.rotation,
             )
-        q_rad = few.q_rad.copy()
-        q_rad[:, joint] += 1e-3 * offset
-        few = replace(few, q_rad=q_rad)
+        offsets = np.zeros(few.joints)
+        offsets[joint] = 1e-3 * offset
+        few = replace(few, q_rad=few.q_rad + offsets)
         frames = fit.frames
         if moved:
-            kept = tables_of(fit)
+            kept = {"frames": frames_columns({"dh": fit.frames}, ("tool",))}
             frames = verify.frames_at(kept, "dh", fit.model, few, arm, moved, WEIGHT)
-        off = errors({"dh": Fit(fit.model, frames)}, few)[MODEL]
-        vectors = off.position_mm[:, None]
-        if moved:
-            vectors = np.concatenate([vectors, WEIGHT * off.rotation_rad[:, None]], axis=2)
-        weight = WEIGHT if moved else None
-        places = verify._places(fit.model, few, frames.targets, moved, weight)
-        yield size, handful.held_to(held, HeldOut(vectors, places)).probability
-
-
-def tables_of(fit: Fit) -> dict:
-    """The table ``frames`` of a fit."""
-    from kinacc.calibration.tables import frames_columns
-
-    return {"frames": frames_columns({"dh": fit.frames}, ("tool",))}
+        there = Fit(fit.model, frames)
+        new = with_places(there, errors({"dh": there}, few)[MODEL], few, moved)
+        yield size, handful.held_to(held, new).probability
 
 
 def main(arms: int, joint: int = 0, offset: float = 0.0) -> None:
@@ -112,10 +97,10 @@ def main(arms: int, joint: int = 0, offset: float = 0.0) -> None:
         order = rng.permutation(POSES)
         own = seen.select(order[:FITTED])
         own = replace(own, fold=folds.assign(np.arange(FITTED), 5, 0))
-        fit, errors_held, _ = fitted(own, arm)
+        fit, off = fitted(own, arm)
         rest = seen.select(order[FITTED:])
         for moved in SETUPS:
-            held = held_out(fit, errors_held, own, moved)
+            held = with_places(fit, off, own, moved)
             for _ in range(3):
                 told = probabilities(fit, held, rest, moved, arm, rng, joint, offset)
                 for size, probability in told:

@@ -9,7 +9,7 @@ set -eu
 repository=$1 commit=$2
 study=${STUDY:-tracker.yaml}
 run=${RUN:-calibrate} # the models; or study: maps, assessors and figures as well
-kept=${KEPT:-$HOME/.cache/kinacc-pipeline} # of one repository; remove it to begin with nothing
+kept=${KEPT:-$HOME/.cache/kinacc-pipeline} # of one repository
 export CI=true SNAKEMAKE_OUTPUT_CACHE="$kept/fits"
 
 mkdir -p "$kept/fits" "$kept/runs"
@@ -37,8 +37,14 @@ fi
 PATH=$environment/bin:$PATH
 
 # Report and results are kept for people, whatever the gate says.
+leave() {
+  mkdir -p "$kept/runs/$commit"
+  for each in gate.* results; do
+    test ! -e "$each" || cp -RL "$each" "$kept/runs/$commit/"
+  done
+}
 rm -f gate.*
-trap 'mkdir -p "$kept/runs/$commit" && cp -RL gate.* results "$kept/runs/$commit/" || true' EXIT
+trap leave EXIT
 kinacc "$run" "$study" -- --cache
 kinacc check-results results --config "$study"
 kinacc gate results --config "$study" --against accepted --out gate.json --out gate.xml --out gate.md

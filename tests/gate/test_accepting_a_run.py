@@ -91,6 +91,11 @@ def test_everything_that_speaks_against_it_is_said_at_once_and_nothing_changes(
     assert files(tmp_path / "mine") == {"letter.txt": b"dear"}
 
 
+def test_the_folder_of_one_data_set_is_named_by_an_option(results, tmp_path):
+    with pytest.raises(InputError, match=r"give .*results and --dataset arm"):
+        accepted.accept(results / "arm", tmp_path / "accepted", WORDS)
+
+
 def test_results_that_do_not_hold_are_not_accepted(results, tmp_path):
     (results / "arm" / "dh_model.parquet").write_bytes(b"edited")
     done = call("accept", results, "--reason", "fine", "--to", tmp_path / "accepted")

@@ -359,6 +359,16 @@ def test_claims_on_a_study_drawn_anew_are_left_aside_and_others_are_not(tmp_path
     )
 
 
+def test_another_setting_of_a_stage_beside_more_repetitions_is_compared_by_numbers(held):
+    now = drawn(1, 90).with_keys("study", study={"search": "bisection"})
+    found = told(held(Run(), now))
+    assert {name for name, _ in found} == {"study", "study_summary", "claims"}
+    assert {where for _, where in found["study_summary", "mean_mm"]} == {
+        "study.repetitions",
+        "study.search",
+    }
+
+
 def test_a_study_of_other_points_is_compared_number_by_number(held):
     outcome = held(Run(), changed(drawn(2, 40), ("assessment_points",)))
     assert {"study_chunk", "study", "study_summary"} <= artefacts(outcome)

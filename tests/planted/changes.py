@@ -311,7 +311,7 @@ def _worse(draw: np.random.Generator) -> Iterator[Change]:
     for noise in (0.5, 1.0, 2.0, 3.0):
         given = {"noise_mm": noise, "draw": int(draw.integers(1000))}
         yield Change(f"worse: {noise:g} mm of noise", WORSE, "noise", given, POSES)
-    for rows in (34, 28, 24):
+    for rows in (34, 30, 27):
         yield Change(f"worse: {rows} poses", WORSE, "fewer", {"rows": rows}, POSES)
     for share in (0.3, 0.6, 0.9):
         yield configured(

@@ -44,9 +44,7 @@ def outcomes(world: World, gates: list[dict]) -> dict[tuple[str, str], dict]:
 
 
 CASES = [
-    ("position", "dh", "held_out"),
     ("position", "vec", "training"),
-    ("position", "nominal", "held_out"),
     ("orientation", "dh", "held_out"),
 ]
 

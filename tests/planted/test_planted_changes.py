@@ -9,9 +9,8 @@ import unchanged
 from planted import Trials
 
 PLANTED = (
-    "input: row 33, x_mm by 1e-09",
+    "input: row 33, x_mm by 1e-9",
     "code: kinacc.workflow.stages.claims, reproduced of claims",
-    "comment: kinacc.study.claims.numbers",
     "version: scipy",
     "map.grid_mm: 200.0",
     "repetitions: 3",

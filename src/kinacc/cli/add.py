@@ -95,7 +95,7 @@ def _day(
         return found[0]
     said = f"its times are of {found[0]} to {found[-1]}" if found else "no column tells"
     if ask and not problems:
-        answer = click.prompt(f"On which day was {path} measured ({said})? {_DAY}")
+        answer = click.prompt(f"On which day was {path} measured ({said}; {_DAY})")
         return _day(name, answer, path, arm, ask, problems)
     what = f"is not given: on which day {path} was measured ({said})"
     problems.append(Problem(name, what, _DAY))

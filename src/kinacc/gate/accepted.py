@@ -178,7 +178,9 @@ def _unusable(
     if not acceptance["reason"].strip():
         yield Problem("--reason", "is empty", "why this run is as it should be, in words")
     if not there:
-        yield Problem(str(results), "holds no data set with records", "a results folder")
+        one = (results / records.FOLDER).is_dir()
+        fix = f"give {results.parent} and --dataset {results.name}" if one else ""
+        yield Problem(str(results), "holds no data set with records", "a results folder", fix)
     elif unknown := [name for name in names if name not in there]:
         yield Problem("--dataset", f"{first_few(unknown)} is none of {results}", ", ".join(there))
     places = results.resolve(), folder.resolve()

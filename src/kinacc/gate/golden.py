@@ -76,22 +76,20 @@ class _Comparison:
 
         return apart(self.before, self.now)
 
-    @cached_property
-    def is_drawn_anew(self) -> bool:
-        """Whether the study differs and was drawn anew, by another seed or number of repetitions.
+    def is_drawn_anew(self, stage: Stage) -> bool:
+        """Whether simulations are others by their seed or number.
 
         Other code or versions beside these do not count, other settings and points do.
         """
-        stage = STAGES["study_chunk"]
-        if not (self.before.record(stage.name) and self.now.record(stage.name)):
-            return False
-        if self.before.digest(stage.name, stage) == self.now.digest(stage.name, stage):
-            return False
         why = self.causes.of_stage(stage.name)
         drawn = [each for each in why if (each.kind, each.where) in _DRAWN_BY]
         others = {each.kind for each in why if each not in drawn}
+        return bool(drawn) and others <= {CODE, VERSION} and self._has_the_same_points
+
+    @cached_property
+    def _has_the_same_points(self) -> bool:
         points = STAGES["assessment_points"]
-        return bool(drawn) and others <= {CODE, VERSION} and not self.of_table(points.name, points)
+        return not self.of_table(points.name, points)
 
     def stages(self) -> dict[str, Stage]:
         """Every table of either run with the stage that makes it, in the order they follow."""
@@ -112,9 +110,9 @@ class _Comparison:
             tables = [_table(each, artefact, stage) for each in (self.before, self.now)]
         except InputError as error:
             return [Found("", error.problems[0].what, 0, 0)]
-        if artefact in _RANDOM and not edited and self.is_drawn_anew:
+        if artefact in _RANDOM and not edited and self.is_drawn_anew(stage):
             return within_chance(ARTEFACTS[artefact], *tables)
-        if artefact == "claims" and self.is_drawn_anew:
+        if artefact == "claims" and self.is_drawn_anew(stage):
             tables = [_without_simulations(each) for each in tables]
         found = self._by_poses(artefact, differences(ARTEFACTS[artefact], *tables))
         if edited and not found:
@@ -215,7 +213,9 @@ def _outcome(name: str, both: _Comparison, exact: bool) -> Outcome:
     artefacts = [*dict.fromkeys(each.artefact for each in found)]
     figures = {"tables": count, "artefacts_that_differ": len(artefacts)}
     anew = ""
-    if both.is_drawn_anew:
+    study = STAGES["study_chunk"]
+    there = both.before.record(study.name) and both.now.record(study.name)
+    if there and both.is_drawn_anew(study):
         anew = f" (the study is drawn anew: its means are held to {BY_STD_ERROR}, no single run is)"
     if not found:
         says = f"{count} tables are as in the accepted run{' to the byte' if exact else ''}{anew}"

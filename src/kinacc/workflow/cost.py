@@ -100,7 +100,7 @@ def _residuals(config: Mapping) -> Cost:
 def _history(config: Mapping) -> Cost:
     """Every line held to the one in force; of lines as long as the newest."""
     lines, poses = len(config.get("series", ())), _poses(config)
-    return Cost(1.4e-3 * lines * poses, _PROCESS_B + 2e5 * poses, ("series",))
+    return Cost(1.4e-3 * lines * poses, 4e8 + 6e4 * poses, ("series",))
 
 
 def cells(config: Mapping) -> float:
