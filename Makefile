@@ -10,6 +10,8 @@
 # make corrupt     a thousand corruptions of a study's results, and what the check finds of them
 # make faults      every command on full and read-only disks and beside other faults (as root)
 # make mutants     faults planted in the code one by one, what the tests notice, and the page about it
+# make planted     two hundred changes planted in runs, and whether the gate tells and explains them
+# make recipes     the recipes for build servers in full, with an environment of their own (needs the network)
 # make versions    the study with the oldest and newest supported packages, and the page about it (needs uv)
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
@@ -20,7 +22,7 @@
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
 .PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults mutants \
-  versions docs docs-links audit sbom lock clean distclean
+  planted recipes versions docs docs-links audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -91,6 +93,13 @@ mutants: $(KINACC) $(TOOLS)
 	$(PY) tools/mutate.py cover
 	$(PY) tools/mutate.py run 1000
 	$(PY) tools/mutate.py page
+
+PLANTED = .planted
+planted: $(KINACC) $(TOOLS)
+	$(PY) tools/planted --into $(PLANTED)
+
+recipes: $(KINACC) $(TOOLS)
+	KINACC_RECIPES_IN_FULL=1 $(PY) -m pytest tests/integration/test_recipes_in_full.py
 
 versions: $(KINACC)
 	$(PY) tools/versions.py .versions
@@ -181,4 +190,4 @@ clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv .venv-bench .venv-audit .versions
+	rm -rf .venv .venv-bench .venv-audit .versions .planted
