@@ -34,7 +34,6 @@ from kinacc.measurements.folds import configurations
 SAME, MOVED = "same", "moved"
 FIRST, HOLDS, RECALIBRATE, OPEN = "first", "holds", "recalibrate", "cannot be told"
 LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
-LEAST = 20  # configurations of a series that chance is resampled from
 ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
 _TEXT = ("series", "date", "digest", "base", "tool", "model", "in_force", "verdict", "reason")
 _WHOLE = ("rows", "configurations")
@@ -146,7 +145,9 @@ class _Comparison:
             )
             return row | {"verdict": OPEN, "reason": what}
         if moved_mm > chance_mm:
-            joint = joint_of(found, robot.dh.prismatic)
+            rng = self._rng(force.name, session.name, "joint")
+            whole = drift_chance.moved(pair, misfit, rng, with_growth=True)
+            joint = joint_of(whole, robot.dh.prismatic)
             return row | {"verdict": RECALIBRATE, "joint": np.nan if joint is None else joint}
         held_out = force.held_out_mm
         if len(held_out) and chance_mm > np.mean(held_out):

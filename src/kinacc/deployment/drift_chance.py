@@ -11,7 +11,9 @@ The null hypothesis: between two series nothing happened at the arm. That does n
    between which nothing happened either (``understated``).
 2. The arm warms up, each time differently. What changes with the order of measuring inside the
    series is a state of the arm in which a series may be as a whole.
-3. Visits repeat within limits, and the instrument has noise.
+3. At another temperature all lengths of the arm have grown alike. That is no change of the arm: it
+   is left out as base and tool are where these were set up anew, whatever it is.
+4. Visits repeat within limits, and the instrument has noise.
 
 The change is estimated together with all of these, by least squares under their variances. Smooth
 misfit and states are drawn from their variances. All else is drawn by resampling configurations
@@ -31,6 +33,7 @@ import scipy
 from kinacc.deployment.drift_pairs import Pair
 
 DRAWS = 4000
+GROWTH = 0.12  # standard deviation, in 1e-3 of lengths: metal by 10 K
 UNITS = (1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3)  # of joint errors: what counts as much as one mm
 _SEEN = 1e-3  # of the best seen movement; what moves less is no direction of the arm
 _ROUNDS, _SETTLED = 15, 0.1  # of the variances; relative change
@@ -43,8 +46,8 @@ class Moved(NamedTuple):
     """Movement of the arm between two series, over the poses of the second.
 
     ``directions`` (d, 6k): joint errors (mm and rad) that move these by 1 mm rms each, after the
-    best base and tool where these were set up anew; ``change`` (d,) in mm along them; ``chance``
-    (DRAWS, d): changes that an arm shows that did not change.
+    best growth of all lengths, and base and tool where these were set up anew; ``change`` (d,) in
+    mm along them; ``chance`` (DRAWS, d): changes that an arm shows that did not change.
     """
 
     directions: np.ndarray
@@ -89,17 +92,20 @@ def understated(cuts: Sequence[Pair], rng: np.random.Generator) -> float:
     return float(np.mean(ratios))
 
 
-def moved(pair: Pair, misfit: float, rng: np.random.Generator) -> Moved:
+def moved(pair: Pair, misfit: float, rng: np.random.Generator, with_growth: bool = False) -> Moved:
     """The movement between two series and what chance shows; all chance is of ``rng``.
 
     ``misfit``: factor on the deviations of the misfit that the series do not share, 1 or more.
+    ``with_growth``: growth of all lengths is part of the movement, and of chance as by ``GROWTH``.
     """
-    directions = seen_directions(pair)
+    directions = seen_directions(pair, with_growth)
     count = len(directions)
     change = pair.constant @ directions.T
     drift = change * pair.late[:, None]
     inside = [drift * (pair.second == each)[:, None] for each in (False, True)]
     firm = np.concatenate([pair.frames, pair.constant], axis=1)
+    if not with_growth:
+        firm = np.column_stack([firm, pair.constant @ pair.longer * pair.second])
     size = np.linalg.norm(firm, axis=0)
     firm = firm / np.where(size > 0.0, size, 1.0)
     free = np.concatenate([firm, change * pair.second[:, None]], axis=1)
@@ -123,20 +129,27 @@ def moved(pair: Pair, misfit: float, rng: np.random.Generator) -> Moved:
     # Between two series a state may differ by both their states.
     smooth = misfit**2 * blurred @ blurred.T + 2.0 * prior[warming] * np.eye(count)
     chance = rng.standard_normal((DRAWS, len(scores))) @ scores
-    chance += rng.standard_normal((DRAWS, count)) @ np.linalg.cholesky(smooth).T
-    return Moved(directions, found[changes], chance)
+    chance += rng.standard_normal((DRAWS, count)) @ _root(smooth).T
+    result = Moved(directions, found[changes], chance)
+    if with_growth:
+        chance += rng.standard_normal((DRAWS, 1)) * GROWTH * result.along(pair.longer[:, None]).T
+    return result
 
 
-def seen_directions(pair: Pair) -> np.ndarray:
+def seen_directions(pair: Pair, with_growth: bool = False) -> np.ndarray:
     """Directions (d, 6k) of joint errors, each moving the second series by 1 mm rms.
 
-    After the best base and tool where these are its own; orthogonal as movements, so that the root
-    of summed squares along them is the rms movement.
+    After the best base and tool where these are its own, and growth of all lengths unless that is
+    part of it; orthogonal as movements, so that the root of summed squares along them is the rms
+    movement.
     """
     rows = pair.second
     constant, own = pair.constant[rows], pair.frames[rows][:, pair.own]
+    if not with_growth:
+        own = np.column_stack([own, constant @ pair.longer])
     if own.shape[1]:
-        left, values, _ = np.linalg.svd(own / np.linalg.norm(own, axis=0), full_matrices=False)
+        size = np.linalg.norm(own, axis=0)
+        left, values, _ = np.linalg.svd(own / np.where(size > 0.0, size, 1.0), full_matrices=False)
         left = left[:, values > _FIRM * values[0]]
         constant = constant - left @ (left.T @ constant)
     at = constant[pair.position[rows]]
@@ -183,6 +196,12 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     lower, _ = scipy.linalg.lapack.dpotrf(matrix, lower=1)
     half, _ = scipy.linalg.lapack.dpotri(lower, lower=1)
     return np.tril(half) + np.tril(half, -1).T
+
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    """A root (d, d) of a covariance, of which directions may have none."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 def _shares(

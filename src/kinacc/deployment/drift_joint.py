@@ -8,8 +8,9 @@ import scipy
 from kinacc.deployment.drift_chance import UNITS, Moved
 from kinacc.kinematics.vec import ERRORS
 
-CLEAR = 0.95  # of the resamples name the same joint
+CLEAR = 0.95  # probability that it is this joint, if it is one and each is as likely before
 MOST = 0.5  # of the squared movement beyond chance
+_FIRM = 1e-12  # of the variance in all directions, which one may be without
 _UNSEEN_MM = 1e-3  # by one mm or mrad: base or tool would take it up
 # A joint's DH parameters as errors in front of joints: of which (itself, the next), and what.
 _TURN, _SLIDE = (0, "eps_z"), (0, "delta_z")
@@ -20,7 +21,7 @@ def joint_of(found: Moved, prismatic: np.ndarray) -> int | None:
     """The joint (1-based) that a change of explains most of the movement; None where unclear.
 
     Offsets first, as belts, encoders and collisions change these; then all parameters of a joint.
-    Clear: it explains most beyond chance, and ``CLEAR`` of changes resampled about it name it too.
+    Clear: it explains most beyond chance, and is it with the probability ``CLEAR``.
     """
     offsets = [[_SLIDE if slides else _TURN] for slides in prismatic]
     whole = [[_TURN, _SLIDE, *_ITS_LINK] for _ in prismatic]
@@ -45,21 +46,20 @@ def _errors(joint: int, parameters: list[tuple[int, str]], joints: int) -> np.nd
 def _named(found: Moved, ways: list[np.ndarray]) -> int | None:
     """Place of the ``ways`` (d, p) along which the change lies; None where unclear."""
     covariance = found.chance.T @ found.chance / len(found.chance)
+    covariance[np.diag_indices(len(covariance))] += _FIRM * np.trace(covariance)
     white = scipy.linalg.cholesky(covariance, lower=True)
-    # The change first, then changes as they might have been seen.
-    changes = np.concatenate([found.change[None], found.change + found.chance])
-    seen = scipy.linalg.solve_triangular(white, changes.T, lower=True)
-    explained, size = np.zeros((len(ways), len(changes))), np.zeros(len(ways))
+    seen = scipy.linalg.solve_triangular(white, found.change, lower=True)
+    explained, left = np.zeros(len(ways)), np.zeros(len(ways))
     for number, way in enumerate(ways):
         if not way.shape[1]:
             continue
         basis, triangle = np.linalg.qr(scipy.linalg.solve_triangular(white, way, lower=True))
         along = basis.T @ seen
-        explained[number] = np.sum(along**2, axis=0)
-        left = found.change - way @ np.linalg.lstsq(triangle, along[:, 0], rcond=1e-9)[0]
-        size[number] = left @ left
-    best = np.argmax(explained, axis=0)
+        explained[number] = along @ along
+        beside = found.change - way @ np.linalg.lstsq(triangle, along, rcond=1e-9)[0]
+        left[number] = beside @ beside
+    best = int(np.argmax(explained))
     chance = np.trace(covariance)
-    most = size[best[0]] - chance <= (1.0 - MOST) * (found.moved_mm**2 - chance)
-    clear = np.mean(best[1:] == best[0]) >= CLEAR
-    return int(best[0]) if most and clear and explained[best[0], 0] > 0.0 else None
+    most = left[best] - chance <= (1.0 - MOST) * (found.moved_mm**2 - chance)
+    clear = np.sum(np.exp(0.5 * (explained - explained[best]))) <= 1.0 / CLEAR
+    return best if most and clear and explained[best] > 0.0 else None

@@ -40,17 +40,19 @@ class Pair:
 
     ``frames`` (m, F): motions of bases and targets, ``is_base`` (F,) says which; ``own`` (F,) marks
     those only the second series has. ``constant`` (m, 6k): errors in front of every joint,
-    ``ERRORS`` joint by joint in mm and rad. ``misfit`` (m, Q): the same growing with the joints, of
-    prior proportions; ``joint`` (Q,) says of which (0-based; one more: by travel direction).
-    ``residual`` (m,) is measured minus model. ``second``, ``position`` (m,): of the second series,
-    of a position. ``cluster`` (m,): configuration, alike in both. ``late`` (m,): order of measuring
-    within a series, of mean 0 and variance 1.
+    ``ERRORS`` joint by joint in mm and rad; ``longer`` (6k,) of them make all lengths 1e-3 longer.
+    ``misfit`` (m, Q): errors growing with the joints, of prior proportions; ``joint`` (Q,) says of
+    which (0-based; one more: by travel direction). ``residual`` (m,) is measured minus model.
+    ``second``, ``position`` (m,): of the second series, of a position. ``cluster`` (m,):
+    configuration, alike in both. ``late`` (m,): order of measuring within a series, of mean 0 and
+    variance 1.
     """
 
     frames: np.ndarray
     is_base: np.ndarray
     own: np.ndarray
     constant: np.ndarray
+    longer: np.ndarray
     misfit: np.ndarray
     joint: np.ndarray
     residual: np.ndarray
@@ -137,6 +139,7 @@ def about(
         is_base=np.arange(coords.size) < 6 * coords.anchor.sessions,
         own=~np.any(of_frames[~second] != 0.0, axis=0),
         constant=errors[:, :polynomials][:, order == 0],
+        longer=longer(model),
         misfit=np.concatenate([growing, travelling], axis=1),
         joint=np.concatenate([joint[order > 0], np.full(travelling.shape[1], model.joints)]).astype(
             int
@@ -147,6 +150,17 @@ def about(
         cluster=configurations(both.pose, both.q_rad)[row],
         late=late[row],
     )
+
+
+def longer(model: DHModel) -> np.ndarray:
+    """Errors in front of every joint (6k,) of an arm whose lengths are all 1e-3 longer.
+
+    The last link's own length goes with the tool.
+    """
+    found = np.zeros((model.joints, len(ERRORS)))
+    found[:, ERRORS.index("delta_z")] = np.where(model.prismatic, 0.0, model.d_mm)
+    found[1:, ERRORS.index("delta_x")] = model.a_mm[:-1]
+    return 1e-3 * found.ravel()
 
 
 def all_shared(pair: Pair) -> bool:
