@@ -19,6 +19,6 @@ def files_read(name, dataset, part):
     return waited_for | files
 
 
-# What `snakemake --list-target-rules` says of the rule above: in a loop no text can stand in it.
+# What `snakemake --list-target-rules` says of the step before it, as no text can stand in a loop.
 def listed_as(words):
     next(reversed(workflow.rules)).docstring = words
