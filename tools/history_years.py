@@ -1,6 +1,6 @@
 """False alarms of a robot's history over simulated years, and how small a change it sees.
 
-    python tools/history_years.py --same 600 --other 60 --out docs/history
+    python tools/history_years.py --same 1000 --other 100 --out docs/history
 
 Without a number of years the picture alone is drawn.
 
@@ -8,9 +8,10 @@ A simulated year: one physical arm (the geometry and the sizes of effects of an 
 effects drawn anew), calibrated twelve times with POSES poses of the synthetic calibration plan: the
 same every month, or others every month. Each time the tracker is set up anew, its noise and the
 arm's repeatability are drawn anew, and the run of RUN_H hours begins at a random time up to RUN_H
-after the cold start: the arm warms up differently each time. Nothing else happens, so every
-"recalibrate" is a false alarm; after one, the new calibration is in force. Fits are linear ones
-about the draw's geometry; all else is the code that makes a history.
+after the cold start: the arm warms up differently each time. Between months the hall differs by
+HALL_K, and all lengths of the arm grow with it. Nothing else happens, so every "recalibrate" is a
+false alarm; after one, the new calibration is in force. Fits are linear ones about the draw's
+geometry; all else is the code that makes a history.
 
 A change of a joint moves the estimate by as much and changes nothing else, as a change of the
 second series is a free unknown beside all variances. So every month in which nothing happened
@@ -23,6 +24,9 @@ import argparse
 import csv
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -40,23 +44,37 @@ from kinacc.synthetic.physical import PhysicalRobot, Visits
 
 POSES, MONTHS = 100, 12
 NOISE_MM, WEIGHT_MM_PER_RAD = 0.02, 500.0
+HALL_K, GROWTH_PER_K = 5.0, 1.2e-5  # standard deviation of months; of steel
 SETUP = Setup(same_base=False, same_tool=True)
 SAME, OTHER = "same", "other"
 POOL = 20_000
 
 
+@cache
+def pool() -> np.ndarray:
+    """Configurations that programmes are drawn of."""
+    return plan.configurations(robots.load("mh180"), POOL)
+
+
+def grown(arm: PhysicalRobot, warmer_k: float) -> PhysicalRobot:
+    """The arm with all lengths grown by a change of temperature."""
+    longer = 1.0 + GROWTH_PER_K * warmer_k
+    geometry = replace(arm.dh, a_mm=arm.dh.a_mm * longer, d_mm=arm.dh.d_mm * longer)
+    return replace(arm, dh=geometry)
+
+
 class Arm:
     """One physical arm and its measuring programme."""
 
-    def __init__(self, number: int, plans: str, pool: np.ndarray) -> None:
+    def __init__(self, number: int, plans: str) -> None:
         draw = accepted_draw(number % len(rows()))
         self.rng = np.random.default_rng([16, number, plans == SAME])
         self.true = physical_robot(100_000 + number, draw.scales, draw.geometry)
-        self.plans, self.pool = plans, pool
+        self.plans = plans
         self.programme = self._programme()
 
     def _programme(self) -> np.ndarray:
-        return self.pool[self.rng.choice(len(self.pool), POSES, replace=False)]
+        return pool()[self.rng.choice(len(pool()), POSES, replace=False)]
 
     def series(self, true: PhysicalRobot | None = None) -> Observations:
         """One calibration run, of this arm or of what became of it."""
@@ -65,7 +83,8 @@ class Arm:
         s, normal = plan.directions(q_rad), self.rng.standard_normal((3, POSES, 6))
         visits = Visits(q_rad, s, time_h, normal[0])
         run = tracker.Run(visits, normal[1, :, :3], normal[2, :, :3])
-        return full_poses(q_rad, tracker.measured(true or self.true, run, NOISE_MM), s)
+        arm = grown(true or self.true, self.rng.normal(0.0, HALL_K))
+        return full_poses(q_rad, tracker.measured(arm, run, NOISE_MM), s)
 
     def pair(self, first: Observations, second: Observations) -> Pair:
         """Both, about the arm's geometry."""
@@ -127,27 +146,28 @@ def _seen(found: drift_chance.Moved, chance_mm: float) -> tuple[np.ndarray, np.n
     return square > chance_mm**2, size
 
 
-def run(same: int, other: int, out: Path) -> None:
-    """Simulate years of each kind, evenly mixed; tables are written now and again."""
-    pool = plan.configurations(robots.load("mh180"), POOL)
-    years = [
-        (number / count, plans, number)
-        for plans, count in ((SAME, same), (OTHER, other))
-        for number in range(count)
-    ]
+def run(same: int, other: int, out: Path, cores: int = 1) -> None:
+    """Simulate years of each kind; tables are written now and again."""
+    years = [(plans, n) for plans, count in ((SAME, same), (OTHER, other)) for n in range(count)]
     decisions: list[dict] = []
     seen, size, count = {}, {}, Counter()
-    for done, (_, plans, number) in enumerate(sorted(years), 1):
-        found, hits, per_unit = year(Arm(number, plans, pool))
-        decisions += [{"year": number} | each for each in found]
-        seen[plans] = seen.get(plans, 0) + hits
-        size[plans] = size.get(plans, 0) + per_unit
-        count[plans] += 1
-        if done % 20 == 0 or done == len(years):
-            _write(out / "years.csv", [*_years(decisions)])
-            _write(out / "power.csv", [*_power(seen, size, count)])
-            alarms = {each: _with_alarm(decisions, each) for each in count}
-            print(f"years with a false alarm: {alarms} of {dict(count)}", flush=True)
+    with ProcessPoolExecutor(cores) as workers:
+        found_of = workers.map(_year_of, years) if cores > 1 else map(_year_of, years)
+        for (plans, number), (found, hits, per_unit) in zip(years, found_of, strict=True):
+            decisions += [{"year": number} | each for each in found]
+            seen[plans] = seen.get(plans, 0) + hits
+            size[plans] = size.get(plans, 0) + per_unit
+            count[plans] += 1
+            if count.total() % 20 == 0 or count.total() == len(years):
+                _write(out / "years.csv", [*_years(decisions)])
+                _write(out / "power.csv", [*_power(seen, size, count)])
+                alarms = {each: _with_alarm(decisions, each) for each in count}
+                print(f"years with a false alarm: {alarms} of {dict(count)}", flush=True)
+
+
+def _year_of(which: tuple[str, int]) -> tuple[list[dict], np.ndarray, np.ndarray]:
+    plans, number = which
+    return year(Arm(number, plans))
 
 
 def _with_alarm(decisions: list[dict], plans: str) -> int:
@@ -231,9 +251,10 @@ def main() -> None:
     parser.add_argument("--same", type=int, default=0, help="years of the same poses")
     parser.add_argument("--other", type=int, default=0, help="years of other poses each month")
     parser.add_argument("--out", type=Path, required=True, help="folder of tables and picture")
+    parser.add_argument("--cores", type=int, default=2, help="processes; of no influence")
     asked = parser.parse_args()
     if asked.same or asked.other:
-        run(asked.same, asked.other, asked.out)
+        run(asked.same, asked.other, asked.out, asked.cores)
     draw(asked.out)
 
 
