@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.workflow.plan import RESULTS
 
 if TYPE_CHECKING:
-    from kinacc.gate.outcome import Outcome
+    from kinacc.gate.outcome import Outcome, Verdicts
     from kinacc.workflow.plan import Plan
     from kinacc.workflow.verification.check import Report
 
@@ -85,7 +85,8 @@ def gate(
         click.echo(outputs.schema_text(), nl=False)
         return
     _refuse(against, exact, as_json, annotations, files)
-    verdicts = _verdicts(results, config, datasets, against, exact)
+    screens = as_json or any(path.suffix in (".json", ".md") for path in files)
+    verdicts = _verdicts(results, config, datasets, against, exact, screens)
     for path in files:
         outputs.written(verdicts, path)
     if as_json:
@@ -123,9 +124,9 @@ def _verdicts(
     datasets: Sequence[str],
     against: Path | None,
     exact: bool,
-):
+    with_screens: bool,
+) -> Verdicts:
     from kinacc.gate import golden
-    from kinacc.gate.first_screens import first_screens
     from kinacc.gate.gates import judged
     from kinacc.gate.outcome import FAILED, Verdicts
     from kinacc.workflow.verification.check import is_dataset
@@ -146,10 +147,17 @@ def _verdicts(
         meant = list(datasets) and list(plan.datasets if plan else datasets)
         outcomes += golden.compared(results, against, meant, exact)
     names = list(full) or [each.name for each in report.datasets]
-    screens = first_screens(results, [each for each in names if each not in broken])
-    screens |= dict.fromkeys(broken, "The results do not hold: nothing is told of them.\n")
+    screens = _screens(results, names, broken) if with_screens else {}
     shown = "" if accepted is None else str(accepted)
     return Verdicts(str(results), shown, report.digest, tuple(outcomes), screens)
+
+
+def _screens(results: Path, names: Sequence[str], broken: Collection[str]) -> dict[str, str]:
+    """The first screen of every data set, for the forms that have them."""
+    from kinacc.gate.first_screens import first_screens
+
+    screens = first_screens(results, [each for each in names if each not in broken])
+    return screens | dict.fromkeys(broken, "The results do not hold: nothing is told of them.\n")
 
 
 def _configurations(
