@@ -97,7 +97,7 @@ def accuracy_map(folder):
 
 def study_summary(folder):
     rows = [
-        (assessor, noise, true + slope * noise, 0.7, 1.1, slope * noise, 0.1, 100)
+        (assessor, noise, true + slope * noise, 0.7, 1.1, slope * noise, 0.1, 100, 0.01)
         for assessor, slope in (("maximum", 2.0), ("outlier_rejection", 1.0))
         for noise in (0.05, 0.1, 0.2)
         for true in (0.8,)
