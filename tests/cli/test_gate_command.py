@@ -115,7 +115,8 @@ def test_results_are_held_to_the_accepted_run_without_a_configuration(cell):
     done = call("gate", "results", "--against", "accepted")
     assert done.exit_code == 0, done.output
     done = call("gate", "results")
-    assert "no gate was read" in " ".join(done.output.split())
+    assert done.exit_code == 2
+    assert "no gate is known" in " ".join(done.output.split())
 
 
 def test_a_campaign_on_an_earlier_calibration_is_told_from_one_on_this(cell):

@@ -134,6 +134,9 @@ def _verdicts(
     if is_dataset(results):  # one data set was named in place of the folder of all
         results, datasets = results.resolve().parent, [*datasets, results.resolve().name]
     files = list(config) or [each for each in [_CONFIG] if Path(each).is_file()]
+    if not files and against is None:
+        what = f"is not given, and there is no {_CONFIG} here: no gate is known"
+        raise InputError(Problem("--config", what, "a configuration, or --against FOLDER"))
     full, plan = _configurations(files, datasets)
     report = _checked(results, files, plan, datasets)
     outcomes = _sound(report)
@@ -141,8 +144,6 @@ def _verdicts(
     accepted = _accepted(full, against)
     found = judged(results, full, accepted, broken)
     outcomes += [replace(each, file=_file(each, files)) for each in found]
-    if not files and against is None:
-        outcomes.append(_ungated(results))
     if against is not None:
         meant = list(datasets) and list(plan.datasets if plan else datasets)
         outcomes += golden.compared(results, against, meant, exact)
@@ -235,11 +236,3 @@ def _file(outcome: Outcome, files: Sequence[str]) -> str:
     """The configuration file that states a gate: the last in which its name stands."""
     named = [each for each in files if outcome.name in Path(each).read_text("utf-8", "replace")]
     return named[-1] if named else files[-1]
-
-
-def _ungated(results: Path) -> Outcome:
-    from kinacc.gate.outcome import WARNED, Outcome
-
-    says = f"no configuration was given, and there is no {_CONFIG} here: no gate was read"
-    fix = f"kinacc gate {results} --config FILE.yaml"
-    return Outcome("", "gates", "value", WARNED, says, fix)
