@@ -114,6 +114,7 @@ def test_what_is_asked_wrongly_is_told_before_anything_is_looked_at(cell, words,
 def test_results_are_held_to_the_accepted_run_without_a_configuration(cell):
     done = call("gate", "results", "--against", "accepted")
     assert done.exit_code == 0, done.output
+    assert "no gate was read" in " ".join(done.output.split())
     done = call("gate", "results")
     assert done.exit_code == 2
     assert "no gate is known" in " ".join(done.output.split())

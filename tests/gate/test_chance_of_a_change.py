@@ -65,6 +65,17 @@ def test_a_largest_error_is_held_against_one_of_as_many_only():
     assert np.isnan(found.least)
     assert found.open == "a maximum of 400 errors says nothing beside one of 200; use p99"
     assert not change("largest", sample(sizes(1, 50)), sample(sizes(2, 50)), True, 0.99).open
+    assert (
+        "by chance"
+        in change("largest", sample(sizes(1, 50)), sample(sizes(2, 50)), False, 0.99).open
+    )
+
+
+def test_a_largest_error_that_grew_at_the_same_poses_is_no_chance():
+    before = sizes(1, 50)
+    now = np.where(np.arange(50) == np.argmax(before), before + 3.0, before)
+    found = change("largest", sample(now), sample(before), True, 0.99)
+    assert found.least == found.difference == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize(("statistic", "count"), [("mean", 19), ("rms", 8), ("p99", 199)])

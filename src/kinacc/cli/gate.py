@@ -144,6 +144,8 @@ def _verdicts(
     accepted = _accepted(full, against)
     found = judged(results, full, accepted, broken)
     outcomes += [replace(each, file=_file(each, files)) for each in found]
+    if not files:
+        outcomes.append(_ungated(results))
     if against is not None:
         meant = list(datasets) and list(plan.datasets if plan else datasets)
         outcomes += golden.compared(results, against, meant, exact)
@@ -236,3 +238,11 @@ def _file(outcome: Outcome, files: Sequence[str]) -> str:
     """The configuration file that states a gate: the last in which its name stands."""
     named = [each for each in files if outcome.name in Path(each).read_text("utf-8", "replace")]
     return named[-1] if named else files[-1]
+
+
+def _ungated(results: Path) -> Outcome:
+    from kinacc.gate.outcome import WARNED, Outcome
+
+    says = f"no configuration was given, and there is no {_CONFIG} here: no gate was read"
+    fix = f"kinacc gate {results} --config FILE.yaml"
+    return Outcome("", "gates", "value", WARNED, says, fix)

@@ -89,10 +89,8 @@ def change(statistic: str, now: Sample, before: Sample, paired: bool, confidence
     difference = statistic_of(statistic, now.sizes) - statistic_of(statistic, before.sizes)
     if paired and _same(now, before):
         return Change(difference, difference)
-    if statistic == "largest" and len(now.sizes) != len(before.sizes):
-        one, other = len(now.sizes), len(before.sizes)
-        why = f"a maximum of {one} errors says nothing beside one of {other}; use p99"
-        return Change(difference, np.nan, why)
+    if statistic == "largest":
+        return _change_of_largest(difference, now, before, paired)
     fewest = FEWEST_OF_QUANTILE if statistic == "p99" else FEWEST
     count = min(now.count, before.count)
     if count < fewest:
@@ -103,6 +101,18 @@ def change(statistic: str, now: Sample, before: Sample, paired: bool, confidence
         return Change(difference, np.nan, why)
     find = _least_of_means if statistic in _SMOOTH else _least_of_ranks
     return Change(difference, find(statistic, now, before, paired, confidence))
+
+
+def _change_of_largest(difference: float, now: Sample, before: Sample, paired: bool) -> Change:
+    """That of maxima: resampling tells nothing of what was not drawn, so only equal poses tell."""
+    one, other = len(now.sizes), len(before.sizes)
+    if one != other:
+        why = f"a maximum of {one} errors says nothing beside one of {other}; use p99"
+        return Change(difference, np.nan, why)
+    if not paired:
+        why = "a maximum of other readings is another by chance, nobody knows by how much; use p99"
+        return Change(difference, np.nan, why)
+    return Change(difference, difference)
 
 
 def _same(now: Sample, before: Sample) -> bool:

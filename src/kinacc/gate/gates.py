@@ -154,10 +154,10 @@ def _change(
     )
     if found.open:
         return _outcome(gate, dataset, UNDECIDED, f"undecided: {says}; {found.open}", "", figures)
-    if found.difference:
+    if found.difference and found.least != found.difference:
         says += f"; with {100.0 * asked:g} % confidence {_at_least(now, found)}, {found.drawn}"
     failed = found.least > allowed
-    fix = "look at what changed: kinacc gate --against names it"
+    fix = f"what changed is named by: kinacc gate --against {accepted.folder.parent}"
     return _outcome(gate, dataset, FAILED if failed else PASSED, says, fix, figures)
 
 
