@@ -96,6 +96,7 @@ def carried_out(
     Snakemake's exit code where that is not 0. Raises InputError for bad configuration.
     """
     from kinacc.errors import InputError, Problem
+    from kinacc.workflow import measured_files
     from kinacc.workflow.plan import SNAKEFILE, planned
 
     first = next((i for i, word in enumerate(words) if word.startswith("-")), len(words))
@@ -110,7 +111,7 @@ def carried_out(
         raise InputError(Problem("FILE.yaml", what, fix=fix))
     configs = tuple(each for word in configs for each in _files(word))
     plan = planned(configs)
-    plan.check_files()
+    measured_files.check(plan)
     from kinacc.workflow import cost
     from kinacc.workflow.catalogue import CALIBRATION, STAGES
 

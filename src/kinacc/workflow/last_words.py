@@ -8,6 +8,7 @@ from pathlib import Path
 
 from kinacc.workflow.answer import answer, read
 from kinacc.workflow.fleet import FEW
+from kinacc.workflow.measured_files import remarks
 from kinacc.workflow.plan import Plan
 
 
@@ -30,5 +31,5 @@ def last_words(plan: Plan, made: Collection[str]) -> list[str]:
                 tables.pop("claims", None)
             lines += ["", *answer(folder, tables)]
         elif dataset in plan.told:
-            lines += plan.remarks(dataset)
+            lines += remarks(plan, dataset)
     return lines

@@ -7,8 +7,6 @@ hashes, so that either leaves the same bytes. Importing it costs nothing but the
 from __future__ import annotations
 
 import os
-import re
-import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, wraps
@@ -19,7 +17,7 @@ from kinacc.artifacts import records
 from kinacc.artifacts.error_models import asked_for
 from kinacc.artifacts.provenance import config_hash, file_hash, stage_code_hash
 from kinacc.campaign.journal import JOURNAL, PLAN, of_each
-from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.workflow.boundary import leading_out
 from kinacc.workflow.catalogue import (
     CALIBRATION,
@@ -328,50 +326,6 @@ class Plan:
             for role, path in files.items()
         }
 
-    def check_files(self) -> None:
-        """Read every measured file that is newer than its table, or read by other settings.
-
-        Raises InputError listing all problems. Done before anything runs, because Snakemake
-        removes a table before it is made anew.
-        """
-        problems: list[Problem] = []
-        for dataset, config in self.datasets.items():
-            files = self._files(STAGES["measurements"], dataset)
-            what = "has braces in its name, which Snakemake takes for a wildcard"
-            problems += [
-                Problem(path, what, fix="rename it")
-                for path in dict.fromkeys(files.values())
-                if re.search(r"\{\s*\w.*\}", path)
-            ]
-            read = [files[role] for role in ("measurements_file", "joints_file") if role in files]
-            table = self._table("measurements", dataset)
-            settings = self.settings("measurements", dataset)
-            if not read or _is_current(table, read, settings):
-                continue
-            from kinacc.kinematics import robot
-            from kinacc.workflow import calibration_settings
-            from kinacc.workflow.stages import measurements
-
-            with gathered(problems):
-                with warnings.catch_warnings(action="ignore"):  # the stage says them itself
-                    made = measurements.run({}, settings)
-                calibration_settings.require_enough_rows(
-                    made, robot.load(config["robot"]), config["calibration"]
-                )
-        refuse(problems)
-
-    def remarks(self, dataset: str) -> list[str]:
-        """What the check found in a data set's file, a line each."""
-        path = self._table("data_check", dataset)
-        if "data_check" in self.left_out(dataset) or not os.path.exists(path):
-            return []
-        from kinacc.artifacts.store import read
-        from kinacc.calibration.summary import findings
-
-        found = findings(read(path))
-        told = [f"{dataset}: the check of the data found:"] if found else []
-        return told + [f"  - {words}" for words in found]
-
     def outputs(self, name: str, dataset: str, part: str | None = None) -> dict[str, str]:
         """Files a stage leaves: artefact -> path, or picture format -> path."""
         stage = STAGES[name]
@@ -584,24 +538,6 @@ def _fix(role: str, dataset: str | bool) -> str:
         return "make it first: kinacc tournament"
     where = f" --dataset {whose or dataset}" if whose or dataset else ""
     return f"make it first: kinacc run {maker_of(artefact).name}{where}"
-
-
-def _is_current(table: str, files: Sequence[str], settings: Mapping[str, object]) -> bool:
-    """Whether a table was made after the ``files`` changed, and by these settings."""
-    changed = max(map(os.path.getmtime, files))
-    if not os.path.exists(table) or changed >= os.path.getmtime(table):
-        return False
-    return _marks(table).get("config_hash") == config_hash(settings)
-
-
-def _marks(table: str) -> dict[str, str]:
-    """What a table says it was made from; nothing where there is none that can be read."""
-    from kinacc.artifacts.store import read_metadata
-
-    try:
-        return read_metadata(table)
-    except InputError:
-        return {}
 
 
 def _copy(source: Mapping[str, object], target: dict[str, object], keys: list[str]) -> None:
