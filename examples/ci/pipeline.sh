@@ -18,8 +18,8 @@ flock 9 # of two pushes the second waits
 
 # The folder stays from run to run, with what was computed: what did not change is not run again.
 unset $(git rev-parse --local-env-vars) # a hook sets them
-test -d "$kept/work/.git" || git clone -q --no-checkout "$repository" "$kept/work"
-cd "$kept/work"
+test -d "$kept/clone/.git" || git clone -q --no-checkout "$repository" "$kept/clone"
+cd "$kept/clone"
 git fetch -q --prune origin
 git checkout -q --force --detach "$commit"
 git ls-files -z | xargs -0 touch -c -t 200001010000 # content tells what changed, not today's date

@@ -10,12 +10,13 @@ import pytest
 import shared_data
 
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.history_tables import MOVED, SAME
 from kinacc.calibration import dh_fit
 from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
 from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment import drift
-from kinacc.deployment.drift import MOVED, SAME, Session
+from kinacc.deployment.drift import Session
 from kinacc.deployment.record import Calibration
 from kinacc.geometry import Pose, compose, exp_so3, invert
 from kinacc.kinematics import robot as robots

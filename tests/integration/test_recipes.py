@@ -148,7 +148,7 @@ def test_on_one_machine(new_server):
     assert len(cold.computed) == 6
     passed_without_computing(server, on_one_machine(server))
 
-    work = server.folder / "kept" / "work"
+    work = server.folder / "kept" / "clone"
     shutil.rmtree(work / "results")
     shutil.rmtree(work / ".snakemake")
     again = on_one_machine(server)

@@ -10,6 +10,7 @@ def test_a_run_ends_with_what_the_calibrations_are_worth(project):
     claims = paper.split("figures  ")[0]
     for word in ("agree", "differ", "cannot be compared", "results/mh180/claims.parquet"):
         assert word in claims
+    assert "results/mh180/figures: fig1 to fig6" in paper
     for name in ("mh180", "own"):
         page = paper[paper.index(f"{name}: what its calibration is worth") :]
         for word in ("held-out error", "selected", "valid where", "undetermined", "not assessed"):

@@ -21,6 +21,7 @@ if __name__ == "__main__":
 from oracles.kinematics import UR10, dh_link, rot_x, rot_y, rot_z, trans
 
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.history_tables import MOVED, SAME
 from kinacc.calibration import dh_fit
 from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
 from kinacc.calibration.frames import known
@@ -89,7 +90,7 @@ def session(seen: Observations, number: int, moved: bool) -> drift.Session:
     at = compose(frames.base, compose(model.pose(seen.at), frames.tool))
     sizes = np.linalg.norm(seen.position_mm - at.position_mm, axis=1)
     nothing = (np.nan, np.nan, np.nan)
-    base = drift.MOVED if moved else drift.SAME
+    base = MOVED if moved else SAME
     date = f"2026-{number:02}-01"
     return drift.Session(
         f"ur-{date}", date, "", base, drift.SAME, calibration, seen, sizes, *nothing

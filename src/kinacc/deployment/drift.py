@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
 from kinacc.calibration.constraints import frame_terms
 from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.observations import Observations
@@ -31,8 +32,6 @@ from kinacc.geometry import Pose, compose
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import configurations
 
-SAME, MOVED = "same", "moved"
-FIRST, HOLDS, RECALIBRATE, OPEN = "first", "holds", "recalibrate", "cannot be told"
 LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
 ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
 _TEXT = ("series", "date", "digest", "base", "tool", "model", "in_force", "verdict", "reason")

@@ -76,7 +76,7 @@ def _errors(ax: Axes, history: Columns, date: np.ndarray) -> None:
     """Mean and 99 % as lines, the largest as marks, of both calibrations at each line's poses."""
     looks = (
         ("held_out", style.BLUE, "ox", "calibrated on this line, held out"),
-        ("in_force", style.ORANGE, "^+", "calibration in force before"),
+        ("in_force", style.ORANGE, "^x", "calibration in force before"),
     )
     size = 3.5 if len(date) <= _MANY else 1.8
     highest = 0.0
@@ -134,9 +134,11 @@ def _moved(ax: Axes, history: Columns, date: np.ndarray, verdicts: np.ndarray) -
                 mec="white", mew=0.4, label=words, clip_on=False, zorder=3,
             )  # fmt: skip
     for row in np.flatnonzero((verdicts == RECALIBRATE) & np.isfinite(joint)):
+        is_late = date[row] > date.mean()  # words go to the side that has room
         ax.annotate(
-            f"joint {joint[row]:.0f}", (date[row], at[row]), (5, 0), textcoords="offset points",
-            fontsize=style.SMALL_PT, color=style.darker(style.VERMILION), va="center",
+            f"joint {joint[row]:.0f}", (date[row], at[row]), (-5 if is_late else 5, 3),
+            textcoords="offset points", ha="right" if is_late else "left", va="bottom",
+            fontsize=style.SMALL_PT, color=style.darker(style.VERMILION),
         )  # fmt: skip
     ax.set_ylabel("Moved (mm rms)")
     highest = np.nanmax([*moved, *chance, 0.0])

@@ -99,8 +99,9 @@ def change(statistic: str, now: Sample, before: Sample, paired: bool, confidence
     if np.isnan(difference):
         why = "an error is exactly zero, to which no gamma distribution can be fitted"
         return Change(difference, np.nan, why)
-    find = _least_of_means if statistic in _SMOOTH else _least_of_ranks
-    return Change(difference, find(statistic, now, before, paired, confidence))
+    if statistic == "p99":
+        return Change(difference, _least_of_quantiles(now, before, paired, confidence))
+    return Change(difference, _least_of_means(statistic, now, before, paired, confidence))
 
 
 def _change_of_largest(difference: float, now: Sample, before: Sample, paired: bool) -> Change:
@@ -215,10 +216,8 @@ def _least_of_means(
     return float(min(student, drawn))
 
 
-def _least_of_ranks(
-    statistic: str, now: Sample, before: Sample, paired: bool, confidence: float
-) -> float:
-    """Lower end of the difference of quantiles or maxima; see above."""
+def _least_of_quantiles(now: Sample, before: Sample, paired: bool, confidence: float) -> float:
+    """Lower end of the difference of empirical quantiles; see above."""
     numbers = [np.unique(each.configuration) for each in (now, before)]
     if paired:
         numbers = [np.union1d(*numbers)]
@@ -230,7 +229,7 @@ def _least_of_ranks(
     found = []
     for weights in _resampled([len(each) for each in numbers]):
         values = [
-            _ranked(each.sizes[rows], own[:, at[rows]], statistic)
+            _quantiles(each.sizes[rows], own[:, at[rows]])
             for each, rows, at, own in zip(
                 (now, before), order, place, (weights[0], weights[-1]), strict=True
             )
@@ -238,19 +237,15 @@ def _least_of_ranks(
         found.append(values[0] - values[1])
     drawn = np.concatenate(found)
     drawn = drawn[np.isfinite(drawn)]
-    difference = statistic_of(statistic, now.sizes) - statistic_of(statistic, before.sizes)
+    difference = statistic_of("p99", now.sizes) - statistic_of("p99", before.sizes)
     normal = difference - scipy.special.ndtri(confidence) * float(drawn.std())
     return float(min(np.quantile(drawn, 1.0 - confidence), normal))
 
 
-def _ranked(sizes: np.ndarray, weights: np.ndarray, statistic: str) -> np.ndarray:
-    """Empirical quantile or maximum (m,) of sorted sizes (n,), each there weights (m, n) times.
-
-    NaN where none is there.
-    """
-    share = QUANTILE if statistic == "p99" else 1.0
+def _quantiles(sizes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Empirical quantiles (m,) of sorted sizes (n,), each weights (m, n) times; NaN of none."""
     until = np.cumsum(weights, axis=1)
-    place = share * (until[:, -1] - 1.0)
+    place = QUANTILE * (until[:, -1] - 1.0)
     low = np.floor(place)
     first, second = (
         sizes[np.minimum((until <= each[:, None]).sum(axis=1), len(sizes) - 1)]
