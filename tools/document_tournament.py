@@ -14,8 +14,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from kinacc.artifacts.store import read, read_metadata
-from kinacc.figures import save, tournament
-from kinacc.study.tournament import pages
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.assess.statement import CONFIDENCE
+from kinacc.figures import save, tournament, tournament_worlds
+from kinacc.study.tournament import pages, worlds_page
 
 DOCS = Path(__file__).parents[1] / "docs"
 TABLES = ("tournament_cells", "tournament_verdicts", "tournament_fields")
@@ -57,10 +59,15 @@ def main(given: Iterable[str] = ()) -> None:
         (DOCS / path).parent.mkdir(exist_ok=True)
         (DOCS / path).write_text(text, encoding="utf-8")
     for name, tables in known.items():
-        if not pages.is_pictured(tables["tournament_cells"]):
+        every = tables["tournament_cells"]
+        if worlds_page.has_worlds(every):
+            rows = [row for row in worlds_page.of_kinds(every) if row["assessor"] == RECOMMENDED]
+            picture = tournament_worlds.draw(rows, CONFIDENCE)
+            save.write(picture, {"png": DOCS / "tournament" / name / "worlds.png"})
+        cells = worlds_page.as_stated(every)
+        if not pages.is_pictured(cells):
             continue
         for quantity in tournament.QUANTITIES:
-            cells = tables["tournament_cells"]
             picture = tournament.draw(cells, quantity, *pages.SHOWN, pages.NAMES)
             save.write(picture, {"png": DOCS / "tournament" / name / f"{quantity}.png"})
 

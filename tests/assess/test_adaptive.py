@@ -13,15 +13,14 @@ import pytest
 
 from kinacc.artifacts.provenance import imported_names
 from kinacc.assess.adaptive import Candidates, Ledger
-from kinacc.assess.coverage import companions, hardly_missed, records
+from kinacc.assess.coverage import companions, excepted, hardly_missed
 from kinacc.assess.error_effects import joint_errors
-from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
+from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, share
 from kinacc.assess.population import largest_size
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.sequential import Sequential
-from kinacc.assess.sequential_limits import share
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS, Reason
@@ -213,11 +212,9 @@ def test_looks_share_out_the_whole_error():
     assert all(share(look) >= share(look + 1) > 0.0 for look in range(50))
 
 
-def test_records_and_companions_against_counting():
+def test_companions_against_counting():
     rng = np.random.default_rng(7)
     orders = rng.permuted(np.tile(np.arange(20), (20_000, 1)), axis=1)
-    largest_so_far = orders == np.maximum.accumulate(orders, axis=1)
-    assert records(8, 20) == pytest.approx(1.0 + largest_so_far[:, 8:].sum(axis=1).mean(), abs=0.02)
     count = companions(20, 8, 0.1)
     missed = [np.mean(orders[:, :8].max(axis=1) < 20 - c) for c in (count - 1, count)]
     assert missed[0] > 0.1 > missed[1]
@@ -272,18 +269,48 @@ def test_the_single_shot_bound_is_exact_where_one_point_decides():
 def test_the_recommended_bound_on_all_candidates_holds_where_its_assumption_does():
     errors = field(60) * 0.7
     errors[:12] = directions(12)
-    upper, _ = coverage(SearchAndConfirm(40, crowd=0.2), errors, 0.1, 120, CANDIDATES)
+    settings = SearchAndConfirm(40, assume="company", crowd=0.2)
+    upper, _ = coverage(settings, errors, 0.1, 120, CANDIDATES)
     assert upper >= least(120)
 
 
-def test_a_visit_ended_early_says_nothing_of_the_rest_without_an_assumption():
+def test_the_recommended_bound_on_all_but_a_few_candidates_holds_whatever_is_missed():
+    # As many large errors as are excepted, and one more: the hardest that there is.
+    points, budget, draws = 40, 20, 400
+    settings = SearchAndConfirm(budget)
+    size = np.full(points, 1e-3)
+    size[: excepted(points, settings.visit(points), 0.025) + 1] = 1.0
+    held = 0
+    for draw in range(draws):
+        order = np.random.default_rng([draw, 9]).permutation(points)
+        errors = (directions(points) * size[:, None])[order]
+        said = conduct(settings, drawn_world(errors, 0.2, key_of(12, draw), budget)).statements()[1]
+        held += said.upper_mm >= np.sort(size)[::-1][said.excepted]
+    assert 0 < said.excepted < points // 2
+    assert held / draws >= least(draws)
+
+
+def test_a_visit_ended_early_speaks_of_all_but_the_points_that_all_can_be_missed():
     campaign = SearchAndConfirm(40).begin(Candidates.with_equal_noise(np.full(40, 0.05)))
     for row, reading in enumerate(field(40)[:30]):
         assert campaign.next() == row
         campaign.record(row, reading)
     about = campaign.statements()[1]
+    left = about.excepted
+    ways = [math.comb(40 - count, 30) / math.comb(40, 30) for count in (left, left + 1)]
+    assert ways[0] > 0.025 >= ways[1]
+    assert not about.assumption
+
+
+def test_a_visit_ended_early_says_nothing_of_all_the_rest_without_an_assumption():
+    settings = SearchAndConfirm(40, assume="company", crowd=0.5)
+    campaign = settings.begin(Candidates.with_equal_noise(np.full(40, 0.05)))
+    for row, reading in enumerate(field(40)[:30]):
+        assert campaign.next() == row
+        campaign.record(row, reading)
+    about = campaign.statements()[1]
     assert about.assumption.numbers["crowd"] > 1
-    assert about.assumption
+    assert about.excepted == 0
 
 
 def test_no_recommended_bound_is_below_its_value():
@@ -296,7 +323,10 @@ def test_no_recommended_bound_is_below_its_value():
 
 def test_an_error_that_stands_alone_is_seen_to_break_the_assumption():
     errors = np.vstack([[[3.0, 0.0, 0.0]], 0.1 * directions(79)])
-    said = conduct(SearchAndConfirm(60, crowd=0.5), drawn_world(errors, 0.05, key_of(8), 60))
+    said = conduct(
+        SearchAndConfirm(60, assume="company", crowd=0.5),
+        drawn_world(errors, 0.05, key_of(8), 60),
+    )
     about = said.statements()[1]
     assert about.target == CANDIDATES
     assert about.withheld == Reason("stands_alone", {"isolation": 1.25})

@@ -24,6 +24,7 @@ from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
 from kinacc.assess.simulate import conduct
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Reason, Statement
 from kinacc.assess.world import drawn_world
+from kinacc.campaign.simulate import width_mm
 from kinacc.errors import InputError
 from kinacc.kinematics import dh, robot
 
@@ -254,6 +255,14 @@ def test_bounds_that_contradict_each_other_or_the_value_decide_nothing(value, lo
         found = decide(Statement(MEASURED, value, lower, upper, 0.95), tolerance)
         assert found.verdict == UNDECIDED
         assert found.reason.code == "contradict"
+
+
+def test_a_bound_that_leaves_candidates_out_accepts_nothing_and_may_reject():
+    said = Statement(CANDIDATES, 0.9, 0.8, 1.0, 0.95, excepted=3)
+    assert decide(said, 1.2).verdict == UNDECIDED
+    assert decide(said, 1.2).reason.numbers == {"excepted": 3}
+    assert decide(said, 0.7).verdict == REJECT
+    assert math.isinf(width_mm(said))
 
 
 def test_no_bound_is_no_decision_and_no_tolerance_an_error():

@@ -1,7 +1,7 @@
 """The bounds of search_and_confirm, worked out again from the raw readings in the order taken.
 
-Own slow code: scipy's noncentral chi-square for the limits, a product of plain ratios for the
-chance of missing points, fractions for the expected number of new largest points.
+Own slow code for the looks of every point, for the points left out and for the lower bound's sums;
+the boundaries themselves are held to other means in test_oracle_boundary.py.
 """
 
 from __future__ import annotations
@@ -10,15 +10,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from scipy.stats import ncx2
 
+from kinacc.assess.boundary import boundary, crossing
+from kinacc.assess.lower_average import LATE, LowerAverage, stages
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
 from kinacc.assess.world import drawn_world
 
-WRONG = Fraction(1, 20)  # of the statements on either target
-MISSED = Fraction(1, 50)  # of those on all candidates: what they lose by points never read
-LOOKS = {1: 0.60, 2: 0.16, 4: 0.10, 8: 0.06, 16: 0.04, 32: 0.02, 64: 0.01, 128: 0.005}
+ERROR = 0.05
 
 
 class Recorded:
@@ -34,102 +33,101 @@ class Recorded:
         return reading
 
 
-def limits(sizes, noise, error):
-    """Sizes a at which readings (n,) at most as large have probability ``error``; by bisection."""
-    square = (sizes / noise) ** 2
-    low, high = np.zeros(len(sizes)), np.sqrt(square) + 10.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        above = ncx2.cdf(square, 3, middle**2) > error
-        low, high = np.where(above, middle, low), np.where(above, high, middle)
-    return noise * high
-
-
-def largest_limit(given, sigma, error):
-    """Largest over the points of each point's smallest limit at 1, 2, 4, .. readings."""
-    sums, count, sizes, noises, errors, rows = {}, {}, [], [], [], []
-    for row, reading in given:
-        sums[row] = sums.get(row, 0.0) + reading
-        n = count[row] = count.get(row, 0) + 1
-        if n in LOOKS:
-            sizes.append(np.linalg.norm(sums[row] / n))
-            noises.append(sigma[row] / np.sqrt(n))
-            errors.append(float(error) * LOOKS[n])
-            rows.append(row)
-    found = limits(np.array(sizes), np.array(noises), np.array(errors))
-    smallest = {row: min(found[np.array(rows) == row]) for row in set(rows)}
-    return max(smallest.values())
-
-
-def missed(marked, points, seen):
-    """Probability that none of ``marked`` points is among ``seen`` of ``points``."""
-    chance = Fraction(1)
-    for drawn in range(seen):
-        chance *= Fraction(max(points - marked - drawn, 0), points - drawn)
-    return chance
-
-
-def visited_anyway(points, budget):
-    """Number of points the settings promise to visit whatever is read."""
-    if 2 * budget >= 3 * points:
-        return points
-    nearly_all = min(n for n in range(points + 1) if missed(1, points, n) <= MISSED)
-    return nearly_all if nearly_all <= budget else -(-6 * min(budget, points) // 10)
-
-
-def worked_out(given, sigma, points, budget):
-    """Limits (mm) for the points read, once at 5 % and once at what 2 % for missing others leave.
-
-    Then how many points are missed together with at most 2 %, and how many were read.
-    """
-    seen, anyway = len({row for row, _ in given}), visited_anyway(points, budget)
-    more = sum((Fraction(1, i) for i in range(anyway + 1, min(budget, points) + 1)), Fraction(1))
-    here = largest_limit(given, sigma, WRONG / more)
-    if anyway == points:
-        return here, here, 1, seen
-    unlikely = next(c for c in range(1, points + 1) if missed(c, points, seen) <= MISSED)
-    everywhere = largest_limit(given, sigma, (WRONG - MISSED) / more)
-    return here, everywhere, unlikely, seen
-
-
-def campaign(points, budget, large, noise_mm):
-    """Statements and readings of a campaign: ``large`` errors near 1 mm, all others below 0.8."""
-    rng = np.random.default_rng([points, budget, large])
-    size = np.append(rng.uniform(0.9, 1.0, large), rng.uniform(0.0, 0.8, points - large))
+def campaign(points, budget, noise_mm, **settings):
+    """A campaign to its end and its readings; errors up to 1 mm, noise different by point."""
+    rng = np.random.default_rng([points, budget])
     error = rng.normal(size=(points, 3))
-    error *= (size / np.linalg.norm(error, axis=1))[:, None]
+    error *= (rng.uniform(0.0, 1.0, points) / np.linalg.norm(error, axis=1))[:, None]
     sigma = rng.uniform(0.8, 1.2, points) * noise_mm
     key = np.array([points, budget], np.uint64)
-    recorded = Recorded(drawn_world(error, sigma, key, 300, rng.permutation(points)))
-    return conduct(SearchAndConfirm(measurements=budget), recorded).statements(), recorded
+    recorded = Recorded(drawn_world(error, sigma, key, budget, rng.permutation(points)))
+    return conduct(SearchAndConfirm(measurements=budget, **settings), recorded), recorded
 
 
-@pytest.mark.parametrize(
-    ("points", "budget", "large", "noise_mm", "read"),
-    [
-        (200, 200, 5, 0.05, {196}),
-        (200, 197, 5, 0.05, {196}),
-        (200, 140, 60, 0.03, range(84, 141)),
-        (200, 400, 5, 0.1, {200}),
-        (50, 50, 1, 0.05, {49}),
-        (50, 60, 1, 0.05, {50}),  # all are visited, but only because the readings said so
-    ],
-)
-def test_bounds_follow_from_the_raw_readings(points, budget, large, noise_mm, read):
-    (measured, everywhere), world = campaign(points, budget, large, noise_mm)
-    here, beyond, unlikely, seen = worked_out(world.given, world.sigma_mm, points, budget)
+def largest_limit(given, sigma, counts, z):
+    """Largest over the points of each point's smallest limit at as many readings as in counts."""
+    found = {}
+    for row in {row for row, _ in given}:
+        own = np.array([reading for at, reading in given if at == row])
+        for count, each in zip(counts, z, strict=True):
+            if count <= len(own):
+                limit = np.linalg.norm(own[:count].mean(axis=0)) + each * sigma[row] / count**0.5
+                found[row] = min(limit, found.get(row, np.inf))
+    return max(found.values())
+
+
+def left_out(points, seen, error):
+    """Fewest points such that these and one more are all missed with ``error`` at most."""
+    for largest in range(1, points + 1):
+        chance = Fraction(1)
+        for drawn in range(seen):
+            chance *= Fraction(max(points - largest - drawn, 0), points - drawn)
+        if chance <= error:
+            return largest - 1
+    raise AssertionError
+
+
+@pytest.mark.parametrize(("points", "budget"), [(60, 90), (60, 300), (40, 200)])
+def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
+    said, world = campaign(points, budget, 0.05, noise_margin=1.0)
+    looks = said.boundary_of(ERROR)
+    assert crossing(tuple(looks.counts.tolist()), looks.z) == pytest.approx(ERROR, rel=1e-5)
+    wanted = largest_limit(world.given, world.sigma_mm, looks.counts, looks.z)
+    measured, everywhere = said.statements()
     assert len(world.given) == budget
-    assert seen in read
-    assert len({row for row, _ in world.given}) < len(world.given)
-    # The likely size is a floor of every bound; here it is below that on the measured points.
-    assert measured.value_mm < here
-    assert measured.upper_mm == pytest.approx(here, rel=1e-6)
-    assert not everywhere.withheld
-    stretch = 1.0 if unlikely == 1 else 1.25
-    expected = stretch * max(beyond, everywhere.value_mm)
-    assert everywhere.upper_mm == pytest.approx(expected, rel=1e-6)
-    assert bool(everywhere.assumption) == (unlikely > 1)
-    if everywhere.assumption:
-        assert everywhere.assumption.numbers["crowd"] == unlikely
-    if unlikely == 1:
-        assert everywhere.value_mm < beyond
+    assert measured.upper_mm == pytest.approx(max(wanted, measured.value_mm), rel=1e-9)
+    assert everywhere.upper_mm == pytest.approx(measured.upper_mm, rel=1e-9)
+    assert everywhere.excepted == 0
+
+
+@pytest.mark.parametrize(("points", "budget"), [(60, 30), (200, 50), (200, 150)])
+def test_where_fewer_are_read_than_there_are_the_bound_is_of_all_but_the_fewest(points, budget):
+    said, world = campaign(points, budget, 0.05, noise_margin=1.0)
+    everywhere = said.statements()[1]
+    seen = len({row for row, _ in world.given})
+    assert seen < points
+    assert everywhere.excepted == left_out(points, seen, Fraction(1, 40))
+    looks = said.boundary_of(ERROR / 2)
+    wanted = largest_limit(world.given, world.sigma_mm, looks.counts, looks.z)
+    assert everywhere.upper_mm == pytest.approx(wanted, rel=1e-9)
+
+
+def test_noise_that_nothing_checks_counts_as_larger_in_the_upper_bound():
+    said, world = campaign(60, 60, 0.05)
+    looks = said.boundary_of(ERROR)
+    wanted = largest_limit(world.given, 1.2 * world.sigma_mm, looks.counts, looks.z)
+    assert said.statements()[0].upper_mm == pytest.approx(wanted, rel=1e-9)
+
+
+def test_the_lower_bound_is_the_average_of_readings_along_what_was_read_before(monkeypatch):
+    counted, record = [], LowerAverage.record
+
+    def noted(average, row, direction, *rest):
+        counted.append((len(campaigns[0].ledger.readings) - 1, row, np.array(direction)))
+        record(average, row, direction, *rest)
+
+    campaigns, begin = [], SearchAndConfirm.begin
+    monkeypatch.setattr(LowerAverage, "record", noted)
+    monkeypatch.setattr(
+        SearchAndConfirm, "begin", lambda *given: campaigns.append(begin(*given)) or campaigns[0]
+    )
+    said, world = campaign(40, 200, 0.02, noise_margin=1.0)
+    rows = np.array([row for row, _ in world.given])
+    readings = np.array([reading for _, reading in world.given])
+    total = weight = 0.0
+    counts = stages(said.average.wanted)
+    bounds, z = [0.0], boundary(counts, said.lower_error, np.inf, 0.0, LATE).z
+    for place, (at, row, direction) in enumerate(counted, start=1):
+        # The direction is that of a mean of readings of the point, all of them before this one.
+        own = np.flatnonzero(rows[:at] == row)
+        means = np.cumsum(readings[own], axis=0)
+        means /= np.linalg.norm(means, axis=1)[:, None]
+        assert np.abs(means - direction).max(axis=1).min() < 1e-9
+        assert rows[at] == row
+        total += direction @ readings[at] / world.sigma_mm[row]
+        weight += 1.0 / world.sigma_mm[row]
+        if place in counts:
+            bounds.append((total - z[counts.index(place)] * np.sqrt(place)) / weight)
+    assert len(counted) == said.average.wanted > 40
+    assert said.average.bound_mm(np.ones(40)) == pytest.approx(max(bounds), rel=1e-9)
+    assert said.statements()[0].lower_mm >= max(bounds) - 1e-12

@@ -12,9 +12,10 @@ from scipy.stats import binom, hypergeom
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.binomial import binomial_interval
-from kinacc.assess.coverage import at_most, companions, hardly_missed, records
+from kinacc.assess.coverage import at_most, companions, hardly_missed
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import RECOMMENDED
+from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import assessed, is_broken, noisy, truth_mm
 from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
@@ -51,8 +52,6 @@ def test_the_largest_of_all_is_hardly_missed_by_nearly_all():
     assert hardly_missed(100, 0.02) == 98
     assert hardly_missed(100, 0.025) == 98
     assert hardly_missed(10, 0.02) == 10
-    assert records(10, 10) == 1.0
-    assert records(3, 6) == pytest.approx(1 + 1 / 4 + 1 / 5 + 1 / 6)
 
 
 @pytest.mark.parametrize(
@@ -67,19 +66,34 @@ def test_the_first_visit_is_a_share_or_everything_where_the_budget_is_half_as_la
 
 
 def test_a_budget_too_small_to_speak_of_all_candidates_is_told_what_would_do():
-    """The recommended assessor, 95 %: two of a hundred may be missed, or five may stand close."""
+    """The recommended assessor, 95 %: two of a hundred may be missed; else all but a few."""
 
     def said(measurements):
         return paper.assessor(RECOMMENDED, measurements=measurements).shortfall(100, 6)
 
     assert said(98) is None
-    assert said(97) == Reason("assumption_ahead", {"enough": 98})
-    # Five companions are all missed by s of a hundred with probability C(95, s) / C(100, s).
-    missed = [Fraction(comb(95, seen), comb(100, seen)) for seen in range(96)]
-    needed = next(seen for seen, chance in enumerate(missed) if chance <= Fraction(2, 100))
-    assert said(needed) == Reason("assumption_ahead", {"enough": 98})
-    for fewer in (1, needed // 2, needed - 1):
-        assert said(fewer) == Reason("no_bound_on_all", {"needed": needed})
+    for few in (97, 60, 12):
+        seen = paper.assessor(RECOMMENDED, measurements=few).visit(100)
+        missed = [Fraction(comb(100 - k, seen), comb(100, seen)) for k in range(1, 101 - seen)]
+        left = next(k for k, chance in enumerate(missed) if chance <= Fraction(25, 1000))
+        assert said(few) == Reason("excepted_ahead", {"enough": 98, "excepted": left})
+
+
+def test_a_budget_that_asks_for_company_is_told_how_many_readings_it_takes():
+    """Five of a hundred may stand close: all are missed by s points with C(95, s) / C(100, s)."""
+
+    def said(measurements):
+        settings = SearchAndConfirm(measurements, assume="company")
+        return settings.shortfall(100, 6), settings.visit(100)
+
+    assert said(98)[0] is None
+    told = [said(budget) for budget in range(1, 98)]
+    for reason, seen in told:
+        enough = Fraction(comb(95, seen), comb(100, seen)) <= Fraction(25, 1000)
+        assert reason.code == ("assumption_ahead" if enough else "no_bound_on_all")
+    needed = 1 + [reason.code for reason, _ in told].index("assumption_ahead")
+    few = {reason.numbers["needed"] for reason, _ in told if reason.code == "no_bound_on_all"}
+    assert few == {needed}
 
 
 def test_the_kinematic_process_needs_a_component_for_every_coefficient():
@@ -153,19 +167,25 @@ def test_a_bound_on_readings_of_unequal_noise_takes_each_ones_own_covariance():
     assert bound([narrow, narrow]) < bound([narrow, across]) < bound([narrow, wide])
 
 
-def test_too_few_points_of_many_say_nothing_of_all_and_tell_how_many_could_hide():
+@pytest.mark.parametrize("assume", ["nothing", "company"])
+def test_few_points_of_many_speak_of_all_but_those_that_all_can_be_missed(assume):
     candidates = Candidates.with_equal_noise(np.full(100, 0.01))
-    campaign = paper.assessor(RECOMMENDED, measurements=12).begin(candidates)
+    campaign = SearchAndConfirm(12, assume=assume).begin(candidates)
     errors = np.random.default_rng(6).normal(size=(100, 3))
     while (row := campaign.next()) is not None:
         campaign.record(row, errors[row])
     measured, everywhere = campaign.statements()
     seen = len(campaign.ledger.visited)
     hidden = [Fraction(comb(100 - k, seen), comb(100, seen)) for k in range(1, 101 - seen)]
-    crowd = next(k for k, chance in enumerate(hidden, 1) if chance <= Fraction(2, 100))
-    assert everywhere.withheld == Reason(
-        "all_missed", {"seen": seen, "points": 100, "crowd": crowd}
-    )
-    assert np.isnan(everywhere.upper_mm)
+    crowd = next(k for k, chance in enumerate(hidden, 1) if chance <= Fraction(25, 1000))
+    if assume == "nothing":
+        assert everywhere.withheld is None
+        assert everywhere.excepted == crowd - 1
+        assert everywhere.upper_mm > 0.0
+    else:
+        assert everywhere.withheld == Reason(
+            "all_missed", {"seen": seen, "points": 100, "crowd": crowd}
+        )
+        assert np.isnan(everywhere.upper_mm)
     assert measured.withheld is None
     assert measured.lower_mm <= measured.value_mm <= measured.upper_mm

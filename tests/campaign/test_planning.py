@@ -8,7 +8,9 @@ import math
 import numpy as np
 import pytest
 from command_line import call
+from scipy.stats import ncx2
 
+from kinacc.assess.attainable import width_limits
 from kinacc.assess.binomial import binomial_interval
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -42,9 +44,57 @@ def test_a_simulated_campaign_is_one_run_in_memory():
         assert each.readings == campaign.ledger.taken
         sizes = np.linalg.norm(errors.error_mm[chosen], axis=1)
         if each.said.target == CANDIDATES:
-            assert each.truth_mm == sizes.max()
+            assert each.truth_mm == np.sort(sizes)[-1 - each.said.excepted]
         else:
             assert each.truth_mm == sizes[campaign.ledger.visited].max()
+
+
+def test_a_plan_for_single_visits_is_held_to_what_95_percent_of_visits_keep():
+    errors, sigma = field(), 0.2
+    visits, arm = (
+        SearchAndConfirm(measurements=60, error_of="visit", **own) for own in ({}, {"arm_mm": 0.1})
+    )
+    found = outcomes([errors], 40, sigma**2 * np.eye(3), (visits, arm), 2, 9)
+    truths = [each.truth_mm for each in found if each.said.target == CANDIDATES]
+    rows = [np.random.default_rng([9, 0, each]).permutation(100)[:40] for each in (0, 1)]
+    wanted = [
+        scale * math.sqrt(ncx2.ppf(0.95, 3, (errors.size_mm[chosen].max() / scale) ** 2))
+        for chosen in rows
+        for scale in (sigma, 0.1)
+    ]
+    assert truths == pytest.approx(wanted, rel=1e-6)
+
+
+def test_a_plan_tells_how_near_bounds_could_come_with_the_errors_known():
+    errors, noise = field(), 0.05**2 * np.eye(3)
+    budgets = (SearchAndConfirm(measurements=30), SearchAndConfirm(measurements=60))
+    found = outcomes([errors], 40, noise, budgets, 2, 9, limits_on=CANDIDATES)
+    few, enough = rows(found, Aim(CANDIDATES))
+    chosen = [np.random.default_rng([9, 0, each]).permutation(100)[:40] for each in range(2)]
+    sizes = [np.linalg.norm(errors.error_mm[each], axis=1) for each in chosen]
+    known = [width_limits(each, 0.05, 60, 0.05) for each in sizes]
+    assert enough.attainable_mm == pytest.approx(np.mean([each.attainable_mm for each in known]))
+    assert enough.proven_mm == pytest.approx(np.mean([each.proven_mm for each in known]))
+    assert enough.proven_mm < enough.attainable_mm
+    # Nothing can be said of all of them by fewer readings than candidates.
+    assert math.isnan(few.attainable_mm)
+    assert math.isnan(few.proven_mm)
+    asked = Simulation((errors,), 40, noise, budgets, Aim(CANDIDATES), 2, 9)
+    sheet = {each.name: each.values for each in as_sheet(asked, [few, enough]).fields}
+    assert np.isnan(sheet["attainable_mm"][0])
+    assert sheet["proven_mm"][1] == enough.proven_mm
+    last = in_words(asked, [few, enough]).splitlines()[-1]
+    assert last.startswith(f"upper bounds after 60 readings are {enough.excess_mm:.2g} mm too high")
+    assert f"{enough.attainable_mm:.2g} mm would be reached" in last
+
+
+def test_a_plan_fits_a_screen(errors_file):
+    words = ("plan-campaign", "--noise-mm", "0.05", "--poses", 30, "--errors", errors_file,
+             "--width-mm", "0.2", "--tolerance-mm", 1, "--repetitions", 2)  # fmt: skip
+    shown = call(*words, "--budget", 30)
+    table = shown.stdout.splitlines()[1:3]
+    assert max(map(len, table)) <= 140
+    assert {"excess_mm", "attainable_mm", "proven_mm"} <= set(table[0].split())
 
 
 def test_the_single_shot_bound_holds_as_often_as_it_says():

@@ -9,14 +9,14 @@ import pytest
 
 import kinacc
 from kinacc.assess.statement import Reason
-from kinacc.campaign import words
+from kinacc.campaign import reasons, words
 
 _GIVEN = re.compile(r"Reason\(\s*\"(\w+)\"")
 
 
 def test_every_reason_that_can_be_given_has_words_and_no_words_are_left_over():
     sources = (path.read_text() for path in Path(kinacc.__file__).parent.rglob("*.py"))
-    assert set(words.REASONS) == {code for text in sources for code in _GIVEN.findall(text)}
+    assert set(reasons.REASONS) == {code for text in sources for code in _GIVEN.findall(text)}
 
 
 @pytest.mark.parametrize(

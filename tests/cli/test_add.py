@@ -10,7 +10,10 @@ import pytest
 from command_line import call
 
 from kinacc.config.series_text import with_line
+from kinacc.errors import InputError
+from kinacc.workflow import measured_files
 from kinacc.workflow.contradictions import load
+from kinacc.workflow.plan import planned
 
 ROOT = Path(__file__).parents[2]
 MEASURED = ROOT / "examples" / "data" / "ur10_tmac" / "series_B.csv"
@@ -94,7 +97,7 @@ def test_paths_are_as_seen_from_the_configuration(cell, monkeypatch):
 def test_without_a_terminal_all_that_is_not_said_is_named_at_once(cell):
     done = added("june.csv")
     assert done.exit_code == 2
-    for option in ("--first-date", "--date"):
+    for option in ("--first-date", "--date", "--base", "--tool"):
         assert f"{option}: is not given" in done.output
     done = added("june.csv", "--date", "2026-06-02", "--first-date", "2026-03-01")
     for option in ("--base", "--tool"):
@@ -132,6 +135,29 @@ def test_the_same_readings_twice_are_no_new_line(cell):
     assert done.exit_code == 2
     assert "holds the readings of data/march.csv" in done.output
     assert Path("tracker.yaml").read_text() == HERE
+
+
+def exported_again() -> None:
+    """The tracker's export of June, which goes on where that of March ended."""
+    names, *new = Path("june.csv").read_text().splitlines()
+    old = Path("data/march.csv").read_text().splitlines()[1:]
+    Path("june.csv").write_text("\n".join([names, *new[:40], *old[:20]]) + "\n")
+
+
+def test_old_readings_among_new_ones_are_no_new_line(cell):
+    exported_again()
+    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
+    assert done.exit_code == 2
+    assert "20 of its 60 readings are those of data/march.csv" in done.output
+    assert Path("tracker.yaml").read_text() == HERE
+
+
+def test_lines_written_by_hand_with_the_same_readings_are_refused_before_anything_runs(cell):
+    assert added("june.csv", *JUNE, "--first-date", "2026-03-01").exit_code == 0
+    exported_again()
+    with pytest.raises(InputError) as refused:
+        measured_files.check(planned(["tracker.yaml"]))
+    assert "20 of its 60 readings are those of" in str(refused.value)
 
 
 def test_a_file_that_cannot_be_read_so_is_refused_with_all_other_problems(cell):

@@ -26,7 +26,7 @@ TRUE_MM = 0.2
 
 def measured(
     texts=("tracker=0.05",), points=12, budget=16, readings=99, noise_mm=0.05, tolerance_mm=None,
-    extra=(), names=None, mean_mm=TRUE_MM,
+    extra=(), names=None, mean_mm=TRUE_MM, off_mm=lambda number: 0.0, **settings,
 ):  # fmt: skip
     """A campaign of an arm whose errors are known, with its state and tables."""
     arm = nominal(robots.load("mh180"))
@@ -37,14 +37,14 @@ def measured(
     about = {"robot": "mh180", "calibration": "cell 3", "model": "dh", "point": "tool",
              "candidates": "drawn", "kinacc_version": "0"}  # fmt: skip
     plan = begin.plan_of(
-        arm, found, assessor_of("search_and_confirm", {"measurements": budget}),
+        arm, found, assessor_of("search_and_confirm", {"measurements": budget, **settings}),
         instruments(texts, "base"), limits, 3, np.zeros(6), about,
     )  # fmt: skip
     rng, true = np.random.default_rng(4), np.random.default_rng(5).normal(0.0, mean_mm, (points, 3))
     rows = plan.visiting(frozenset())
     asking, entries = plan.assessor.begin(plan.candidates(rows)), []
     while len(entries) < readings and (row := asking.next()) is not None:
-        seen = true[rows[row]] + rng.normal(0.0, noise_mm, 3)
+        seen = true[rows[row]] + rng.normal(0.0, noise_mm, 3) + off_mm(len(entries))
         used = plan.instruments[len(entries) % len(plan.instruments)]
         asking.record(row, seen, used.covariance_mm2)
         at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, used.name)
@@ -106,11 +106,44 @@ def test_a_campaign_just_begun_promises_nothing_and_asks_for_the_next_point():
 def test_readings_that_scatter_more_than_stated_take_the_promise_back():
     campaign = measured(points=8, budget=60, noise_mm=0.4)
     first = first_of(campaign)
-    assert first.badge == ("BOUND IN DOUBT", True)
-    assert "cannot be relied on" in first.answers[0]
+    assert first.badge == ("NO BOUND", True)
+    assert "times as much as the noise stated" in first.answers[0]
+    assert "So no bound is stated." in first.answers
     assert not any("By a procedure" in each for each in first.answers)
     assert {row[4] for row in first.tables[0].rows} == {"-"}
     assert "new campaign" in note(first, "NEXT")
+
+
+def test_a_drift_that_was_found_asks_for_what_moved_and_not_for_more_readings():
+    drifts = measured(points=40, budget=100, references=20, off_mm=lambda n: [4e-3 * n, 0, 0])
+    first = first_of(drifts)
+    assert first.badge == ("NO BOUND", True)
+    assert "The reference poses show a drift of 0.4" in first.answers[0]
+    assert "find what moved" in note(first, "NEXT").lower()
+
+
+def test_a_reading_that_went_wrong_is_named_on_the_first_screen():
+    wrong = measured(points=40, budget=100, off_mm=lambda number: 0.8 * (number == 70))
+    first = first_of(wrong)
+    assert "Reading 71 at point" in first.answers[1]
+    assert "stated too small" not in " ".join(first.answers)
+    assert "strike" in note(first, "NEXT")
+
+
+def test_a_bound_on_all_but_some_says_so_in_promise_and_table():
+    first = first_of(measured(points=60, budget=40, tolerance_mm=2.0))
+    assert "no more than 3 of these 60 candidates are off" in first.answers[0]
+    assert [row[0] for row in first.tables[0].rows][-1] == "all candidates but 3"
+    assert first.badge == ("UNDECIDED", True)
+
+
+def test_a_promise_names_what_was_asked_to_be_guarded_and_allowed_for():
+    asked = {"error_of": "visit", "arm_mm": 0.03, "allowance_mm": 0.02, "wrong_rate": 0.01}
+    promise = first_of(measured(points=40, budget=100, **asked)).answers[0]
+    assert "right in 94 of 100 campaigns" in promise
+    assert "in more than 5% of its future visits" in promise
+    assert "what no repeat sees is at most 0.02 mm" in promise
+    assert "at most 1.0% of the readings are wrong" in promise
 
 
 def test_a_bound_as_small_as_the_noise_is_not_promised_for_less_noise():

@@ -78,12 +78,14 @@ def test_verdicts_are_told_to_machines_with_times_on_request(results):
 def test_statements_whose_assumption_is_untrue_are_told_apart(results, monkeypatch):
     verdict = {"assessor": "search_and_confirm", "target": "candidates", "cells": 2, "rejected": 1,
                "statements": 50, "below": 1, "worst_holds": 0.9, "mean_holds": 0.98,
-               "withheld": 0.125}  # fmt: skip
+               "withheld": 0.125, "setup": "plain", "world": "stated"}  # fmt: skip
     cells = {
         "assessor": ["search_and_confirm"] * 3 + ["single_shot"],
         "target": ["candidates", "candidates", "measured", "candidates"],
         "broken": [7, 0, 9, 5],
         "broken_holds": [5 / 7, np.nan, 1.0, 1.0],
+        "setup": ["plain"] * 4,
+        "world": ["stated"] * 4,
     }
     tables = {
         "tournament_verdicts": {name: np.array([value]) for name, value in verdict.items()},

@@ -76,6 +76,7 @@ CAMPAIGN_BOUNDS = Artefact(
         magnitude("value_mm", "mm", "estimate", ERROR_MM, True),
         magnitude("lower_mm", "mm", "lower bound", ERROR_MM, True),
         magnitude("upper_mm", "mm", "upper bound", ERROR_MM, True),
+        whole("excepted", "candidates that the upper bound leaves out, whichever they are", 0),
         real("confidence", "1", "confidence of each bound", 0.0, 1.0, True),
         text("assumption", "what the bounds rest on beside the noise", nullable=True),
         text("withheld", "why no upper bound is stated", nullable=True),

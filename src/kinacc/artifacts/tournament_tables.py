@@ -16,9 +16,12 @@ from kinacc.artifacts.columns import (
 
 FOLDER = "tournament"
 TARGETS = ("measured", "candidates", "region")
-FIELD_KINDS = ("paper", "synthetic", "measured")
+FIELD_KINDS = ("paper", "synthetic", "made_up", "measured")
 _ASSESSOR = text("assessor", "method of assessment", pattern=ASSESSOR_PATTERN)
 _TARGET = text("target", "what the statements are about", TARGETS)
+_NAME_PATTERN = "[a-z][a-z0-9_.]*"
+_SETUP = text("setup", "settings that assessors had, by name", pattern=_NAME_PATTERN)
+_WORLD = text("world", "how readings came about: `stated`, or otherwise", pattern=_NAME_PATTERN)
 _CONFIDENCE = magnitude("confidence", "1", "confidence stated; null where none is", 1.0, True)
 
 
@@ -33,8 +36,10 @@ _CELL = (
     whole("candidates", "points that may be measured", 1),
     magnitude("noise_mm", "mm", "standard deviation of the noise per axis", 10.0),
     whole("budget", "measurements that may be spent", 1),
+    _SETUP,
+    _WORLD,
     whole("repetitions", "campaigns simulated", 1),
-    length("true_mm", "mean of what the statements are graded against", ERROR_MM),
+    length("true_mm", "mean of what values and lower bounds are graded against", ERROR_MM),
     length("bias_mm", "mean of stated value minus truth; null without a value", ERROR_MM, True),
     magnitude("rmse_mm", "mm", "root mean square of the same", ERROR_MM, True),
     _CONFIDENCE,
@@ -45,38 +50,67 @@ _CELL = (
     _share("broken_holds", "share of the `broken` upper bounds at or above the truth"),
     _share("upper_low", "lower end of its exact 95 % interval"),
     _share("upper_high", "upper end of its exact 95 % interval"),
+    whole("lower_stated", "campaigns that state a lower bound"),
     _share("lower_holds", "share of lower bounds at or below the truth"),
+    whole("alarmed", "campaigns whose readings contradict what the statements rest on"),
+    real("excepted", "1", "mean number of points that an upper bound leaves out", 0, nullable=True),
     length("excess_mm", "mean of upper bound minus truth, `broken` left out", ERROR_MM, True),
     length("width_mm", "mean of upper minus lower bound", ERROR_MM, True),
+    magnitude(
+        "attainable_mm",
+        "mm",
+        "excess with all errors known beforehand, every point read "
+        "and the rest spent best, mean of the first 20 campaigns; null where it has no bound",
+        ERROR_MM,
+        True,
+    ),
+    magnitude(
+        "proven_mm",
+        "mm",
+        "excess below which no rule stays whose bounds hold, the same mean",
+        ERROR_MM,
+        True,
+    ),
     real("measurements", "1", "mean number of measurements spent", 0),
     real("points_visited", "1", "mean number of distinct points measured", 0),
 )
-_KEY = ("assessor", "target", "field", "candidates", "noise_mm", "budget")
+_KEY = ("assessor", "target", "field", "candidates", "noise_mm", "budget", "setup", "world")
 TOURNAMENT_CHUNK = Artefact(
     "tournament_chunk", "Some of the cells of the tournament of assessors.", _CELL, _KEY
 )
 TOURNAMENT_CELLS = Artefact(
     "tournament_cells",
-    "Tournament of assessors: one row per assessor, target, field, candidates, noise and budget.",
+    "Tournament of assessors: a row per assessor, target, field, candidates, noise, budget, setup "
+    "and world.",
     _CELL,
     _KEY,
 )
 TOURNAMENT_VERDICTS = Artefact(
     "tournament_verdicts",
-    "Whether every assessor keeps the confidence it states, over all cells of a target.",
+    "Whether every assessor keeps the confidence it states, over all cells of a target, setup and "
+    "world.",
     (
         _ASSESSOR,
         _TARGET,
+        _SETUP,
+        _WORLD,
         whole("cells", "cells with statements", 1),
         whole("statements", "statements in them, those on a broken assumption left out", 1),
         whole("rejected", "cells with coverage below the confidence (Holm, family-wise 1 %)"),
         whole("below", "cells of 200 statements or more with coverage three points below it"),
         _share("worst_holds", "smallest coverage of a cell", False),
+        _share(
+            "worst_begun", "the same of all campaigns begun: no statement is no false one", False
+        ),
         _share("mean_holds", "coverage over all statements", False),
+        whole("lower_rejected", "cells whose lower bounds are below the confidence, as `rejected`"),
+        _share("lower_worst", "smallest coverage of the lower bounds of a cell"),
+        _share("lower_holds", "coverage over all lower bounds"),
         _share("withheld", "share of campaigns that state no upper bound", False),
         _share("withheld_sound", "the same of campaigns counted as `sound`, worst cell"),
+        _share("alarmed", "share of campaigns whose readings contradict what is stated", False),
     ),
-    ("assessor", "target"),
+    ("assessor", "target", "setup", "world"),
 )
 TOURNAMENT_FIELDS = Artefact(
     "tournament_fields",

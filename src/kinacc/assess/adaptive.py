@@ -13,13 +13,16 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import Reason, Statement
+from kinacc.assess.statement import Reason, Statement, Suspicious
 from kinacc.errors import InputError, Problem, refuse
+
+if TYPE_CHECKING:
+    from kinacc.assess.reference_poses import Change
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
 
@@ -86,11 +89,19 @@ class Campaign(Protocol):
     """One assessment under way.
 
     ``first``: rows 0 to ``first`` - 1 are visited whatever is read, each before any other point.
-    ``ledger``: the readings that count, for others to look at and not to change.
+    ``reference_poses``: of these, rows 0 to ``reference_poses`` - 1 come first of all, and are read
+    again by plan. ``factor``: times the noise stated that bounds allow for. ``ledger``: the
+    readings that count, for others to look at and not to change.
     """
 
     first: int
+    reference_poses: int
+    factor: float
     ledger: Ledger
+
+    def visit(self) -> tuple[int, ...]:
+        """Rows in the order in which they are read whatever is read, until readings decide."""
+        ...
 
     def next(self) -> int | None:
         """The row to measure next; None if no further measurement is wanted."""
@@ -108,6 +119,22 @@ class Campaign(Protocol):
 
     def statements(self) -> tuple[Statement, ...]:
         """What the readings so far allow to say, the main statement first."""
+        ...
+
+    def alarms(self) -> tuple[Reason, ...]:
+        """What the readings say against what the statements rest on: codes with their numbers."""
+        ...
+
+    def suspicious(self) -> tuple[Suspicious, ...]:
+        """Readings that the noise as stated does not explain, by number."""
+        ...
+
+    def change(self) -> Change | None:
+        """What reference poses show of a drift or step of the frame; None where there are none."""
+        ...
+
+    def reading_blocks(self) -> list[int]:
+        """Of every reading in order the number of its block: what one decision reads at a point."""
         ...
 
     def point_limits(self) -> dict[int, tuple[float, float]]:
@@ -153,6 +180,9 @@ class Ledger:
         self.count = np.zeros(points, dtype=np.int64)
         self.visited: list[int] = []  # in the order of their first readings
         self.taken = 0
+        # Every reading in order: its row, its numbers, its covariance where not the planned one.
+        self.readings: list[tuple[int, list[float], np.ndarray | None]] = []
+        self._unplanned: set[int] = set()  # rows with readings of other covariance
         self.mean_mm = np.zeros((points, 3))
         self.noise_mm = np.full(points, math.inf)  # of the mean, per axis, root mean square
         self._weight = np.zeros(points)  # sum of 1 / variance where all noise was equal
@@ -171,6 +201,9 @@ class Ledger:
             self._information.pop(point, None)
         self.count[point] += 1
         self.taken += 1
+        self.readings.append((point, reading, covariance_mm2))
+        if covariance_mm2 is not None:
+            self._unplanned.add(point)
         if equal and point not in self._information:
             # Plain numbers: three components are too few for array operations to pay.
             weight = 1.0 / covariance.item(0, 0)
@@ -198,6 +231,10 @@ class Ledger:
             spread = np.linalg.inv(self._information[point][0])
             return 0.5 * (spread + spread.T)
         return float(self.noise_mm[point])
+
+    def as_planned(self, point: int) -> bool:
+        """Whether all readings of a point came with the covariance planned for it."""
+        return point not in self._unplanned
 
     def sizes_mm(self) -> np.ndarray:
         """Sizes of the mean readings of the visited points, in visiting order."""
@@ -234,6 +271,8 @@ class LedgerCampaign:
     """What campaigns have in common: readings in a ledger, limits from the means."""
 
     first = 0
+    reference_poses = 0
+    factor = 1.0
 
     def __init__(self, settings: AdaptiveAssessor, candidates: Candidates) -> None:
         lacking = [
@@ -245,9 +284,37 @@ class LedgerCampaign:
         self.settings = settings
         self.ledger = Ledger(candidates)
 
+    def visit(self) -> tuple[int, ...]:
+        """The first rows, one after the other."""
+        return tuple(range(self.first))
+
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
         """Take a reading."""
         self.ledger.record(point, reading_mm, covariance_mm2)
+
+    def reading_blocks(self) -> list[int]:
+        """Of every reading in order the number of its block: what one decision reads at a point.
+
+        The first reading of a point is a block, all others of it are one.
+        """
+        seen: set[int] = set()
+        found = []
+        for row, _, _ in self.ledger.readings:
+            found.append(row if row in seen else -1 - row)
+            seen.add(row)
+        return found
+
+    def alarms(self) -> tuple[Reason, ...]:
+        """None: this assessor takes what it is told of the noise."""
+        return ()
+
+    def change(self) -> Change | None:
+        """None: this assessor reads no reference poses again."""
+        return None
+
+    def suspicious(self) -> tuple[Suspicious, ...]:
+        """None: this assessor looks for none."""
+        return ()
 
     def point_limits(self) -> dict[int, tuple[float, float]]:
         """Those of the mean readings alone, the lower one corrected for the number of points."""

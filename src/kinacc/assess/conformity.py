@@ -36,7 +36,8 @@ def decide(said: Statement, tolerance_mm: float) -> Decision:
     8.3.3), guard band by the bounds; as each bound holds with the statement's confidence by itself,
     each wrong decision has at most the remaining probability. Undecided without bounds, and where
     the value or the lower bound is above the upper bound: such readings decide nothing.
-    Raises InputError for a tolerance that is not positive.
+    An upper bound that leaves candidates out accepts nothing. Raises InputError for a tolerance
+    that is not positive.
     """
     if not (tolerance_mm > 0.0 and math.isfinite(tolerance_mm)):
         raise InputError(Problem("tolerance", f"{tolerance_mm}", "above 0, in mm"))
@@ -44,10 +45,13 @@ def decide(said: Statement, tolerance_mm: float) -> Decision:
     verdict, reason = UNDECIDED, Reason("between")
     if said.upper_mm < said.lower_mm or band < 0.0:
         reason = Reason("contradict")
-    elif said.upper_mm <= tolerance_mm:
-        verdict, reason = ACCEPT, Reason("within")
     elif said.lower_mm > tolerance_mm:
         verdict, reason = REJECT, Reason("beyond")
+    elif said.upper_mm <= tolerance_mm and said.excepted:
+        # The largest error may be among those the bound leaves out.
+        reason = Reason("some_excepted", {"excepted": said.excepted})
+    elif said.upper_mm <= tolerance_mm:
+        verdict, reason = ACCEPT, Reason("within")
     elif math.isnan(said.upper_mm):
         reason = said.withheld or Reason("no_upper")
     risk = 1.0 - said.confidence

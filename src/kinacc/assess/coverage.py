@@ -21,14 +21,18 @@ def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statemen
     return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)
 
 
-def records(first: int, most: int) -> float:
-    """1 + expected number of points above all before them among the first+1 .. most, by chance."""
-    return 1.0 + sum(1.0 / place for place in range(first + 1, most + 1))
-
-
 def hardly_missed(points: int, error: float) -> int:
     """Smallest number of random points that hold the largest of ``points`` but for ``error``."""
     return next(seen for seen in range(points + 1) if points - seen <= error * points)
+
+
+def excepted(points: int, seen: int, error: float) -> int:
+    """Smallest K such that K + 1 points of ``points`` are all missed with ``error`` at most.
+
+    ``seen`` of them are measured at random: C(points - K - 1, seen) / C(points, seen). All but K
+    points are then no larger than the largest measured one, whatever their errors are.
+    """
+    return companions(points, seen, error) - 1
 
 
 def companions(points: int, seen: int, error: float) -> int:

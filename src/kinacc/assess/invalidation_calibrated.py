@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.boundary import Boundary
 from kinacc.assess.challenges import ChallengeCampaign, invalidation_problems
 from kinacc.assess.coverage import about_all_if_all_measured
-from kinacc.assess.ellipsoid import largest_size
 from kinacc.assess.sequential_limits import Looks
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.assess.visits import FIRST_SHARE
@@ -19,6 +19,7 @@ from kinacc.errors import refuse
 
 SIMULATIONS = 200_000
 _SEED = 20_200  # of the calibration; it is part of the method, not of a study
+_FIRST_SHARES = (0.60, 0.16, 0.10, 0.06)  # of the looks at 1, 2, 4 and 8 readings; then halving
 _SIMULATED_DEVIATIONS = 2.33  # the calibrated error rate is below the wanted one at 99 %
 
 
@@ -62,19 +63,14 @@ class CalibratedCampaign(ChallengeCampaign):
     def __init__(self, settings: InvalidationCalibrated, candidates: Candidates) -> None:
         super().__init__(settings, candidates)
         allowed = 1.0 - settings.confidence
-        most = settings.measurements - self.first + 1
-        self.looks = Looks(self.ledger, (), allowed / self.first)
-        self.number = most.bit_length()
-        self._limits: list[list[tuple[np.ndarray, object]]] = [[] for _ in range(candidates.points)]
-        self._is_even = True
+        number = (settings.measurements - self.first + 1).bit_length()
+        shares = np.array([share(look) for look in range(number)])
+        self._counts = 2 ** np.arange(number)
+        self.looks = Looks(self.ledger, self._widths(True), allowed / self.first, shares, 1.0)
 
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
         """Take a reading."""
         self.ledger.record(point, reading_mm, covariance_mm2)
-        self._is_even = self._is_even and covariance_mm2 is None
-        if int(self.ledger.count[point]) == self.looks.due(point):
-            seen = (self.ledger.mean_mm[point].copy(), self.ledger.noise(point))
-            self._limits[point].append(seen)
         self.looks.update(point)
 
     def statements(self) -> tuple[Statement, ...]:
@@ -82,23 +78,31 @@ class CalibratedCampaign(ChallengeCampaign):
         if self.ledger.taken < self.first:
             left = Reason("first_visit", {"left": self.first - self.ledger.taken})
             return (Statement(MEASURED, withheld=left),)
-        error = 1.0 - self.settings.confidence
-        width = boundary(self.number, error, self._is_even)
         visited = self.ledger.visited
+        is_even = all(self.ledger.as_planned(point) for point in visited)
+        factor = np.ones(self.ledger.candidates.points)
+        upper_mm = self.looks.limits_mm(self._widths(is_even), factor)
         said = Statement(
             MEASURED,
             value_mm=self.smallest_mm(),
-            lower_mm=float(self.looks.lower_mm[visited].max()),
-            upper_mm=max(min(_limit(*seen, width) for seen in self._limits[p]) for p in visited),
+            lower_mm=self.looks.largest_lower_mm(factor),
+            upper_mm=float(upper_mm[visited].max()),
             confidence=self.settings.confidence,
         )
         return about_all_if_all_measured(said, self.ledger)
 
+    def _widths(self, is_even: bool) -> Boundary:
+        """The same standard deviations at every look."""
+        width = boundary(len(self._counts), 1.0 - self.settings.confidence, is_even)
+        widths = np.full(len(self._counts), width)
+        return Boundary(self._counts, widths, widths)
 
-def _limit(mean_mm: np.ndarray, noise, width: float) -> float:
-    if isinstance(noise, float):
-        return float(np.sqrt(mean_mm @ mean_mm)) + width * noise
-    return largest_size(mean_mm, noise, width)
+
+def share(look: int) -> float:
+    """Part of a point's allowed error that its lower limit at a look (0 = first) may spend."""
+    if look < len(_FIRST_SHARES):
+        return _FIRST_SHARES[look]
+    return 0.5 ** (look - len(_FIRST_SHARES) + 1) * (1.0 - sum(_FIRST_SHARES))
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""The recommended assessor: look for large errors at new points, confirm the suspects, say both."""
+"""The recommended assessor: look at every candidate once, confirm the suspects, say both bounds."""
 
 from __future__ import annotations
 
@@ -9,172 +9,383 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
+from kinacc.assess.confirming import ConfirmingCampaign
+from kinacc.assess.corrected_drift import Corrected, corrected
 from kinacc.assess.coverage import (
     CROWD,
     ISOLATION,
-    MISSING_PART,
     at_most,
     companions,
+    excepted,
     hardly_missed,
-    records,
+)
+from kinacc.assess.future_visit import of_future_visits
+from kinacc.assess.noise_taken import (
+    ESTIMATED,
+    KNOWN,
+    CampaignNoise,
+    noise_faults,
+    noise_plan,
 )
 from kinacc.assess.population import LargestSize, largest_size
-from kinacc.assess.sequential_limits import Looks, LooksCampaign
-from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
-from kinacc.assess.visits import FIRST_SHARE, first_points
+from kinacc.assess.reference_poses import (
+    Change,
+    alarms,
+    awaited,
+    found,
+    planned_readings,
+    schedule_faults,
+)
+from kinacc.assess.statement import (
+    CANDIDATES,
+    CONFIDENCE,
+    MEAN,
+    MEASURED,
+    VISIT,
+    Reason,
+    Statement,
+    Suspicious,
+)
+from kinacc.assess.visits import FIRST_SHARE
 from kinacc.errors import Problem, refuse
 
+NOTHING, COMPANY = "nothing", "company"
+VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
+MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
+MOST_WRONG = 0.1  # of the readings: with more, clipped scores tell hardly anything
 _ALONE = 0.1  # chance of so little company below which the assumption counts as broken
-_RESERVE = 0.04  # of the budget, kept for confirming whatever is found last
-_RECONSIDER = 0.06  # of the budget, between two estimates of the likely largest size
+_MISSED = 0.5  # of the allowed error, where candidates are left that may hold the largest
+_WORDS = {
+    "noise": (KNOWN, ESTIMATED),
+    "error_of": (MEAN, VISIT),
+    "assume": (NOTHING, COMPANY),
+}
 
 
 @dataclass(frozen=True)
 class SearchAndConfirm(AdaptiveAssessor):
-    """Visit candidates until none can be missed, or as many as suspects allow; then confirm those.
+    """Visit all candidates if the budget has readings for them; then confirm the likely largest.
 
-    With a budget for it, so many candidates are visited that the largest error is missed with
-    2 % at most (196 of 200), whatever is read; the rest of the budget goes to suspects. With
-    fewer measurements, the visit goes on while the readings left cover reading every suspect as
-    often again as it was, and 4 % of the budget: little noise or one outstanding error lead to
-    many points, much noise to fewer. A suspect is a point whose mean reading plus one standard
-    deviation exceeds the likely largest size; the point with the largest upper limit is measured
-    until its next look.
+    Readings left after the visit go, block by block, to the point with the largest upper limit
+    whose next look they can reach, and a share of them to the largest mean, for the lower bound
+    (:mod:`kinacc.assess.confirming`). With fewer readings than candidates nine tenths of them visit
+    new points.
 
-    ``measured``: the bounds of :mod:`kinacc.assess.sequential_limits`. They hold whatever the
-    errors are, for readings that are normal with known covariance (eq. 9) and points in random
-    order. Where readings decide the number of points, the allowed error is divided by 1 + the
-    expected number of largest-so-far points among those that come after the ones visited in any
-    case. Stated from 60 % of the visit on; who ends it early must do so for other reasons than the
-    readings. ``candidates``: without an assumption where 2 % at most can have missed the largest.
-    Otherwise the bound for the measured points times ``isolation``: it holds if the largest error
-    is not isolated, at least so many candidates (stated in the assumption) having an error above
-    the largest divided by ``isolation`` that missing them all is improbable. Withheld where that
-    number is more than ``crowd`` of the candidates, and where the largest error measured stands so
-    far above all others that the assumption is broken by what was seen. The value is the median of
-    the posterior of :mod:`kinacc.assess.population`.
+    ``measured``: upper limits that hold at all looks at once (:mod:`kinacc.assess.boundary`), and a
+    lower bound by an average of readings along directions seen before
+    (:mod:`kinacc.assess.lower_average`). Both hold whatever the errors are, for readings that are
+    normal with known covariance (eq. 9). ``candidates``: the same where all are visited. Otherwise
+    half of the allowed error is for the largest errors that all were missed: the upper bound is of
+    all but the fewest candidates with which that is improbable enough, and assumes nothing but the
+    random order. ``assume: company`` asks for a bound on all of them that rests on an assumption:
+    at least so many candidates (stated in it) have an error above the largest divided by
+    ``isolation`` that missing them all is improbable. Withheld where that number is more than
+    ``crowd`` of the candidates, and where the largest error measured stands so far above all others
+    that the assumption is broken by what was seen.
+
+    Where too few readings are planned at points read before to check a noise that is stated as
+    known, it is taken ``noise_margin`` times as large. ``noise: estimated`` takes it as stated up
+    to one factor: estimated from readings of the same block, or from a test before with
+    ``noise_freedom`` degrees of freedom (:mod:`kinacc.assess.noise_factor`). Where readings
+    contradict what is stated, bounds are withheld (:mod:`kinacc.assess.noise_alarms`). ``error_of:
+    visit`` bounds what 95 % of future visits to the worst pose keep; ``arm_mm`` is the arm's own
+    standard deviation per axis, all of the noise where it is null. ``references`` readings return
+    to reference poses by plan; where these show a drift or step, bounds are withheld, or with
+    ``correct_drift`` a linear drift is taken from all readings and both bounds are wider by what is
+    not known of it (:mod:`kinacc.assess.reference_poses`). ``allowance_mm`` is what no repeat sees;
+    it widens both bounds. ``wrong_rate`` is the largest share of readings that go wrong and are
+    guarded against (:mod:`kinacc.assess.wrong_readings`): it is lost from the confidence. Without
+    it, bounds are withheld where a reading stands apart (:mod:`kinacc.assess.suspicious_readings`).
+    The value is the median of the posterior of
+    :mod:`kinacc.assess.population`.
     """
 
     measurements: int
     confidence: float = CONFIDENCE
+    noise: str = KNOWN
+    noise_freedom: int = 0
+    noise_margin: float = MARGIN
+    wrong_rate: float = 0.0
+    references: int = 0
+    correct_drift: bool = False
+    error_of: str = MEAN
+    arm_mm: float | None = None
+    allowance_mm: float = 0.0
+    assume: str = NOTHING
     isolation: float = ISOLATION
     crowd: float = CROWD
     name: ClassVar[str] = "search_and_confirm"
 
     def __post_init__(self) -> None:
         problems = check_budget(self.measurements, self.confidence)
+        for each, words in _WORDS.items():
+            if getattr(self, each) not in words:
+                problems.append(Problem(each, f"{getattr(self, each)!r}", ", ".join(words)))
         if not self.isolation > 1.0:
             problems.append(Problem("isolation", f"{self.isolation}", "above 1"))
         if not 0.0 < self.crowd < 1.0:
             problems.append(Problem("crowd", f"{self.crowd}", "above 0 and below 1"))
+        if not 1.0 <= self.noise_margin <= 10.0:
+            problems.append(Problem("noise_margin", f"{self.noise_margin}", "from 1 to 10"))
+        if not 0.0 <= self.allowance_mm < math.inf:
+            problems.append(Problem("allowance_mm", f"{self.allowance_mm}", "0 or above, in mm"))
+        problems += schedule_faults(self.measurements, self.references, self.correct_drift)
+        problems += noise_faults(self)
+        if not 0.0 <= self.wrong_rate <= MOST_WRONG:
+            problems.append(Problem("wrong_rate", f"{self.wrong_rate}", f"from 0 to {MOST_WRONG}"))
+        if self.wrong_rate and self.noise == ESTIMATED:
+            what = (
+                f"{self.wrong_rate:g}, and the noise is estimated from readings that may be wrong"
+            )
+            fix = "state the noise, or leave wrong_rate at 0: suspicious readings are then named"
+            problems.append(Problem("wrong_rate", what, "0 where noise is estimated", fix))
+        if self.wrong_rate and self.correct_drift:
+            what = f"{self.wrong_rate:g}, and a drift is taken from readings that may be wrong"
+            fix = "leave one of them: suspicious readings are named where wrong_rate is 0"
+            problems.append(Problem("wrong_rate", what, "0 where a drift is corrected for", fix))
         refuse(problems, f"{self.name} cannot work with these settings")
 
     def enough_for_all(self, points: int) -> int:
         """Measurements with which the statement on all ``points`` candidates assumes nothing."""
-        return hardly_missed(points, MISSING_PART * (1.0 - self.confidence))
+        return hardly_missed(points, _MISSED * (1.0 - self.confidence))
+
+    def visit(self, points: int) -> int:
+        """How many of the candidates are visited in any case."""
+        enough, own = self.enough_for_all(points), self.measurements - self.references
+        if own >= points + (points - enough):
+            return points
+        if own >= enough:
+            return enough
+        return max(math.ceil(VISITED * own), 1)
 
     def shortfall(self, points: int, joints: int) -> Reason | None:
         """What a larger budget would be good for with so many candidates; None if nothing."""
-        if self.measurements >= (enough := self.enough_for_all(points)):
+        enough = self.enough_for_all(points) + self.references
+        if self.measurements >= enough:
             return None
-        error, most = MISSING_PART * (1.0 - self.confidence), max(1.0, self.crowd * points)
-        if companions(points, min(self.measurements, points), error) > most:
-            visits = range(self.measurements, points + 1)
-            needed = next(seen for seen in visits if companions(points, seen, error) <= most)
-            return Reason("no_bound_on_all", {"needed": needed})
-        return Reason("assumption_ahead", {"enough": enough})
+        error, seen = _MISSED * (1.0 - self.confidence), self.visit(points)
+        if self.assume == NOTHING:
+            left = excepted(points, seen, error)
+            return Reason("excepted_ahead", {"enough": enough, "excepted": left})
+        most = max(1.0, self.crowd * points)
+        if companions(points, seen, error) <= most:
+            return Reason("assumption_ahead", {"enough": enough})
+        budgets = range(self.measurements, enough + 1)
+        needed = next(
+            each
+            for each in budgets
+            if companions(points, replace(self, measurements=each).visit(points), error) <= most
+        )
+        return Reason("no_bound_on_all", {"needed": needed})
 
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
         return SearchAndConfirmCampaign(self, candidates)
 
 
-class SearchAndConfirmCampaign(LooksCampaign):
+class SearchAndConfirmCampaign(ConfirmingCampaign):
     """See :class:`SearchAndConfirm`."""
 
-    def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
-        super().__init__(settings, candidates)
-        budget, points = settings.measurements, candidates.points
-        allowed = 1.0 - settings.confidence
-        self.first = self._speaks_from = first_points(budget, points, FIRST_SHARE)
-        if (nearly_all := settings.enough_for_all(points)) <= budget:
-            self.first = max(self.first, nearly_all)
-        self.most = min(budget, points)
-        chosen = records(self.first, self.most)
-        errors = (allowed / chosen, (1.0 - MISSING_PART) * allowed / chosen)
-        self.looks = Looks(self.ledger, errors, allowed / self.most)
-        self._pause = max(round(_RECONSIDER * budget), 2)
-        self._likely_mm, self._asked_at = math.nan, -self._pause
+    settings: SearchAndConfirm
 
-    def next(self) -> int | None:
-        """A new point or the suspect to confirm."""
-        taken, visited = self.ledger.taken, len(self.ledger.visited)
-        left = self.settings.measurements - taken
-        if left <= 0:
-            return None
-        if visited < self.first or (visited < self.most and self._wanted_by_suspects() < left):
-            return visited
-        return self.looks.bounding_point(left)
+    def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
+        first = settings.visit(candidates.points)
+        super().__init__(
+            settings,
+            candidates,
+            first,
+            noise_plan(settings, first),
+            settings.wrong_rate,
+            settings.references,
+            settings.correct_drift,
+        )
+        self.noise = CampaignNoise(settings, self.noise_plan, self.ledger, self.blocks, first)
+        self._told: tuple[int, Corrected | None] = (-1, None)
+        self._alarmed: tuple[int, tuple[Reason, ...]] = (-1, ())  # after so many readings
+        self._speaks_from = max(math.ceil(FIRST_SHARE * first), 1)
 
     def statements(self) -> tuple[Statement, ...]:
         """On the measured points, and on all candidates."""
-        ledger, looks = self.ledger, self.looks
-        visited = ledger.visited
-        if len(visited) < self._speaks_from:
-            left = Reason("first_visit", {"left": self._speaks_from - len(visited)})
+        seen = len(self.ledger.visited)
+        if seen < self._speaks_from:
+            left = Reason("first_visit", {"left": self._speaks_from - seen})
             return Statement(MEASURED, withheld=left), Statement(CANDIDATES, withheld=left)
+        against = self.noise.missing() or self._withheld()
+        if not against and self.settings.correct_drift:
+            against = awaited(self.plan, self.ledger.taken)
         posterior = self._posterior()
         value_mm = posterior.quantile_mm(0.5, measured_only=True)
+        if against:
+            both = (MEASURED, value_mm), (CANDIDATES, posterior.quantile_mm(0.5))
+            return tuple(self._as_asked(Statement(*each, withheld=against)) for each in both)
         said = Statement(
             MEASURED,
             value_mm=value_mm,
-            lower_mm=float(looks.lower_mm[visited].max()),
-            # Where unlucky readings put the bound below the likely size, that is the better bound.
-            upper_mm=max(float(looks.upper_mm[0, visited].max()), value_mm),
-            confidence=self.settings.confidence,
+            lower_mm=self._lower_mm(),
+            upper_mm=self._upper_mm(1.0 - self.settings.confidence, value_mm),
+            confidence=self.settings.confidence - self.settings.wrong_rate,
         )
-        return said, self._about_candidates(said, posterior.quantile_mm(0.5))
+        both = said, self._about_candidates(said, posterior.quantile_mm(0.5))
+        return tuple(self._as_asked(each) for each in both)
+
+    def change(self) -> Change | None:
+        """What the reference poses show of a drift or step; None where too few are read."""
+        if self.ledger.taken < self.plan.poses or not self.plan.poses:
+            return None
+        tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
+        return found(self.plan, planned_readings(self.plan, self.ledger), tested)
+
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """The limits that hold at every look, with the noise as bounds take it.
+
+        Of corrected readings where there are any.
+        """
+        if self.noise.missing():
+            return dict.fromkeys(self.ledger.visited, (0.0, math.inf))
+        error = 1.0 - self.settings.confidence
+        upper, single = self._limits_mm(error), self._single_factor()
+        looks = self._corrected.looks if self._corrected else self.looks
+        lower = looks.lower_limits_mm(single)
+        if self.settings.wrong_rate:
+            lower = np.zeros_like(lower)  # any single point may have been read wrong
+        return {row: (float(lower[row]), float(upper[row])) for row in self.ledger.visited}
+
+    def _as_asked(self, said: Statement) -> Statement:
+        """A statement with the noise it rests on, and on future visits where these are meant."""
+        if self.noise.missing():
+            return replace(said, error_of=self.settings.error_of)
+        noise = self.noise.taken(1.0 - self.settings.confidence)
+        said = replace(said, noise=noise.said)
+        if self.settings.error_of == MEAN:
+            return said
+        return of_future_visits(said, self.noise.arms_mm(noise))
+
+    @property
+    def _corrected(self) -> Corrected | None:
+        """The campaign without its drift, where that is wanted and all references are read."""
+        if not self.settings.correct_drift or self.noise.missing():
+            return None
+        if self._told[0] != self.ledger.taken:
+            error = 1.0 - self.settings.confidence
+            factor = self._factor_of_references(error)
+            part = self.drift_part * self.noise_plan.mean_share * error
+            told = corrected(self, part, factor, self.noise_plan.freedom)
+            self._told = self.ledger.taken, told
+        return self._told[1]
+
+    def _factor_of_references(self, error: float) -> float:
+        """Factor on the noise of the reference poses, the largest."""
+        return float(self.noise.taken(error).factor.own[: self.plan.poses].max())
+
+    def _limits_mm(self, error: float) -> np.ndarray:
+        """Upper limits (m,) of single points for an allowed error."""
+        plan, told = self.noise_plan, self._corrected
+        own, allowed = self.noise.taken(error).factor.own, plan.mean_share * error
+        boundary = self.boundary_of((1.0 - self.drift_part) * allowed, plan.freedom)
+        if told is None:
+            return self.looks.limits_mm(boundary, own)
+        astray_mm = told.drift.along_mm(self.drift_part * allowed, plan.freedom)
+        return told.looks.corrected_limits_mm(
+            boundary, own, self._factor_of_references(error) * astray_mm
+        )
+
+    def _single_factor(self) -> np.ndarray:
+        """Factors (m,) on the noise that lower limits of single points rest on."""
+        factor = self.noise.taken(1.0 - self.settings.confidence).factor
+        return factor.own * (factor.at_most(0.5 * self.single_error) / factor.value)
+
+    def alarms(self) -> tuple[Reason, ...]:
+        """What the readings say against what the bounds rest on."""
+        if self._alarmed[0] != self.ledger.taken:
+            self._alarmed = self.ledger.taken, self._alarms()
+        return self._alarmed[1]
+
+    def _alarms(self) -> tuple[Reason, ...]:
+        found: tuple[Reason, ...] = ()
+        if suspicious := self.suspicious():
+            first = {"readings": len(suspicious), "number": suspicious[0].number}
+            found = (Reason("wrong_readings", first),)
+        # A few wrong readings look like too much scatter: what tells more comes first.
+        drift = alarms(self.change(), self.settings.correct_drift)
+        return (*found, *drift, *self.noise.alarms())
+
+    def suspicious(self) -> tuple[Suspicious, ...]:
+        """Readings that stand apart from others of their point."""
+        from kinacc.assess.suspicious_readings import Noise, readings_by_row, suspicious_readings
+
+        if self.noise.missing():
+            return ()
+        factor = self.noise.taken(1.0 - self.settings.confidence).factor.value
+        # Where all readings scatter more than stated, none is wrong for doing so too.
+        factor = max(factor, self.noise.usual_scatter())
+        ledger = self._corrected.ledger if self._corrected else self.ledger
+        return suspicious_readings(
+            readings_by_row(ledger, self.blocks, self.counts),
+            self.extra + self.settings.references,
+            self.ledger.candidates.points,
+            Noise(factor, self.noise_plan.freedom),
+        )
+
+    def _withheld(self) -> Reason | None:
+        """The alarm by which bounds are withheld; wrong readings are none where guarded against."""
+        guarded = self.settings.wrong_rate > 0.0
+        told = (each for each in self.alarms() if not (guarded and each.code == "wrong_readings"))
+        return next(told, None)
+
+    def _upper_mm(self, error: float, value_mm: float) -> float:
+        """The largest upper limit of the visited points for an allowed error."""
+        # Where unlucky readings put the bound below the likely size, that is the better bound.
+        largest = max(float(self._limits_mm(error)[self.ledger.visited].max()), value_mm)
+        return largest + self.settings.allowance_mm
+
+    def _lower_mm(self) -> float:
+        told, factor = self._corrected, self._single_factor()
+        own = self.noise.taken(1.0 - self.settings.confidence).factor.own
+        if told is None:
+            single, average = self.looks.largest_lower_mm(factor), self.average.bound_mm(own)
+        else:
+            single = told.looks.largest_lower_mm(factor)
+            slope_mm = told.drift.slope_mm.tolist()
+            average = self.average.corrected_bound_mm(own, slope_mm, told.looks.astray_mm)
+        return max(self.lower_of(single, average) - self.settings.allowance_mm, 0.0)
 
     def _about_candidates(self, said: Statement, value_mm: float) -> Statement:
         points, seen = self.ledger.candidates.points, len(self.ledger.visited)
         allowed = 1.0 - self.settings.confidence
         known = replace(said, target=CANDIDATES, value_mm=value_mm)
-        # Visiting all only where the readings say so is no certainty: they may say so where the
-        # largest error was met and not where it was missed, and what was allowed is then spent.
-        if seen == self.first == points:
+        if seen == points:
             return known
-        crowd = companions(points, seen, MISSING_PART * allowed)
-        beyond_mm = max(float(self.looks.upper_mm[1, self.ledger.visited].max()), value_mm)
-        if crowd == 1:
-            return replace(known, upper_mm=beyond_mm)
+        left = excepted(points, seen, _MISSED * allowed)
+        floor_mm = value_mm if not left or self.settings.assume == COMPANY else 0.0
+        upper_mm = self._upper_mm((1.0 - _MISSED) * allowed, floor_mm)
+        if left and self.settings.assume == COMPANY:
+            return self._in_company(replace(known, upper_mm=upper_mm), left + 1)
+        return replace(known, upper_mm=upper_mm, excepted=left)
+
+    def _in_company(self, known: Statement, crowd: int) -> Statement:
+        """On all candidates, if the largest error is one of ``crowd`` or more that are alike."""
+        points, seen = self.ledger.candidates.points, len(self.ledger.visited)
         factor = self.settings.isolation
         assumption = Reason("crowd", {"crowd": crowd, "points": points, "isolation": factor})
-        resting = replace(known, upper_mm=factor * beyond_mm, assumption=assumption)
+        resting = replace(known, upper_mm=factor * known.upper_mm, assumption=assumption)
         withheld = None
         if crowd > self.settings.crowd * points:
             withheld = Reason("all_missed", {"seen": seen, "points": points, "crowd": crowd})
-        elif self._stands_alone(crowd, said.lower_mm):
+        elif self._stands_alone(crowd, known.lower_mm):
             withheld = Reason("stands_alone", {"isolation": factor})
         return replace(resting, upper_mm=math.nan, withheld=withheld) if withheld else resting
 
     def _stands_alone(self, crowd: int, lower_mm: float) -> bool:
         """Whether hardly any measured error can be as large as the assumption says many are."""
         visited = self.ledger.visited
-        upper = self.looks.upper_mm[0, visited]
-        company = int(np.sum(upper >= lower_mm / self.settings.isolation))
+        company = int(np.sum(self.looks.upper_mm[visited] >= lower_mm / self.settings.isolation))
         points = self.ledger.candidates.points
         return at_most(company, crowd, points, len(visited)) < _ALONE
 
-    def _wanted_by_suspects(self) -> float:
-        if self.ledger.taken - self._asked_at >= self._pause:
-            self._likely_mm = self._posterior().quantile_mm(0.5, measured_only=True)
-            self._asked_at = self.ledger.taken
-        visited = self.ledger.visited
-        reach = self.ledger.sizes_mm() + self.ledger.noise_mm[visited]
-        readings = int(self.ledger.count[visited][reach > self._likely_mm].sum())
-        return readings + _RESERVE * self.settings.measurements
-
     def _posterior(self) -> LargestSize:
-        visited = self.ledger.visited
-        unmeasured = self.ledger.candidates.points - len(visited)
-        return largest_size(self.ledger.sizes_mm(), self.ledger.noise_mm[visited], unmeasured)
+        # A drift that is not found is a worse guess of the drift than none.
+        change, ledger = self.change() if self._corrected else None, self.ledger
+        if self._corrected and change and change.is_found:
+            ledger = self._corrected.ledger
+        unmeasured = ledger.candidates.points - len(ledger.visited)
+        return largest_size(ledger.sizes_mm(), ledger.noise_mm[ledger.visited], unmeasured)

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
+from kinacc.assess.confirming import ConfirmingCampaign
 from kinacc.assess.coverage import about_all_if_all_measured
-from kinacc.assess.sequential_limits import Looks, LooksCampaign
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
@@ -18,12 +18,12 @@ from kinacc.errors import Problem, refuse
 
 @dataclass(frozen=True)
 class Sequential(AdaptiveAssessor):
-    """Visit a fixed number of points, then double the readings of the one with the largest limit.
+    """Visit a fixed number of points, then read again where the upper limit is largest.
 
     ``visited`` is the share of the budget spent on visiting points (all candidates where the budget
-    allows one and a half times as many). The bound is the largest upper limit of the points, each
-    limit valid at all times at once (:mod:`kinacc.assess.sequential_limits`), so it holds at
-    whatever moment the campaign is stopped: at the end of the budget, or as soon as upper and lower
+    allows one and a half times as many). Bounds and the choice of what is read again are those of
+    :mod:`kinacc.assess.confirming`: each limit holds at all times at once, so the bounds hold at
+    whatever moment the campaign is stopped, at the end of the budget or as soon as upper and lower
     bound are within ``width_mm`` of each other (null: never early). Assumes normal readings of
     known covariance (eq. 9).
     """
@@ -47,43 +47,52 @@ class Sequential(AdaptiveAssessor):
         return SequentialCampaign(self, candidates)
 
 
-class SequentialCampaign(LooksCampaign):
+class SequentialCampaign(ConfirmingCampaign):
     """See :class:`Sequential`."""
 
+    settings: Sequential
+
     def __init__(self, settings: Sequential, candidates: Candidates) -> None:
-        super().__init__(settings, candidates)
-        self.first = first_points(settings.measurements, candidates.points, settings.visited)
-        allowed = 1.0 - settings.confidence
-        self.looks = Looks(self.ledger, (allowed,), allowed / self.first)
+        first = first_points(settings.measurements, candidates.points, settings.visited)
+        super().__init__(settings, candidates, first)
 
     def next(self) -> int | None:
-        """Points in order, then the one whose limit is the bound."""
-        if self.ledger.taken < self.first:
-            return self.ledger.taken
-        if self.ledger.taken >= self.settings.measurements or self._is_tight():
-            return None
-        return self.looks.bounding_point(self.settings.measurements - self.ledger.taken)
+        """As in every campaign that confirms, until the bounds are near enough."""
+        return None if self._is_tight() else super().next()
 
     def statements(self) -> tuple[Statement, ...]:
         """The bounds as they stand."""
         if self.ledger.taken < self.first:
             left = Reason("first_visit", {"left": self.first - self.ledger.taken})
             return (Statement(MEASURED, withheld=left),)
-        visited = self.ledger.visited
         said = Statement(
             MEASURED,
             value_mm=corrected_largest_mm(self.ledger),
-            lower_mm=float(self.looks.lower_mm[visited].max()),
-            upper_mm=float(self.looks.upper_mm[0, visited].max()),
+            lower_mm=self._lower_mm(),
+            upper_mm=self._upper_mm(),
             confidence=self.settings.confidence,
         )
         return about_all_if_all_measured(said, self.ledger)
 
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """The limits that hold at every look."""
+        lower, upper = self.looks.lower_limits_mm(self._as_stated()), self.looks.upper_mm
+        return {row: (float(lower[row]), float(upper[row])) for row in self.ledger.visited}
+
+    def _upper_mm(self) -> float:
+        return float(self.looks.upper_mm[self.ledger.visited].max())
+
+    def _lower_mm(self) -> float:
+        factor = self._as_stated()
+        return self.lower_of(self.looks.largest_lower_mm(factor), self.average.bound_mm(factor))
+
+    def _as_stated(self) -> np.ndarray:
+        return np.ones(self.ledger.candidates.points)
+
     def _is_tight(self) -> bool:
-        if self.settings.width_mm is None:
+        if self.settings.width_mm is None or self.ledger.taken < self.first:
             return False
-        upper = float(self.looks.upper_mm[0, self.ledger.visited].max())
-        return upper - float(self.looks.lower_mm.max()) <= self.settings.width_mm
+        return self._upper_mm() - self._lower_mm() <= self.settings.width_mm
 
 
 def corrected_largest_mm(ledger: Ledger) -> float:

@@ -1,10 +1,11 @@
 """Limits on every point's size that hold however often and whenever somebody looks.
 
-A point is looked at when it has 1, 2, 4, 8, ... readings. Look number l may err with probability
-``SHARES[l]`` of the error allowed to a point, so all its limits hold together whatever decided
-when to measure it again, to look or to stop. The upper limits of different points need no
-correction for their number: the largest of them is at least the limit of the one point that is
-truly largest.
+A point is looked at when it has as many readings as one of the counts fixed beforehand. Its upper
+limits at all looks together miss with the probability its boundary was made for
+(:mod:`kinacc.assess.boundary`), whatever decided when to measure it again or to stop, for the
+decision knows only what was read before. The upper limits of different points need no correction
+for their number: the largest of them is at least the limit of the one point that is truly largest.
+Lower limits share their error out over points and looks.
 """
 
 from __future__ import annotations
@@ -13,78 +14,128 @@ import math
 
 import numpy as np
 
-from kinacc.assess.adaptive import Ledger, LedgerCampaign
-from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-
-_FIRST_SHARES = (0.60, 0.16, 0.10, 0.06)  # of the looks at 1, 2, 4 and 8 readings; then halving
-
-
-def share(look: int) -> float:
-    """Part of a point's allowed error that a look (0 = first) may spend; all together 1."""
-    if look < len(_FIRST_SHARES):
-        return _FIRST_SHARES[look]
-    return 0.5 ** (look - len(_FIRST_SHARES) + 1) * (1.0 - sum(_FIRST_SHARES))
+from kinacc.assess.adaptive import Ledger
+from kinacc.assess.boundary import Boundary
+from kinacc.assess.limits import lower_limit_mm
 
 
 class Looks:
-    """Running limits of all points of a ledger, for one or more allowed errors of a point.
+    """Limits of all points of a ledger, mm; upper ones are kept as points are looked at.
 
-    upper_mm: (errors, m), infinite before the first look; lower_mm: (m,), for ``lower_error``.
+    ``upper`` says at which counts points are looked at and how wide the upper limits are;
+    ``lower_error`` is what the lower limits of one point may miss by, ``shares`` (L,) its parts by
+    look. ``factor`` is how much larger than planned the noise is taken where points are chosen.
+    ``astray_mm``: what a drift that was taken from readings is off by in any direction, over the
+    whole sequence. upper_mm: (m,), infinite before the first look.
     """
 
-    def __init__(self, ledger: Ledger, errors: tuple[float, ...], lower_error: float) -> None:
-        points = ledger.candidates.points
-        self.ledger = ledger
-        self.errors = errors
-        self.lower_error = lower_error
-        self.upper_mm = np.full((len(errors), points), math.inf)
-        self.lower_mm = np.zeros(points)
-        self._done = np.zeros(points, dtype=np.int64)
+    astray_mm = 0.0
 
-    def update(self, point: int) -> None:
-        """Look at a point if its number of readings asks for it."""
-        count = int(self.ledger.count[point])
-        if count != self.due(point):
+    def __init__(
+        self, ledger: Ledger, upper: Boundary, lower_error: float, shares: np.ndarray, factor: float
+    ) -> None:
+        points, looks = ledger.candidates.points, len(upper.counts)
+        self.ledger, self.boundary, self.factor = ledger, upper, factor
+        self.lower_error, self.shares = lower_error, shares
+        self.upper_mm = np.full(points, math.inf)
+        self._counts = [*upper.counts.tolist(), math.inf]
+        self._done = [0] * points
+        self._size_mm = np.full((points, looks), np.nan)  # of the mean at every look
+        self._noise_mm = np.full((points, looks), np.nan)  # its standard deviation where even
+        self._even = np.ones((points, looks), dtype=bool)  # all readings so far as planned
+        self._time = np.zeros((points, looks))  # of readings from which a drift was taken
+        self._unequal: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
+
+    def update(self, point: int, time: float = 0.0) -> None:
+        """Look at a point if its number of readings asks for it; ``time`` is the mean of these."""
+        count, look = self.ledger.count.item(point), self._done[point]
+        if count != self._counts[look]:
             return
-        spent = share(int(self._done[point]))
-        mean, noise = self.ledger.mean_mm[point], self.ledger.noise(point)
-        for row, error in enumerate(self.errors):
-            limit = upper_limit_mm(mean, noise, error * spent)
-            self.upper_mm[row, point] = min(self.upper_mm[row, point], limit)
-        limit = lower_limit_mm(mean, noise, self.lower_error * spent)
-        self.lower_mm[point] = max(self.lower_mm[point], limit)
         self._done[point] += 1
+        mean, noise = self.ledger.mean_mm[point], self.ledger.noise(point)
+        self._even[point, look] = self.ledger.as_planned(point)
+        self._time[point, look] = time
+        x, y, z = mean.tolist()
+        self._size_mm[point, look] = math.sqrt(x * x + y * y + z * z)
+        if isinstance(noise, float):
+            self._noise_mm[point, look] = noise
+        else:
+            self._unequal[point, look] = mean.copy(), noise
+        limit = self._limit(point, look, self.boundary, self.factor)
+        if limit < self.upper_mm[point]:
+            self.upper_mm[point] = limit
 
-    def due(self, point: int) -> int:
-        """Number of readings at which the point is looked at next."""
-        return 1 << int(self._done[point])
+    def due(self, point: int) -> float:
+        """Number of readings at which the point is looked at next; infinite after the last."""
+        return self._counts[self._done[point]]
 
-    def missing(self, point: int) -> int:
+    def done(self, point: int) -> int:
+        """How often the point was looked at."""
+        return self._done[point]
+
+    def missing(self, point: int) -> float:
         """Readings missing until the next look."""
-        return self.due(point) - int(self.ledger.count[point])
+        return self.due(point) - self.ledger.count.item(point)
 
-    def bounding_point(self, left: int) -> int:
-        """The visited point with the largest upper limit among those whose next look is affordable.
+    def limits_mm(self, boundary: Boundary, factor: np.ndarray) -> np.ndarray:
+        """Upper limits (m,) of another boundary at the same counts, noise (m,) times as planned.
 
-        With ``left`` readings to go. Where no look is affordable the largest limit decides alone:
-        its readings still serve the value.
+        Infinite where a point was not looked at.
         """
-        visited = np.array(self.ledger.visited)
-        order = visited[np.argsort(-self.upper_mm[0, visited], kind="stable")]
-        return int(next((point for point in order if self.missing(point) <= left), order[0]))
+        return self.corrected_limits_mm(boundary, factor, 0.0)
 
+    def corrected_limits_mm(
+        self, boundary: Boundary, factor: np.ndarray, astray_mm: float
+    ) -> np.ndarray:
+        """As :meth:`limits_mm`, where a drift was taken from readings.
 
-class LooksCampaign(LedgerCampaign):
-    """A campaign that looks at every point as it is read: ``looks`` is the assessor's to set."""
+        ``astray_mm``: what it falls short by along one direction, over the whole sequence.
+        """
+        width = np.where(self._even, boundary.z, boundary.alone) * factor[:, None]
+        at_looks = self._size_mm + width * self._noise_mm + astray_mm * self._time
+        found = np.where(np.isnan(at_looks), math.inf, at_looks).min(axis=1)
+        for point, look in self._unequal:
+            limit = self._limit(point, look, boundary, factor.item(point))
+            found[point] = min(found[point], limit + astray_mm * self._time.item(point, look))
+        return found
 
-    looks: Looks
+    def largest_lower_mm(self, factor: np.ndarray) -> float:
+        """The largest lower limit of any point at any look, noise (m,) times as planned."""
+        from scipy.special import ndtri
 
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading, and look at the point where that is due."""
-        super().record(point, reading_mm, covariance_mm2)
-        self.looks.update(point)
+        # No limit exceeds the size less as many standard deviations as a single axis would take.
+        noise = np.nan_to_num(self._noise_mm) * factor[:, None]
+        highest = self._size_mm + ndtri(self.lower_error * self.shares) * noise
+        best = 0.0
+        for place in np.argsort(-np.nan_to_num(highest, nan=-math.inf), axis=None).tolist():
+            point, look = divmod(place, highest.shape[1])
+            if not highest.item(place) > best:
+                break
+            best = max(best, self._below(point, look, factor.item(point)))
+        return best
 
-    def point_limits(self) -> dict[int, tuple[float, float]]:
-        """The limits that hold at every look."""
-        lower, upper = self.looks.lower_mm, self.looks.upper_mm[0]
-        return {row: (float(lower[row]), float(upper[row])) for row in self.ledger.visited}
+    def lower_limits_mm(self, factor: np.ndarray) -> np.ndarray:
+        """Lower limits (m,), noise (m,) times as planned; 0 where a point was not looked at."""
+        found = np.zeros(len(self._done))
+        for point, done in enumerate(self._done):
+            looks = (self._below(point, look, factor.item(point)) for look in range(done))
+            found[point] = max(looks, default=0.0)
+        return found
+
+    def _below(self, point: int, look: int, factor: float) -> float:
+        error = self.lower_error * self.shares.item(look)
+        astray = self._time.item(point, look) * self.astray_mm
+        if (point, look) in self._unequal:
+            mean, spread = self._unequal[point, look]
+            return lower_limit_mm(mean, factor**2 * spread, error) - astray
+        mean = np.array([self._size_mm.item(point, look), 0.0, 0.0])
+        return lower_limit_mm(mean, factor * self._noise_mm.item(point, look), error) - astray
+
+    def _limit(self, point: int, look: int, boundary: Boundary, factor: float) -> float:
+        width = boundary.z if self._even[point, look] else boundary.alone
+        deviations = factor * width.item(look)
+        if (point, look) in self._unequal:
+            from kinacc.assess.ellipsoid import largest_size
+
+            return largest_size(*self._unequal[point, look], deviations)
+        return self._size_mm.item(point, look) + deviations * self._noise_mm.item(point, look)

@@ -9,9 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
+from kinacc.assess.conditions import CONDITIONS, STATED, Course
+from kinacc.assess.future_visit import SHARE
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS
-from kinacc.assess.statement import CANDIDATES, MEASURED, Statement
+from kinacc.assess.statement import CANDIDATES, MEASURED, VISIT, Reason, Statement
 from kinacc.assess.world import World, drawn_world
 from kinacc.config.records import of_section
 
@@ -40,55 +42,93 @@ def carry_on(
     return done
 
 
-def conduct(assessor: AdaptiveAssessor, world: World, **known: np.ndarray) -> Campaign:
-    """Run a campaign to its end on the readings of a world; ``known`` as in :class:`Candidates`."""
-    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **known))
-    carry_on(campaign, world.reading_mm)
+def conduct(
+    assessor: AdaptiveAssessor, world: World, condition: str = STATED, **known: np.ndarray
+) -> Campaign:
+    """Run a campaign to its end on the readings of a world; ``known`` as in :class:`Candidates`.
+
+    ``condition``: how readings come about, a name of :data:`kinacc.assess.conditions.CONDITIONS`.
+    """
+    if condition == STATED:
+        campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **known))
+        carry_on(campaign, world.reading_mm)
+        return campaign
+    course = Course(CONDITIONS[condition], world, assessor.measurements)
+    campaign = assessor.begin(Candidates.with_equal_noise(course.stated_mm(), **known))
+    carry_on(campaign, course.reading_mm)
     return campaign
 
 
 def noisy(errors_mm: np.ndarray, noise_root: np.ndarray, visits: int, *entropy: int) -> Reading:
     """Readings of errors (m, 3), up to ``visits`` a row: the same whatever else is read.
 
-    ``noise_root`` (3, 3): its product with its transpose is the covariance of a reading.
+    ``noise_root``, (3, 3) or one for each row (m, 3, 3): its product with its transpose is the
+    covariance of a reading.
     """
+    root = np.broadcast_to(noise_root, (len(errors_mm), 3, 3))
     deviates = drawn_world(np.zeros((len(errors_mm), 3)), 1.0, key_of(*entropy), max(visits, 1))
-    return lambda row, visit: errors_mm[row] + noise_root @ deviates.reading_mm(row, visit)
+    return lambda row, visit: errors_mm[row] + root[row] @ deviates.reading_mm(row, visit)
 
 
 class Assessed(NamedTuple):
-    """What an assessor says in the end, what it took; rows read (None: it looks back)."""
+    """What an assessor says in the end, what it took; rows read (None: it looks back); alarms."""
 
     statements: tuple[Statement, ...]
     measurements: int
     points_visited: int
     visited: list[int] | None
+    alarms: tuple[Reason, ...] = ()
 
 
 def assessed(
-    name: str, settings: Mapping[str, object], world: World, **known: np.ndarray
+    name: str,
+    settings: Mapping[str, object],
+    world: World,
+    condition: str = STATED,
+    **known: np.ndarray,
 ) -> Assessed:
     """What an assessor of the registry says of a world, whichever its interface.
 
-    ``settings``: values of which it takes those that it has.
+    ``settings``: values of which it takes those that it has. One that looks back has readings as
+    stated, whatever the ``condition``.
     """
     assessor = of_section(ASSESSORS[name], settings)
     if name in ADAPTIVE:
-        campaign = conduct(assessor, world, **known)
+        campaign = conduct(assessor, world, condition, **known)
         taken, rows = campaign.ledger.taken, campaign.ledger.visited
-        return Assessed(campaign.statements(), taken, len(rows), rows)
+        return Assessed(campaign.statements(), taken, len(rows), rows, campaign.alarms())
     found = assessor.assess(world)
     said = Statement(CANDIDATES, found.assessed_mm)
     return Assessed((said,), found.measurements, found.points_visited, None)
 
 
-def truth_mm(said: Statement, size_mm: np.ndarray, visited: list[int] | None) -> float:
-    """What a statement is held to, of sizes (m,) of all candidates; NaN where these do not tell."""
+def truth_mm(
+    said: Statement,
+    size_mm: np.ndarray,
+    visited: list[int] | None,
+    arm_mm: float | np.ndarray = 0.0,
+) -> float:
+    """What an upper bound is held to, of sizes (m,) of all candidates; NaN where these do not tell.
+
+    ``arm_mm``: standard deviation of a visit per axis, of each candidate or of all.
+    """
+    if said.error_of == VISIT:
+        size_mm = _visits_mm(size_mm, arm_mm)
     if said.target == CANDIDATES:
-        return float(size_mm.max())
+        return float(np.sort(size_mm)[-1 - said.excepted])
     if said.target == MEASURED and visited:
         return float(size_mm[visited].max())
     return math.nan
+
+
+def _visits_mm(size_mm: np.ndarray, arm_mm: float | np.ndarray) -> np.ndarray:
+    """Sizes (m,) that 95 % of the visits to each candidate keep."""
+    from scipy.special import chndtrix
+
+    arm = np.broadcast_to(arm_mm, size_mm.shape)
+    safe = np.where(arm > 0.0, arm, 1.0)
+    found = safe * np.sqrt(chndtrix(SHARE, 3.0, (size_mm / safe) ** 2))
+    return np.where(arm > 0.0, found, size_mm)
 
 
 def is_broken(said: Statement, size_mm: np.ndarray) -> bool:

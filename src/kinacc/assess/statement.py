@@ -10,11 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 MEASURED = "measured"
 CANDIDATES = "candidates"
 REGION = "region"
 TARGETS = (MEASURED, CANDIDATES, REGION)
+MEAN, VISIT = "mean", "visit"  # what of a pose's error is meant
 CONFIDENCE = 0.95  # of each bound, where no other is asked for
 
 
@@ -26,6 +28,14 @@ class Reason:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
+class Suspicious(NamedTuple):
+    """A reading that noise does not explain: its number, from 1; its row; standard deviations."""
+
+    number: int
+    row: int
+    deviations: float
+
+
 @dataclass(frozen=True)
 class Statement:
     """One statement on the size of the errors, mm; NaN where nothing is said.
@@ -35,7 +45,11 @@ class Statement:
     bounds rest on beyond normal readings of known covariance; None if nothing. Its numbers
     ``crowd`` and ``isolation`` say that at least so many candidates have an error above the largest
     divided by ``isolation``. ``withheld`` is why no bound is stated; None if one is. Where an
-    assumption was at hand, a statement that is withheld still names it.
+    assumption was at hand, a statement that is withheld still names it. ``excepted``: so many
+    points may lie above the upper bound, which is of all but these; no confidence is lost by
+    saying which. ``error_of``: ``mean``, what stays when a pose is measured again, or ``visit``,
+    what 95 % of visits to the worst pose keep. ``noise``: how
+    large the bounds take the noise; None where it is as stated.
     """
 
     target: str
@@ -46,3 +60,6 @@ class Statement:
     share: float = 1.0
     assumption: Reason | None = None
     withheld: Reason | None = None
+    excepted: int = 0
+    error_of: str = MEAN
+    noise: Reason | None = None

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import INSTRUMENT, Instrument
-from kinacc.campaign.plan import Limits, Plan, Points, candidates_of, fixed_visit
+from kinacc.campaign.plan import Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.planning import travel
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.geometry import compose, invert
+from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics.inverse.limits import travel_unit
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import outside_limits
@@ -72,17 +72,26 @@ def plan_of(
     """
     order = np.random.default_rng(seed).permutation(len(points))
     kept = Arm.of(arm, about.get("point"))
-    to_base = compose(arm.origin("base"), invert(arm.origin("instrument")))
-    covariance = instruments[0].in_base(to_base.rotation)
-    equal = candidates_of(covariance, points.joints, kept)
-    route = order[: fixed_visit(assessor, equal)]
+    to_base = _to_base(arm)
+    noise = instruments[0].in_base(to_base, points.modelled_mm)
+    effects = kept.effects(points.joints)
+    candidates = Candidates(noise[order], q_rad=points.joints[order], effects=effects[order])
+    begun = assessor.begin(candidates)
+    route = order[: begun.first]
     if by_travel:
         unit = travel_unit(arm.robot)
-        route = route[_short_path(points.joints[route] / unit, start / unit)]
+        route = route[_visit_path(points.joints[route] / unit, start / unit, begun.reference_poses)]
     return Plan(
         points, order, route, assessor, tuple(instruments), to_base,
         kept, limits, seed, about,
     )  # fmt: skip
+
+
+def placed(
+    arm: Calibration, instruments: Sequence[Instrument], points: Points
+) -> tuple[Instrument, ...]:
+    """The instruments, with the largest noise that each has at any of the candidates."""
+    return tuple(each.placed(_to_base(arm), points.modelled_mm) for each in instruments)
 
 
 def plausible_mm(arm: Calibration, instruments: Sequence[Instrument]) -> float:
@@ -100,6 +109,20 @@ def plausible_mm(arm: Calibration, instruments: Sequence[Instrument]) -> float:
 def needs_instrument_frame(instruments: Sequence[Instrument]) -> bool:
     """Whether any reading comes in the instrument's frame."""
     return any(each.frame == INSTRUMENT for each in instruments)
+
+
+def _to_base(arm: Calibration) -> Pose:
+    """The instrument's frame in the robot's base."""
+    return compose(arm.origin("base"), invert(arm.origin("instrument")))
+
+
+def _visit_path(places: np.ndarray, start: np.ndarray, references: int) -> np.ndarray:
+    """Rows (n,) of places (n, k): the reference poses, then the others, each with little travel."""
+    if not references:
+        return _short_path(places, start)
+    early = _short_path(places[:references], start)
+    later = _short_path(places[references:], places[early[-1]])
+    return np.concatenate([early, references + later])
 
 
 def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:

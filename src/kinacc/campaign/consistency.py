@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.campaign.reading import covariance_mm2
-from kinacc.campaign.state import State, Told
+from kinacc.assess.adaptive import Ledger
+from kinacc.assess.noise_alarms import scatter_alarm
+from kinacc.assess.noise_factor import Contrasts, contrasts
+from kinacc.assess.noise_taken import ESTIMATED, KNOWN, without_wrong_blocks
+from kinacc.campaign.reading import covariance_mm2, unplanned_mm2
+from kinacc.campaign.state import State
 
 SUSPICIOUS = 1e-3
 
@@ -17,16 +20,15 @@ SUSPICIOUS = 1e-3
 @dataclass(frozen=True)
 class Scatter:
     """Root of chi-square over its degrees of freedom (1 on average where the noise is as stated),
-    the degrees, and the probability of so much scatter or more by chance."""
+    the degrees, and the probability of so much scatter or more by chance.
+
+    ``too_large``: the readings contradict the noise stated, the bounds cannot be relied on.
+    """
 
     ratio: float
     freedom: int
     probability: float
-
-    @property
-    def too_large(self) -> bool:
-        """Whether the readings contradict the noise stated: the bounds cannot be relied on."""
-        return self.probability < SUSPICIOUS
+    too_large: bool = False
 
     @property
     def too_small(self) -> bool:
@@ -35,53 +37,46 @@ class Scatter:
 
 
 def scatter(state: State) -> Scatter | None:
-    """Scatter of repeated readings about their means by point, with the covariances stated.
+    """Scatter of readings within their blocks, with the covariances stated.
 
-    The first reading of a point is left out, because a point is read again for being large there.
-    None without a point that was read at least three times.
+    A block is what one decision reads at one point: the first reading of a point, for which it may
+    be read again, is none. None without two readings of one block.
     """
-    square, freedom = 0.0, 0
-    for later in _repeated(state):
-        square += _square(state, later)
-        freedom += 3 * (len(later) - 1)
-    if not freedom:
+    found = _within_blocks(state)
+    if not found.freedom:
         return None
     from scipy.special import chdtrc
 
-    return Scatter(math.sqrt(square / freedom), freedom, float(chdtrc(freedom, square)))
+    square = float(np.sum(found.values**2))
+    chance = float(chdtrc(found.freedom, square))
+    too_large = scatter_alarm(found, margin=state.campaign.factor) is not None
+    return Scatter(math.sqrt(square / found.freedom), found.freedom, chance, too_large)
 
 
 def deviations(state: State) -> dict[int, float]:
-    """Of the readings that ``scatter`` counts, by number: distance from the mean of their point.
+    """Of the readings that ``scatter`` counts, by number: distance from those before in the block.
 
     In units of what the noise stated brings: the root mean square is 1 where it is as stated.
     """
-    found = {}
-    for later in _repeated(state):
-        weights, mean = _mean(state, later)
-        of_mean = np.linalg.inv(sum(weights))
-        for each, weight in zip(later, weights, strict=True):
-            apart = each.error_mm - mean
-            own = np.linalg.inv(weight) - of_mean
-            found[each.number] = math.sqrt(float(apart @ np.linalg.solve(own, apart)) / 3.0)
-    return found
+    found = _within_blocks(state)
+    numbers = [each.number for each in (*state.told, *state.in_hand)]
+    sizes = np.sqrt(np.mean(found.values**2, axis=1)).tolist()
+    return {numbers[at]: size for at, size in zip(found.places.tolist(), sizes, strict=True)}
 
 
-def _repeated(state: State) -> Iterator[list[Told]]:
-    """Readings of every point that was read at least three times, without its first."""
-    groups: dict[int, list[Told]] = {}
-    for each in (*state.told, *state.in_hand):
-        groups.setdefault(each.reading.point, []).append(each)
-    for group in groups.values():
-        if len(group) >= 3:
-            yield sorted(group, key=lambda each: each.number)[1:]
-
-
-def _mean(state: State, readings: list[Told]) -> tuple[list[np.ndarray], np.ndarray]:
-    """Weights (3, 3) of readings of one point, and their weighted mean (3,)."""
-    weights = [np.linalg.inv(covariance_mm2(state.plan, each.reading)) for each in readings]
-    sums = sum(w @ each.error_mm for w, each in zip(weights, readings, strict=True))
-    return weights, np.linalg.solve(sum(weights), sums)
+def _within_blocks(state: State) -> Contrasts:
+    """Of readings told by the blocks they were asked for in, of those in hand by point."""
+    ledger, blocks = Ledger(state.campaign.ledger.candidates), state.campaign.reading_blocks()
+    row_of = {int(point): row for row, point in enumerate(state.rows)}
+    in_hand = [each for each in state.in_hand if each.reading.point in row_of]
+    for each in (*state.told, *in_hand):
+        own = unplanned_mm2(state.plan, each.reading)
+        ledger.record(row_of[each.reading.point], each.error_mm, own)
+    beyond = max(blocks, default=0) + 1
+    every = [*blocks, *(beyond + row_of[each.reading.point] for each in in_hand)]
+    found = contrasts(ledger, every)
+    guarded = getattr(state.plan.assessor, "wrong_rate", 0.0) > 0.0
+    return without_wrong_blocks(found, every) if guarded else found
 
 
 def nearness(state: State) -> Scatter | None:
@@ -117,7 +112,7 @@ def too_near(state: State) -> str | None:
 
 def remarks(state: State) -> list[str]:
     """What the readings say of the noise stated, a sentence each."""
-    near, found = too_near(state), scatter(state)
+    near, found = too_near(state), _held_to_stated(state)
     if near is not None:
         # Bounds are wider for noise stated too large where errors outweigh it, and only there.
         return [near]
@@ -126,16 +121,14 @@ def remarks(state: State) -> list[str]:
 
 def contradicted(state: State) -> list[str]:
     """Those of ``remarks`` by which the bounds cannot be relied on."""
-    found = scatter(state)
+    found = _held_to_stated(state)
     contradicts = too_near(state) is not None or (found is not None and found.too_large)
     return remarks(state) if contradicts else []
 
 
-def _square(state: State, readings: list[Told]) -> float:
-    """Chi-square of readings of one point about their weighted mean."""
-    weights, mean = _mean(state, readings)
-    values = [each.error_mm for each in readings]
-    return float(sum((x - mean) @ w @ (x - mean) for w, x in zip(weights, values, strict=True)))
+def _held_to_stated(state: State) -> Scatter | None:
+    """The scatter, where the bounds rest on the noise stated and not on an estimate."""
+    return None if getattr(state.plan.assessor, "noise", KNOWN) == ESTIMATED else scatter(state)
 
 
 def in_words(found: Scatter) -> str:

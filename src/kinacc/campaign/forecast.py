@@ -212,7 +212,8 @@ def _by_row(state: State) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _root(state: State) -> np.ndarray:
-    return np.linalg.cholesky(state.plan.covariance_mm2)
+    """Roots (m, 3, 3) of the covariances of readings, by the assessor's rows."""
+    return np.linalg.cholesky(state.plan.covariance_mm2[state.rows])
 
 
 def _likelihood(square: np.ndarray, noise_mm: np.ndarray, scale_mm: np.ndarray) -> np.ndarray:

@@ -49,6 +49,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "b1cf89dd11ffcffe",
         "92c21a4bb3ec2a38",
         "1f2b66209ee755c1",
+        "bbaffb0b966dd2e9",
     },
     "invalidation_calibrated": _BEFORE_ROOMS
     | {
@@ -57,6 +58,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "b295789925e904fc",
         "136d34131906ef05",
         "b607931e6f633d3a",
+        "ae77007204b5a5d7",
     },
     "kinematic": _BEFORE_ROOMS
     | {
@@ -65,6 +67,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "ec5bc9a390f5ab84",
         "8e1bb6d080eeda6f",
         "e13db065367f0d1a",
+        "a3a306a7af20befb",
     },
     "model_invalidation_full": _BEFORE_ROOMS
     | {
@@ -73,6 +76,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "f922bfe981ed1abf",
         "6c3f88d9087efb73",
         "ec7a1a87ea98390e",
+        "5485300349a48fa1",
     },
     "region_share": _BEFORE_ROOMS
     | {
@@ -81,23 +85,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "02b91a8e49c3da8c",
         "9e5efc1a7d7755e5",
         "3985176744349931",
-    },
-    "search_and_confirm": _BEFORE_ROOMS
-    | {
-        "47fbae570ce61729",
-        "0e1ed1ef42570ea4",
-        "7d799bcacdd9b633",
-        "e6b1d5ee9f4f4ddb",
-        "8b22e7a5c8c0731b",
-        "12f8150f3e56878e",
-    },
-    "sequential": _BEFORE_ROOMS
-    | {
-        "94960c384a0a8485",
-        "803268b7890760fe",
-        "c98c882b0f01018a",
-        "a0f441f47bd0567b",
-        "34dd982a0979230b",
+        "315c9ed2d8f5cf5b",
     },
     "single_shot": _BEFORE_ROOMS
     | {
@@ -106,6 +94,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "99bc95063c5154d9",
         "0fd8bee355f51b05",
         "b26433629f82dbdb",
+        "368fe70b6419f77d",
     },
     "two_stage": _BEFORE_ROOMS
     | {
@@ -114,6 +103,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "42c20fc02fe70a7a",
         "6de38d1bb0294859",
         "e9a469f2807caf7a",
+        "e36479a8446a76f6",
     },
 }
 

@@ -62,7 +62,7 @@ class Assessed:
         """The same for a machine; None where nothing is said."""
         plan, said = self.state.plan, self.said or Statement(CANDIDATES)
         numbers = {"lower_mm": said.lower_mm, "upper_mm": said.upper_mm}
-        numbers |= {"confidence": said.confidence}
+        numbers |= {"confidence": said.confidence, "excepted": said.excepted}
         return {
             "campaign": str(self.place),
             "model": plan.about["model"],
@@ -127,7 +127,8 @@ def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) 
                 continue
             state = opened.state()
             said = min(state.statements(), key=lambda each: _ORDER.index(each.target), default=None)
-            if state.asked is None and said is not None and np.isfinite(said.upper_mm):
+            whole = said is not None and np.isfinite(said.upper_mm) and not said.excepted
+            if state.asked is None and said is not None and whole:
                 ended.append((max(opened.recorded, default=""), said.upper_mm))
     return max(ended, default=("", np.nan))[1]
 

@@ -15,6 +15,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES, TARGETS
 from kinacc.campaign.arm import Arm, numbers
 from kinacc.campaign.instrument import BASE, INSTRUMENT, Instrument
+from kinacc.campaign.laser_tracker import LaserTracker
 from kinacc.config import json_files, schema
 from kinacc.config.values import check
 from kinacc.errors import InputError, Problem, refuse
@@ -98,10 +99,11 @@ class Plan:
         """Which joints (k,) slide."""
         return self.arm.dh.prismatic
 
-    @property
+    @cached_property
     def covariance_mm2(self) -> np.ndarray:
-        """Covariance (3, 3) of a reading of the first instrument, in the robot's base."""
-        return self.instruments[0].in_base(self.to_base.rotation)
+        """Covariances (m, 3, 3) of a reading of the first instrument at each of the points, in the
+        robot's base."""
+        return self.instruments[0].in_base(self.to_base, self.points.modelled_mm)
 
     @property
     def by_travel(self) -> bool:
@@ -132,13 +134,8 @@ class Plan:
 
     def candidates(self, rows: np.ndarray) -> Candidates:
         """The candidates in the order of ``rows``, with the noise of the first instrument."""
-        return candidates_of(self.covariance_mm2, self.points.joints[rows], self.arm)
-
-
-def candidates_of(covariance_mm2: np.ndarray, joints: np.ndarray, arm: Arm) -> Candidates:
-    """Candidates at joints (m, k) with equal covariances (3, 3)."""
-    noise = np.tile(covariance_mm2, (len(joints), 1, 1))
-    return Candidates(noise, q_rad=joints, effects=arm.effects(joints))
+        joints = self.points.joints[rows]
+        return Candidates(self.covariance_mm2[rows], q_rad=joints, effects=self.arm.effects(joints))
 
 
 def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:
@@ -165,11 +162,19 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
             problems.append(Problem(where, "is not there", ", ".join(known)))
         elif each in shared:
             problems += check(shared[each], value, (where,), "".join)[1]
-        elif not _is_number(value) and value is not known[each].default:
-            problems.append(Problem(where, f"{value!r}"[:60], "a number"))
+        elif not _is_like(value, known[each].default):
+            allowed = {str: "a word", bool: "true or false"}.get(type(known[each].default))
+            problems.append(Problem(where, f"{value!r}"[:60], allowed or "a number"))
     refuse(problems)
     defaults = {each: key.default for each, key in shared.items()}
     return ADAPTIVE[name](**{**defaults, **settings})
+
+
+def _is_like(value: object, default: object) -> bool:
+    """Whether a value is of the kind of a setting's default; a number where that tells none."""
+    if isinstance(default, (str, bool)):
+        return type(value) is type(default)
+    return _is_number(value) or value is default
 
 
 def _is_number(value: object) -> bool:
@@ -199,6 +204,8 @@ def to_json(plan: Plan) -> bytes:
                 "name": each.name,
                 "frame": each.frame,
                 "covariance_mm2": each.covariance_mm2.tolist(),
+                **({"laser": asdict(each.laser)} if each.laser else {}),
+                **({"resolution_mm": each.resolution_mm} if each.resolution_mm else {}),
             }
             for each in plan.instruments
         ],
@@ -252,16 +259,23 @@ def _plan(content: Mapping) -> Plan:
         np.array(content["order"], dtype=int),
         np.array(content["route"], dtype=int),
         assessor_of(content["assessor"]["name"], content["assessor"]["settings"]),
-        tuple(
-            Instrument(each["name"], numbers(each["covariance_mm2"]), each["frame"])
-            for each in content["instruments"]
-        ),
+        tuple(map(_instrument, content["instruments"])),
         Pose(*(numbers(content["to_base"][each]) for each in ("rotation", "position_mm"))),
         Arm.of_entry(content["arm"]),
         Limits(**content["limits"]),
         content["seed"],
         content["about"],
         tuple(map(str, content.get("overruled", ()))),
+    )
+
+
+def _instrument(entry: Mapping) -> Instrument:
+    return Instrument(
+        entry["name"],
+        numbers(entry["covariance_mm2"]),
+        entry["frame"],
+        LaserTracker(**entry["laser"]) if "laser" in entry else None,
+        entry.get("resolution_mm", 0.0),
     )
 
 
@@ -283,6 +297,8 @@ def _checked(plan: Plan) -> Plan:
             and np.isfinite(each.covariance_mm2).all()
             and isinstance(each.name, str)
             and each.frame in (BASE, INSTRUMENT)
+            and _is_number(each.resolution_mm)
+            and (each.laser is None or all(map(_is_number, asdict(each.laser).values())))
             for each in plan.instruments
         ),
         "to_base": plan.to_base.rotation.shape == (3, 3) and plan.to_base.position_mm.shape == (3,),

@@ -37,6 +37,8 @@ class Row:
     assumption that is not true of the errors simulated. Of the upper bounds stated, those left out:
     ``excess_mm``, mean of bound minus truth, and ``holds``, share at or above the truth (NaN where
     there are none); ``judged`` is how many these are, ``holding`` how many of them hold.
+    ``attainable_mm``, ``proven_mm``: the same excess of the best design that knows all errors, and
+    what no bound that can be relied on stays below; NaN or infinite where none can be had.
     ``within``: share whose width is as wanted, ``interval`` its exact 95 % limits.
     ``decisions``: share by decision on the tolerance.
     """
@@ -56,6 +58,8 @@ class Row:
     decisions: dict[str, float]
     judged: int = 0
     holding: int = 0
+    attainable_mm: float = math.nan
+    proven_mm: float = math.nan
 
     @property
     def holds_interval(self) -> tuple[float, float]:
@@ -138,6 +142,8 @@ def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
         {kind: said.count(kind) / count for kind in VERDICTS} if said else {},
         len(holds),
         sum(holds),
+        _mean([each.limits.attainable_mm for each in stated]),
+        _mean([each.limits.proven_mm for each in stated]),
     )
 
 

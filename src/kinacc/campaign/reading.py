@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
 def covariance_mm2(plan: Plan, reading: Reading) -> np.ndarray:
     """Covariance (3, 3) of the reading in the robot's base."""
     unplanned = unplanned_mm2(plan, reading)
-    return plan.covariance_mm2 if unplanned is None else unplanned
+    return plan.covariance_mm2[reading.point] if unplanned is None else unplanned
 
 
 def unplanned_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
@@ -74,10 +74,10 @@ def unplanned_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
     instrument = plan.instrument(reading.instrument)
     if reading.std is not None:
         own = covariance_of(reading.std, "reading", [])
-        return replace(instrument, covariance_mm2=own).in_base(plan.to_base.rotation)
-    if instrument is plan.instruments[0]:
+        instrument = instrument.of_reading(own)
+    elif instrument is plan.instruments[0]:
         return None
-    return instrument.in_base(plan.to_base.rotation)
+    return instrument.in_base(plan.to_base, plan.points.modelled_mm[[reading.point]])[0]
 
 
 def entry_faults(plan: Plan, reading: Reading) -> list[str]:

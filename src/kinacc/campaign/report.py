@@ -11,8 +11,9 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
-from kinacc.assess.statement import REGION
-from kinacc.campaign import consistency, words
+from kinacc.assess.future_visit import SHARE as FUTURE
+from kinacc.assess.statement import MEAN, REGION
+from kinacc.campaign import consistency, nearness, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
 from kinacc.campaign.reading import covariance_mm2
@@ -60,6 +61,7 @@ def _said(said, count: int, visited: int) -> dict[str, object]:
         "value_mm": said.value_mm,
         "lower_mm": said.lower_mm,
         "upper_mm": said.upper_mm,
+        "excepted": said.excepted,
         "confidence": said.confidence,
         "assumption": words.reason(said.assumption),
         "withheld": words.reason(said.withheld),
@@ -147,6 +149,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
         f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
         "",
         *(f"- {each}" for each in words.statements(state)),
+        *(f"- {each}" for each in nearness.in_words(state)),
         *(f"- {in_markdown(each)}" for each in words.begun_against(plan)),
         *(f"- {in_markdown(each)}" for each in read_above(state, found["campaign_points"])),
         "",
@@ -169,7 +172,7 @@ def _conformity(state: State) -> list[str]:
     lines = [f"Largest error allowed: {tolerance:g} mm.", ""]
     for said in state.statements():
         found = decide(said, tolerance)
-        line = f"- {words.TARGETS[said.target]}: **{found.verdict}**; {words.reason(found.reason)}"
+        line = f"- {words.target(said)}: **{found.verdict}**; {words.reason(found.reason)}"
         if math.isfinite(found.guard_band_mm):
             line += (
                 f" (guard band {found.guard_band_mm:.3f} mm, acceptance limit "
@@ -179,7 +182,8 @@ def _conformity(state: State) -> list[str]:
     lines += [
         "",
         "Accepted where the upper bound is within the tolerance, rejected where the lower bound is "
-        "beyond it (JCGM 106:2012, guarded acceptance and rejection). The guard band is how far "
+        "beyond it: guarded acceptance and rejection of JCGM 106:2012, the rule of ISO 14253-1. "
+        "Between them nothing is decided. The guard band is how far "
         "the estimate has to stay below the tolerance; the risk is that of either being wrong.",
     ]
     return lines
@@ -220,7 +224,8 @@ def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markd
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
     lines += map(written, words.not_counted(state))
-    return [*lines, *consistency.remarks(state)]
+    lines += [*consistency.remarks(state), *words.of_frame(state), *words.of_the_noise(state)]
+    return [*lines, *map(written, words.suspicious(state))]
 
 
 def read_above(state: State, points: Columns) -> list[str]:
@@ -228,7 +233,7 @@ def read_above(state: State, points: Columns) -> list[str]:
     size = _as_shown(points["error_mm"])
     measured = int(np.sum(~np.isnan(size)))
     lines = []
-    for said in state.statements():
+    for said in words.distinct(state):
         above = np.flatnonzero(size > round(said.upper_mm, _DECIMALS))
         if not above.size:
             continue
@@ -249,7 +254,7 @@ def read_above(state: State, points: Columns) -> list[str]:
                 f"the mean of {readings} with noise of {noise_mm:.3f} mm per axis"
             )
         lines.append(
-            f"At most {said.upper_mm:.3f} mm for {words.TARGETS[said.target]}: {above.size} of the "
+            f"At most {said.upper_mm:.3f} mm for {words.target(said)}: {above.size} of the "
             f"{measured} measured points read more than that, point {points['point'][top]} the "
             f"most, {size[top]:.3f} mm; {why}."
         )
@@ -290,7 +295,7 @@ def beyond_limits(
     if (above := size > upper).any():
         text = (
             f"Read above their own limit: {named(above)}. A limit is on the error that stays when "
-            "a pose is measured again, and the narrowest of those after 1, 2, 4, .. readings; the "
+            "a pose is measured again, and the narrowest of those at several looks; the "
             "error shown is the mean of what was read, with its noise."
         )
         if (quiet := above & once).any():
@@ -311,12 +316,13 @@ def beyond_limits(
 def grounds(state: State) -> list[str]:
     """What the bounds rest on, a line each."""
     lines = [
-        "readings are normal about the true position, with the covariance stated: it holds the "
-        "instrument, its target, and how well the arm repeats a pose",
+        "readings are normal about the true position, with the covariance stated"
+        f"{words.told_factor(state.plan)}: it holds the instrument, its target, and how well the "
+        "arm repeats a pose",
         "readings are independent of each other; what the instrument gets wrong every time at a "
         "pose counts as an error of the arm",
         "candidates were drawn without regard to their errors, and none was left out for its error",
-        "the error meant is the deterministic one: what stays when a pose is measured again",
+        *_by_settings(state),
         "readings in the instrument's frame are brought to the robot's base as the calibration "
         "placed it: the instrument has not moved since, or was set up anew in that frame",
     ]
@@ -325,3 +331,36 @@ def grounds(state: State) -> list[str]:
     return lines + sorted(
         {words.reason(each.assumption) for each in state.statements() if each.assumption}
     )
+
+
+def _by_settings(state: State) -> list[str]:
+    """What is meant, guarded against and allowed for, and what would go unseen without."""
+    told = vars(state.plan.assessor)
+    meant = "the error meant is the deterministic one: what stays when a pose is measured again"
+    if told.get("error_of", MEAN) != MEAN:
+        arm = "all of the noise" if told["arm_mm"] is None else f"{told['arm_mm']:g} mm per axis"
+        meant = (
+            f"the error meant is what {FUTURE:.0%} of future visits to the worst pose keep; the "
+            f"arm's own scatter is {arm}"
+        )
+    rate, allowed_mm = told.get("wrong_rate", 0.0), told.get("allowance_mm", 0.0)
+    lines = [
+        meant,
+        f"at most {rate:.1%} of the readings are wrong, each at random" if rate
+        else "no reading went wrong without standing apart from others of its pose",
+        f"what no repeat sees (frame, tool offset, scale: at most {allowed_mm:g} mm) is allowed for"
+        if allowed_mm
+        else "nothing is allowed for what no repeat sees: frame, tool offset, the instrument's "
+        "scale",
+    ]  # fmt: skip
+    if not told.get("references", 0):
+        lines.append(
+            "nothing drifted or moved: no reference poses are read again that would show it"
+        )
+    if "confidence" in told:
+        sure = told["confidence"] - rate
+        lines.append(
+            f"each bound holds with {sure:.0%} confidence, both together with "
+            f"{max(2.0 * sure - 1.0, 0.0):.0%} at least"
+        )
+    return lines

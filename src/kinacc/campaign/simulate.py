@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.attainable import NONE, WidthLimits, limits_of
 from kinacc.assess.simulate import carry_on, is_broken, noisy, truth_mm
 from kinacc.assess.statement import Statement
 from kinacc.errors import Problem, refuse
@@ -19,7 +20,8 @@ from kinacc.study.tournament.fields import ErrorField
 class Outcome:
     """One simulated campaign: what it said of one target, and the truth it is graded against.
 
-    ``broken``: what the statement rests on is not true of these errors.
+    ``broken``: what the statement rests on is not true of these errors. ``limits``: how near to the
+    truth its bounds could come on average, with the errors known beforehand.
     """
 
     field: str
@@ -29,6 +31,7 @@ class Outcome:
     said: Statement
     truth_mm: float
     broken: bool = False
+    limits: WidthLimits = NONE
 
     @property
     def width_mm(self) -> float:
@@ -37,7 +40,9 @@ class Outcome:
 
 
 def width_mm(said: Statement) -> float:
-    """Distance of upper from lower bound; infinite where none is stated."""
+    """Distance of upper from lower bound; infinite where none is stated on the largest error."""
+    if said.excepted:
+        return math.inf
     width = said.upper_mm - said.lower_mm
     return math.inf if math.isnan(width) else width
 
@@ -50,10 +55,12 @@ def outcomes(
     repetitions: int,
     seed: int,
     progress: Callable | None = None,
+    limits_on: str | None = None,
 ) -> list[Outcome]:
     """Campaigns of every assessor (one per budget) over ``points`` candidates of every field.
 
     One repetition is one drawing of candidates and their readings, the same for every budget.
+    Limits are computed for statements on the target ``limits_on`` alone.
     Raises InputError where a field holds fewer errors than candidates are wanted.
     """
     small = [
@@ -77,7 +84,14 @@ def outcomes(
         for assessor in assessors:
             campaign = assessor.begin(candidates)
             readings = carry_on(campaign, reading)
+            visited = campaign.ledger.visited
+            known = visited, sizes, candidates.sigma_mm, assessor.measurements
+            own_mm = getattr(assessor, "arm_mm", None)
+            arm_mm = candidates.sigma_mm if own_mm is None else own_mm
             for said in campaign.statements():
+                limits = NONE
+                if said.target == limits_on:
+                    limits = limits_of(said, *known)
                 found.append(
                     Outcome(
                         field.name,
@@ -85,8 +99,9 @@ def outcomes(
                         repetition,
                         readings,
                         said,
-                        truth_mm(said, sizes, campaign.ledger.visited),
+                        truth_mm(said, sizes, visited, arm_mm),
                         broken=is_broken(said, sizes),
+                        limits=limits,
                     )
                 )
     return found

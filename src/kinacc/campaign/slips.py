@@ -23,6 +23,7 @@ from kinacc.errors import Problem
 if TYPE_CHECKING:
     from kinacc.checks.noise import Revisits
 
+_NEAREST_M, _FARTHEST_M = 0.3, 80.0  # at which laser trackers measure
 _NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads to nothing
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
@@ -30,7 +31,10 @@ _LITTLE_NOISE = 0.8  # of the scatter that was measured
 _USUAL_READINGS = 10  # that say what size is usual
 _UNUSUAL = 6.0  # times the median size
 _FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
-MEASURE_IT = "read a pose ten times, leaving it between, and take the scatter"
+MEASURE_IT = (
+    "visit 20 poses three times each, leaving them between: kinacc repeatability tells the noise "
+    "of these readings"
+)
 _TOO_FEW = f"too few repeats: {MEASURE_IT}"
 
 
@@ -156,6 +160,25 @@ def scatter(measured: Columns, errors: Columns, frames: Columns | None = None) -
     )
     same = folds.configurations_of(measured)
     return revisits(session[row], target[row], left_mm, same[row])
+
+
+def of_distance(begun: Plan) -> list[Problem]:
+    """Laser trackers that stand where none does, as where the origin of a frame is no tracker."""
+    problems = []
+    for each in begun.instruments:
+        if each.laser is None:
+            continue
+        least, most = words.distances_m(begun)
+        if least >= _NEAREST_M and most <= _FARTHEST_M:
+            continue
+        what = f"{least:.2f} m to {most:.2f} m from the candidates, by the calibration"
+        fix = (
+            "its head has to be the origin of the frame of its readings; else state the noise "
+            "otherwise. --sure takes it as it is"
+        )
+        allowed = f"{_NEAREST_M:g} m to {_FARTHEST_M:g} m"
+        problems.append(Problem(f"laser tracker {each.name}", what, allowed, fix))
+    return problems
 
 
 def of_budget(begun: Plan) -> list[Problem]:

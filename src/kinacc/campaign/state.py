@@ -7,7 +7,7 @@ readings in hand, so measuring ahead, or importing a whole file, does not bias a
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -82,10 +82,15 @@ class State:
         return sayable(self.plan, self.campaign)
 
     def ahead(self) -> list[int]:
-        """Points without a reading that are measured whatever the others read, in order."""
-        first = self.campaign.first
-        have = {each.reading.point for each in (*self.told, *self.in_hand)}
-        return [int(point) for point in self.rows[:first] if point not in have]
+        """Points still to be read whatever is read, in order, planned revisits in their places."""
+        have = Counter(each.reading.point for each in (*self.told, *self.in_hand))
+        wanted = []
+        for point in self.rows[list(self.campaign.visit())].tolist():
+            if have[point]:
+                have[point] -= 1
+            else:
+                wanted.append(point)
+        return wanted
 
 
 def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:

@@ -4,66 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
-from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Reason, Statement
+from kinacc.assess.future_visit import SHARE as FUTURE
+from kinacc.assess.noise_taken import KNOWN, noise_plan
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.assess.statement import CANDIDATES, MEAN, MEASURED, REGION, Reason, Statement
 from kinacc.campaign import consistency, instrument
 from kinacc.campaign.plan import Plan
+from kinacc.campaign.reasons import ADVICE, reason
 from kinacc.campaign.state import State
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds stay right where the noise is less
 TARGETS = {MEASURED: "measured points", CANDIDATES: "all candidates", REGION: "share of the region"}
-
-REASONS = {
-    # assumptions
-    "drawn_at_random": "the points were drawn at random from the region",
-    "crowd": "at least {crowd} of the {points} candidates have an error above the largest divided "
-    "by {isolation:g}",
-    "smooth": "smooth errors of single joints cause the errors, but for local ones",
-    "smooth_and_crowd": "smooth errors of single joints cause the errors, but for local ones; at "
-    "least {crowd} candidates have an error above the largest divided by {isolation:g}",
-    # of statements withheld
-    "nothing_measured": "nothing measured yet",
-    "first_visit": "{left} more points of the first visit have to be read before anything is said",
-    "first_visit_by_travel": "{left} points of the first visit, made in order of travel, are left",
-    "predicted": "every reading ({read}) equals the predicted position to the last digit, which "
-    "none of an instrument does: were predictions recorded?",
-    "suspects": "the suspects are not all measured again yet",
-    "unmeasured": "{left} of {points} candidates are not measured",
-    "missed": "{seen} of {points} candidates measured: {crowd} could have been missed",
-    "all_missed": "{seen} of {points} candidates measured: fewer than {crowd} large errors could "
-    "all have been missed",
-    "stands_alone": "one measured error is more than {isolation:g} times all others",
-    "few_points": "{read} points read; {share:.0%} of the region needs {needed}",
-    "few_sizes": "{read} points read; a distribution needs at least {needed}, of different size",
-    "few_for_model": "{first} points in the first visit; the model needs {needed}",
-    "much_noise": "noise makes up {part:.0%} of the mean square of the readings",
-    "not_gamma": "the largest reading does not belong to a gamma distribution",
-    "unexplained_reading": "a reading is farther from what joints explain than local errors are",
-    "unexplained_half": "smooth errors of single joints explain less than half of the errors",
-    # of budgets that are small
-    "no_bound_ahead": "no bound will be stated: that takes {needed} points in the first visit",
-    "no_bound_on_all": "no bound on all candidates would ever be stated: that takes {needed} "
-    "readings at least",
-    "assumption_ahead": "with {enough} readings, the bound on all candidates would need no "
-    "assumption",
-    # of forecasts that are not made
-    "few_read": "{read} points were read, {needed} are needed",
-    "not_exchangeable": "simulated errors know nothing of each other, and this assessor rests on "
-    "how errors of different poses belong together: see kinacc plan-campaign",
-    # of decisions on a tolerance
-    "between": "the tolerance lies between lower and upper bound: measure more",
-    "contradict": "the bounds contradict each other or the value: is the noise stated too small?",
-    "within": "the upper bound is within the tolerance",
-    "beyond": "the lower bound exceeds the tolerance",
-    "no_upper": "no upper bound is stated",
-}
-
-
-def reason(why: Reason | None) -> str | None:
-    """A reason in words; None where there is none."""
-    return None if why is None else REASONS[why.code].format(**why.numbers)
 
 
 def one_of(point: str, targets: Sequence[str]) -> list[str]:
@@ -74,6 +29,51 @@ def one_of(point: str, targets: Sequence[str]) -> list[str]:
         f"the first of {', '.join(targets)}" if point == targets[0] else f"of {', '.join(targets)}"
     )
     return [f"a campaign is about one point: {point}, {why}; --point names another"]
+
+
+def distances_m(plan: Plan) -> tuple[float, float]:
+    """The nearest and the farthest candidate from the origin of the instrument's frame, m."""
+    apart = np.linalg.norm(plan.points.modelled_mm - plan.to_base.position_mm, axis=1)
+    return 1e-3 * float(apart.min()), 1e-3 * float(apart.max())
+
+
+def trackers(plan: Plan) -> list[str]:
+    """Where laser trackers stand, whose noise hangs on that."""
+    named = ", ".join(each.name for each in plan.instruments if each.laser is not None)
+    least, most = distances_m(plan)
+    said = f"{least:.2f} m to {most:.2f} m from the candidates, by the calibration: its head is "
+    return [f"{named}: {said}taken to be the origin of its frame"] if named else []
+
+
+def arrangements(plan: Plan) -> list[str]:
+    """What a campaign does about noise, wrong readings and drift, a line each."""
+    if plan.assessor.name != RECOMMENDED:
+        return []
+    of: Any = plan.assessor
+    lines = []
+    if of.noise != KNOWN and of.noise_freedom:
+        lines.append(f"the noise is as stated{told_factor(plan)}")
+    elif of.noise != KNOWN:
+        lines.append(
+            "the noise is estimated in this campaign, by readings repeated at once: what is stated "
+            "is what readings are planned by"
+        )
+    elif (margin := noise_plan(of, len(plan.route)).margin) > 1.0:
+        told = reason(Reason("noise_margin", {"margin": margin}))
+        lines.append(f"{told}; --set noise_margin=1 takes it as stated")
+    if of.wrong_rate:
+        lines.append(
+            f"up to {of.wrong_rate:.1%} of the readings may be wrong: bounds hold all the same, "
+            f"with {of.confidence - of.wrong_rate:.1%} confidence"
+        )
+    if of.references:
+        what = "taken from all readings" if of.correct_drift else "said, and no bound is stated"
+        lines.append(f"{of.references} readings return to reference poses: a drift found is {what}")
+    if of.error_of != MEAN:
+        lines.append(f"the error meant is what {FUTURE:.0%} of visits to the worst pose keep")
+    if of.allowance_mm:
+        lines.append(f"{of.allowance_mm:g} mm are allowed for what no repeat sees, in both bounds")
+    return lines
 
 
 def begun_against(plan: Plan) -> list[str]:
@@ -106,10 +106,13 @@ def pledge(said: Statement, state: State) -> str:
     if math.isnan(said.upper_mm):
         return statement(said, state)
     points = len(state.plan.points) - len(state.left_out)
-    limit = f"is off by more than {said.upper_mm:.3f} mm"
+    verb = "are" if said.excepted > 1 else "is"
+    limit = f"{verb} off by more than {said.upper_mm:.3f} mm"
+    if said.error_of != MEAN:
+        limit += f" in more than {1.0 - FUTURE:.0%} of its future visits"
     of_all = {
         MEASURED: f"none of the {_visited(state)} measured points {limit}",
-        CANDIDATES: f"none of these {points} candidates {limit}",
+        CANDIDATES: f"{_no_more(said.excepted)} of these {points} candidates {limit}",
         REGION: f"no more than {1.0 - said.share:.1%} of the region {limit}",
     }
     return (
@@ -118,10 +121,22 @@ def pledge(said: Statement, state: State) -> str:
     )
 
 
+def _no_more(count: int) -> str:
+    return f"no more than {count}" if count else "none"
+
+
 def conditions(said: Statement, state: State) -> str:
     """On what an upper bound hangs."""
+    of: Any = state.plan.assessor
     moved = "nothing moved (base, tool, instrument)"
-    needed = [reason(said.assumption) or "", _noise_assumed(said, state), moved]
+    if getattr(of, "correct_drift", False):
+        moved = "the frame moved evenly with the readings, if at all"
+    needed = [reason(said.assumption) or "", _noise_assumed(said, state)]
+    if getattr(of, "wrong_rate", 0.0):
+        needed.append(f"at most {of.wrong_rate:.1%} of the readings are wrong")
+    if getattr(of, "allowance_mm", 0.0):
+        needed.append(f"what no repeat sees is at most {of.allowance_mm:g} mm")
+    needed.append(moved)
     named = [each for each in needed if each]
     return f"{', '.join(named[:-1])} and {named[-1]}"
 
@@ -137,10 +152,22 @@ def _noise_assumed(said: Statement, state: State) -> str:
     used = state.plan.instruments
     largest = max(float(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in used)
     clear = said.upper_mm > _CLEAR_OF_NOISE * math.sqrt(largest)
+    factor = told_factor(state.plan)
     if len(used) == 1:
-        return f"the noise is {'at most' if clear else 'exactly'} {instrument.noise(used[0])}"
+        most = "" if factor else "at most " if clear else "exactly "
+        return f"the noise is {most}{instrument.noise(used[0])}{factor}"
     each = "; ".join(f"{one.name}: {instrument.noise(one)}" for one in used)
-    return f"the noise is {'at most ' if clear else ''}as stated ({each})"
+    most = "at most " if clear and not factor else ""
+    return f"the noise is {most}as stated{factor} ({each})"
+
+
+def told_factor(plan: Plan) -> str:
+    """What may be wrong with the noise as stated; empty where it is taken as known."""
+    if getattr(plan.assessor, "noise", KNOWN) == KNOWN:
+        return ""
+    freedom = getattr(plan.assessor, "noise_freedom", 0)
+    told = f"{freedom} degrees of freedom of a test" if freedom else "the campaign's own readings"
+    return f", but for one factor that {told} tell"
 
 
 def statement(said: Statement, state: State) -> str:
@@ -153,6 +180,8 @@ def statement(said: Statement, state: State) -> str:
         if not math.isnan(said.lower_mm):
             seen += f", and at least {said.lower_mm:.3f} mm ({_sure(said)})"
         return f"No upper bound for {whose}: {reason(said.withheld)}{seen}."
+    if said.excepted and not math.isnan(said.lower_mm):
+        return _all_but(said, state)
     parts = [f"at most {said.upper_mm:.3f} mm"] if not math.isnan(said.upper_mm) else []
     if not math.isnan(said.lower_mm):
         parts.append(f"at least {said.lower_mm:.3f} mm")
@@ -162,9 +191,40 @@ def statement(said: Statement, state: State) -> str:
     each = "each " if len(parts) > 1 else ""
     text = f"{whose[0].upper()}{whose[1:]} is {' and '.join(parts)}, {each}with {_sure(said)}"
     text += f" ({value})" if value else ""
+    text += _meant(said)
     text += f", if {reason(said.assumption)}" if said.assumption else ""
     against = doubt(said, state).replace("The bounds contradict", "They contradict")
     return f"{text}. {against}." if against else f"{text}."
+
+
+def _all_but(said: Statement, state: State) -> str:
+    """The sentence on all candidates but a few that may all have been missed."""
+    points = len(state.plan.points) - len(state.left_out)
+    return (
+        f"All but {said.excepted} of the {points} candidates are off by at most "
+        f"{said.upper_mm:.3f} mm, and the largest error of all is at least {said.lower_mm:.3f} mm, "
+        f"each with {_sure(said)} (largest estimated at {said.value_mm:.3f} mm){_meant(said)}. "
+        f"Which {said.excepted} is not known: with {_visited(state)} of {points} measured, so many "
+        "could all have been missed."
+    )
+
+
+def of_the_noise(state: State) -> list[str]:
+    """How large the bounds take the noise, where it is not as stated."""
+    said = (reason(each.noise) for each in state.statements())
+    return list(dict.fromkeys(each for each in said if each is not None))
+
+
+def suspicious(state: State) -> list[str]:
+    """Readings that do not fit the others of their pose, by their number in the journal."""
+    found = getattr(state.campaign, "suspicious", tuple)()
+    label = state.plan.points.label
+    return [
+        f"reading {state.told[each.number - 1].number} at point {label[state.rows[each.row]]} lies "
+        f"{each.deviations:.1f} standard deviations from the others there: look what happened; "
+        "where something went wrong, kinacc campaign strike leaves it out, with the reason"
+        for each in found
+    ]
 
 
 def standing(state: State) -> list[str]:
@@ -180,6 +240,8 @@ def standing(state: State) -> list[str]:
     ]
     lines += not_counted(state)
     lines += consistency.remarks(state)
+    lines += of_frame(state)
+    lines += [*of_the_noise(state), *suspicious(state)]
     if state.asked is not None:
         lines.append(f"measure next: point {state.plan.points.label[state.asked]}")
     elif len(state.told) >= budget:
@@ -187,6 +249,19 @@ def standing(state: State) -> list[str]:
     else:
         lines.append("no further measurement is wanted")
     return lines
+
+
+def of_frame(state: State) -> list[str]:
+    """What reference poses say of the frame, and how large a drift may go unseen."""
+    change = state.campaign.change()
+    if change is None:
+        return []
+    unseen = f"a drift of {change.unseen_mm:.3f} mm would be found in half of the cases"
+    if not change.is_found:
+        return [f"the reference poses show no drift and no step; {unseen}"]
+    corrected = change.reason not in state.campaign.alarms()
+    taken = ", which is taken from all readings" if corrected else ""
+    return [f"{reason(change.reason)}{taken}"]
 
 
 def not_counted(state: State) -> list[str]:
@@ -204,6 +279,13 @@ def _visited(state: State) -> int:
     return len({each.reading.point for each in state.told})
 
 
+def target(said: Statement) -> str:
+    """What a statement is about, in a table."""
+    if said.target == REGION:
+        return f"{said.share:.1%} of the region"
+    return TARGETS[said.target] + (f" but {said.excepted}" if said.excepted else "")
+
+
 def about(said: Statement, state: State) -> str:
     """Whose largest error a statement is on."""
     if said.target == MEASURED:
@@ -214,6 +296,13 @@ def about(said: Statement, state: State) -> str:
         points = len(state.plan.points) - len(state.left_out)
         return f"the largest error of all {points} candidates"
     return f"the largest error of {said.share:.1%} of the region"
+
+
+def _meant(said: Statement) -> str:
+    """Which error of a pose is meant, where it is not its mean."""
+    if said.error_of == MEAN:
+        return ""
+    return f", as {FUTURE:.0%} of future visits to the worst pose keep it"
 
 
 def doubt(said: Statement, state: State) -> str:
@@ -236,10 +325,18 @@ def doubt(said: Statement, state: State) -> str:
     )
 
 
-def against(said: Iterable[Statement], state: State) -> list[str]:
-    """Why the bounds of a campaign cannot be relied on, without a full stop."""
+def against(said: Sequence[Statement], state: State) -> list[str]:
+    """Why the bounds of a campaign are withheld or cannot be relied on, without a full stop."""
+    alarms = dict.fromkeys(reason(each) for each in alarmed(said))
+    if alarms:
+        return [*filter(None, alarms), *suspicious(state)]
     doubts = (doubt(each, state) for each in said)
     return [each for each in (*consistency.contradicted(state), *doubts) if each]
+
+
+def alarmed(said: Iterable[Statement]) -> list[Reason]:
+    """What withholds bounds because readings speak against what these rest on."""
+    return [each.withheld for each in said if each.withheld and each.withheld.code in ADVICE]
 
 
 def _sure(said: Statement) -> str:

@@ -75,8 +75,8 @@ def fit(seen: Seen, model: DHModel) -> Fitted:
     left = robust_fit.residuals(found.arm, seen)
     left_mm = np.linalg.norm(left.position_mm, axis=1)
     left_rad = np.linalg.norm(left.turn_rad, axis=1)
-    left_mm[chosen] = np.linalg.norm(found.left_out_mm, axis=1)
-    left_rad[chosen] = np.linalg.norm(found.left_out_rad, axis=1)
+    left_mm[chosen] = _told_apart(found.left_out[:, :3], found.judged[:, :3])
+    left_rad[chosen] = _told_apart(found.left_out[:, 3:], found.judged[:, 3:])
     return Fitted(
         seen,
         found,
@@ -86,6 +86,17 @@ def fit(seen: Seen, model: DHModel) -> Fitted:
         tails.limit(left_mm, 3),
         tails.limit(left_rad, 3),
     )
+
+
+def _told_apart(left_out: np.ndarray, judged: np.ndarray) -> np.ndarray:
+    """How far readings (n, 3) lie where the others put the arm, as far as the others tell.
+
+    A reading that alone determines something lies anywhere without it, however sound it is: it is
+    far only where it is so too over what the fit without it leaves open.
+    """
+    length, over = (np.linalg.norm(each, axis=1) for each in (left_out, judged))
+    unknown = (length > tails.limit(length, 3)) & (over <= tails.limit(over, 3))
+    return np.where(unknown, over, length)
 
 
 def with_jumps(seen: Seen, model: DHModel, progress: Progress) -> Fitted:
@@ -200,7 +211,7 @@ def _coarse(fitted: Fitted, rows: np.ndarray, kinds: list) -> list[tuple]:
 
 
 def _typical(seen: Seen, fitted: Trial) -> float:
-    return float(np.median(np.linalg.norm(fitted.left_out_mm, axis=1)))
+    return float(np.median(np.linalg.norm(fitted.left_out[:, :3], axis=1)))
 
 
 def _refined(fitted: Fitted, row: int, target: int | None) -> int | None:

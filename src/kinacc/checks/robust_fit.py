@@ -78,8 +78,9 @@ class Residuals:
 class Trial:
     """A fit: the arm, and robust standard deviations per axis of what it leaves.
 
-    ``left_out_mm`` and ``left_out_rad`` (n, 3): residuals of the fitted readings when their
-    configuration is left out, to first order. ``nominal`` is the model the corrections lean on.
+    ``left_out`` (n, 6), mm and rad: residuals of the fitted readings when their configuration is
+    left out, to first order; ``judged``: the same over what the fit without it leaves open there.
+    ``nominal`` is the model the corrections lean on.
     """
 
     arm: Arm
@@ -87,8 +88,8 @@ class Trial:
     sigma_mm: float
     sigma_rad: float
     strength: float
-    left_out_mm: np.ndarray
-    left_out_rad: np.ndarray
+    left_out: np.ndarray
+    judged: np.ndarray
 
 
 def sigma_of(vectors: np.ndarray) -> float:
@@ -156,8 +157,8 @@ def fit(seen: Seen, start: Arm, nominal: DHModel, strength: float, huber: bool =
         if moved < _SETTLED * min(step.sigma_mm, 1.0):
             break
     step = _Step.at(seen, arm, nominal, strength, huber)
-    left_mm, left_rad = step.left_out(seen)
-    return Trial(arm, nominal, step.sigma_mm, step.sigma_rad, strength, left_mm, left_rad)
+    plain, judged = step.left_out(seen)
+    return Trial(arm, nominal, step.sigma_mm, step.sigma_rad, strength, plain, judged)
 
 
 def _far(model: DHModel, nominal: DHModel) -> bool:
@@ -167,7 +168,7 @@ def _far(model: DHModel, nominal: DHModel) -> bool:
 
 def _left_out_score(trial: Trial, seen: Seen, cap: float) -> float:
     """Mean length of what configurations leave when left out."""
-    length = np.minimum(np.linalg.norm(trial.left_out_mm, axis=1), cap)
+    length = np.minimum(np.linalg.norm(trial.left_out[:, :3], axis=1), cap)
     number = np.unique(seen.cells.pose, return_inverse=True)[1]
     return float(np.mean(np.bincount(number, length) / np.bincount(number)))
 
@@ -251,22 +252,39 @@ class _Step:
         return moved, float(max(lengths.max(), 1e3 * angles.max()))
 
     def left_out(self, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals (n, 3) in mm and in rad of every reading with its configuration left out."""
-        result = self.residual.copy()
+        """Residuals (n, 6), mm and rad, of every reading with its configuration left out.
+
+        Then the same over what the fit without it leaves open there: as wide as ``sigma`` for a
+        sound reading, whether others determine it or it alone does. NaN where not measured.
+        """
+        plain, judged = self.residual.copy(), self.residual.copy()
+        unit = np.repeat([self.sigma_mm, self.sigma_rad], 3)
+        unit = np.where(np.isfinite(unit), unit, 1.0)
+        seen_there = np.repeat([np.ones(len(seen.q), bool), seen.cells.turned], 3, axis=0).T
+        scaled = self.design / unit[:, None] * seen_there[:, :, None]
+        share = self.weights * unit**2
         order = np.argsort(seen.cells.pose, kind="stable")
         sizes = np.unique(seen.cells.pose, return_counts=True)[1]
         begins = np.concatenate([[0], np.cumsum(sizes)[:-1]])
         for size in np.unique(sizes):
             rows = order[begins[sizes == size][:, None] + np.arange(size)]
-            block = self.design[rows].reshape(len(rows), 6 * size, -1)
-            weight = self.weights[rows].reshape(len(rows), -1)
-            hat = block @ self.inverse @ np.swapaxes(block, 1, 2) * weight[:, None, :]
+            block = scaled[rows].reshape(len(rows), 6 * size, -1)
+            weight = share[rows].reshape(len(rows), 1, -1)
+            open_there = block @ self.inverse @ np.swapaxes(block, 1, 2)
             # What one configuration alone determines is unknown without it: far, not infinite.
-            rest = np.linalg.pinv((1.0 + _OFF_ZERO) * np.eye(6 * size) - hat, rcond=1e-12)
-            found = rest @ self.residual[rows].reshape(len(rows), -1, 1)
-            result[rows.ravel()] = found.reshape(-1, 6)
-        turn = np.where(seen.cells.turned[:, None], result[:, 3:], np.nan)
-        return result[:, :3], turn
+            whole = (1.0 + _OFF_ZERO) * np.eye(6 * size)
+            rest = np.linalg.pinv(whole - open_there * weight, rcond=1e-12)
+            left = rest @ (self.residual[rows] / unit).reshape(len(rows), -1, 1)
+            value, axes = np.linalg.eigh(_symmetric(rest @ open_there))
+            spread = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
+            found = axes @ ((np.swapaxes(axes, 1, 2) @ left) / spread)
+            plain[rows.ravel()] = left.reshape(-1, 6) * unit
+            judged[rows.ravel()] = found.reshape(-1, 6) * unit
+        return np.where(seen_there, plain, np.nan), np.where(seen_there, judged, np.nan)
+
+
+def _symmetric(matrices: np.ndarray) -> np.ndarray:
+    return 0.5 * (matrices + np.swapaxes(matrices, 1, 2))
 
 
 _IS_ANGLE = np.array([True, False, False, True, True])  # of dh.PARAMETERS

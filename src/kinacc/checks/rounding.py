@@ -1,9 +1,11 @@
-"""What it costs that a file states its joints with few digits."""
+"""In which steps a file states numbers, and what that costs where they are joints."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
 _MOST_POSES = 200
+_MOST_DIGITS = 30  # before or behind the mark: beyond all that is measured
 _STEP = 1e-4  # of a difference quotient, rad
 
 
@@ -43,6 +46,30 @@ def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) 
                 return 0.0
             digits = max(digits, len(text.partition(decimal)[2]))
     return unit * 10.0**-digits
+
+
+def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
+    """The largest step of which all numbers of a column are whole multiples away from each other.
+
+    ``unit`` is that of the file in the unit wanted. Zero where all are equal, or a cell is no
+    number.
+    """
+    try:
+        values = [_exact(cell, decimal) for cell in cells]
+    except InvalidOperation:
+        return 0.0
+    digits = max((-int(each.as_tuple().exponent) for each in values), default=0)
+    whole = [int(each.scaleb(digits)) for each in values]
+    step = math.gcd(*(each - whole[0] for each in whole)) if whole else 0
+    return unit * step * 10.0**-digits
+
+
+def _exact(cell: object, decimal: str) -> Decimal:
+    text = str(cell).strip().replace("\u2212", "-").replace(decimal, ".")
+    value = Decimal(text)
+    if not value.is_finite() or abs(value.adjusted()) > _MOST_DIGITS:
+        raise InvalidOperation
+    return value
 
 
 def cost(model: DHModel, q: np.ndarray, step: float) -> Rounding:

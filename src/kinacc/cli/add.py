@@ -66,6 +66,8 @@ def add(
     dates = [each.date for each in arm.members] if arm.is_series else [first_date]
     moved: dict[str, str | None] = {"base": base, "tool": tool}
     since = adding.before(arm, dates, day)
+    if since is None and None in (day, *dates):
+        since = "the day of the line before"  # which day is among what is asked
     if since is not None:
         moved = {flag: _flag(flag, moved[flag], since, ask, problems) for flag in FLAGS}
     text, lines = "", []

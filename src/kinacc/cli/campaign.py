@@ -54,7 +54,8 @@ def campaign() -> None:
 @option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...".')
 @option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')
 @option("--instrument", multiple=True,
-        help="NAME=noise, NAME=three or NAME=nine numbers; may be repeated.")  # fmt: skip
+        help="NAME=noise, NAME=three or NAME=nine numbers, NAME=laser:KEY=.. (see above); may be "
+        "repeated.")  # fmt: skip
 @option("--frame", type=click.Choice(["instrument", "base"]), default="instrument",
         help="Frame of readings and covariances.")  # fmt: skip
 @choice.campaign_options
@@ -75,11 +76,18 @@ def start(out, **given) -> None:
     tenth of them lie where the calibration was not measured, that is asked about.
 
     The noise must hold all that differs between readings of one pose: the instrument, its target,
-    and how well the arm repeats the pose.
+    and how well the arm repeats the pose. `kinacc repeatability` tells it of repeated readings.
+
+    A laser tracker's noise grows with the distance: give standard deviations along the beam
+    (range_mm, range_um_per_m) and across it (angle_mm, angle_um_per_m), and how the arm repeats a
+    pose (repeat_mm). Half of what makers state as MPE or as two standard deviations is meant. Its
+    head is the origin of the frame of the calibration's readings.
 
     \b
     Example:
       kinacc campaign start check --calibration results/ur10_d --noise-mm 0.05 --budget 200
+      kinacc campaign start check --calibration results/ur10_d \\
+          --instrument tracker=laser:range_mm=0.008,angle_um_per_m=5,repeat_mm=0.03
       kinacc campaign start check --calibration results/mh180 --candidates points.csv \\
           --instrument tracker=0.03 --instrument camera=0.1,0.1,0.3 --tolerance-mm 0.8
     """

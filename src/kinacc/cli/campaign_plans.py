@@ -13,7 +13,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import PLAINEST
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.binomial import binomial_interval
-from kinacc.campaign import power, simulate, slips, words
+from kinacc.campaign import known_noise, power, simulate, slips, words
 from kinacc.campaign.power import Aim, Row
 from kinacc.cli import campaign_options, rows
 from kinacc.cli.sheet import Field, Sheet
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 _DRAW = 0
+_JOINTS = 6  # of arms; what the recommended assessor lacks does not depend on it
 _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be the one that is read again and again
 
 
@@ -55,12 +56,19 @@ def question(given: Mapping) -> Simulation:
     if given["point"] is not None and not folders:
         what = "names a target of a results folder, and --errors names no such folder"
         problems.append(Problem("--point", what, fix="leave it out, or give --errors FOLDER"))
+    tested = None
+    with gathered(problems):
+        tested = campaign_options.tested_noise(given["repeatability"])
     with gathered(problems):
         instruments = campaign_options.instruments(
-            given["noise_mm"], given["covariance_mm2"], calibrations=folders
+            given["noise_mm"],
+            given["covariance_mm2"],
+            resolution_mm=given["resolution_mm"],
+            calibrations=folders,
+            tested=tested,
         )
         if not given["sure"]:
-            problems += slips.of_noise(instruments)
+            problems += [*slips.of_noise(instruments), *known_noise.doubts(tested)]
             problems += [each for path in folders for each in slips.of_repeats(instruments, path)]
     lengths = ("width_mm", "tolerance_mm", "largest_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
@@ -73,7 +81,10 @@ def question(given: Mapping) -> Simulation:
     name, *method = (given[each] for each in ("assessor", "confidence", "settings"))
     for budget in sorted(set(budgets)):
         with gathered(problems):
-            assessors.append(campaign_options.assessor(name, budget, *method))
+            asked = campaign_options.workshop(given)
+            assessors.append(
+                campaign_options.assessor(name, budget, *method, asked=asked, tested=tested)
+            )
     for errors in named:
         with gathered(problems):
             chosen.append(field_of(errors, given["point"]))
@@ -113,7 +124,7 @@ def answer(asked: Simulation, progress: Callable | None = None) -> list[Row]:
     """Simulate."""
     found = simulate.outcomes(
         asked.fields, asked.points, asked.covariance_mm2, asked.assessors, asked.repetitions,
-        asked.seed, progress,
+        asked.seed, progress, asked.aim.target,
     )  # fmt: skip
     return power.rows(found, asked.aim)
 
@@ -214,6 +225,9 @@ def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
     def finite(values: np.ndarray) -> np.ndarray:
         return np.where(np.isfinite(values), values, np.nan)
 
+    # A screen holds no more: files have all columns.
+    widths = ("median", "q95") if aim.tolerance_mm is None else ("median",)
+    any_broken = any(row.broken for row in found)
     fields = [
         Field("errors", np.array([row.errors for row in found], dtype=object), "", "simulated"),
         Field("budget", np.array([row.budget for row in found]), "1", "readings allowed"),
@@ -221,15 +235,19 @@ def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
         Field("true_mm", column(lambda row: row.truth_mm), "mm", "mean largest error"),
         *(
             Field(f"width_{name}_mm", finite(column(lambda row, i=i: row.width_mm[i])), "mm",
-                  "upper minus lower bound; none where no bound is stated")
+                  "upper minus lower bound; none where no bound is stated", name in widths)
             for i, name in enumerate(("q05", "median", "q95"))
         ),
         Field("excess_mm", column(lambda row: row.excess_mm), "mm", "mean of upper minus truth"),
+        Field("attainable_mm", finite(column(lambda row: row.attainable_mm)), "mm",
+              "excess of the best design that knows the errors; none where it has no bound"),
+        Field("proven_mm", finite(column(lambda row: row.proven_mm)), "mm",
+              "excess below which no bound stays that can be relied on"),
         Field("stated", column(lambda row: row.stated), "1", "share with an upper bound"),
         Field("assumption_broken", column(lambda row: row.broken), "1",
-              "share whose bound rests on an assumption these errors break"),
+              "share whose bound rests on an assumption these errors break", any_broken),
         Field("holds", column(lambda row: row.holds), "1",
-              "share of the other upper bounds that hold"),
+              "share of the other upper bounds that hold", False),
         Field("bounds_held", np.array([_counted(row) for row in found], dtype=object), "",
               "the same, counted"),
         Field("holds_low", column(lambda row: row.holds_interval[0]), "1", "95 % limits", False),
@@ -274,8 +292,38 @@ def _counted(row: Row) -> str | None:
 
 
 def in_words(asked: Simulation, found: list[Row]) -> str:
-    """Which errors were meant, and the budget that does."""
-    return "\n".join([*asked.remarks, _verdict(asked, found)])
+    """Which errors were meant, the budget that does, and what more skill could still save."""
+    said = [*asked.remarks, *_left_out(asked), _verdict(asked, found), *_nearness(found)]
+    return "\n".join(said)
+
+
+def _left_out(asked: Simulation) -> list[str]:
+    """Budgets whose bound leaves candidates out."""
+    short = []
+    for each in asked.assessors:
+        why = each.shortfall(asked.points, _JOINTS)
+        if why is not None and why.code == "excepted_ahead":
+            short.append(f"{why.numbers['excepted']:.0f} with {each.measurements}")
+    if not short:
+        return []
+    return [
+        f"candidates that the bound leaves out, whichever they are: {', '.join(short)} readings; "
+        "true_mm and excess_mm are then of all others, and no width counts"
+    ]
+
+
+def _nearness(found: list[Row]) -> list[str]:
+    """How near upper bounds come with the largest budget, and how near they could come."""
+    judged = [row for row in found if row.judged and np.isfinite(row.attainable_mm)]
+    if not judged:
+        return []
+    most = max(row.budget for row in judged)
+    worst = max((row for row in judged if row.budget == most), key=lambda row: row.excess_mm)
+    return [
+        f"upper bounds after {most} readings are {worst.excess_mm:.2g} mm too high on average "
+        f"(errors: {worst.errors}); with every error known beforehand, {worst.attainable_mm:.2g} "
+        f"mm would be reached, and no rule whose bounds hold gets below {worst.proven_mm:.2g} mm"
+    ]
 
 
 def _verdict(asked: Simulation, found: list[Row]) -> str:
@@ -298,6 +346,11 @@ def _verdict(asked: Simulation, found: list[Row]) -> str:
         return proof
     gave = "may be enough:" if shown else f"gave {said} in"
     hits, low = _hits(asked, found, enough)
+    if low >= aim.power:
+        return (
+            f"{enough} readings gave {said} in {hits} of {asked.repetitions} simulated campaigns "
+            "or more; with more readings so few campaigns do not show it yet: give --repetitions"
+        )
     needed = power.repetitions_to_show(hits / asked.repetitions, aim.power)
     more = "only more readings would" if needed is None else f"--repetitions {needed} would, if"
     more += "" if needed is None else " as large a share of them does"

@@ -28,19 +28,24 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 
 def start(given: Mapping, out: Output) -> None:
     """Begin a campaign and say what was begun."""
-    from kinacc.campaign import begin, prediction_check, slips
+    from kinacc.campaign import begin, known_noise, prediction_check, slips
     from kinacc.cli import campaign_candidates, campaign_options, rows
     from kinacc.cli.file_options import joint_answers
 
     problems = folders.in_the_way(given["folder"])
-    noise = (given[each] for each in ("noise_mm", "covariance_mm2", "instrument", "frame"))
+    names = ("noise_mm", "covariance_mm2", "instrument", "frame", "resolution_mm")
+    noise = (given[each] for each in names)
     method = (given[each] for each in ("assessor", "budget", "confidence", "settings"))
+    tested = None
+    with gathered(problems):
+        tested = campaign_options.tested_noise(given["repeatability"])
     with gathered(problems):
         instruments = campaign_options.instruments(
-            *noise, calibrations=[Path(given["calibration"])]
+            *noise, calibrations=[Path(given["calibration"])], tested=tested
         )
     with gathered(problems):
-        assessor = campaign_options.assessor(*method)
+        asked = campaign_options.workshop(given)
+        assessor = campaign_options.assessor(*method, asked=asked, tested=tested)
     lengths = ("tolerance_mm", "width_mm", "joint_tolerance_deg", "implausible_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     refuse(problems, "The campaign was not begun")
@@ -52,6 +57,7 @@ def start(given: Mapping, out: Output) -> None:
     points = begin.points_of(
         calibration, found.joints, found.label, found.directions, given["point"]
     )
+    instruments = begin.placed(calibration, instruments, points)
     joints_now = np.zeros(calibration.robot.dh.joints)
     if given["from_deg"] is not None:
         joints_now = rows.of_arguments(
@@ -83,6 +89,7 @@ def start(given: Mapping, out: Output) -> None:
     )
     left_mm = calibration.residual.position_mm if calibration.residual else math.nan
     problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
+    problems += [*slips.of_distance(begun), *known_noise.doubts(tested)]
     problems += slips.of_repeats(instruments, Path(given["calibration"]))
     problems += [] if unsure is None else unsure.asked()
     if not given["sure"]:
@@ -138,7 +145,7 @@ def status(
     out: Output,
 ) -> None:
     """Say where the campaign stands, and what it is likely to need."""
-    from kinacc.campaign import forecast
+    from kinacc.campaign import forecast, nearness
     from kinacc.cli.campaign_options import not_positive
     from kinacc.progress import reporting
 
@@ -158,12 +165,13 @@ def status(
         say_doubts(opened)
     lines = words.standing(found)
     lines += words.statements(found)
+    lines += nearness.in_words(found)
     lines += words.begun_against(opened.plan)
     if tolerance is not None:
         for said in found.statements():
             verdict = decide(said, tolerance)
             lines.append(
-                f"tolerance {tolerance:g} mm, {words.TARGETS[said.target]}: {verdict.verdict}, "
+                f"tolerance {tolerance:g} mm, {words.target(said)}: {verdict.verdict}, "
                 f"{words.reason(verdict.reason)}"
             )
     if ahead is not None:
@@ -171,6 +179,7 @@ def status(
     elif why_none and (wanted or tolerance):
         lines.append(f"no forecast: {why_none}")
     facts = answers.as_facts(found, tolerance)
+    facts["limits"] = nearness.as_facts(found)
     facts |= {"forecast": answers.forecast_facts(ahead), "no_forecast": why_none or None}
     out.say(facts, "\n".join(lines))
 
@@ -179,7 +188,7 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     """Write tables, picture, text and, where one is asked for, the page of a campaign."""
     from kinacc.artifacts.atomic import write_together
     from kinacc.artifacts.store import content_of, to_table
-    from kinacc.campaign import report
+    from kinacc.campaign import nearness, report
     from kinacc.cli.output import require_writable
     from kinacc.figures import campaign as drawing
     from kinacc.figures.save import render
@@ -223,6 +232,7 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
 
         out.write_page(campaign_page(opened, state, tables))
     facts = answers.as_facts(state, state.plan.limits.tolerance_mm)
+    facts["limits"] = nearness.as_facts(state)
     lines = [*words.statements(state), *words.begun_against(state.plan)]
     lines += report.read_above(state, tables["campaign_points"])
     lines.append(f"{into}: {', '.join(written)}")

@@ -159,7 +159,8 @@ def _unusual_mm(before: State, more: Iterable[Reading] = ()) -> float:
     with np.errstate(over="ignore"):  # what lies that far away is refused on its own
         sizes += [float(np.linalg.norm(reading.error_mm(before.plan, each))) for each in more]
     usable = [size for size in sizes if np.isfinite(size)]
-    return slips.unusual_mm(usable, float(np.sqrt(np.trace(before.plan.covariance_mm2))))
+    squares = np.trace(before.plan.covariance_mm2, axis1=1, axis2=2)
+    return slips.unusual_mm(usable, float(np.sqrt(squares.max())))
 
 
 def _recorded(before: State) -> dict[tuple, str]:

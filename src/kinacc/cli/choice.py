@@ -92,6 +92,47 @@ point_options = together(
 campaign_options = together(
     option("--noise-mm", help="Standard deviation per axis: one number, or three."),
     option("--covariance-mm2", help="Covariance of a reading: nine numbers, row by row."),
+    option(
+        "--repeatability",
+        type=click.Path(),
+        help="Noise that a repeatability test told, instead of --noise-mm: a .json file of `kinacc "
+        "repeatability`.",
+    ),
+    option(
+        "--resolution-mm",
+        type=float,
+        help="Step in which positions are read off: no axis has less noise than its rounding.",
+    ),
+    option(
+        "--noise",
+        type=click.Choice(["known", "estimate"]),
+        default="known",
+        help="Whether --noise-mm is known, or what readings are planned with: it is then estimated "
+        "from repeats within the campaign.",
+    ),
+    option("--wrong-readings", help="Largest share of readings that go wrong, e.g. 1%.  [none]"),
+    option(
+        "--references",
+        default=0,
+        type=click.IntRange(0, 10_000),
+        help="Readings that return to reference poses by plan, to see drifts and steps; 20 do.",
+    ),
+    option("--correct-drift", is_flag=True, help="Take a linear drift from all readings."),
+    option(
+        "--error",
+        type=click.Choice(["mean", "visit"]),
+        default="mean",
+        help="The error that stays when a pose is measured again, or what 95 % of future visits to "
+        "the worst pose keep.",
+    ),
+    option("--arm-mm", type=float, help="The arm's own repeatability, for --error visit. [noise]"),
+    option("--allowance-mm", type=float, help="What no repeat sees, added to the bounds. [0]"),
+    option(
+        "--assume",
+        type=click.Choice(["nothing", "company"]),
+        default="nothing",
+        help="What a bound on all candidates may rest on where fewer are measured.",
+    ),
     option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]"),
     option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
     option("--confidence", type=float, help=f"How surely each bound is to hold. [{CONFIDENCE}]"),

@@ -39,6 +39,11 @@ OF_COMMANDS: dict[str, tuple[str, str, str]] = {
         "there are suspicions",
         "a file or its description cannot be used",
     ),
+    "verify": (
+        "the calibration passes",
+        "it fails, or it cannot be told",
+        "the readings, the folder or an option cannot be used",
+    ),
     "summary": (
         "every data set is accepted",
         "a data set has no results to tell of, or its verdict is not accept",

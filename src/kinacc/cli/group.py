@@ -54,6 +54,7 @@ _MEANT = {
     "measure": "campaign next",
     "correct": "compensate",
     "remove": "strike",
+    "noise": "repeatability",
     "reproduce": "study",
     "results": "fitted",
     "cat": "show",
@@ -260,6 +261,7 @@ SECTIONS = {
         "compare": "what differs between two calibrations",
     },
     "Its largest error": {
+        "repeatability": "poses read again and again: what noise a reading has",
         "plan-campaign": "how many readings a wanted bound takes",
         "campaign": "measure: what next, what was read, what may be said",
         "tournament": "hold all assessors to errors that are known",

@@ -299,12 +299,14 @@ def open_table(path: str | Path) -> RawTable:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(Problem(str(path), "no such file", "a CSV, Parquet or JSON file"))
+        raise InputError(Problem(str(path), "no such file", "a CSV, Excel, Parquet or JSON file"))
     kind = path.suffix.lower()
     if kind == ".json":
         return _of_json(path)
     if kind in (".parquet", ".pq"):
         return _with_units(load(path))
+    if kind in EXCEL:
+        return load(path)
     delimiter, decimal = ",", "."
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head, first = file.readline(_HEAD), file.readline(_HEAD)

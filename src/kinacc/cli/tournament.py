@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 @option(
     "--size",
     type=choice.values_of("tournament.size"),
-    help="Minutes, hours for coverage or for other budgets, or a day and more. [configuration]",
+    help="Minutes; hours for coverage, for other budgets or for readings that are not as stated "
+    "(workshop); or days on a cluster. [configuration]",
 )
 @option("--parts", type=choice.values_of("tournament.chunks"),
         help="Number of parts. [configuration]")  # fmt: skip
@@ -97,12 +98,12 @@ def _play(waiting: Sequence, cores: int) -> None:
 
 def _cost(left: Sequence) -> Cost:
     """What the parts that are left cost, by the share of the tournament that they are."""
-    from kinacc.study.tournament.contest import CONTESTANTS, Contest
+    from kinacc.study.tournament.contest import Contest
     from kinacc.workflow.cost import of_tournament
 
     settings = left[0].settings
     contest, whole = Contest.of(settings), Contest.of({**settings, "noise_mm": ()})
-    share = len(contest.assessors) / len(CONTESTANTS)
+    share = len(contest.assessors) / len(whole.size.assessors)
     share *= len(contest.size.noise_mm) / len(whole.size.noise_mm)
     share *= len(left) / int(left[0].part.rpartition("-")[2])
     found = of_tournament(settings["size"])
@@ -129,13 +130,18 @@ def _tell(outputs: Mapping[str, str], times: dict[str, float], out: Output) -> N
     path = outputs["tournament_verdicts"]
     table = read(path)
     rows = [dict(zip(table, each, strict=True)) for each in zip(*_plain(table), strict=True)]
+    rows.sort(key=lambda row: (row["setup"] != "plain", row["setup"], row["world"] != "stated"))
     cells = read(outputs["tournament_cells"])
     lines = [
         "assessor                 about       statements   held  worst cell  rejected  below  cells"
         "  no statement  assumption broken  held so"
     ]
+    told = ""
     for row in rows:
-        untrue, held = _untrue(cells, row["assessor"], row["target"])
+        if (where := f"{row['setup']}: {row['world']}") != "plain: stated" and where != told:
+            lines.append(f"settings and world {where}")
+        told = where
+        untrue, held = _untrue(cells, row)
         lines.append(
             f"{row['assessor']:23s}  {row['target']:10s}  {row['statements']:10d}  "
             f"{row['mean_holds']:5.3f}  {row['worst_holds']:10.3f}  {row['rejected']:8d}  "
@@ -153,9 +159,11 @@ def _tell(outputs: Mapping[str, str], times: dict[str, float], out: Output) -> N
     out.say({"verdicts": rows, "time_ms": times, "table": path}, "\n".join(lines))
 
 
-def _untrue(cells: Mapping, assessor: str, target: str) -> tuple[int, int]:
+def _untrue(cells: Mapping, row: Mapping) -> tuple[int, int]:
     """Number of statements whose assumption is not true of the field, and how many of them held."""
-    mine = (cells["assessor"] == assessor) & (cells["target"] == target) & (cells["broken"] > 0)
+    mine = cells["broken"] > 0
+    for name in ("assessor", "target", "setup", "world"):
+        mine = mine & (cells[name] == row[name])
     broken = cells["broken"][mine]
     return int(broken.sum()), round(float((cells["broken_holds"][mine] * broken).sum()))
 

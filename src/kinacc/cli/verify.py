@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.cli import choice
+from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import answers
 
 if TYPE_CHECKING:
@@ -43,7 +44,8 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     verdict is on the selected model where the calibration was measured: it fails where errors are
     as large, or look as much like offsets of joints, as in 1 % of such handfuls where nothing has
     changed; passes otherwise; and cannot be told where fewer poses than show errors doubled are no
-    worse. It is no bound on the largest error.
+    worse. It goes by positions; where base or tool was moved, by measured orientations too. It is
+    no bound on the largest error. Exit code 1: it fails, or cannot be told.
 
     \b
     Example:
@@ -58,7 +60,7 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     from kinacc.deployment import folder as results
     from kinacc.deployment import shared_readings
     from kinacc.deployment.applicability import is_measured_there
-    from kinacc.deployment.verify import BASE, OPEN, TOOL, Verdict, trials, verdict
+    from kinacc.deployment.verify import BASE, OPEN, PASSES, TOOL, Verdict, trials, verdict
     from kinacc.progress import reporting
     from kinacc.workflow.stages import measurements
 
@@ -110,6 +112,8 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     }
     units = ["mm" if slides else "mrad" for slides in arm.dh.prismatic]
     out.deliver(_sheet(facts, tried), _in_words(facts, tried, found, moved, units))
+    if found.says != PASSES:
+        raise SystemExit(AGAINST)
 
 
 _FITTED = "some are among those it was fitted to"

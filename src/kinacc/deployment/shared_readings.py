@@ -48,6 +48,16 @@ def shared(first: Mapping, second: Mapping, same_file: bool) -> SharedReadings:
     return SharedReadings(common, *counts)
 
 
+def repeated(first: Mapping, second: Mapping) -> int:
+    """How many readings of ``second`` the table ``first`` holds as well, whatever they are for.
+
+    0 where so few agree to the last digits that it may be chance.
+    """
+    tables = [_readings(each, np.ones(len(each["subset"]), dtype=bool)) for each in (first, second)]
+    common = _common(*(each.values for each in tables))
+    return 0 if common < _COINCIDENCE * min(len(each.values) for each in tables) else common
+
+
 def counted_once(
     first: Calibration, second: Calibration, readings: SharedReadings
 ) -> tuple[Calibration, Calibration]:

@@ -68,7 +68,6 @@ def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     sizes, rows = errors_of(tables, model, gate["at"], quantity)
     of, words = STATISTICS[statistic]
     called = f"{words} of the {quantity} errors {_AT[gate['at']]}"
-    called = called.replace("largest of the", "largest of the", 1)
     about = {"model": model, "statistic": words, "at": gate["at"], "rows": len(rows)}
     size, why = of(sizes), ""
     if statistic == "p99" and len(rows) < FEWEST_OF_QUANTILE:
@@ -159,6 +158,8 @@ def _of_bound(word: str, tables: RunTables, unit: str) -> Figure:
         raise Absent(Problem(str(tables.folder), what, fix=fix))
     size = found.said.upper_mm if found.said else float("nan")
     why = "its campaign states no upper bound so far" if np.isnan(size) else ""
+    if found.said and found.said.excepted:
+        why = f"its upper bound leaves {found.said.excepted} candidates out"
     called = f"{word} bound on the largest error, by campaign {found.place}"
     about: dict[str, Any] = {"campaign": str(found.place)}
     if found.said:

@@ -10,9 +10,10 @@ import numpy as np
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import model_name
 from kinacc.assess.conformity import ACCEPT, REJECT, decide
-from kinacc.assess.statement import REGION, Statement
-from kinacc.campaign import consistency, marks, words
+from kinacc.assess.statement import Statement
+from kinacc.campaign import consistency, marks, nearness, words
 from kinacc.campaign.folder import Opened
+from kinacc.campaign.reasons import ADVICE
 from kinacc.campaign.report import facts, grounds, head, read_above
 from kinacc.campaign.state import State
 from kinacc.report.campaign_answers import against, answers, leading, sentence
@@ -64,7 +65,7 @@ def _sections(state: State, tables: Mapping[str, Columns]) -> tuple[Section, ...
             "something moved).",
             "Bounds that are too far apart at the end take more readings: kinacc plan-campaign "
             "says how many a new campaign needs.",
-            course(state, tables, "course"),
+            (*_lines(nearness.in_words(state)), *course(state, tables, "course")),
         ),
         Section(
             "points",
@@ -96,8 +97,8 @@ def _sections(state: State, tables: Mapping[str, Columns]) -> tuple[Section, ...
         Section(
             "noise",
             "Noise as stated, and as seen",
-            "points that were read three times or more, without the reading that chose them",
-            "How far repeated readings lie from the mean of their point, over what the noise "
+            "readings that one decision had taken at one point, but the first of them",
+            "How far repeated readings lie from the mean of those before, over what the noise "
             "stated brings: 1 on average where it is as stated.",
             "Good: around 1, few above the dotted line, no trend. Bad: most above 1 (the noise is "
             "stated too small), a rise over the readings (something moves).",
@@ -138,7 +139,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
 def _badge(state: State, said: Sequence[Statement], lead: Statement) -> tuple[str, bool]:
     tolerance = state.plan.limits.tolerance_mm
     if against(state, said):
-        return "BOUND IN DOUBT", True
+        return "NO BOUND" if np.isnan(lead.upper_mm) else "BOUND IN DOUBT", True
     if tolerance is not None and (verdict := decide(lead, tolerance).verdict) in _VERDICTS:
         return f"{_VERDICTS[verdict]} {tolerance:g} mm", verdict != ACCEPT
     if np.isnan(lead.upper_mm):
@@ -152,8 +153,7 @@ def _statements(state: State, said: Sequence[Statement]) -> Table:
     heads = ("of", "at most", "estimate", "at least", "each bound is right in")
     rows = []
     for each in said:
-        share = f"{each.share:.1%} of the region"
-        about = share if each.target == REGION else words.TARGETS[each.target]
+        about = words.target(each)
         sure = np.isfinite(each.confidence) and not doubtful
         right = words.how_often(each.confidence) if sure else "-"
         sizes = (mm(size) for size in (each.upper_mm, each.value_mm, each.lower_mm))
@@ -179,8 +179,9 @@ def _notes(
     ]
     if state.in_hand:
         check.append(f"{len(state.in_hand)} readings were not asked for yet and are not used")
-    noise = "no point was read three times or more: nothing holds the noise stated to readings"
-    noise = "; ".join(consistency.remarks(state)) or noise
+    noise = "no point was read twice in a row: nothing holds the noise stated to readings"
+    seen = consistency.remarks(state) or ([] if words.of_the_noise(state) else [noise])
+    noise = "; ".join([*seen, *words.of_the_noise(state)])
     valid = [
         f"only for {_population(state)}; nothing is said of other poses",
         f"off by: distance from measured to modelled position of the {about['point']}",
@@ -206,6 +207,8 @@ def _next(
 ) -> tuple[Text, ...]:
     """What to do now."""
     folder, limits = shlex.quote(str(opened.folder)), state.plan.limits
+    if alarms := words.alarmed(said):
+        return _lines(list(dict.fromkeys(ADVICE[each.code] for each in alarms)))
     if against(state, said):
         return _lines(
             [

@@ -20,6 +20,8 @@ def answers(state: State, stated: Tolerance | None) -> tuple[str, ...]:
     said = words.distinct(state)
     lead, lines = leading(state, said), against(state, said)
     kept = _kept(state, lead, bool(lines), stated)
+    if lines and np.isnan(lead.upper_mm):
+        return (*lines, "So no bound is stated.", *kept)
     if lines:
         by_noise = "The bounds of the campaign are what the readings give by the noise stated"
         return (*lines, f"{by_noise}; they are no statement on the arm.", *kept)

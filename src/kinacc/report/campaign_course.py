@@ -45,7 +45,8 @@ def course(state: State, tables: Mapping[str, Columns], key: str) -> tuple[Block
         *((said, f"@{name}{{0.000}} mm") for name, said in _BOUNDS),
     ]
     plot.add_tools(HoverTool(tooltips=hover, renderers=marks))
-    plot.vspan(x=len(state.plan.route), line_color=GREY, line_dash="dotted")
+    planned = len(state.campaign.visit())
+    plot.vspan(x=planned, line_color=GREY, line_dash="dotted")
     tolerance(plot, state)
     plot.legend.click_policy = "hide"
     plot.legend.orientation = "horizontal"
@@ -53,7 +54,7 @@ def course(state: State, tables: Mapping[str, Columns], key: str) -> tuple[Block
     pictures.from_zero(plot)
     caption = (
         "Upper and lower bounds, the estimate between them. Up to the dotted line at "
-        f"{len(state.plan.route)} readings, points of the first visit are measured whatever is "
+        f"{planned} readings, points of the first visit are measured whatever is "
         f"read.{of_tolerance(state)} A click in the legend hides one."
     )
     details = {
@@ -173,9 +174,7 @@ def scatter(state: State, key: str) -> tuple[Block, ...]:
     """Repeated readings against the noise stated: every one, by instrument, and the verdict."""
     found = consistency.scatter(state)
     if found is None:
-        said = (
-            "No point was read three times or more, so nothing holds the noise stated to readings."
-        )
+        said = "No point was read twice in a row, so nothing holds the noise stated to readings."
         return (Text(said),)
     apart = consistency.deviations(state)
     known = {each.number: each.reading for each in (*state.told, *state.in_hand)}
@@ -207,9 +206,9 @@ def scatter(state: State, key: str) -> tuple[Block, ...]:
         "number": "reading {}",
         "instrument": "{}",
         "called": "point {}",
-        "apart": "{} times the noise stated from the mean of its point",
+        "apart": "{} times the noise stated from the mean of those before",
     }
-    words_of = "Distances of repeated readings from the mean of their point."
+    words_of = "Distances of repeated readings from the mean of those before."
     drawn = Picture(
         f"{key}-repeats", plot, f"{words_of} {caption}", caption, details=details,
         invitation="Select a reading to see which it is.",

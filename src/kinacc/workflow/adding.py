@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinacc.artifacts import store
 from kinacc.artifacts.atomic import write_whole
 from kinacc.config.reading import read
 from kinacc.config.series import FLAGS, MOVED, SAME
@@ -20,7 +19,7 @@ from kinacc.kinematics import robot
 from kinacc.measurements import times
 from kinacc.measurements.files import load as loaded
 from kinacc.measurements.written import Written
-from kinacc.workflow import calibration_settings
+from kinacc.workflow import calibration_settings, measured_files
 from kinacc.workflow.contradictions import load
 from kinacc.workflow.stages import measurements
 
@@ -96,21 +95,23 @@ def _path(settings: Mapping[str, Any]) -> str:
 
 
 def misfits(path: str, arm: Arm, tool: str | None) -> list[Problem]:
-    """Why a file cannot be a line of the arm's series: unreadable, other targets, there already."""
+    """Why a file cannot be a line of the arm's series: unreadable, other targets, read before."""
     problems: list[Problem] = []
     with gathered(problems):
         own = _measured(path, arm)
         given = {"measurements": own}
         section = arm.settings["calibration"]
-        calibration_settings.require_enough_rows(given, robot.load(arm.settings["robot"]), section)
-        digest = store.digest_of("measurements", own)
+        with gathered(problems):
+            calibration_settings.require_enough_rows(
+                given, robot.load(arm.settings["robot"]), section
+            )
+        other = None
         for member in arm.members:
             with suppress(InputError):
                 other = _measured(member.path, arm)
-                if store.digest_of("measurements", other) == digest:
-                    what = f"holds the readings of {member.path}, which is a line already"
-                    problems.append(Problem(path, what, "new readings"))
-        problems += _of_targets(path, own, other, arm, tool)
+                problems += measured_files.repeated(path, own, member.path, other)
+        if other is not None:
+            problems += _of_targets(path, own, other, arm, tool)
     return problems
 
 

@@ -9,6 +9,7 @@ import paper_settings as paper
 import pytest
 from scipy.stats import binomtest
 
+from kinacc.assess.attainable import width_limits
 from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.registry import ASSESSORS
 from kinacc.errors import InputError
@@ -149,6 +150,37 @@ def test_each_target_is_graded_against_its_own_truth(rows):
     assert np.any(measured < everywhere)
 
 
+def test_every_bound_on_enough_readings_is_told_how_near_it_could_be(rows, field):
+    enough = (rows["budget"] == 40) & (rows["repetition"] == 1) & ~np.isnan(rows["upper_mm"])
+    enough &= np.isin(rows["target"], ("measured", "candidates"))
+    assert enough.sum() > 5
+    job = contest.Job(contest.Cell(field, 20, 0.1), 40)
+    world, _ = contest.world_of(job.cell, 1, 40, 5)
+    size = np.linalg.norm(world.error_mm, axis=1)
+    known = width_limits(size, 0.1, 40, 0.05)
+    of_all = enough & (rows["noise_mm"] == 0.1) & (rows["points_visited"] == 20)
+    assert of_all.any()
+    np.testing.assert_allclose(rows["attainable_mm"][of_all], known.attainable_mm, rtol=1e-9)
+    np.testing.assert_allclose(rows["proven_mm"][of_all], known.proven_mm, rtol=1e-9)
+    assert np.all(rows["proven_mm"][enough] < rows["attainable_mm"][enough])
+    assert np.isnan(rows["attainable_mm"][np.isnan(rows["upper_mm"])]).all()
+    # With fewer readings than candidates nothing bounds them all; those measured can be.
+    few = (rows["budget"] == 10) & ~np.isnan(rows["upper_mm"])
+    assert not np.isfinite(rows["attainable_mm"][few & (rows["target"] == "candidates")]).any()
+    assert np.isfinite(rows["attainable_mm"][few & (rows["target"] == "measured")]).all()
+
+
+def test_a_cell_sums_up_the_limits_of_those_campaigns_that_have_them():
+    said = graded(
+        attainable_mm=[0.1, 0.3, np.nan, np.inf, np.nan], proven_mm=[0.1, 0.1, 0.1, 0.3, np.nan]
+    )
+    (cell,) = summary.cells(said)
+    assert cell["attainable_mm"] == pytest.approx(0.2)
+    assert cell["proven_mm"] == pytest.approx(0.15)
+    (cell,) = summary.cells(graded(attainable_mm=np.inf))
+    assert np.isnan(cell["attainable_mm"])
+
+
 def graded(**columns) -> dict:
     """Rows of one cell, five campaigns."""
     row = {
@@ -158,17 +190,24 @@ def graded(**columns) -> dict:
         "candidates": 20,
         "noise_mm": 0.1,
         "budget": 10,
+        "setup": "plain",
+        "world": "stated",
         "true_mm": 1.0,
+        "bounded_mm": columns.get("true_mm", 1.0),
         "value_mm": 1.1,
         "lower_mm": 0.9,
         "upper_mm": 1.2,
         "confidence": 0.95,
+        "excepted": 0,
+        "alarmed": False,
         "assumption": "none",
         "measurements": 10,
         "points_visited": 8,
+        "attainable_mm": np.nan,
+        "proven_mm": np.nan,
         **columns,
     }
-    text = ("assessor", "target", "field", "assumption")
+    text = ("assessor", "target", "field", "assumption", "setup", "world")
     return {
         name: np.array(np.broadcast_to(value, 5), object if name in text else None)
         for name, value in row.items()
@@ -218,6 +257,55 @@ def test_silence_counts_where_what_it_would_rest_on_is_true():
     found = summary.judged(summary.summed(said))
     assert found["withheld"].tolist() == [pytest.approx(3 / 5)]
     assert found["withheld_sound"].tolist() == [pytest.approx(1 / 2)]
+
+
+def test_a_bound_of_all_points_but_some_is_held_to_the_largest_of_these(field):
+    cell, plain = contest.Cell(field, 30, 0.05), contest.Setup()
+    everyone = contest.Contest(SMALL, 5, ("search_and_confirm",), paper.study())
+    rows, _ = contest.campaigns(contest.Job(cell, 20, plain), range(3), everyone)
+    rows = {name: column[rows["target"] == "candidates"] for name, column in rows.items()}
+    left = rows["excepted"].astype(int)
+    assert left.min() > 0
+    size = np.sort(field.size_mm)[::-1]
+    assert rows["true_mm"].tolist() == [size[0]] * 3
+    assert rows["bounded_mm"].tolist() == size[left].tolist()
+    (summed,) = summary.cells(rows)
+    assert summed["upper_holds"] == np.mean(rows["upper_mm"] >= size[left])
+    assert summed["lower_holds"] == np.mean(rows["lower_mm"] <= size[0])
+    assert summed["excepted"] == left.mean()
+
+
+def test_lower_bounds_that_claim_too_much_are_caught_and_silence_is_not():
+    bold = graded(lower_mm=[0.9, 0.9, 0.9, 0.9, 1.1])
+    found = summary.judged(summary.summed({n: np.tile(c, 200) for n, c in bold.items()}))
+    assert (found["rejected"][0], found["lower_rejected"][0]) == (0, 1)
+    assert found["lower_worst"][0] == pytest.approx(0.8)
+    silent = graded(upper_mm=[1.2, np.nan, np.nan, np.nan, 0.9], alarmed=[0, 1, 1, 1, 0])
+    found = summary.judged(summary.summed(silent))
+    assert found["worst_holds"][0] == pytest.approx(1 / 2)
+    assert found["worst_begun"][0] == pytest.approx(4 / 5)
+    assert found["alarmed"][0] == pytest.approx(3 / 5)
+
+
+def test_every_world_with_every_setup_is_a_row_of_its_own(field):
+    setups = (
+        contest.Setup(worlds=("stated", "noise_1.2")),
+        contest.Setup("estimated", {"noise": "estimated"}, ("noise_1.2",)),
+    )
+    size = replace(SMALL, noise_mm=(0.1,), budgets={20: (40,)}, setups=setups)
+    names = ("maximum", "search_and_confirm", "sequential")
+    given = contest.Contest(size, 5, names, paper.study())
+    found = summary.in_order(contest.summed(contest.jobs([field], size), given))
+    of_all = found["target"] == "candidates"
+    kinds = zip(*(found[n][of_all] for n in ("assessor", "setup", "world")), strict=True)
+    assert sorted(kinds) == [
+        ("maximum", "plain", "stated"),  # looks back: it has readings as stated alone
+        ("search_and_confirm", "estimated", "noise_1.2"),
+        ("search_and_confirm", "plain", "noise_1.2"),
+        ("search_and_confirm", "plain", "stated"),
+        ("sequential", "plain", "noise_1.2"),
+        ("sequential", "plain", "stated"),  # knows no setting `noise`
+    ]
 
 
 def test_few_campaigns_do_not_tell_three_points_from_chance():

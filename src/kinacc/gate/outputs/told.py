@@ -92,7 +92,8 @@ def difference_in_words(difference: Difference) -> str:
     told = f"{where}: {difference.what}"
     if difference.largest is not None:
         allowed = "" if difference.allowed is None else f" ({difference.allowed:g} allowed)"
-        told += f"; largest {difference.largest:.3g} {difference.unit}".rstrip() + allowed
+        unit = "" if difference.unit == "1" else f" {difference.unit}".rstrip()
+        told += f"; largest {difference.largest:.3g}{unit}{allowed}"
     if difference.rows:
         told += f"; {difference.rows} of {difference.of} rows"
         told += f", the first: {difference.first}" if difference.first else ""

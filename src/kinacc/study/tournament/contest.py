@@ -1,33 +1,59 @@
-"""Campaigns of every assessor in every cell: field, candidates, noise, budget, repetition.
+"""Campaigns of every assessor in every cell: field, candidates, noise, budget, setup, condition.
 
 One repetition of a field, candidate count and noise is one world: the candidates drawn, their order
 and every reading are fixed by (seed, field, candidates, noise, repetition). All assessors and
-budgets see that world, whatever part of the work it is simulated in.
+budgets see that world, whatever part of the work it is simulated in. In other conditions than
+stated its readings are changed, the chance in them is the same.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import time
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
+from kinacc.assess.attainable import NONE, WidthLimits, limits_of, points_bounded
+from kinacc.assess.conditions import CONDITIONS, STATED
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.registry import ASSESSORS
+from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.simulate import Assessed, assessed, is_broken, truth_mm
 from kinacc.assess.statement import REGION, Statement
 from kinacc.assess.world import World, drawn_world
 from kinacc.errors import InputError, Problem
 from kinacc.study.tournament import summary
-from kinacc.study.tournament.fields import ErrorField
+from kinacc.study.tournament.fields import ErrorField, of_tables
+from kinacc.study.tournament.made_up_fields import MADE_UP, made_up
 
 NM_PER_MM = 1_000_000
 CONTESTANTS = tuple(ASSESSORS)
-_TEXTS = ("field", "assessor", "target", "assumption")
+LIMITED = 20  # campaigns of a cell whose limits are computed: what worlds differ by is small
+_TEXTS = ("field", "assessor", "target", "assumption", "setup", "world")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Settings that assessors have in some worlds: names of how readings come about.
+
+    An assessor without one of the ``settings`` takes no part, nor does one that looks back where
+    readings are not as stated. ``least``: smallest budget that the settings are good for.
+    """
+
+    name: str = "plain"
+    settings: Mapping[str, object] = dataclasses.field(default_factory=dict)
+    worlds: tuple[str, ...] = (STATED,)
+    least: int = 1
+
+    def takes(self, assessor: str, world: str) -> bool:
+        """Whether an assessor takes part in a world with these settings."""
+        if world != STATED and assessor not in ADAPTIVE:
+            return False
+        return set(self.settings) <= {each.name for each in dataclasses.fields(ASSESSORS[assessor])}
 
 
 @dataclass(frozen=True)
@@ -36,7 +62,8 @@ class Size:
 
     ``budgets`` by number of candidates; ``repetitions`` of every cell, and ``repetitions_slow`` for
     assessors that take more than 50 ms; ``draws``: accepted draws of which every synthetic family
-    is made.
+    is made; ``made_up``: names of fields that are made up; ``setups``: settings, and worlds in
+    which they are tried; ``assessors``: who takes part where nobody is named.
     """
 
     noise_mm: tuple[float, ...]
@@ -44,6 +71,9 @@ class Size:
     repetitions: int
     repetitions_slow: int
     draws: tuple[int, ...]
+    made_up: tuple[str, ...] = ()
+    setups: tuple[Setup, ...] = (Setup(),)
+    assessors: tuple[str, ...] = CONTESTANTS
 
     def only(self, noise_mm: Sequence[float]) -> Size:
         """The same with this noise alone, of its own; with all of it where none is given."""
@@ -54,16 +84,48 @@ class Size:
         return replace(self, noise_mm=tuple(noise_mm) or self.noise_mm)
 
 
+SETUPS = (
+    Setup(
+        worlds=("stated", "noise_1.2", "student_t4", "student_t4_whole", "wrong_1pct", "drift_3",
+                "step_3", "repeatability"),
+    ),
+    Setup(
+        "estimated",
+        {"noise": "estimated"},
+        ("stated", "noise_1.2", "student_t4", "student_t4_whole", "repeatability"),
+    ),
+    Setup("tested", {"noise": "estimated", "noise_freedom": 60}, ("tested_60",)),
+    Setup("guarded", {"wrong_rate": 0.01}, ("stated", "wrong_1pct")),
+    Setup("references", {"references": 20}, ("stated", "drift_3", "step_3"), 100),
+    Setup(
+        "corrected", {"references": 20, "correct_drift": True}, ("stated", "drift_3", "step_3"), 100
+    ),
+    Setup("visit", {"error_of": "visit"}, ("stated",)),
+    Setup("visit_estimated", {"error_of": "visit", "noise": "estimated"}, ("stated", "noise_1.2")),
+)  # fmt: skip
+
 SIZES = {
     "default": Size((0.05, 0.1, 0.2, 0.3), {200: (50, 200), 1000: (200,)}, 20, 6, (0,)),
     "coverage": Size((0.05, 0.1, 0.2, 0.3), {200: (200,)}, 1000, 200, (0,)),
     "budgets": Size((0.1,), {200: (50, 100, 500), 1000: (200,)}, 200, 200, (0,)),
+    "workshop": Size(
+        (0.1,),
+        {200: (200, 300, 400)},
+        2000,
+        200,
+        (),
+        tuple(MADE_UP),
+        SETUPS,
+        (RECOMMENDED, "sequential"),
+    ),
     "full": Size(
         (0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
-        {200: (50, 100, 200, 500, 1000), 1000: (50, 200, 500, 1000)},
-        1000,
+        {200: (50, 100, 150, 200, 300, 400, 500, 1000), 1000: (50, 200, 500, 1000, 1500)},
+        2000,
         200,
         (0, 1),
+        tuple(MADE_UP),
+        SETUPS,
     ),
 }
 
@@ -84,8 +146,15 @@ class Contest:
     def of(cls, settings: Mapping) -> Contest:
         """The contest of a stage's settings: all assessors and noises where none is named."""
         size = SIZES[settings["size"]].only(settings["noise_mm"])
-        names = tuple(settings["assessors"]) or CONTESTANTS
+        names = tuple(settings["assessors"]) or size.assessors
         return cls(size, settings["seed"], names, settings["study"])
+
+
+def contested(
+    tables: Mapping[str, Mapping], robot_names: Mapping[str, str], size: Size
+) -> list[ErrorField]:
+    """Every field of a tournament: those of :func:`of_tables`, then those made up."""
+    return of_tables(tables, robot_names, size.draws) + [made_up(name) for name in size.made_up]
 
 
 @dataclass(frozen=True)
@@ -112,18 +181,26 @@ def _listed(size: Size, candidates: int) -> int:
 
 @dataclass(frozen=True)
 class Job:
-    """All campaigns of one cell with one budget: what a part of the work consists of."""
+    """All campaigns of one cell with one budget: what a part of the work consists of.
+
+    ``setup``: what assessors are told; ``world``: how readings come about.
+    """
 
     cell: Cell
     budget: int
+    setup: Setup = Setup()
+    world: str = STATED
 
 
 def jobs(fields: Sequence[ErrorField], size: Size) -> list[Job]:
     """Every job of a tournament, in a fixed order."""
     return [
-        Job(cell, budget)
+        Job(cell, budget, setup, world)
         for cell in cells(fields, size)
         for budget in size.budgets[_listed(size, cell.candidates)]
+        for setup in size.setups
+        for world in setup.worlds
+        if budget >= setup.least
     ]
 
 
@@ -143,7 +220,11 @@ def summed(work: Sequence[Job], contest: Contest, progress=None) -> Columns:
     size = contest.size
     for job in progress(work, "kinds of campaigns simulated", len(work)) if progress else work:
         for count, is_slow in ((size.repetitions, False), (size.repetitions_slow, True)):
-            own = tuple(each for each in contest.assessors if ASSESSORS[each].is_slow == is_slow)
+            own = tuple(
+                each
+                for each in contest.assessors
+                if ASSESSORS[each].is_slow == is_slow and job.setup.takes(each, job.world)
+            )
             if own:
                 some = replace(contest, assessors=own)
                 found += summary.cells(campaigns(job, range(count), some)[0])
@@ -169,22 +250,33 @@ def campaigns(
     """
     rows: list[dict] = []
     times: list[float] = []
-    cell, settings = job.cell, {**contest.study, "measurements": job.budget}
+    cell = job.cell
+    settings = {**contest.study, "measurements": job.budget, **job.setup.settings}
     for repetition in repetitions:
         place = {
             "field": cell.field.name,
             "candidates": cell.candidates,
             "noise_mm": cell.noise_mm,
             "budget": job.budget,
+            "setup": job.setup.name,
+            "world": job.world,
             "repetition": repetition,
         }
         world, chosen = world_of(cell, repetition, job.budget, contest.seed)
+        near = _limits_in(world, job.budget)
         for name in contest.assessors:
             own = {**place, "assessor": name}
             begun = time.process_time()
-            found = assessed(name, settings, world, **cell.field.known(chosen))
+            found = assessed(name, settings, world, job.world, **cell.field.known(chosen))
             times.append(1e3 * (time.process_time() - begun))
-            rows += [{**own, **graded} for graded in _graded(found, world, cell.field)]
+            graded = _graded(found, world, cell.field, job)
+            if repetition < LIMITED:
+                limits = [near(each, found.visited) for each in found.statements]
+            else:
+                limits = [NONE] * len(graded)
+            for each, (attainable_mm, proven_mm, _) in zip(graded, limits, strict=True):
+                each |= {"attainable_mm": attainable_mm, "proven_mm": proven_mm}
+                rows.append({**own, **each})
     kinds = {name: object if name in _TEXTS else None for name in rows[0]} if rows else {}
     return {name: np.array([row[name] for row in rows], kinds[name]) for name in kinds}, times
 
@@ -201,17 +293,22 @@ def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World
     return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits), chosen
 
 
-def _graded(found: Assessed, world: World, field: ErrorField) -> list[dict]:
+def _graded(found: Assessed, world: World, field: ErrorField, job: Job) -> list[dict]:
     """The statements of one campaign, each with its truth."""
     size = np.linalg.norm(world.error_mm, axis=1)
+    own_mm = job.setup.settings.get("arm_mm")
+    arm_mm = CONDITIONS[job.world].factor * world.sigma_mm if own_mm is None else own_mm
     return [
         {
             "target": each.target,
-            "true_mm": _truth(each, size, found.visited, field),
+            "true_mm": _truth(replace(each, excepted=0), size, found.visited, field, arm_mm),
+            "bounded_mm": _truth(each, size, found.visited, field, arm_mm),
             "value_mm": each.value_mm,
             "lower_mm": each.lower_mm,
             "upper_mm": each.upper_mm,
             "confidence": each.confidence,
+            "excepted": each.excepted,
+            "alarmed": bool(found.alarms),
             "assumption": _assumption(each, size),
             "measurements": found.measurements,
             "points_visited": found.points_visited,
@@ -220,12 +317,30 @@ def _graded(found: Assessed, world: World, field: ErrorField) -> list[dict]:
     ]
 
 
+def _limits_in(world: World, budget: int) -> Callable[[Statement, list[int] | None], WidthLimits]:
+    """What bounds could be like in a world, by statement and rows visited; NaN without a bound.
+
+    Computed once for statements on the same points.
+    """
+    size = np.linalg.norm(world.error_mm, axis=1)
+    known: dict[tuple, WidthLimits] = {}
+
+    def near(said: Statement, visited: list[int] | None) -> WidthLimits:
+        rows = points_bounded(said, visited or (), size.size)
+        key = rows.tobytes(), said.confidence
+        if key not in known:
+            known[key] = limits_of(said, visited or (), size, world.sigma_mm, budget)
+        return known[key]
+
+    return near
+
+
 def _truth(
-    said: Statement, size: np.ndarray, visited: list[int] | None, field: ErrorField
+    said: Statement, size: np.ndarray, visited: list[int] | None, field: ErrorField, arm_mm
 ) -> float:
-    """What a statement is graded against; of the region: what its share does not exceed."""
+    """What an upper bound is graded against; of the region: what its share does not exceed."""
     if said.target != REGION:
-        return truth_mm(said, size, visited)
+        return truth_mm(said, size, visited, arm_mm)
     return float(np.quantile(field.size_mm, said.share, method="inverted_cdf"))
 
 

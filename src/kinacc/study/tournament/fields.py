@@ -40,7 +40,8 @@ class ErrorField:
 
     Where the joints are known: ``q_rad`` (n, k) as reported; where the robot is: ``effects``
     (n, 3, 6 k) of errors of each joint at the tool, see :func:`joint_errors`. ``kind`` is
-    ``paper``, ``synthetic`` or ``measured``, empty for errors of a file.
+    ``paper``, ``synthetic``, ``made_up`` or ``measured``, empty for errors of a file. The first
+    ``kept`` configurations are among any candidates drawn.
     """
 
     name: str
@@ -49,6 +50,7 @@ class ErrorField:
     effects: np.ndarray | None = None
     kind: str = ""
     meaning: str = ""
+    kept: int = 0
 
     def __post_init__(self) -> None:
         count = len(self.error_mm)
@@ -79,7 +81,11 @@ class ErrorField:
 
     def candidates(self, count: int, entropy: tuple[int, ...]) -> np.ndarray:
         """Rows of ``count`` configurations drawn without replacement, in random order."""
-        return np.random.default_rng([*entropy, 0]).permutation(self.points)[:count]
+        rng = np.random.default_rng([*entropy, 0])
+        if not self.kept:
+            return rng.permutation(self.points)[:count]
+        others = self.kept + rng.permutation(self.points - self.kept)
+        return rng.permutation(np.append(np.arange(self.kept), others)[:count])
 
 
 def of_points(name: str, robot: Robot | None, points: Mapping) -> ErrorField:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from kinacc.study.tournament import contest
-from kinacc.study.tournament.fields import of_tables
 
 
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
@@ -17,7 +16,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     the configuration) and, by data set, ``robots``.
     """
     given = contest.Contest.of(settings)
-    fields = of_tables(inputs, settings["robots"], given.size.draws)
+    fields = contest.contested(inputs, settings["robots"], given.size)
     part = settings.get("part") or {"number": 1, "of": 1}
     work = contest.part_of(contest.jobs(fields, given.size), part["number"], part["of"])
     return {"tournament_chunk": contest.summed(work, given, progress)}

@@ -1,0 +1,307 @@
+"""Reference poses, read again by plan: whether the frame drifted or jumped, and what corrects it.
+
+The first rows of the random order are the reference poses. They are read first, and again at
+places of the sequence that are fixed beforehand: at its start, evenly between and at its end. Only
+differences between readings of one pose are looked at, so nothing has to be known of its error.
+Proofs: docs/drift-and-steps.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from kinacc.assess.adaptive import Ledger
+from kinacc.assess.change_shapes import Shapes, half_found, likelier, shapes_of
+from kinacc.assess.statement import Reason
+from kinacc.errors import Problem
+
+POSES = 5  # reference poses of a plan with at least four revisits of each
+FALSE_ALARMS = 0.005  # of campaigns without drift or step, all stages together
+_EARLIER = 0.2  # of these, spent on the stages before the last
+_LEAST_FREEDOM = 6.0  # of readings that have to tell a change and their noise
+_BESIDE = 5.0  # times a stage's false alarms, where the readings say their noise themselves
+_LEAST_ROUNDS = 3  # readings of every reference pose before the first look
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Where in a sequence of ``measurements`` readings the reference poses are read.
+
+    ``row_at``: row of the pose to read at a place (0 = first), for all planned places. Rows 0 to
+    ``poses`` - 1, each read ``revisits`` / ``poses`` times again.
+    """
+
+    measurements: int
+    poses: int
+    row_at: Mapping[int, int]
+
+    def left(self, taken: int) -> int:
+        """Planned readings that are still to come after so many."""
+        return sum(place >= taken for place in self.row_at)
+
+    def time(self, place: int | np.ndarray) -> float | np.ndarray:
+        """Place in the sequence over its length: 0 at the start, below 1."""
+        return place / self.measurements
+
+    def visit(self, first: int) -> tuple[int, ...]:
+        """Rows in the order in which they are read whatever is read, ``first`` rows being visited.
+
+        Ends where readings decide for the first time.
+        """
+        rows, unvisited = [], iter(range(self.poses, first))
+        for place in range(self.measurements):
+            row = self.row_at.get(place)
+            if row is None and (row := next(unvisited, None)) is None:
+                break
+            rows.append(row)
+        return tuple(rows)
+
+
+def schedule(measurements: int, points: int, references: int) -> Schedule:
+    """Places of the first readings of the reference poses and of ``references`` revisits.
+
+    A quarter of the revisits follows the first readings, a quarter ends the sequence, the rest
+    is spread evenly between: of 20 revisits 5, 10 and 5. Each revisit takes the next pose in turn.
+    """
+    poses = min(poses_of(references), points)
+    if not poses:
+        return Schedule(measurements, 0, {})
+    start, end = references // 4, -(-references // 4)
+    between = references - start - end
+    low, high = poses + start, measurements - end
+    places = [*range(low)]
+    places += [low + (each + 1) * (high - low) // (between + 1) for each in range(between)]
+    places += range(high, measurements)
+    return Schedule(measurements, poses, {place: k % poses for k, place in enumerate(places)})
+
+
+def poses_of(references: int) -> int:
+    """Number of reference poses for a number of revisits: four of each, 5 poses at most."""
+    return min(POSES, max(references // 4, 1)) if references else 0
+
+
+def schedule_faults(measurements: int, references: int, correct_drift: bool) -> list[Problem]:
+    """What is wrong with a number of revisits in so many readings, and with correcting by them."""
+    if not isinstance(references, (int, np.integer)) or references < 0:
+        return [Problem("references", f"{references!r}", "a whole number, 0 or more")]
+    if correct_drift and not references:
+        fix = "plan 20 revisits, or do not correct"
+        return [Problem("correct_drift", "no revisits show a drift", "references above 0", fix)]
+    poses = poses_of(references)
+    if (least := references + 2 * poses) > measurements:
+        what = f"{references} revisits of {poses} poses take {least} readings or more"
+        fix = "plan fewer revisits or more readings"
+        return [Problem("references", what, f"{measurements} readings are planned", fix)]
+    return []
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Readings of reference poses in their order: place, pose, vector (n, 3), covariance."""
+
+    place: np.ndarray
+    row: np.ndarray
+    vector_mm: np.ndarray
+    covariance_mm2: np.ndarray
+
+    def head(self, count: int) -> Readings:
+        """The first readings."""
+        each = (self.place, self.row, self.vector_mm, self.covariance_mm2)
+        return Readings(*(column[:count] for column in each))
+
+    @cached_property
+    def root_mm(self) -> np.ndarray:
+        """Root (3, 3) of the mean covariance of the readings."""
+        return np.linalg.cholesky(self.covariance_mm2.mean(axis=0))
+
+    @cached_property
+    def whitened(self) -> np.ndarray:
+        """Readings (n, 3) in units of that root."""
+        return np.linalg.solve(self.root_mm, self.vector_mm.T).T
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Weights (n,): a reading's covariance is at most the mean one divided by its weight.
+
+        Equal where covariances are in proportion to each other; less weight than due otherwise.
+        """
+        inverse = np.linalg.inv(self.root_mm)
+        relative = inverse @ self.covariance_mm2 @ inverse.T
+        return np.round(1.0 / np.linalg.eigvalsh(relative)[:, -1], 9)
+
+
+def planned_readings(plan: Schedule, ledger: Ledger) -> Readings:
+    """Of the readings of a ledger, those planned of reference poses."""
+    place = [at for at in sorted(plan.row_at) if at < ledger.taken]
+    rows, vectors, covariances = zip(*(ledger.readings[at] for at in place), strict=True)
+    planned = ledger.candidates.covariance_mm2
+    covariance = [
+        planned[row] if own is None else own for row, own in zip(rows, covariances, strict=True)
+    ]
+    return Readings(np.array(place), np.array(rows), np.array(vectors), np.array(covariance))
+
+
+@dataclass(frozen=True)
+class Change:
+    """What the references say of a change of the frame.
+
+    ``between``: the readings (from 1) before and after a step; None for a drift. ``change_mm``
+    (3,): over the whole campaign, or of the step; ``deviation_mm``: its standard deviation per
+    axis, the largest. ``is_found``: beyond what chance shows. ``unseen_mm``: size of the drift over
+    the campaign that is found in half of the cases.
+    """
+
+    between: tuple[int, int] | None
+    change_mm: tuple[float, float, float]
+    deviation_mm: float
+    is_found: bool
+    unseen_mm: float
+
+    @property
+    def size_mm(self) -> float:
+        """Size of the change."""
+        return math.hypot(*self.change_mm)
+
+    @property
+    def reason(self) -> Reason:
+        """The finding as a reason for stating no bounds."""
+        x, y, z = self.change_mm
+        numbers = {"size": self.size_mm, "x": x, "y": y, "z": z, "deviation": self.deviation_mm}
+        if self.between is None:
+            return Reason("drift", numbers)
+        return Reason("step", numbers | {"after": self.between[0], "before": self.between[1]})
+
+
+def alarms(change: Change | None, is_corrected: bool) -> tuple[Reason, ...]:
+    """Why no bounds are stated: what is found, but for a drift where that is corrected for."""
+    if change is None or not change.is_found or (is_corrected and change.between is None):
+        return ()
+    return (change.reason,)
+
+
+def awaited(plan: Schedule, taken: int) -> Reason | None:
+    """Why a drift cannot be corrected for after so many readings; None where it can."""
+    left = plan.left(taken)
+    return Reason("references_left", {"left": left}) if left else None
+
+
+def stages(plan: Schedule) -> tuple[tuple[int, float], ...]:
+    """Numbers of reference readings at which they are looked at, each with its false alarms."""
+    total = len(plan.row_at)
+    earlier = [*range(_LEAST_ROUNDS * plan.poses, total, plan.poses)] if plan.poses else []
+    if not earlier:
+        return ((total, FALSE_ALARMS),) if plan.poses else ()
+    each = _EARLIER * FALSE_ALARMS / len(earlier)
+    return (*((count, each) for count in earlier), (total, (1.0 - _EARLIER) * FALSE_ALARMS))
+
+
+def found(plan: Schedule, readings: Readings, freedom: float = math.inf) -> Change | None:
+    """What the readings show at the last stage reached; found is what any stage found.
+
+    ``freedom``: inf where the noise is as stated. Otherwise it is right up to one factor, and this
+    is the number of degrees of freedom of an earlier test that found the factor 1 (0: no test).
+    None before the first stage.
+    """
+    change = None
+    for count, error in stages(plan):
+        if count > len(readings.place) or freedom + 3.0 * (count - plan.poses) <= _LEAST_FREEDOM:
+            continue
+        before, change = change, _at_stage(plan, readings.head(count), error, freedom)
+        if before is not None and before.is_found:
+            change = replace(change, is_found=True)
+    return change
+
+
+def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) -> Change:
+    shapes = _shapes(plan, readings)
+    along = shapes.unit @ readings.whitened  # (shapes, 3)
+    square = np.sum(along**2, axis=1)
+    within = float(np.sum(shapes.within(readings.whitened.T) ** 2))
+    own = 3.0 * (len(readings.place) - plan.poses)
+    factor, stands_out = 1.0, True
+    if math.isfinite(freedom):
+        within, freedom = within + freedom, own + freedom
+        square, factor = square / within, math.sqrt((within - square.max()) / (freedom - 3.0))
+    elif own > _LEAST_FREEDOM:
+        # Noise larger than stated, or one reading that went wrong, is no change: that has to stand
+        # out from the scatter of the readings as well.
+        against = shapes.thresholds(_BESIDE * error, own)
+        stands_out = bool(np.any(square / within > against))
+    least = shapes.thresholds(error, freedom)
+    best = likelier(square, freedom)
+    scale = 1.0 / shapes.length[best]
+    widest = math.sqrt(float(np.linalg.eigvalsh(readings.root_mm @ readings.root_mm.T)[-1]))
+    change = readings.root_mm @ along[best] * scale
+    return Change(
+        between=None if best == 0 else _about(readings.place, shapes.gap[best]),
+        change_mm=(float(change[0]), float(change[1]), float(change[2])),
+        deviation_mm=float(factor * widest * scale),
+        is_found=stands_out and bool(np.any(square > least)),
+        unseen_mm=float(factor * widest / shapes.length[0] * half_found(float(least[0]), freedom)),
+    )
+
+
+def _shapes(plan: Schedule, readings: Readings) -> Shapes:
+    time, row = plan.time(readings.place), readings.row
+    return shapes_of(tuple(time), tuple(row), tuple(readings.weight))
+
+
+def _about(place: np.ndarray, gap: int) -> tuple[int, int]:
+    """Numbers (from 1) of the reference readings on both sides of a gap."""
+    return int(place[gap - 1]) + 1, int(place[gap]) + 1
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A linear drift as the references show it, to be taken from readings, and how sure it is.
+
+    ``slope_mm`` (3,): drift over the whole campaign; ``deviation_mm``: its standard deviation per
+    axis, the largest. A reading at time t is corrected by t times the slope.
+    """
+
+    slope_mm: np.ndarray
+    deviation_mm: float
+
+    def along_mm(self, error: float, freedom: float = math.inf) -> float:
+        """What the slope falls short by in one direction, but for probability ``error``."""
+        if math.isinf(freedom):
+            return -self.deviation_mm * float(scipy.special.ndtri(error))
+        return -self.deviation_mm * float(scipy.special.stdtrit(freedom, error))
+
+    def anywhere_mm(self, error: float, freedom: float = math.inf) -> float:
+        """What the slope is off by in any direction, but for probability ``error``."""
+        if math.isinf(freedom):
+            return self.deviation_mm * math.sqrt(float(scipy.special.chdtri(3.0, error)))
+        ratio = float(scipy.special.fdtri(3.0, freedom, 1.0 - error))
+        return self.deviation_mm * math.sqrt(3.0 * ratio)
+
+
+def correction(plan: Schedule, readings: Readings) -> Correction | None:
+    """The linear drift of all planned readings; None before the last of them."""
+    if len(readings.place) < len(plan.row_at) or not plan.poses:
+        return None
+    shapes = _shapes(plan, readings)
+    slope = shapes.unit[0] @ readings.vector_mm / shapes.length[0]
+    covariance = readings.root_mm @ readings.root_mm.T / shapes.length[0] ** 2
+    return Correction(slope, math.sqrt(float(np.linalg.eigvalsh(covariance)[-1])))
+
+
+def part_of_drift(allowed: float, confirming: int, plan: Schedule) -> float:
+    """Part of an allowed error that goes to the correction; the limits have the rest.
+
+    The part at which both together are narrowest where one point has ``confirming`` readings after
+    its first, at 0.6 of the time: fixed before anything is read.
+    """
+    place = np.array(list(plan.row_at))
+    shapes = shapes_of(tuple(plan.time(place)), tuple(plan.row_at.values()), (1.0,) * len(place))
+    parts = np.arange(0.05, 0.96, 0.05)
+    ndtri = scipy.special.ndtri
+    limits = ndtri((1.0 - parts) * allowed) / math.sqrt(confirming + 1)
+    widths = limits + 0.6 / shapes.length[0] * ndtri(parts * allowed)
+    return float(parts[np.argmax(widths)])

@@ -1,0 +1,320 @@
+"""What readings of poses that were gone to again and again say of instrument and arm.
+
+Three nested kinds of scatter: of readings of one visit (the instrument), of visits of a pose from
+one side, and of the sides a pose is approached from (both the arm). Their variances are found by
+the analysis of variance of unweighted means, the noise of one reading is their sum, and its degrees
+of freedom are those of Welch and Satterthwaite.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+# Levels at which axes, and poses, are taken to differ. Axes that are wrongly averaged make bounds
+# too small along one: at this level 5 % become 6.0 at worst of 40 degrees of freedom, 6.5 of 20.
+EQUAL, UNEQUAL = 0.2, 0.01
+_FAR = 6.0  # medians from the middle of a pose's readings
+_FEWEST_VISITS = 3  # whose distances from their middle can differ
+_FEWEST = 5  # degrees of freedom that a covariance is told from an equal one by
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """The n readings: ``position_mm`` (n, 3), and numbers (n,) from 0 of pose, side and visit.
+
+    A side is of one pose, and a visit is of one side: no number is that of two.
+    """
+
+    position_mm: np.ndarray
+    pose: np.ndarray
+    side: np.ndarray
+    visit: np.ndarray
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Mean square (3, 3), mm^2, of deviations from means, of ``freedom`` degrees for each axis.
+
+    Zero where there is none. ``std_mm``: per axis.
+    """
+
+    mean_square_mm2: np.ndarray
+    freedom: int
+
+    @property
+    def std_mm(self) -> np.ndarray:
+        return np.sqrt(np.diag(self.mean_square_mm2))
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Covariances (3, 3), mm^2: of readings of one visit, of visits from one side, of sides.
+
+    NaN where the readings do not tell. ``whole`` is that of a reading, of ``freedom`` degrees for
+    each axis (0: not told).
+    """
+
+    instrument: np.ndarray
+    visits: np.ndarray
+    sides: np.ndarray
+    whole: np.ndarray
+    freedom: float
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Covariance (3, 3), mm^2, of one reading of a campaign, right up to one factor.
+
+    The factor has ``freedom`` degrees. ``by_axis``: probability that axes differ so by chance; they
+    are taken as equal where ``is_even``. ``rounded`` (3,): whether an axis is that of rounding.
+    """
+
+    covariance_mm2: np.ndarray
+    freedom: float
+    by_axis: float
+    is_even: bool
+    rounded: np.ndarray
+
+    @property
+    def std_mm(self) -> np.ndarray:
+        """Standard deviation per axis (3,)."""
+        return np.sqrt(np.diag(self.covariance_mm2))
+
+
+@dataclass(frozen=True)
+class Group:
+    """Visits of one pose from one side: how many, of how many readings; per axis ``std_mm`` (3,).
+
+    ``mean_distance_mm`` of the visits from their middle, and ISO 9283's pose repeatability
+    ``rp_mm``: that mean and three standard deviations of the distances. NaN for a single visit, RP
+    also for two, which are equally far from their middle.
+    """
+
+    pose: int
+    side: int
+    visits: int
+    readings: int
+    std_mm: np.ndarray
+    mean_distance_mm: float
+    rp_mm: float
+
+
+def visits_of(read: Repeated) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean (v, 3) of every visit, its number of readings (v,) and its side (v,)."""
+    mean, count = _means(read.position_mm, read.visit)
+    return mean, count, _of_group(read.visit, read.side)
+
+
+def parts(read: Repeated) -> Parts:
+    """Variances of instrument, visits and sides, and that of a reading from any side."""
+    within = _within(read.position_mm, read.visit)
+    visit_mm, readings, side_of = visits_of(read)
+    between = _within(visit_mm, side_of)
+    side_mm, visits = _means(visit_mm, side_of)
+    pose_of = _of_group(read.side, read.pose)
+    across = _within(side_mm, pose_of)
+    # What part of the variance of a level below is in the mean square of each level.
+    per_visit = 1.0 / readings
+    of_visit = _average(per_visit, side_of, between.freedom)
+    of_side = _average(1.0 / visits, pose_of, across.freedom)
+    deeper = _means(per_visit[:, None], side_of)[0][:, 0] / visits
+    of_side_below = _average(deeper, pose_of, across.freedom)
+    unknown = np.full((3, 3), np.nan)
+    seen, returned = within.freedom > 0, between.freedom > 0
+    instrument = within.mean_square_mm2
+    arm = _no_less_than_zero(between.mean_square_mm2 - of_visit * instrument)
+    sides = _no_less_than_zero(
+        across.mean_square_mm2 - of_side * arm - of_side_below * instrument
+    ) * (across.freedom > 0)
+    if not returned:
+        return Parts(instrument if seen else unknown, unknown, unknown, unknown, 0.0)
+    shares = (
+        (1.0 - of_visit + of_side * of_visit - of_side_below, within),
+        (1.0 - of_side, between),
+        (1.0, across),
+    )
+    terms = [(c * np.trace(x.mean_square_mm2), x.freedom) for c, x in shares if x.freedom]
+    spread = sum(term**2 / freedom for term, freedom in terms)
+    freedom = sum(term for term, _ in terms) ** 2 / spread if spread > 0.0 else between.freedom
+    return Parts(
+        instrument if seen else unknown,
+        arm,
+        sides if across.freedom else unknown,
+        (instrument if seen else 0.0) + arm + (sides if across.freedom else 0.0),
+        float(freedom),
+    )
+
+
+def noise_of(found: Parts, resolution_mm: np.ndarray) -> Noise | None:
+    """The noise of a reading, no less than the rounding of ``resolution_mm`` (3,).
+
+    None where it is not told. Equal along the axes, with three times their degrees of freedom,
+    unless they are shown to differ: then a covariance, every direction with the degrees of one.
+    """
+    if not found.freedom:
+        return None
+    by_axis = differ_by_axis(found.whole, found.freedom)
+    is_even = not by_axis < EQUAL
+    whole = np.eye(3) * np.trace(found.whole) / 3.0 if is_even else found.whole
+    least = resolution_mm**2 / 12.0
+    least = np.full(3, least.max()) if is_even else least
+    lacking = np.maximum(least - np.diag(whole), 0.0)
+    freedom = (3.0 if is_even else 1.0) * found.freedom
+    return Noise(whole + np.diag(lacking), freedom, by_axis, is_even, lacking > 0.0)
+
+
+def differ_by_axis(covariance_mm2: np.ndarray, freedom: float) -> float:
+    """Probability of a covariance (3, 3) so unlike an equal one, where it is equal (Mauchly).
+
+    NaN for fewer than five degrees of freedom, or a covariance of less than three directions.
+    """
+    from scipy.special import chdtrc
+
+    sizes = np.linalg.eigvalsh(covariance_mm2)
+    if freedom < _FEWEST or sizes[0] <= 1e-12 * sizes[-1]:
+        return math.nan
+    shape = float(np.sum(np.log(sizes)) - 3.0 * np.log(np.mean(sizes)))
+    return float(chdtrc(5, -(freedom - 23.0 / 18.0) * shape))
+
+
+def differ_by_pose(read: Repeated, resolution_mm: np.ndarray) -> tuple[float, np.ndarray]:
+    """Probability that poses scatter so differently by chance (Bartlett), and their scatter (p,).
+
+    Of the visits of every pose from one side, over that of all poses; NaN where a pose tells
+    nothing. Where there is none, of the readings of one visit. Less than the rounding of
+    ``resolution_mm`` (3,) counts as that.
+    """
+    from scipy.special import chdtrc
+
+    values, _, group = visits_of(read)
+    pose_of = _of_group(read.side, read.pose)
+    if not _within(values, group).freedom:
+        values, group, pose_of = read.position_mm, read.visit, _of_group(read.visit, read.pose)
+    pooled = _within(values, group)
+    if not pooled.freedom:
+        return math.nan, np.full(read.pose.max() + 1, np.nan)
+    floor = np.diag(resolution_mm**2 / 12.0) + 1e-24 * np.eye(3)
+    root = np.linalg.cholesky(pooled.mean_square_mm2 + floor)
+    mean, count = _means(values, group)
+    white = np.linalg.solve(root, (values - mean[group]).T).T
+    square = np.bincount(pose_of[group], np.sum(white**2, axis=1))
+    freedom = 3.0 * np.bincount(pose_of, count - 1)
+    least = np.sum(np.linalg.solve(root, np.diag(resolution_mm / math.sqrt(12.0))) ** 2) / 3.0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        own = np.maximum(square / freedom, max(least, 1e-12))
+    own[freedom == 0] = np.nan
+    told = freedom > 0
+    if told.sum() < 2:
+        return math.nan, np.sqrt(own)
+    nu, s2 = freedom[told], own[told]
+    middle = np.sum(nu * s2) / nu.sum()
+    statistic = nu.sum() * math.log(middle) - float(np.sum(nu * np.log(s2)))
+    correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (len(nu) - 1))
+    return float(chdtrc(len(nu) - 1, statistic / correction)), np.sqrt(own / middle)
+
+
+def groups(read: Repeated) -> list[Group]:
+    """Every pose from every side, with ISO 9283's repeatability of its visits."""
+    visit_mm, readings, side_of = visits_of(read)
+    found = []
+    for side, pose in enumerate(_of_group(read.side, read.pose)):
+        own = visit_mm[side_of == side]
+        count = len(own)
+        centred = own - own.mean(axis=0)
+        length = np.linalg.norm(centred, axis=1)
+        many = count > 1
+        std = np.sqrt(np.sum(centred**2, axis=0) / (count - 1)) if many else np.full(3, np.nan)
+        middle = float(length.mean()) if many else math.nan
+        spread = float(np.std(length, ddof=1)) if count >= _FEWEST_VISITS else math.nan
+        seen = int(readings[side_of == side].sum())
+        found.append(Group(int(pose), side, count, seen, std, middle, middle + 3.0 * spread))
+    return found
+
+
+def pooled_rp(read: Repeated) -> tuple[float, float]:
+    """Mean distance of all visits from the middle of their pose and side, and RP over all of them.
+
+    The standard deviation is pooled. NaN without a pose that was visited thrice from one side.
+    """
+    visit_mm, _, side_of = visits_of(read)
+    mean, count = _means(visit_mm, side_of)
+    many = count[side_of] >= _FEWEST_VISITS
+    length, own = np.linalg.norm(visit_mm - mean[side_of], axis=1)[many], side_of[many]
+    if not len(own):
+        return math.nan, math.nan
+    own = np.unique(own, return_inverse=True)[1].ravel()
+    spread = _within(length[:, None], own)
+    return float(length.mean()), float(length.mean() + 3.0 * spread.std_mm[0])
+
+
+def between_sides_mm(read: Repeated) -> float:
+    """ISO 9283's vAP: largest distance of a pose's middle from one side to that from another."""
+    visit_mm, _, side_of = visits_of(read)
+    side_mm, pose_of = _means(visit_mm, side_of)[0], _of_group(read.side, read.pose)
+    apart = [
+        np.linalg.norm(side_mm[one] - side_mm[other])
+        for one in range(len(side_mm))
+        for other in range(one)
+        if pose_of[one] == pose_of[other]
+    ]
+    return float(max(apart, default=math.nan))
+
+
+def far_off(read: Repeated) -> np.ndarray:
+    """Readings, by index, that lie much farther from the others of their pose than most do.
+
+    More than six times the median distance from the median position of the pose from that side.
+    """
+    length = np.full(len(read.side), np.nan)
+    for side in range(read.side.max() + 1):
+        own = np.flatnonzero(read.side == side)
+        if len(own) > 2:
+            middle = np.median(read.position_mm[own], axis=0)
+            length[own] = np.linalg.norm(read.position_mm[own] - middle, axis=1)
+    if np.isnan(length).all():
+        return np.zeros(0, dtype=int)
+    return np.flatnonzero(length > _FAR * max(float(np.nanmedian(length)), 1e-12))
+
+
+def limits(std_mm: np.ndarray, freedom: float) -> tuple[np.ndarray, np.ndarray]:
+    """95 % limits of standard deviations of ``freedom`` degrees each."""
+    from scipy.special import gammaincinv
+
+    low, high = (np.sqrt(freedom / (2.0 * gammaincinv(freedom / 2.0, p))) for p in (0.975, 0.025))
+    return std_mm * low, std_mm * high
+
+
+def _of_group(group: np.ndarray, larger: np.ndarray) -> np.ndarray:
+    """The pose or side (g,), of ``larger`` (n,), that every group (n,) of readings is of."""
+    found = np.zeros(group.max() + 1, dtype=int)
+    found[group] = larger
+    return found
+
+
+def _means(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (g, k) of values (n, k) in every group, and how many there are (g,)."""
+    count = np.bincount(group)
+    sums = [np.bincount(group, column) for column in values.T]
+    return np.stack(sums, axis=1) / count[:, None], count
+
+
+def _within(values: np.ndarray, group: np.ndarray) -> Scatter:
+    """Scatter of values (n, k) about the means of their groups."""
+    mean, count = _means(values, group)
+    centred, freedom = values - mean[group], int(np.sum(count - 1))
+    return Scatter(centred.T @ centred / max(freedom, 1), freedom)
+
+
+def _average(part: np.ndarray, group: np.ndarray, freedom: int) -> float:
+    """Mean of what each member (n,) of a group brings to the mean square of ``_within``."""
+    _, count = _means(part[:, None], group)
+    return float(np.sum(part * (1.0 - 1.0 / count[group])) / max(freedom, 1))
+
+
+def _no_less_than_zero(covariance: np.ndarray) -> np.ndarray:
+    """The nearest covariance (3, 3) of a difference of two, which need not be one."""
+    size, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return (axes * np.maximum(size, 0.0)) @ axes.T

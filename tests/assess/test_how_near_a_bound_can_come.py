@@ -1,0 +1,190 @@
+"""The limits shown beside a bound: held to slow sums, all designs and simulated campaigns."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy import integrate, optimize, special
+
+from kinacc.assess.attainable import (
+    attainable_excess_mm,
+    best_counts,
+    limits_of,
+    lower_distance_mm,
+    proven_excess_mm,
+    width_limits,
+)
+from kinacc.assess.limits import upper_limit_mm
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
+
+ERROR = 0.05
+Z = 1.6448536269514722
+
+FIELDS = {
+    "lone": np.r_[0.2 * np.ones(5), 1.0, 0.2 * np.ones(4)],
+    "two tied": np.r_[0.9, 0.3 * np.ones(8), 0.9],
+    "all tied": np.full(10, 0.5),
+    "spread": np.linspace(0.05, 0.8, 10),
+    "none is any": np.zeros(10),
+}
+
+
+def upper_limits(lengths: np.ndarray, spread: float) -> np.ndarray:
+    """Upper limits of lengths (k,) by the noncentral chi-squared of scipy, by interpolation."""
+    sizes = np.linspace(0.0, lengths.max() + 3.0 * spread, 1500)
+    shortest = spread * np.sqrt(special.chndtrix(ERROR, 3, (sizes / spread) ** 2))
+    return np.interp(lengths, shortest, sizes)
+
+
+def simulated(sizes: np.ndarray, noise: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Largest upper limits (20000,) of campaigns that read a fixed number of times."""
+    rng = np.random.default_rng(17)
+    largest = np.zeros(20_000)
+    for size, spread in zip(sizes, noise / np.sqrt(counts), strict=True):
+        means = spread * rng.standard_normal((len(largest), 3)) + [size, 0.0, 0.0]
+        limits = upper_limits(np.linalg.norm(means, axis=1), spread)
+        largest = np.maximum(largest, limits)
+    return largest
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_the_attainable_excess_is_what_campaigns_of_its_design_have(field):
+    sizes, noise = FIELDS[field], np.linspace(0.08, 0.2, 10)
+    for readings in (10, 25):
+        counts = best_counts(sizes, noise, readings, ERROR)
+        assert counts.min() >= 1
+        assert counts.sum() == readings
+        excess = np.maximum(simulated(sizes, noise, counts) - sizes.max(), 0.0)
+        near = 4.0 * excess.std() / math.sqrt(len(excess))
+        said = attainable_excess_mm(sizes, noise, readings, ERROR)
+        assert said == pytest.approx(excess.mean(), abs=near)
+
+
+def test_its_bound_misses_a_lone_point_as_often_as_is_allowed():
+    sizes, noise = np.array([1.0, 0.0]), np.full(2, 0.1)
+    largest = simulated(sizes, noise, best_counts(sizes, noise, 6, ERROR))
+    assert np.mean(largest < 1.0) == pytest.approx(ERROR, abs=4 * math.sqrt(0.0475 / 20_000))
+    assert upper_limits(np.array([0.7]), 0.1)[0] == pytest.approx(
+        upper_limit_mm(np.array([0.7, 0.0, 0.0]), 0.1, ERROR), abs=1e-5
+    )
+
+
+def excess_by_quad(sizes: np.ndarray, noise: np.ndarray, counts: tuple[int, ...]) -> float:
+    spread = noise / np.sqrt(counts)
+
+    def above(level: float) -> float:
+        shortest = special.chndtrix(ERROR, 3, (level / spread) ** 2)
+        return 1.0 - float(np.prod(special.chndtr(shortest, 3, (sizes / spread) ** 2)))
+
+    levels = np.linspace(sizes.max(), float((sizes + 6.0 * spread).max()), 401)
+    return float(integrate.simpson([above(level) for level in levels], x=levels))
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [np.array([1.0, 0.9, 0.2]), np.array([0.5, 0.5, 0.5]), np.array([1.0, 0.3, 0.3])],
+    ids=["near", "tied", "lone"],
+)
+def test_no_other_counts_do_much_better_than_the_best_counts(sizes):
+    noise, readings = np.array([0.2, 0.1, 0.3]), 9
+    every = (c for c in itertools.product(range(1, 8), repeat=3) if sum(c) == readings)
+    best_mm = min(excess_by_quad(sizes, noise, counts) for counts in every)
+    said = attainable_excess_mm(sizes, noise, readings, ERROR)
+    assert best_mm - 1e-4 <= said <= 1.02 * best_mm
+
+
+def proven_slowly(sizes: np.ndarray, noise: np.ndarray, readings: int) -> float:
+    def divergence(p: float) -> float:
+        return special.rel_entr(p, ERROR) + special.rel_entr(1.0 - p, 1.0 - ERROR)
+
+    def excess(level: float) -> float:
+        distance = (level - sizes) / noise
+        test = min(special.ndtr(math.sqrt(readings) * distance - Z))
+
+        def over(p: float) -> float:
+            needed = [max(2.0 * divergence(p) / d**2, 1.0 - ERROR) for d in distance]
+            return sum(needed) - readings
+
+        paid = 1.0 if over(1.0) <= 0.0 else optimize.brentq(over, ERROR, 1.0)
+        return 1.0 - min(test, paid)
+
+    top = sizes.max()
+    edges = top + np.r_[1e-9, np.geomspace(0.01, 20.0, 12)]
+    return sum(integrate.quad(excess, *ends, limit=200)[0] for ends in itertools.pairwise(edges))
+
+
+@pytest.mark.parametrize("field", ["lone", "all tied", "spread"])
+def test_the_proven_excess_is_the_integral_of_what_readings_can_pay_for(field):
+    sizes, noise = FIELDS[field], np.linspace(0.08, 0.2, 10)
+    for readings in (10, 30):
+        said = proven_excess_mm(sizes, noise, readings, ERROR)
+        assert said == pytest.approx(proven_slowly(sizes, noise, readings), rel=2e-3)
+
+
+def test_no_fixed_design_has_less_than_what_is_proven():
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        points = int(rng.integers(1, 40))
+        sizes, noise = rng.gamma(1.0, 0.3, points), rng.uniform(0.05, 0.3, points)
+        readings = points + int(rng.integers(0, 4 * points))
+        limits = width_limits(sizes, noise, readings, ERROR)
+        assert 0.0 < limits.proven_mm < limits.attainable_mm < math.inf
+
+
+def test_one_point_leaves_nothing_between_what_is_proven_and_attained():
+    size, noise = np.array([5.0]), 0.01
+    expected = noise / 3.0 * (Z * (1.0 - ERROR) + math.exp(-0.5 * Z * Z) / math.sqrt(2 * math.pi))
+    limits = width_limits(size, noise, 9, ERROR)
+    assert limits.attainable_mm == pytest.approx(expected, rel=1e-2)
+    # The divergence counts what rules of a changing number of readings could save; at most that.
+    assert 0.7 * expected < limits.proven_mm <= limits.attainable_mm
+    assert limits.lower_mm == pytest.approx(Z * noise / 3.0)
+
+
+def test_fewer_readings_than_points_leave_no_bound_at_all():
+    sizes = np.linspace(0.1, 1.0, 200)
+    limits = width_limits(sizes, 0.1, 150, ERROR)
+    assert limits == (math.inf, math.inf, math.inf)
+    with pytest.raises(ValueError, match="at least once"):
+        best_counts(sizes, 0.1, 150, ERROR)
+    # Who may miss 5 % of the points may leave some of them unread.
+    assert proven_excess_mm(sizes, 0.1, 195, ERROR) < math.inf
+
+
+def test_limits_are_told_of_statements_on_the_mean_error_of_all_their_points_alone():
+    sizes, noise = FIELDS["spread"], np.full(10, 0.1)
+    visited = [9, 2, 4]
+
+    def told(target, upper_mm=1.0, **more):
+        said = Statement(target, upper_mm=upper_mm, confidence=1.0 - ERROR, **more)
+        return limits_of(said, visited, sizes, noise, 15)
+
+    assert told(CANDIDATES) == pytest.approx(width_limits(sizes, 0.1, 15, ERROR))
+    assert told(MEASURED) == pytest.approx(width_limits(sizes[visited], 0.1, 15, ERROR))
+    for other in (
+        told(REGION, share=0.9),
+        told(CANDIDATES, upper_mm=math.nan),
+        told(CANDIDATES, excepted=2),
+        told(MEASURED, error_of="visit"),
+    ):
+        assert all(math.isnan(limit) for limit in other)
+
+
+def test_the_order_of_points_does_not_matter():
+    sizes, noise = np.linspace(0.1, 1.0, 12), np.linspace(0.3, 0.05, 12)
+    order = np.random.default_rng(1).permutation(12)
+    counts = best_counts(sizes, noise, 40, ERROR)
+    assert np.array_equal(best_counts(sizes[order], noise[order], 40, ERROR), counts[order])
+    mixed = width_limits(sizes[order], noise[order], 40, ERROR)
+    assert np.allclose(mixed, width_limits(sizes, noise, 40, ERROR), rtol=1e-12)
+    assert lower_distance_mm(sizes, noise, 40, ERROR) == pytest.approx(Z * 0.05 / math.sqrt(29))
+
+
+def test_more_readings_or_less_noise_leave_less():
+    sizes = FIELDS["spread"]
+    by_readings = np.array([width_limits(sizes, 0.1, n, ERROR) for n in (10, 15, 20, 40, 80)])
+    assert np.all(np.diff(by_readings, axis=0) < 0.0)
+    # A limit scales with noise and sizes together.
+    once, tenfold = (width_limits(k * sizes, k * 0.1, 25, ERROR) for k in (1.0, 10.0))
+    assert np.allclose(np.array(tenfold), 10.0 * np.array(once), rtol=2e-3)

@@ -1,0 +1,201 @@
+"""Reference poses that are read again by plan: what they find, how often, and what corrects it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kinacc.assess.change_shapes import shapes_of
+from kinacc.assess.reference_poses import (
+    FALSE_ALARMS,
+    Readings,
+    alarms,
+    correction,
+    found,
+    schedule,
+    schedule_faults,
+    stages,
+)
+
+SLANTED = np.array([[4.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.0]]) * 1e-2
+
+
+def read(plan, rng, change_mm=lambda time: 0.0, covariance=None, errors=5.0):
+    """Readings of the planned places: errors of poses, a change along a random direction, noise."""
+    place = np.array(sorted(plan.row_at))
+    row = np.array([plan.row_at[each] for each in place])
+    covariance = np.eye(3) if covariance is None else covariance
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    vectors = (rng.normal(size=(plan.poses, 3)) * errors)[row]
+    vectors = vectors + np.array([change_mm(time) for time in plan.time(place)])[..., None] * way
+    vectors += rng.multivariate_normal(np.zeros(3), covariance, len(place))
+    return Readings(place, row, vectors, np.tile(covariance, (len(place), 1, 1)))
+
+
+def test_twenty_revisits_stand_at_the_start_between_and_at_the_end():
+    plan = schedule(200, 150, 20)
+    places = sorted(plan.row_at)
+    assert places[:10] == list(range(10))
+    assert places[-5:] == list(range(195, 200))
+    between = np.diff([9, *places[10:20], 195])
+    assert between.max() - between.min() <= 1
+    assert [plan.row_at[each] for each in places] == [0, 1, 2, 3, 4] * 5
+
+
+@pytest.mark.parametrize("references", range(1, 45))
+def test_any_number_of_revisits_finds_its_places(references):
+    for measurements in (references + 10, 97, 400):
+        plan = schedule(measurements, 60, references)
+        assert len(plan.row_at) == references + plan.poses <= measurements
+        assert set(plan.row_at) <= set(range(measurements))
+        counts = np.bincount(list(plan.row_at.values()))
+        assert counts.max() - counts.min() <= 1
+    assert not schedule_faults(references + 10, references, True)
+
+
+def test_a_plan_names_what_is_read_whatever_is_read():
+    plan = schedule(40, 30, 8)
+    visit = plan.visit(12)
+    assert visit[:4] == (0, 1, 0, 1)
+    assert set(visit) == set(range(12))
+    assert [row for at, row in enumerate(visit) if at not in plan.row_at] == [*range(2, 12)]
+    assert schedule(40, 30, 0).visit(12) == tuple(range(12))
+
+
+def test_revisits_that_cannot_be_are_refused():
+    assert schedule_faults(200, 20, True) == schedule_faults(200, 0, False) == []
+    for wrong in ((200, -1, False), (20, 20, False), (200, 0, True), (200, 2.5, False)):
+        assert len(schedule_faults(*wrong)) == 1
+
+
+@pytest.mark.parametrize("covariance", [np.eye(3) * 0.04, SLANTED])
+def test_a_drift_is_what_least_squares_make_of_the_references(covariance):
+    plan, rng = schedule(300, 200, 20), np.random.default_rng(5)
+    readings = read(plan, rng, lambda time: 2.0 * time, covariance)
+    found_change = found(plan, readings)
+    # the oracle: one constant for each pose and a slope, by plain least squares
+    design = np.column_stack([readings.row[:, None] == np.arange(5), readings.place / 300])
+    slope = np.linalg.lstsq(design, readings.vector_mm, rcond=None)[0][5]
+    variance = np.linalg.inv(design.T @ design)[5, 5] * np.linalg.eigvalsh(covariance)[-1]
+    assert found_change.between is None
+    assert found_change.is_found
+    assert_allclose(found_change.change_mm, slope, rtol=1e-9)
+    assert_allclose(found_change.deviation_mm, math.sqrt(variance), rtol=1e-9)
+    corrected = correction(plan, readings)
+    assert_allclose(corrected.slope_mm, slope, rtol=1e-9)
+    assert_allclose(corrected.deviation_mm, math.sqrt(variance), rtol=1e-9)
+
+
+@pytest.mark.parametrize("freedom", [math.inf, 0.0, 60.0])
+def test_references_without_a_change_alarm_as_rarely_as_stated(freedom):
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(11)
+    place, row = np.array(sorted(plan.row_at)), np.array([*plan.row_at.values()])
+    reps, alarm = 40_000, np.zeros(40_000, dtype=bool)
+    vectors = rng.normal(size=(3 * reps, len(place)))
+    total = rng.chisquare(freedom, reps) if 0.0 < freedom < math.inf else np.zeros(reps)
+    for count, error in stages(plan):
+        # explained by each shape, by projections that share nothing with the package
+        poses = (row[:count, None] == np.arange(5)).astype(float)
+        left = np.eye(count) - poses @ np.linalg.pinv(poses)
+        gaps = [np.arange(count) >= gap for gap in range(5, count - 4)]
+        apart = np.column_stack([place[:count] / 200.0, *gaps]).T.astype(float) @ left
+        apart /= np.linalg.norm(apart, axis=1)[:, None]
+        square = ((vectors[:, :count] @ apart.T) ** 2).reshape(3, reps, -1).sum(axis=0)
+        degrees = freedom
+        if math.isfinite(freedom):
+            within = ((vectors[:, :count] @ left) ** 2).sum(axis=1).reshape(3, reps).sum(axis=0)
+            square /= (within + total)[:, None]
+            degrees += 3.0 * (count - 5)
+        shapes = shapes_of(tuple(place[:count] / 200.0), tuple(row[:count]), (1.0,) * count)
+        alarm |= (square > shapes.thresholds(error, degrees)).any(axis=1)
+    assert_allclose(sum(error for _, error in stages(plan)), FALSE_ALARMS)
+    spread = math.sqrt(FALSE_ALARMS / reps)
+    assert 0.6 * FALSE_ALARMS < alarm.mean() < FALSE_ALARMS + 3.0 * spread
+
+
+@pytest.mark.parametrize("freedom", [math.inf, 0.0])
+@pytest.mark.parametrize(
+    "change", [lambda time: 3.0 * time, lambda time: 3.0 * (time >= 0.5)], ids=["drift", "step"]
+)
+def test_a_drift_or_step_of_three_deviations_is_said(change, freedom):
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(3)
+    said = [found(plan, read(plan, rng, change), freedom).is_found for _ in range(300)]
+    assert np.mean(said) >= 0.95
+
+
+def test_a_moved_tripod_is_said_as_a_step_between_two_readings():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(8)
+    change = found(plan, read(plan, rng, lambda time: 8.0 * (time >= 0.6)))
+    (why,) = alarms(change, is_corrected=True)
+    assert why.code == "step"
+    assert why.numbers["after"] <= 120 < why.numbers["before"]
+    assert abs(why.numbers["size"] - 8.0) < 3.0 * why.numbers["deviation"]
+
+
+def test_a_drift_withholds_bounds_unless_it_is_corrected_for():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(9)
+    change = found(plan, read(plan, rng, lambda time: 6.0 * time))
+    assert [each.code for each in alarms(change, is_corrected=False)] == ["drift"]
+    assert alarms(change, is_corrected=True) == alarms(None, is_corrected=False) == ()
+
+
+def test_the_drift_that_may_go_unseen_is_found_half_of_the_time():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(2)
+    size = found(plan, read(plan, rng)).unseen_mm
+    said = [found(plan, read(plan, rng, lambda time: size * time)).is_found for _ in range(400)]
+    assert 0.45 < np.mean(said) < 0.6
+
+
+def test_noise_larger_than_stated_is_seldom_taken_for_a_change():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(13)
+    said = []
+    for _ in range(300):
+        readings = read(plan, rng, covariance=2.25 * np.eye(3))
+        stated = replace(readings, covariance_mm2=readings.covariance_mm2 / 2.25)
+        said.append(found(plan, stated).is_found)
+    assert np.mean(said) < 0.06  # of a quarter, by the noise stated alone
+
+
+def test_a_single_reading_that_went_wrong_is_seldom_taken_for_a_change():
+    plan, rng, said = schedule(200, 180, 20), np.random.default_rng(12), []
+    for each in [*range(25)] * 4:
+        readings = read(plan, rng)
+        readings.vector_mm[each, each % 3] += 12.0
+        said.append(found(plan, readings).is_found)
+    assert np.mean(said) < 0.15  # of most, by the noise stated alone
+
+
+def test_an_early_drift_is_said_before_the_campaign_is_over():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(1)
+    whole = read(plan, rng, lambda time: 20.0 * time)
+    assert found(plan, whole.head(14)) is None
+    assert found(plan, whole.head(15)).is_found
+    assert correction(plan, whole.head(24)) is None
+
+
+def test_a_correction_misses_the_drift_as_rarely_as_stated():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(4)
+    widest = np.linalg.eigh(SLANTED)[1][:, -1]
+    along, anywhere = 0, 0
+    for _ in range(1500):
+        readings = read(plan, rng, covariance=SLANTED)
+        slope = correction(plan, readings)
+        along += slope.slope_mm @ widest > slope.along_mm(0.1)
+        anywhere += np.linalg.norm(slope.slope_mm) > slope.anywhere_mm(0.1)
+    assert abs(along / 1500 - 0.1) < 0.025  # the widest direction has the error stated
+    assert anywhere / 1500 <= 0.1  # others less
+
+
+def test_a_noisier_instrument_on_some_visits_costs_no_false_alarms():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(6)
+    place = np.array(sorted(plan.row_at))
+    row = np.array([plan.row_at[each] for each in place])
+    covariance = np.array([SLANTED if k % 3 else np.diag([0.3, 0.1, 0.9]) for k in range(len(row))])
+    said = 0
+    for _ in range(300):
+        noise = [rng.multivariate_normal(np.zeros(3), each) for each in covariance]
+        said += found(plan, Readings(place, row, np.array(noise), covariance)).is_found
+    assert said <= 6  # 1.5 are expected at most

@@ -1,0 +1,170 @@
+"""A laser tracker's noise, by range and angles, at each candidate's distance from its head."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from campaign_on_disk import Arm
+from command_line import call
+
+from kinacc.campaign import folder as campaigns
+from kinacc.campaign.plan import from_json, to_json
+from kinacc.campaign.reading import covariance_mm2
+
+LASER = "laser:range_mm=0.01,range_um_per_m=5,angle_mm=0.02,angle_um_per_m=15,repeat_mm=0.03"
+
+
+def of_spherical_readings(seen_mm):
+    """Covariance of x, y, z of a reading of range, azimuth and elevation, by their differences."""
+
+    def cartesian(at):
+        distance, azimuth, elevation = at
+        flat = distance * np.cos(elevation)
+        return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth),
+                         distance * np.sin(elevation)])  # fmt: skip
+
+    x, y, z = seen_mm
+    distance = np.sqrt(x * x + y * y + z * z)
+    at = np.array([distance, np.arctan2(y, x), np.arcsin(z / distance)])
+    across = 0.02 + 15e-6 * distance
+    std = np.array([0.01 + 5e-6 * distance, across / np.hypot(x, y), across / distance])
+    step = 1e-4 * np.array([distance, 1.0, 1.0])
+    slope = np.stack(
+        [(cartesian(at + h) - cartesian(at - h)) / (2 * h.sum()) for h in np.diag(step)], axis=1
+    )
+    return slope @ np.diag(std**2) @ slope.T + 0.03**2 * np.eye(3)
+
+
+def test_a_laser_tracker_is_as_sure_of_each_candidate_as_its_range_and_angles_there(begun):
+    folder = begun("--instrument", f"tracker={LASER}")
+    plan = campaigns.open_(folder).plan
+    turn, head = plan.to_base.rotation, plan.to_base.position_mm
+    wanted = [
+        turn @ of_spherical_readings(turn.T @ (at - head)) @ turn.T
+        for at in plan.points.modelled_mm
+    ]
+    np.testing.assert_allclose(plan.covariance_mm2, wanted, rtol=1e-5, atol=1e-9)
+    sizes = np.trace(plan.covariance_mm2, axis1=1, axis2=2)
+    assert sizes.max() > 1.05 * sizes.min()
+    order = plan.visiting(frozenset())
+    told = plan.candidates(order).covariance_mm2
+    np.testing.assert_array_equal(told, plan.covariance_mm2[order])
+
+
+def read_in_its_frame(folder, points, file):
+    """Take readings of so many points of the visit, as the tracker sees them; the campaign then."""
+    arm = Arm(folder)
+    turn, head = arm.plan.to_base.rotation, arm.plan.to_base.position_mm
+    lines = ["pose,x_mm,y_mm,z_mm,instrument"]
+    for point in campaigns.open_(folder).state().ahead()[:points]:
+        label = arm.plan.points.label[point]
+        seen = np.array([float(each) for each in arm.position(label).split(",")])
+        lines.append(f"{label},{','.join(map(repr, (turn.T @ (seen - head)).tolist()))},tracker")
+    file.write_text("\n".join(lines) + "\n")
+    done = call("campaign", "record", folder, file, "--accept-implausible")
+    assert done.exit_code == 0, done.output
+    return campaigns.open_(folder)
+
+
+def test_readings_of_a_laser_tracker_count_by_where_they_were_taken(begun, tmp_path):
+    folder = begun("--instrument", f"tracker={LASER}", "--instrument", "camera=0.2")
+    opened = read_in_its_frame(folder, 20, tmp_path / "readings.csv")
+    state = opened.state()
+    assert state.asked is None
+    assert len(state.told) == 20
+    for each in state.told:
+        own = covariance_mm2(opened.plan, each.reading)
+        np.testing.assert_array_equal(own, opened.plan.covariance_mm2[each.reading.point])
+    written = call("campaign", "report", folder, "--table", "csv")
+    assert written.exit_code == 0, written.output
+    head, *rows = (folder / "report" / "campaign_points.csv").read_text().splitlines()
+    cells = [dict(zip(head.split(","), row.split(","), strict=True)) for row in rows]
+    rms = np.sqrt(np.trace(opened.plan.covariance_mm2, axis1=1, axis2=2) / 3.0)
+    wanted = [rms[opened.plan.points.number(row["point"])] for row in cells]
+    np.testing.assert_allclose([float(row["noise_mm"]) for row in cells], wanted, rtol=1e-9)
+
+
+def test_a_forecast_of_a_campaign_simulates_each_reading_with_the_noise_there(begun, tmp_path):
+    folder = begun("--instrument", f"tracker={LASER}", budget=30)
+    read_in_its_frame(folder, 12, tmp_path / "readings.csv")
+    done = call("campaign", "status", folder, "--width-mm", 3, "--json", "--simulations", 2)
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["forecast"]["simulations"] == 2
+
+
+def test_a_plan_with_a_laser_tracker_is_read_as_it_was_written(begun):
+    plan = campaigns.open_(begun("--instrument", f"tracker={LASER}", "--resolution-mm", 0.01)).plan
+    again = from_json(to_json(plan), "here")
+    assert again.instruments[0].laser == plan.instruments[0].laser
+    assert again.instruments[0].resolution_mm == 0.01
+    np.testing.assert_array_equal(again.covariance_mm2, plan.covariance_mm2)
+
+
+def test_the_start_says_where_a_laser_tracker_is_taken_to_stand(calibration, tmp_path):
+    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration, "--robot",
+                "mh180", "--model", "dh", "--instrument", f"tracker={LASER}")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    plan = campaigns.open_(tmp_path / "check").plan
+    apart = np.linalg.norm(plan.points.modelled_mm - plan.to_base.position_mm, axis=1) * 1e-3
+    said = f"tracker: {apart.min():.2f} m to {apart.max():.2f} m from the candidates"
+    assert said in done.output
+    most = np.sqrt(np.linalg.eigvalsh(plan.covariance_mm2).max())
+    assert f"tracker ({most:.3g} mm per axis at the farthest candidate, less nearer" in done.output
+
+
+def test_a_tracker_without_its_distance_from_the_arm_is_asked_about(
+    calibration, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("kinacc.campaign.slips._NEAREST_M", 30.0)
+    words = ["campaign", "start", tmp_path / "check", "--calibration", calibration, "--robot",
+             "mh180", "--model", "dh", "--instrument", f"tracker={LASER}"]  # fmt: skip
+    done = call(*words)
+    assert done.exit_code == 2
+    assert "its head has to be the origin of the frame of its readings" in done.output
+    assert not (tmp_path / "check").exists()
+    assert call(*words, "--sure").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("laser:0.01,0.02", "range_mm"),
+        ("laser:range_mm=-1,angle_mm=0.1,repeat_mm=0", "range_mm=NUMBER"),
+        ("laser:angle_mm=0.1,repeat_mm=0", "neither range_mm nor range_um_per_m is above 0"),
+        ("laser:range_mm=0.1,repeat_mm=0", "neither angle_mm nor angle_um_per_m is above 0"),
+        ("laser:range_mm=0.1,angle_mm=0.1", "repeat_mm is not given"),
+        ("laser:range_mm=0.1,range_mm=0.2,angle_mm=0.1,repeat_mm=0", "is given twice"),
+        ("laser:range_mm=zehn,angle_mm=0.1,repeat_mm=0", "range_mm=NUMBER"),
+    ],
+)
+def test_a_laser_tracker_stated_wrongly_is_refused_with_what_is_meant(
+    calibration, tmp_path, text, said
+):
+    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration,
+                "--instrument", f"tracker={text}", "--instrument", "camera=0")  # fmt: skip
+    assert done.exit_code == 2, done.output
+    assert said in done.output
+    assert "noise of camera" in done.output, "all problems at once"
+    assert not (tmp_path / "check").exists()
+
+
+def test_a_laser_tracker_is_no_instrument_of_the_robots_own_base(calibration, tmp_path):
+    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration,
+                "--instrument", f"tracker={LASER}", "--frame", "base")  # fmt: skip
+    assert done.exit_code == 2
+    assert "hangs on where it stands; allowed: --frame instrument" in done.output
+
+
+def test_a_noise_below_the_rounding_of_the_readings_is_taken_as_the_rounding(begun):
+    plan = campaigns.open_(begun("--noise-mm", "0.001,0.001,0.2", "--resolution-mm", 0.1)).plan
+    std = np.sqrt(np.diag(plan.instruments[0].covariance_mm2))
+    np.testing.assert_allclose(std, [0.1 / np.sqrt(12), 0.1 / np.sqrt(12), 0.2])
+
+
+def test_a_resolution_that_is_no_length_is_refused(calibration, tmp_path):
+    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration,
+                "--noise-mm", 0.1, "--resolution-mm", -1)  # fmt: skip
+    assert done.exit_code == 2
+    assert "--resolution-mm: -1" in done.output

@@ -1,0 +1,68 @@
+"""A campaign on disk whose reference poses are read again by plan."""
+
+import numpy as np
+
+from kinacc.assess.statement import CANDIDATES
+from kinacc.campaign import folder, words
+from kinacc.campaign.plan import from_json, to_json
+from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import restore
+
+PLANNED = {"points": 30, "budget": 70, "references": 20}
+
+
+def entries_of(plan, world, drift_mm=(0.0, 0.0, 0.0)):
+    """The journal of a whole campaign whose frame drifts by so much."""
+    rows = plan.visiting(frozenset())
+    campaign, reads, entries = plan.assessor.begin(plan.candidates(rows)), {}, []
+    while (row := campaign.next()) is not None:
+        part = len(entries) / plan.assessor.measurements
+        error = world.reading_mm(row, reads.get(row, 0)) + part * np.array(drift_mm)
+        reads[row] = reads.get(row, 0) + 1
+        campaign.record(row, error)
+        point = int(rows[row])
+        position = plan.points.modelled_mm[point] + error
+        reading = Reading(point, position, plan.instruments[0].name)
+        entries.append(folder.readings_entry([reading]))
+    return entries
+
+
+def test_the_route_begins_with_the_first_of_the_random_order(make_plan):
+    plan = make_plan(**PLANNED)
+    assert set(plan.route[:5]) == set(plan.order[:5])
+    assert sorted(plan.route) == sorted(plan.order[: len(plan.route)])
+    assert plan.by_travel
+
+
+def test_all_that_is_certain_lists_planned_revisits_in_their_places(make_plan, make_world):
+    plan = make_plan(**PLANNED)
+    entries = entries_of(plan, make_world(plan))
+    ahead = restore(plan, []).ahead()
+    assert ahead[:10] == [*plan.route[:5], *plan.route[:5]]
+    assert set(ahead) == set(plan.route)
+    read = [entry["readings"][0]["point"] for entry in entries]
+    assert read[: len(ahead)] == ahead
+    for done in (3, 7, 25):
+        assert restore(plan, entries[:done]).ahead() == ahead[done:]
+
+
+def test_a_drift_is_said_where_the_campaign_stands(make_plan, make_world):
+    plan = make_plan(**PLANNED)
+    entries = entries_of(plan, make_world(plan))
+    (quiet,) = words.of_frame(restore(plan, entries))
+    assert quiet.startswith("the reference poses show no drift and no step; a drift of 0.")
+    state = restore(plan, entries_of(plan, make_world(plan), (0.5, 0.0, 0.0)))
+    assert "drift of 0." in " ".join(words.standing(state))
+    said = next(each for each in state.statements() if each.target == CANDIDATES)
+    assert words.statement(said, state).startswith("No upper bound for the largest error of all")
+    assert "the reference poses show a drift of 0." in words.statement(said, state)
+
+
+def test_a_drift_that_is_corrected_for_is_said_beside_the_bounds(make_plan, make_world):
+    plan = make_plan(**PLANNED, correct_drift=True)
+    entries = entries_of(plan, make_world(plan), (0.0, 0.6, 0.0))
+    state = restore(from_json(to_json(plan), "here"), entries)
+    (text,) = words.of_frame(state)
+    assert text.endswith("which is taken from all readings")
+    said = next(each for each in state.statements() if each.target == CANDIDATES)
+    assert said.lower_mm < np.linalg.norm((0.9, -0.6, 0.5)) < said.upper_mm

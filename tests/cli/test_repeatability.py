@@ -1,0 +1,315 @@
+"""Repeated readings: what `kinacc repeatability` says of instrument, arm and a campaign's noise."""
+
+from __future__ import annotations
+
+import datetime
+import json
+
+import numpy as np
+import pytest
+import scipy.stats
+from command_line import call
+
+FIVE = np.array(
+    [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, -0.4, 0.0), (0.0, 0.0, 0.1), (-0.1, 0.2, 0.2)]
+)
+
+
+def written(path, header, rows):
+    """A CSV of rows whose last three cells are a position in mm."""
+    lines = [",".join([*map(str, row[:-1]), *(f"{each:.9f}" for each in row[-1])]) for row in rows]
+    path.write_text("\n".join([header, *lines]) + "\n")
+    return path
+
+
+def said_of(file, *more):
+    done = call("repeatability", file, *more, "--json")
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+def simulated(seed, poses, sides, visits, readings, std_mm):
+    """Rows of a nested experiment with standard deviations of instrument, visits and sides."""
+    rng = np.random.default_rng(seed)
+    instrument, arm, side_of = std_mm
+    rows = []
+    for pose in range(poses):
+        middle = rng.uniform(-900, 900, 3)
+        for side in range(sides):
+            shift = rng.normal(size=3) * side_of
+            for visit in range(visits):
+                off = rng.normal(size=3) * arm
+                for _ in range(readings):
+                    at = middle + shift + off + rng.normal(size=3) * instrument
+                    rows.append((f"P{pose}", "+-"[side], f"{side}.{visit}", at))
+    return rows
+
+
+def position(rows, poses, sides, visits, readings):
+    return np.array([row[-1] for row in rows]).reshape(poses, sides, visits, readings, 3)
+
+
+def test_pose_repeatability_is_that_of_iso_9283_worked_by_hand(tmp_path):
+    rows = [("A", number, each) for number, each in enumerate(FIVE + 100.0 * np.arange(1, 4))]
+    rows += [("B", number, 2.0 * shift) for number, shift in enumerate(FIVE)]
+    said = said_of(written(tmp_path / "five.csv", "pose,visit,x_mm,y_mm,z_mm", rows))
+    middle = np.array([0.04, -0.04, 0.06])
+    distance = [np.linalg.norm(each - middle) for each in FIVE]
+    mean = sum(distance) / 5.0
+    spread = (sum((each - mean) ** 2 for each in distance) / 4.0) ** 0.5
+    first, second = said["rows"]
+    assert first["rp_mm"] == pytest.approx(mean + 3.0 * spread, rel=1e-9)
+    assert second["rp_mm"] == pytest.approx(2.0 * (mean + 3.0 * spread), rel=1e-9)
+    pooled = (4.0 * (1.0 + 4.0) * spread**2 / 8.0) ** 0.5
+    assert said["mean_distance_mm"] == pytest.approx(1.5 * mean, rel=1e-9)
+    assert said["rp_mm"] == pytest.approx(1.5 * mean + 3.0 * pooled, rel=1e-9)
+    np.testing.assert_allclose(first["std_x_mm"], np.std(FIVE[:, 0], ddof=1), rtol=1e-9)
+
+
+def test_two_visits_have_no_pose_repeatability_as_both_are_as_far_from_their_middle(tmp_path):
+    rows = [(pose, number, at) for pose in "AB" for number, at in enumerate(FIVE[1:3])]
+    said = said_of(written(tmp_path / "two.csv", "pose,visit,x_mm,y_mm,z_mm", rows))
+    assert said["rp_mm"] is None
+    assert said["rows"][0]["distance_mm"] == pytest.approx(0.25)
+
+
+def test_instrument_visits_and_sides_are_told_apart_as_by_the_analysis_of_variance(tmp_path):
+    shape = 12, 2, 3, 2
+    rows = simulated(4, *shape, (0.02, 0.05, 0.04))
+    said = said_of(written(tmp_path / "all.csv", "pose,side,visit,x_mm,y_mm,z_mm", rows))
+    at = position(rows, *shape)
+    within = at.var(axis=3, ddof=1).mean(axis=(0, 1, 2))
+    between = at.mean(axis=3).var(axis=2, ddof=1).mean(axis=(0, 1))
+    across = at.mean(axis=(2, 3)).var(axis=1, ddof=1).mean(axis=0)
+    visits = between - within / 2.0
+    sides = across - visits / 3.0 - within / 6.0
+    np.testing.assert_allclose(said["instrument_std_mm"], np.sqrt(within), rtol=1e-6)
+    # The arm's own parts are covariances: a difference of two is one only nearly.
+    np.testing.assert_allclose(said["one_side_std_mm"], np.sqrt(visits), rtol=1e-6)
+    np.testing.assert_allclose(said["all_sides_std_mm"], np.sqrt(visits + sides), rtol=1e-6)
+    whole = np.mean(within + visits + sides)
+    np.testing.assert_allclose(said["noise"]["std_mm"], np.sqrt(whole), rtol=1e-6)
+    terms = np.mean(within) / 2.0, np.mean(between) * 2.0 / 3.0, np.mean(across)
+    assert sum(terms) == pytest.approx(whole)
+    welch = whole**2 / sum(t**2 / nu for t, nu in zip(terms, (72, 48, 12), strict=True))
+    assert said["noise"]["freedom"] == pytest.approx(3.0 * welch, rel=1e-9)
+    low = np.sqrt(whole * 3.0 * welch / scipy.stats.chi2.ppf(0.975, 3.0 * welch))
+    assert said["noise"]["std_low_mm"][0] == pytest.approx(low, rel=1e-9)
+
+
+def test_a_campaign_of_readings_like_these_has_the_noise_told_of_them(tmp_path):
+    """Over many files, unbalanced as people measure: unbiased, with limits that hold in 95 %."""
+    from kinacc.checks.repeatability import Repeated, limits, noise_of, parts
+
+    rng = np.random.default_rng(2)
+    truth, held, sizes = 0.02**2 + 0.05**2 + 0.03**2, 0, []
+    side = np.repeat(np.arange(30), 4)
+    visit = np.cumsum(np.r_[1, rng.random(119) < 0.7] | np.r_[1, np.diff(side)]) - 1
+    for _ in range(400):
+        shift = rng.normal(size=(30, 3)) * 0.03
+        off = rng.normal(size=(visit[-1] + 1, 3)) * 0.05
+        at = shift[side] + off[visit] + rng.normal(size=(120, 3)) * 0.02
+        found = noise_of(parts(Repeated(at, side // 2, side, visit)), np.zeros(3))
+        size = np.trace(found.covariance_mm2) / 3.0
+        sizes.append(size)
+        low, high = limits(np.sqrt([size]), found.freedom)
+        held += bool(low[0] ** 2 <= truth <= high[0] ** 2)
+    assert np.mean(sizes) == pytest.approx(truth, rel=0.03)
+    assert 0.92 * 400 <= held <= 0.98 * 400
+
+
+def test_poses_that_scatter_alike_and_differently_are_told_as_by_bartlett(tmp_path):
+    rng = np.random.default_rng(5)
+    scatter = [0.05, 0.05, 0.05, 0.05, 0.2]
+    rows = [
+        (f"P{pose}", visit, std * rng.normal(size=3))
+        for pose, std in enumerate(scatter)
+        for visit in range(12)
+    ]
+    file = written(tmp_path / "poses.csv", "pose,visit,x_mm,y_mm,z_mm", rows)
+    said = said_of(file)
+    assert said["poses_equal_probability"] < 1e-6
+    assert any("pose P4" in each and "--noise-mm" in each for each in said["remarks"])
+    alike = [(pose, visit, at if pose != "P4" else at / 4.0) for pose, visit, at in rows]
+    said = said_of(written(tmp_path / "alike.csv", "pose,visit,x_mm,y_mm,z_mm", alike))
+    at = np.array([row[-1] for row in alike]).reshape(5, 12, 3)
+    centred = at - at.mean(axis=1, keepdims=True)
+    root = np.linalg.cholesky(np.einsum("pvi,pvj->ij", centred, centred) / 55.0)
+    white = np.linalg.solve(root, centred.reshape(-1, 3).T).T.reshape(5, 12, 3)
+    own = np.sum(white**2, axis=(1, 2)) / 33.0
+    # Bartlett's statistic is that of five samples of 34 numbers with these variances.
+    samples = []
+    for each in own:
+        numbers = rng.normal(size=34)
+        samples.append((numbers - numbers.mean()) / numbers.std(ddof=1) * np.sqrt(each))
+    wanted = scipy.stats.bartlett(*samples).pvalue
+    assert said["poses_equal_probability"] == pytest.approx(wanted, rel=1e-6)
+    assert not any("poses scatter differently" in each for each in said["remarks"])
+
+
+def test_axes_that_differ_are_said_and_make_a_covariance(tmp_path):
+    rng = np.random.default_rng(6)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    rows = [
+        (f"P{pose}", visit, turn @ (rng.normal(size=3) * (0.01, 0.01, 0.1)))
+        for pose in range(20)
+        for visit in range(3)
+    ]
+    said = said_of(written(tmp_path / "axes.csv", "pose,visit,x_mm,y_mm,z_mm", rows))
+    assert not said["noise"]["equal_axes"]
+    assert any("axes may differ" in each for each in said["remarks"])
+    at = np.array([row[-1] for row in rows]).reshape(20, 3, 3)
+    pooled = sum(np.cov(each.T, ddof=1) for each in at) / 20.0
+    np.testing.assert_allclose(said["noise"]["covariance_mm2"], pooled, rtol=1e-6)
+    assert said["noise"]["freedom"] == pytest.approx(40.0)
+
+
+def test_axes_that_are_equal_are_said_to_differ_no_more_often_than_by_chance():
+    from kinacc.checks.repeatability import differ_by_axis
+
+    rng = np.random.default_rng(7)
+    at = rng.normal(size=(2000, 21, 3))
+    at -= at.mean(axis=1, keepdims=True)
+    found = [differ_by_axis(each.T @ each / 20.0, 20.0) for each in at]
+    assert np.mean(np.array(found) < 0.05) == pytest.approx(0.05, abs=0.015)
+
+
+def test_readings_the_instrument_rounds_away_have_the_noise_of_the_rounding(tmp_path):
+    rng = np.random.default_rng(8)
+    rows = [
+        (f"P{pose}", visit, 5.0 * pose + 0.5 * np.round(rng.normal(size=3) * (0.3, 0.01, 0.01)))
+        for pose in range(20)
+        for visit in range(3)
+    ]
+    said = said_of(written(tmp_path / "steps.csv", "pose,visit,x_mm,y_mm,z_mm", rows))
+    assert said["resolution_mm"][0] == pytest.approx(0.5)
+    assert min(said["noise"]["std_mm"]) == pytest.approx(5.0 / np.sqrt(12.0))
+    assert any("steps of" in each for each in said["remarks"])
+
+
+def test_an_axis_that_never_moves_is_rounded_as_the_others_are(tmp_path):
+    rows = [("A", number, (100.0, at[1], at[2])) for number, at in enumerate(FIVE)]
+    said = said_of(written(tmp_path / "flat.csv", "pose,visit,x_mm,y_mm,z_mm", rows))
+    assert said["resolution_mm"] == pytest.approx([0.2, 0.2, 0.1])
+
+
+def test_readings_that_are_equal_to_the_last_of_many_digits_are_none(tmp_path):
+    rows = [("A", number, (0.123456789, 5.0, 7.0)) for number in range(9)]
+    done = call("repeatability", written(tmp_path / "same.csv", "pose,visit,x_mm,y_mm,z_mm", rows))
+    assert done.exit_code == 2
+    assert "equal to the last digit" in done.output
+
+
+def test_rows_of_one_pose_after_another_are_asked_about(tmp_path):
+    rng = np.random.default_rng(3)
+    rows = [(pose, rng.normal(size=3)) for pose in "AB" for _ in range(5)]
+    file = written(tmp_path / "rows.csv", "pose,x_mm,y_mm,z_mm", rows)
+    done = call("repeatability", file)
+    assert done.exit_code == 2
+    assert "lines 3, 4, 5, 6, 8 and 3 more" in done.output
+    assert "--rows visits" in done.output
+    assert "--rows stays" in done.output
+    visits = said_of(file, "--rows", "visits")
+    assert visits["noise"]["freedom"] == pytest.approx(24.0)
+    stays = said_of(file, "--rows", "stays")
+    assert stays["noise"] is None
+    np.testing.assert_allclose(stays["instrument_std_mm"], visits["noise"]["std_mm"], rtol=0.5)
+    assert (
+        "no pose was left and come back to" in call("repeatability", file, "--rows", "stays").output
+    )
+
+
+def test_a_file_that_goes_from_pose_to_pose_has_a_visit_in_every_row(tmp_path):
+    rows = [(pose, at + (at[0] > 0.2)) for at in FIVE for pose in "ABC"]
+    said = said_of(written(tmp_path / "rounds.csv", "pose,x_mm,y_mm,z_mm", rows))
+    assert (said["visits"], said["readings"], said["poses"]) == (15, 15, 3)
+
+
+@pytest.mark.parametrize(
+    ("header", "stamps", "said"),
+    [
+        ("time", [f"2026-05-04T08:0{each}:00" for each in range(5)], "within 4 minutes"),
+        ("time", [f"08:0{each}:30" for each in range(5)], "within 4 minutes"),
+        ("time_s", [60 * each for each in range(5)], "within 4 minutes"),
+        ("time_h", list(range(5)), ""),
+        ("started", list(range(5)), "no column says when"),
+    ],
+)
+def test_readings_back_to_back_are_said_to_understate_a_day(tmp_path, header, stamps, said):
+    rows = [("A", number, stamps[number], at) for number, at in enumerate(FIVE)]
+    file = written(tmp_path / "time.csv", f"pose,visit,{header},x_mm,y_mm,z_mm", rows)
+    remarks = " ".join(said_of(file)["remarks"])
+    assert ("understate a day" in remarks) == bool(said)
+    assert said in remarks
+
+
+def test_a_few_readings_are_told_how_many_more_are_missing(tmp_path):
+    rows = [(pose, number, at) for pose in "AB" for number, at in enumerate(FIVE[:3])]
+    file = written(tmp_path / "few.csv", "pose,visit,x_mm,y_mm,z_mm", rows)
+    remarks = " ".join(said_of(file)["remarks"])
+    assert "12 degrees of freedom: fewer than 30" in remarks
+    assert "About 16 more returns to poses make 60" in remarks
+    assert "--repeatability" not in call("repeatability", file).output
+
+
+def test_a_reading_that_went_wrong_is_named_by_its_line(tmp_path):
+    rng = np.random.default_rng(9)
+    rows = [(f"P{row // 5}", row, rng.normal(size=3) * 0.02) for row in range(50)]
+    rows[17] = ("P3", 17, np.array([0.9, 0.0, 0.0]))
+    file = written(tmp_path / "wrong.csv", "pose,visit,x_mm,y_mm,z_mm", rows)
+    assert any(
+        "far from the others of its pose: line 19" in each for each in said_of(file)["remarks"]
+    )
+
+
+def test_everything_that_is_wrong_with_a_file_is_said_at_once(tmp_path):
+    file = tmp_path / "bad.csv"
+    file.write_text(
+        "pose,visit,side,time,target,x_mm,y_mm,z_mm\n"
+        "A,1,left,noon,m1,1,2,3\n"
+        "A,1,right,12:00,m2,1,zwei,3\n"
+        ",2,right,12:01,m1,1,2,1e9\n"
+    )
+    done = call("repeatability", file)
+    assert done.exit_code == 2
+    for words in (
+        "column y_mm, line 3: not a finite number: 'zwei'",
+        "column pose, line 4: an empty cell",
+        "column time, line 2: no time: 'noon'",
+        "column target: holds several: m1, m2",
+        "lines 2, 3: visit 1 of pose A came from left and from right",
+        "line 4: a position beyond a kilometre",
+    ):
+        assert words in done.output
+
+
+def test_a_file_in_metres_from_a_spreadsheet_of_another_country_is_read(tmp_path):
+    file = tmp_path / "metres.csv"
+    lines = [f"A;{number};" + ";".join(f"{1e-3 * each:.6f}" for each in at).replace(".", ",")
+             for number, at in enumerate(FIVE)]  # fmt: skip
+    file.write_text("\n".join(["pose;visit;x_m;y_m;z_m", *lines]) + "\n")
+    said = said_of(file)
+    np.testing.assert_allclose(said["rows"][0]["std_y_mm"], np.std(FIVE[:, 1], ddof=1), rtol=1e-9)
+    assert said["resolution_mm"] == pytest.approx([0.1, 0.2, 0.1])
+
+
+def test_a_sheet_of_a_workbook_is_read_as_a_file_is(tmp_path):
+    from openpyxl import Workbook
+
+    book = Workbook()
+    book.active.append(["pose", "visit", "time", "x_mm", "y_mm", "z_mm"])
+    for number, at in enumerate(FIVE):
+        when = datetime.datetime(2026, 5, 4, 8 + number)
+        book.active.append([7, number, when, *map(float, at)])
+    book.save(tmp_path / "book.xlsx")
+    said = said_of(tmp_path / "book.xlsx")
+    assert said["rows"][0]["pose"] == "7"
+    np.testing.assert_allclose(said["rows"][0]["std_y_mm"], np.std(FIVE[:, 1], ddof=1), rtol=1e-9)
+    assert said["hours_at_a_pose"] == pytest.approx(4.0)
+
+
+def test_a_pose_that_was_read_once_tells_nothing(tmp_path):
+    file = written(tmp_path / "once.csv", "pose,x_mm,y_mm,z_mm", [("A", FIVE[0]), ("B", FIVE[1])])
+    done = call("repeatability", file)
+    assert done.exit_code == 2
+    assert "no pose has more than one reading" in done.output
