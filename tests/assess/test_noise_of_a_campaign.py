@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 
 import numpy as np
 import pytest
@@ -17,15 +18,31 @@ POINTS, NOISE_MM = 40, 0.1
 LONE = np.array([[1.0, 0.0, 0.0]] + [[0.1, 0.0, 0.0]] * (POINTS - 1))
 
 
-def said(seed, measurements=70, times=1.0, stated_mm=NOISE_MM, limit=None, **settings):
-    """The statement on all candidates, one of which is far off; noise ``times`` 0.1 mm."""
+def carried_on(seed, measurements=70, times=1.0, stated_mm=NOISE_MM, limit=None, **settings):
+    """A campaign on candidates one of which is far off; noise ``times`` 0.1 mm."""
     rng = np.random.default_rng(seed)
     errors = rng.permutation(LONE)
     candidates = Candidates.with_equal_noise(np.full(POINTS, stated_mm))
     campaign = SearchAndConfirm(measurements, **settings).begin(candidates)
     noise_mm = times * NOISE_MM
     carry_on(campaign, lambda row, _: errors[row] + noise_mm * rng.normal(size=3), limit=limit)
-    return campaign.statements()[1]
+    return campaign
+
+
+def said(seed, measurements=70, **given):
+    """What such a campaign states on all candidates."""
+    return carried_on(seed, measurements, **given).statements()[1]
+
+
+def scatter_within_blocks(campaign):
+    """Root of the pooled variance of readings of the same block, over the noise stated."""
+    of_block = defaultdict(list)
+    for block, (_, reading, _) in zip(
+        campaign.reading_blocks(), campaign.ledger.readings, strict=True
+    ):
+        of_block[block].append(reading)
+    apart = sum(((np.array(each) - np.mean(each, axis=0)) ** 2).sum() for each in of_block.values())
+    return math.sqrt(apart / sum(3 * (len(each) - 1) for each in of_block.values())) / NOISE_MM
 
 
 def test_without_knowing_the_noise_bounds_follow_the_noise_there_is():
@@ -84,7 +101,27 @@ def test_noise_that_hardly_anything_checks_is_taken_larger():
     assert as_stated.noise is None
     assert taken.upper_mm > as_stated.upper_mm
     assert taken.lower_mm < as_stated.lower_mm
-    assert said(3, 200).noise is None
+
+
+def test_noise_is_taken_as_stated_or_as_repeats_show_it_where_that_is_more():
+    more = 0
+    for campaign in (carried_on(seed, 200, times=1.04) for seed in range(12)):
+        shown, told, ones = (
+            scatter_within_blocks(campaign),
+            campaign.statements()[1],
+            np.ones(POINTS),
+        )
+        upper_mm = campaign.looks.limits_mm(campaign.looks.boundary, ones).max()
+        lower_mm = campaign.average.bound_mm(ones)
+        if shown <= 1.0:
+            assert (told.noise, told.upper_mm, told.lower_mm) == (None, upper_mm, lower_mm)
+            continue
+        more += 1
+        assert told.noise.code == "noise_shown"
+        assert told.noise.numbers["factor"] == pytest.approx(shown)
+        assert told.upper_mm > upper_mm
+        assert told.lower_mm < lower_mm
+    assert 0 < more < 12
 
 
 @pytest.mark.parametrize("noise", ["known", "estimated"])

@@ -56,6 +56,16 @@ def largest_limit(given, sigma, counts, z):
     return max(found.values())
 
 
+def shown(said, world):
+    """Noise over that stated by the pooled variance within blocks; 1 at least."""
+    of_block = {}
+    for block, (row, reading) in zip(said.reading_blocks(), world.given, strict=True):
+        of_block.setdefault(block, []).append(reading / world.sigma_mm[row])
+    freedom = sum(3 * (len(each) - 1) for each in of_block.values())
+    square = sum(3 * len(each) * np.var(each, axis=0).mean() for each in of_block.values())
+    return max(1.0, np.sqrt(square / freedom)) if freedom >= 30 else 1.0
+
+
 def left_out(points, seen, error):
     """Fewest points such that these and one more are all missed with ``error`` at most."""
     for largest in range(1, points + 1):
@@ -72,7 +82,8 @@ def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
     said, world = campaign(points, budget, 0.05, noise_margin=1.0)
     looks = said.boundary_of(ERROR)
     assert crossing(tuple(looks.counts.tolist()), looks.z) == pytest.approx(ERROR, rel=1e-5)
-    wanted = largest_limit(world.given, world.sigma_mm, looks.counts, looks.z)
+    noise_mm = shown(said, world) * world.sigma_mm
+    wanted = largest_limit(world.given, noise_mm, looks.counts, looks.z)
     measured, everywhere = said.statements()
     assert len(world.given) == budget
     assert measured.upper_mm == pytest.approx(max(wanted, measured.value_mm), rel=1e-9)

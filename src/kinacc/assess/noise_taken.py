@@ -128,6 +128,13 @@ class CampaignNoise:
             self._known = taken, contrasts(self.ledger, self._blocks)
         return self._known[1]
 
+    @property
+    def telling(self) -> Contrasts:
+        """Those that tell of the noise: of blocks without a wrong reading, where some may be."""
+        if self.settings.wrong_rate > 0.0:
+            return without_wrong_blocks(self.contrasts, self._blocks)
+        return self.contrasts
+
     def missing(self) -> Reason | None:
         """Why the noise is not known yet; None where it is."""
         if self.plan.estimating and self.contrasts.freedom < self.plan.estimating:
@@ -141,12 +148,8 @@ class CampaignNoise:
         """The noise for bounds that may err with this probability; not where it is ``missing``."""
         points = self.ledger.candidates.points
         if self.settings.noise == KNOWN:
-            said = (
-                Reason("noise_margin", {"margin": self.plan.margin})
-                if self.plan.margin > 1.0
-                else None
-            )
-            return NoiseTaken(known_factor(points, self.plan.margin), 1.0, self.plan.margin, said)
+            most, said = self._stated_or_shown()
+            return NoiseTaken(known_factor(points, most), 1.0, most, said)
         part = _NOISE_PART * error
         if self.plan.is_bounded:
             rows, readings = self._first_readings()
@@ -162,12 +165,8 @@ class CampaignNoise:
 
     def alarms(self) -> tuple[Reason, ...]:
         """What readings of the same block say against the noise stated, and against normal ones."""
-        found, settings = self.contrasts, self.settings
-        scatter = tails = None
-        if settings.wrong_rate > 0.0:
-            found = without_wrong_blocks(found, self._blocks)
-        else:
-            tails = tails_alarm(found)
+        found, scatter = self.telling, None
+        tails = None if self.settings.wrong_rate > 0.0 else tails_alarm(found)
         if not self.plan.estimating and not self.plan.is_bounded:
             scatter = scatter_alarm(found, tested=self.plan.freedom, margin=self.plan.margin)
         return tuple(each for each in (scatter, tails) if each is not None)
@@ -195,6 +194,17 @@ class CampaignNoise:
         least = noise.least * math.sqrt(float(variances.min()))
         most = noise.most * float((own[visited] * np.sqrt(variances[:, -1])).max())
         return least, likely, most
+
+    def _stated_or_shown(self) -> tuple[float, Reason | None]:
+        """Factor on a noise that is stated: what bounds allow for, or more where repeats show more.
+
+        Where the noise is as stated, bounds are never less sure for being wider.
+        """
+        found, margin = self.telling, self.plan.margin
+        shown = math.sqrt(float(np.sum(found.values**2)) / max(found.freedom, 1))
+        if found.freedom >= FEWEST and shown > margin:
+            return shown, Reason("noise_shown", {"factor": shown, "freedom": found.freedom})
+        return margin, Reason("noise_margin", {"margin": margin}) if margin > 1.0 else None
 
     def _first_readings(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows (first,) and first readings (first, 3) of the visit."""

@@ -84,7 +84,8 @@ class SearchAndConfirm(AdaptiveAssessor):
     that the assumption is broken by what was seen.
 
     Where too few readings are planned at points read before to check a noise that is stated as
-    known, it is taken ``noise_margin`` times as large. ``noise: estimated`` takes it as stated up
+    known, it is taken ``noise_margin`` times as large, and always at least as large as readings of
+    the same block show it. ``noise: estimated`` takes it as stated up
     to one factor: estimated from readings of the same block, or from a test before with
     ``noise_freedom`` degrees of freedom (:mod:`kinacc.assess.noise_factor`). Where readings
     contradict what is stated, bounds are withheld (:mod:`kinacc.assess.noise_alarms`). ``error_of:

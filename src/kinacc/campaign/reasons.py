@@ -46,6 +46,8 @@ REASONS = {
     # of the noise that bounds take
     "noise_margin": "bounds take the noise {margin:g} times as large as stated: the plan has too "
     "few repeats to be sure of finding it stated too small",
+    "noise_shown": "bounds take the noise {factor:.2f} times as large as stated: readings of one "
+    "pose, taken one after the other, scatter so much ({freedom:.0f} degrees of freedom)",
     "noise_estimated": "the noise is estimated in this campaign: {factor:.2f} times as large as "
     "planned with ({freedom:.0f} degrees of freedom)",
     "noise_tested": "the noise is that of a repeatability test ({freedom:.0f} degrees of freedom)",
