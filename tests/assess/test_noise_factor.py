@@ -11,6 +11,7 @@ from scipy.stats import binom, chi2, f, kstest, ncx2, norm, t
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.future_visit import visit_mm
 from kinacc.assess.noise_alarms import (
+    BESIDE_REFERENCES,
     SCATTER,
     heavy_over_normal,
     larger_over_stated,
@@ -189,6 +190,10 @@ def test_scatter_as_stated_is_hardly_ever_an_alarm_at_any_time():
         scatter_alarm(of_normal(900, rng, 1.2), margin=1.2) is not None for _ in range(4000)
     )
     assert binom.sf(false - 1, 4000, SCATTER) > 0.005
+    rare = sum(
+        scatter_alarm(of_normal(300, rng), false=BESIDE_REFERENCES) is not None for _ in range(8000)
+    )
+    assert binom.sf(rare - 1, 8000, BESIDE_REFERENCES) > 0.005
 
 
 def test_scatter_is_held_to_a_repeatability_test_with_its_own_uncertainty():

@@ -9,7 +9,8 @@ import numpy as np
 from kinacc.assess.noise_factor import FEWEST, Contrasts
 from kinacc.assess.statement import Reason
 
-SCATTER = 1e-3  # probability that noise as stated is ever called larger in a campaign
+SCATTER = 4e-3  # probability that noise as stated is ever called larger in a campaign
+BESIDE_REFERENCES = 1e-3  # the same where alarms of reference poses have their part of 1 % in all
 _LARGER = 1.2  # times the noise stated: what readings are held against
 _LARGER_THAN_TESTED = 1.5  # the same where a test says the noise: no test tells it to 20 %
 _TAILS = 5.5  # logarithm of the ratio of likelihoods that tells heavy tails; false in 0.2 %
@@ -18,20 +19,21 @@ _STEP = 0.7  # of the standard deviation of a logarithm of scale: nodes of the i
 
 
 def scatter_alarm(
-    found: Contrasts, *, tested: float = math.inf, margin: float = 1.0
+    found: Contrasts, *, tested: float = math.inf, margin: float = 1.0, false: float = SCATTER
 ) -> Reason | None:
     """That readings of the same block differ more than the noise stated allows.
 
     ``tested``: degrees of freedom of the test that the noise stated comes from; ``margin``: how
-    many times that noise the bounds allow for. Ratio of two likelihoods: noise 1.2 times as large
-    as allowed for (1.5 times where it was tested) over noise as large. Where it is no larger the
-    ratio's mean never exceeds 1, so it ever exceeds 1000 with a probability of 0.1 % at most
-    (Ville's inequality).
+    many times that noise the bounds allow for; ``false``: the probability that noise as stated is
+    ever called larger. Ratio of two likelihoods: noise 1.2 times as large as allowed for (1.5 times
+    where it was tested) over noise as large. Where it is no larger the
+    ratio's mean never exceeds 1, so it ever exceeds 1/p with a probability of p at most (Ville's
+    inequality).
     """
     squares = np.sum(found.values**2, axis=1)
-    if not squares.size or larger_over_stated(squares / margin**2, tested).max() < -math.log(
-        SCATTER
-    ):
+    if not squares.size:
+        return None
+    if larger_over_stated(squares / margin**2, tested).max() < -math.log(false):
         return None
     ratio = math.sqrt(float(np.mean(squares)) / 3.0)
     return Reason("scatter", {"ratio": ratio, "freedom": found.freedom})

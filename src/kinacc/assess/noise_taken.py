@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.assess.adaptive import Ledger
-from kinacc.assess.noise_alarms import scatter_alarm, tails_alarm
+from kinacc.assess.noise_alarms import BESIDE_REFERENCES, SCATTER, scatter_alarm, tails_alarm
 from kinacc.assess.noise_factor import (
     CHECKED,
     ENOUGH,
@@ -168,7 +168,12 @@ class CampaignNoise:
         found, scatter = self.telling, None
         tails = None if self.settings.wrong_rate > 0.0 else tails_alarm(found)
         if not self.plan.estimating and not self.plan.is_bounded:
-            scatter = scatter_alarm(found, tested=self.plan.freedom, margin=self.plan.margin)
+            scatter = scatter_alarm(
+                found,
+                tested=self.plan.freedom,
+                margin=self.plan.margin,
+                false=false_scatter(self.settings.references),
+            )
         return tuple(each for each in (scatter, tails) if each is not None)
 
     def usual_scatter(self) -> float:
@@ -213,6 +218,11 @@ class CampaignNoise:
             read.setdefault(row, reading)
         rows = self.ledger.visited[: self.first]
         return np.array(rows), np.array([read[row] for row in rows])
+
+
+def false_scatter(references: int) -> float:
+    """Probability that noise as stated is ever called larger, beside so many references."""
+    return BESIDE_REFERENCES if references else SCATTER
 
 
 def without_wrong_blocks(found: Contrasts, blocks: Sequence[int]) -> Contrasts:

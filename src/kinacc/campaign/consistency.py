@@ -10,7 +10,7 @@ import numpy as np
 from kinacc.assess.adaptive import Ledger
 from kinacc.assess.noise_alarms import scatter_alarm
 from kinacc.assess.noise_factor import Contrasts, contrasts
-from kinacc.assess.noise_taken import ESTIMATED, KNOWN, without_wrong_blocks
+from kinacc.assess.noise_taken import ESTIMATED, KNOWN, false_scatter, without_wrong_blocks
 from kinacc.campaign.reading import covariance_mm2, unplanned_mm2
 from kinacc.campaign.state import State
 
@@ -49,7 +49,8 @@ def scatter(state: State) -> Scatter | None:
 
     square = float(np.sum(found.values**2))
     chance = float(chdtrc(found.freedom, square))
-    too_large = scatter_alarm(found, margin=state.campaign.factor) is not None
+    false = false_scatter(getattr(state.plan.assessor, "references", 0))
+    too_large = scatter_alarm(found, margin=state.campaign.factor, false=false) is not None
     return Scatter(math.sqrt(square / found.freedom), found.freedom, chance, too_large)
 
 
