@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -24,11 +25,14 @@ def errors(rng, tied):
     )
 
 
-def run(seed, wrong, measurements=BUDGET, stop=BUDGET, tied=6, **settings):
-    """A campaign and the largest error; ``wrong(number, rng, error)``: a shift (3,) or None."""
+def run(seed, wrong, measurements=BUDGET, stop=BUDGET, tied=6, tested=1.0, **settings):
+    """A campaign and the largest error; ``wrong(number, rng, error)``: a shift (3,) or None.
+
+    ``tested``: what the noise, 1, is taken for.
+    """
     rng = np.random.default_rng(seed)
     error, numbers = errors(rng, tied), iter(range(1, stop + 1))
-    even = np.tile(np.eye(3), (POINTS, 1, 1))
+    even = np.tile(tested**2 * np.eye(3), (POINTS, 1, 1))
     campaign = SearchAndConfirm(measurements, **settings).begin(Candidates(even))
     for number in numbers:
         if (row := campaign.next()) is None:
@@ -71,6 +75,24 @@ def test_bounds_hold_as_stated_where_some_readings_go_wrong(wrong, rate, tied):
         too_high += said.lower_mm > largest
     most = campaigns * (0.05 + rate) + 3.0 * math.sqrt(campaigns * (0.05 + rate) * (0.95 - rate))
     assert max(too_low, too_high) <= most
+
+
+@pytest.mark.parametrize("low", [0.02, 0.5])
+def test_a_guard_takes_the_upper_limit_of_a_noise_that_was_tested_before(low):
+    """The test of 60 degrees of freedom found less noise than there is, by chance."""
+    tested = math.sqrt(chi2.ppf(low, 60) / 60)
+    settings = {"noise": "estimated", "noise_freedom": 60, "wrong_rate": RATE, "tied": 1}
+    missed = 0
+    for seed in range(12):
+        campaign, largest = run(seed, at_random(RATE), tested=tested, **settings)
+        said = campaign.statements()[1]
+        assert said.noise.code == "noise_limited"
+        most = math.sqrt(60 / chi2.ppf(0.01, 60))
+        assert said.noise.numbers == {"factor": pytest.approx(most), "freedom": 60}
+        assert tested * most > 1.0
+        assert said.confidence == pytest.approx(0.95 - RATE)
+        missed += not said.lower_mm <= largest <= said.upper_mm
+    assert missed <= 3
 
 
 def test_the_guard_is_no_excuse_for_a_wide_bound():
@@ -140,7 +162,7 @@ def test_single_points_have_no_lower_limit_where_any_reading_may_be_wrong():
     [
         ({"wrong_rate": 0.3}, "from 0 to 0.1"),
         ({"wrong_rate": -0.1}, "from 0 to 0.1"),
-        ({"wrong_rate": 0.01, "noise": "estimated"}, "0 where noise is estimated"),
+        ({"wrong_rate": 0.01, "noise": "estimated"}, "0 where the campaign estimates the noise"),
     ],
 )
 def test_a_guard_that_cannot_be_kept_is_refused(settings, told):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,7 +59,8 @@ class NoisePlan:
     limits on means are calibrated with, infinite where the factor is no estimate; ``estimating``:
     of the campaign's own, 0 where a test brings them. ``is_bounded``: nothing but the size of
     readings says how large the noise may be. ``mean_share``: part of an allowed error that limits
-    on means may spend; the rest is for limits of the noise.
+    on means may spend; the rest is for limits of the noise. ``limited``: degrees of freedom of the
+    test whose upper limit is taken for the noise, where readings may be wrong; else 0.
     """
 
     margin: float = 1.0
@@ -67,6 +68,7 @@ class NoisePlan:
     estimating: int = 0
     is_bounded: bool = False
     mean_share: float = 1.0
+    limited: int = 0
 
 
 AS_STATED = NoisePlan()
@@ -78,6 +80,9 @@ def noise_plan(settings: SearchAndConfirm, first: int) -> NoisePlan:
     if settings.noise == KNOWN:
         checked = planned_freedom(spare) >= CHECKED
         return NoisePlan(margin=1.0 if checked else settings.noise_margin)
+    if settings.wrong_rate:
+        # The law of clipped scores is known for a stated noise alone, or one that is no larger.
+        return NoisePlan(mean_share=1.0 - _NOISE_PART, limited=settings.noise_freedom)
     estimating = 0 if settings.noise_freedom else estimating_freedom(spare)
     freedom = settings.noise_freedom or estimating
     if not freedom:
@@ -156,6 +161,11 @@ class CampaignNoise:
             most = largest_factor(self.ledger.candidates, rows, readings, part)
             said = Reason("noise_bounded", {"factor": most})
             return NoiseTaken(known_factor(points, most), 0.0, most, said)
+        if self.plan.limited:
+            tested = replace(known_factor(points), freedom=self.plan.limited)
+            least, most = tested.at_least(part), tested.at_most(part)
+            said = Reason("noise_limited", {"factor": most, "freedom": self.plan.limited})
+            return NoiseTaken(known_factor(points, most), least, most, said)
         factor = estimated_factor(self.contrasts, self.plan.estimating, points, self.plan.freedom)
         numbers = {"factor": factor.value, "freedom": self.plan.freedom}
         said = Reason("noise_tested", numbers)
@@ -170,7 +180,7 @@ class CampaignNoise:
         if not self.plan.estimating and not self.plan.is_bounded:
             scatter = scatter_alarm(
                 found,
-                tested=self.plan.freedom,
+                tested=self.settings.noise_freedom or math.inf,
                 margin=self.plan.margin,
                 false=false_scatter(self.settings.references),
             )

@@ -134,12 +134,16 @@ class SearchAndConfirm(AdaptiveAssessor):
         problems += noise_faults(self)
         if not 0.0 <= self.wrong_rate <= MOST_WRONG:
             problems.append(Problem("wrong_rate", f"{self.wrong_rate}", f"from 0 to {MOST_WRONG}"))
-        if self.wrong_rate and self.noise == ESTIMATED:
+        if self.wrong_rate and self.noise == ESTIMATED and not self.noise_freedom:
             what = (
                 f"{self.wrong_rate:g}, and the noise is estimated from readings that may be wrong"
             )
-            fix = "state the noise, or leave wrong_rate at 0: suspicious readings are then named"
-            problems.append(Problem("wrong_rate", what, "0 where noise is estimated", fix))
+            fix = (
+                "state the noise or test it before, or leave wrong_rate at 0: suspicious readings "
+                "are then named"
+            )
+            allowed = "0 where the campaign estimates the noise"
+            problems.append(Problem("wrong_rate", what, allowed, fix))
         if self.wrong_rate and self.correct_drift:
             what = f"{self.wrong_rate:g}, and a drift is taken from readings that may be wrong"
             fix = "leave one of them: suspicious readings are named where wrong_rate is 0"

@@ -51,6 +51,8 @@ REASONS = {
     "noise_estimated": "the noise is estimated in this campaign: {factor:.2f} times as large as "
     "planned with ({freedom:.0f} degrees of freedom)",
     "noise_tested": "the noise is that of a repeatability test ({freedom:.0f} degrees of freedom)",
+    "noise_limited": "the noise is at most {factor:.2f} times that of the repeatability test "
+    "({freedom:.0f} degrees of freedom), and bounds take it so large: readings may be wrong",
     "noise_bounded": "nothing repeats, so the noise is bounded by the size of all readings: at "
     "most {factor:.2f} times as large as planned with",
     "references_left": "{left} readings of reference poses are left, and the drift is corrected "
