@@ -12,12 +12,14 @@ from scipy.optimize import brentq, minimize
 from scipy.stats import binom, norm
 
 from kinacc.assess.wrong_readings import (
+    _around,
     at_most_wrong,
     clip_of,
     guarded_boundary,
     guarded_lower_mm,
     guarded_stages,
     guarded_upper_mm,
+    sizes_at,
 )
 
 RATE = 0.01
@@ -109,6 +111,37 @@ def test_the_limit_is_the_largest_over_all_directions(count, even):
     climbed = [minimize(lambda x: -limit(x), each, method="Nelder-Mead").fun for each in begins]
     found = guarded_upper_mm(readings, covariances, 2.6, RATE)
     assert found == pytest.approx(-min(climbed), rel=1e-3)
+
+
+def searched(readings, covariances, deviations):
+    """As the compiled search, all directions of a round at once, roots by sorted bends."""
+    count = len(readings)
+    number = min(max(4000 // count, 24), 200)
+    tried, apart = (
+        np.vstack([readings.mean(axis=0), _around(number)]),
+        math.sqrt(4 * math.pi / number),
+    )
+    for _ in range(7):
+        tried = tried / np.linalg.norm(tried, axis=1)[:, None]
+        sigma = np.sqrt(np.einsum("qi,kij,qj->qk", tried, covariances, tried))
+        sizes = sizes_at(tried @ readings.T, sigma, clip_of(RATE), -deviations * math.sqrt(count))
+        best = tried[np.argsort(-sizes)[:3]]
+        tried = np.vstack([best, (best[:, None] + apart * _around(12)).reshape(-1, 3)])
+        apart *= 0.5
+    return sizes.max()
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 20, 180])
+@pytest.mark.parametrize("even", [True, False])
+def test_the_compiled_search_finds_what_one_over_arrays_does(count, even):
+    rng = np.random.default_rng([7, count, even])
+    root = np.eye(3) + (0.0 if even else 0.4) * rng.normal(size=(count, 3, 3))
+    covariances = root @ np.swapaxes(root, 1, 2)
+    for largest in (0.0, 0.5, 8.0):
+        readings = np.array([largest, 0.0, 0.0]) + rng.normal(size=(count, 3))
+        readings[0] += (0.0, -9.0, 0.0)
+        found = guarded_upper_mm(readings, covariances, 2.2, RATE)
+        assert found == pytest.approx(searched(readings, covariances, 2.2), rel=1e-12)
 
 
 def test_few_readings_allow_no_limit_where_wrong_ones_could_explain_all():

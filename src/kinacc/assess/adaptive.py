@@ -84,6 +84,12 @@ class Candidates:
         spread = np.abs(self.covariance_mm2 - even).max(axis=(1, 2))
         return spread <= _SYMMETRY * self.sigma_mm**2
 
+    @cached_property
+    def weights(self) -> list[float]:
+        """Of a reading of each point 1 / variance per axis; 0 where that is not equal in all."""
+        variances = np.where(self.is_equal_noise, self.covariance_mm2[:, 0, 0], math.inf)
+        return (1.0 / variances).tolist()
+
 
 class Campaign(Protocol):
     """One assessment under way.
@@ -193,7 +199,7 @@ class Ledger:
 
         ``afresh`` forgets what was read at the point before; it counts as taken all the same.
         """
-        reading, covariance, equal = self._checked(point, reading_mm, covariance_mm2)
+        reading, weight = self._checked(point, reading_mm, covariance_mm2)
         if not self.count[point]:
             self.visited.append(point)
         if afresh:
@@ -204,21 +210,20 @@ class Ledger:
         self.readings.append((point, reading, covariance_mm2))
         if covariance_mm2 is not None:
             self._unplanned.add(point)
-        if equal and point not in self._information:
+        if weight and point not in self._information:
             # Plain numbers: three components are too few for array operations to pay.
-            weight = 1.0 / covariance.item(0, 0)
             total = self._weight.item(point) + weight
-            mean = self.mean_mm[point]
-            for axis, each in enumerate(reading):
-                before = mean.item(axis)
-                mean[axis] = before + (each - before) * (weight / total)
+            part, mean = weight / total, self.mean_mm[point]
+            (a, b, c), (x, y, z) = mean.tolist(), reading
+            mean[0], mean[1], mean[2] = a + (x - a) * part, b + (y - b) * part, c + (z - c) * part
             self._weight[point] = total
             self.noise_mm[point] = math.sqrt(1.0 / total)
             return
         known = self._weight[point]
         before = (known * np.eye(3), known * self.mean_mm[point])
         matrix, vector = self._information.get(point, before)
-        inverse = np.linalg.inv(covariance)
+        planned = self.candidates.covariance_mm2[point]
+        inverse = np.linalg.inv(planned if covariance_mm2 is None else np.asarray(covariance_mm2))
         matrix, vector = matrix + inverse, vector + inverse @ np.array(reading)
         self._information[point] = (matrix, vector)
         spread = np.linalg.inv(matrix)
@@ -240,20 +245,19 @@ class Ledger:
         """Sizes of the mean readings of the visited points, in visiting order."""
         return np.sqrt(np.sum(self.mean_mm[self.visited] ** 2, axis=1))
 
-    def _checked(self, point, reading_mm, covariance_mm2) -> tuple[list[float], np.ndarray, bool]:
-        """The reading as numbers, its covariance, and whether that is equal in all directions."""
+    def _checked(self, point, reading_mm, covariance_mm2) -> tuple[list[float], float]:
+        """The reading as numbers, and its weight as in :attr:`Candidates.weights`."""
         problems = []
         points = self.candidates.points
         if not 0 <= point < points:
             problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
-        reading = np.asarray(reading_mm, dtype=float).tolist()
-        is_vector = isinstance(reading, list) and len(reading) == 3
-        if not is_vector or not all(isinstance(x, float) and math.isfinite(x) for x in reading):
+        given = np.asarray(reading_mm, dtype=float)
+        reading = given.tolist()
+        if given.shape != (3,) or not all(map(math.isfinite, reading)):
             problems.append(Problem("reading", f"{reading}", "three numbers, in mm"))
         if covariance_mm2 is None:
             refuse(problems, "this reading cannot be recorded")
-            chosen = self.candidates
-            return reading, chosen.covariance_mm2[point], bool(chosen.is_equal_noise[point])
+            return reading, self.candidates.weights[point]
         covariance = np.asarray(covariance_mm2, dtype=float)
         if covariance.shape != (3, 3):
             problems.append(Problem("covariance", f"shape {covariance.shape}", "(3, 3), in mm^2"))
@@ -264,7 +268,7 @@ class Ledger:
         refuse(problems, "this reading cannot be recorded")
         even = np.trace(covariance) / 3.0
         spread = np.abs(covariance - even * np.eye(3)).max()
-        return reading, covariance, bool(spread <= _SYMMETRY * even)
+        return reading, 1.0 / covariance.item(0, 0) if spread <= _SYMMETRY * even else 0.0
 
 
 class LedgerCampaign:

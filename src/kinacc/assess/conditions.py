@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,9 +33,23 @@ class Sequence:
     planned: int
 
     def chance(self, kind: int, row: int = 0, visit: int = 0) -> np.random.Generator:
-        """Further random numbers of a reading, of a pose or of the campaign."""
-        stream = np.random.Philox(key=self.world.key, counter=[0, row, visit, kind])
-        return np.random.Generator(stream)
+        """Further random numbers of a reading, of a pose or of the campaign, until asked again."""
+        generator, begun = self._stream
+        begun["state"]["counter"][1:] = row, visit, kind
+        generator.bit_generator.state = begun
+        return generator
+
+    @cached_property
+    def far_mm(self) -> np.ndarray:
+        """How far a drift of the frame comes, or a step: (3,), mm."""
+        sigma = float(np.sqrt(np.mean(self.world.sigma_mm**2)))
+        return _MOVED * sigma * _direction(self.chance(_CAMPAIGN))
+
+    @cached_property
+    def _stream(self) -> tuple[np.random.Generator, dict]:
+        """One generator, put to the place of what is asked for: a new one takes far longer."""
+        stream = np.random.Philox(key=self.world.key)
+        return np.random.Generator(stream), dict(stream.state)
 
 
 @dataclass(frozen=True)
@@ -107,17 +122,12 @@ def _by_pose(sequence: Sequence, row: int, visit: int, deviation: np.ndarray) ->
     return deviation * sequence.chance(_POSE, row).uniform(least, _POSES * least)
 
 
-def _far_mm(sequence: Sequence) -> np.ndarray:
-    sigma = float(np.sqrt(np.mean(sequence.world.sigma_mm**2)))
-    return _MOVED * sigma * _direction(sequence.chance(_CAMPAIGN))
-
-
 def _drift(sequence: Sequence, number: int) -> np.ndarray:
-    return _far_mm(sequence) * (number / max(sequence.planned - 1, 1))
+    return sequence.far_mm * (number / max(sequence.planned - 1, 1))
 
 
 def _step(sequence: Sequence, number: int) -> np.ndarray:
-    return _far_mm(sequence) * float(2 * number >= sequence.planned)
+    return sequence.far_mm * float(2 * number >= sequence.planned)
 
 
 def _tested(sequence: Sequence) -> float:

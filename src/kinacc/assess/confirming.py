@@ -120,21 +120,16 @@ class ConfirmingCampaign(LedgerCampaign):
         # A planned reading ends a block only where the point is looked at.
         if is_due or not (self._left or is_planned):
             self._mean_mm[point] = self.ledger.mean_mm[point]
-            self._size_mm[point] = math.sqrt(sum(x * x for x in self._mean_mm[point].tolist()))
-        left = self.settings.measurements - taken - 1 - self.plan.left(taken + 1)
-        if not self._left and len(self.ledger.visited) >= self.first and left > 0:
-            self._begin_block(left)
+            x, y, z = self.ledger.mean_mm[point].tolist()
+            self._size_mm[point] = math.sqrt(x * x + y * y + z * z)
+        if not self._left and len(self.ledger.visited) >= self.first:
+            left = self.settings.measurements - taken - 1 - self.plan.left(taken + 1)
+            if left > 0:
+                self._begin_block(left)
 
     def reading_blocks(self) -> list[int]:
         """Of every reading in order the number of its block."""
         return self.blocks
-
-    def lower_of(self, single_mm: float, average_mm: float) -> float:
-        """The lower bound: by the average once it has spoken, by single points before.
-
-        Never the larger of both: the farthest of many single readings is what a heavy tail brings.
-        """
-        return average_mm if self.average.has_spoken else single_mm
 
     def _block_of(self, in_block: bool) -> int:
         """The number of a reading's block: that under way, or one of its own."""

@@ -66,7 +66,11 @@ class LowerAverage:
 
     @property
     def has_spoken(self) -> bool:
-        """Whether a stage was reached."""
+        """Whether a stage was reached: from then on the lower bound is by the average alone.
+
+        Never the larger of it and of single points: the farthest of many single readings is what a
+        heavy tail brings.
+        """
         return bool(self._counts) and self.taken >= self._counts[0]
 
     @property

@@ -96,35 +96,39 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
     if not ledger.readings:
         none = np.zeros(0, dtype=np.int64)
         return Contrasts(none, none, np.zeros((0, 3)))
-    rows = np.array([each[0] for each in ledger.readings])
+    rows, given, own = zip(*ledger.readings, strict=True)
+    rows = np.array(rows)
     order = np.argsort(np.asarray(blocks), kind="stable")
     ordered = np.asarray(blocks)[order]
     begins = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
     lengths = np.diff([*begins, len(order)])
     behind = np.arange(len(order)) - np.repeat(begins, lengths)
-    readings = np.array([ledger.readings[at][1] for at in order])
     values = np.empty((len(order), 3))
-    values[order] = _of_planned(ledger.candidates, rows[order], readings, behind)
-    for begin, length in zip(begins, lengths, strict=True):
-        of_block = order[begin : begin + length]
-        if any(ledger.readings[at][2] is not None for at in of_block):
-            values[of_block] = _of_unlike(ledger, of_block)
+    values[order] = _of_planned(ledger.candidates, rows[order], np.array(given)[order], behind)
+    unlike = np.array([each is not None for each in own])[order]
+    for block in np.flatnonzero(np.logical_or.reduceat(unlike, begins)):
+        of_block = order[begins[block] : begins[block] + lengths[block]]
+        values[of_block] = _of_unlike(ledger, of_block)
     inside = np.empty(len(order), dtype=bool)
     inside[order] = behind > 0
     return Contrasts(rows[inside], np.flatnonzero(inside), values[inside])
 
 
 def _of_planned(candidates, rows, readings_mm, behind) -> np.ndarray:
-    """Differences (n, 3) from the mean of the ``behind`` readings before each, all as planned."""
+    """Differences (n, 3) from the mean of the ``behind`` readings before each, all as planned.
+
+    Of the first of a block, which has none before it: 0.
+    """
     total = np.cumsum(readings_mm, axis=0)
     at = np.arange(len(rows)) - behind
     before = total - readings_mm - (total[at] - readings_mm[at])
     count = np.maximum(behind, 1)[:, None]
     apart = (readings_mm - before / count) * np.sqrt(count / (count + 1.0))
-    # Numbered by covariance, of which most campaigns have one.
-    kinds, kind = np.unique(candidates.covariance_mm2[rows], axis=0, return_inverse=True)
-    inverse = np.linalg.inv(np.linalg.cholesky(kinds))
-    return np.einsum("nij,nj->ni", inverse[kind.reshape(-1)], apart)
+    inside, found = behind > 0, np.zeros_like(apart)
+    again, place = np.unique(rows[inside], return_inverse=True)
+    inverse = np.linalg.inv(np.linalg.cholesky(candidates.covariance_mm2[again]))
+    found[inside] = np.einsum("nij,nj->ni", inverse[place], apart[inside])
+    return found
 
 
 def _of_unlike(ledger: Ledger, of_block: np.ndarray) -> np.ndarray:

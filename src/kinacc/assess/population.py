@@ -58,9 +58,12 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
         weight = (share / share.sum(axis=1, keepdims=True)).sum(axis=0) + pseudo
         weight /= weight.sum()
     prior = weight @ bumps
-    posterior = np.cumsum(likelihood * prior, axis=1)
-    posterior /= posterior[:, -1:]
-    measured = np.exp(np.log(np.maximum(posterior, 1e-300)).sum(axis=0))
+    # In the memory of the likelihood: arrays so large are slow to get from the system.
+    posterior = np.multiply(likelihood, prior, out=likelihood)
+    np.cumsum(posterior, axis=1, out=posterior)
+    posterior /= posterior[:, -1:].copy()
+    np.log(np.maximum(posterior, 1e-300, out=posterior), out=posterior)
+    measured = np.exp(posterior.sum(axis=0))
     everywhere = measured * np.cumsum(prior) ** unmeasured
     return LargestSize(size, _rising(measured), _rising(everywhere))
 

@@ -344,15 +344,17 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         return largest + self.settings.allowance_mm
 
     def _lower_mm(self) -> float:
-        told, factor = self._corrected, self._single_factor()
+        told = self._corrected
         own = self.noise.taken(1.0 - self.settings.confidence).factor.own
-        if told is None:
-            single, average = self.looks.largest_lower_mm(factor), self.average.bound_mm(own)
+        if not self.average.has_spoken:
+            looks = told.looks if told else self.looks
+            found = looks.largest_lower_mm(self._single_factor())
+        elif told is None:
+            found = self.average.bound_mm(own)
         else:
-            single = told.looks.largest_lower_mm(factor)
             slope_mm = told.drift.slope_mm.tolist()
-            average = self.average.corrected_bound_mm(own, slope_mm, told.looks.astray_mm)
-        return max(self.lower_of(single, average) - self.settings.allowance_mm, 0.0)
+            found = self.average.corrected_bound_mm(own, slope_mm, told.looks.astray_mm)
+        return max(found - self.settings.allowance_mm, 0.0)
 
     def _about_candidates(self, said: Statement, value_mm: float) -> Statement:
         points, seen = self.ledger.candidates.points, len(self.ledger.visited)

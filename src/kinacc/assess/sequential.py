@@ -84,7 +84,9 @@ class SequentialCampaign(ConfirmingCampaign):
 
     def _lower_mm(self) -> float:
         factor = self._as_stated()
-        return self.lower_of(self.looks.largest_lower_mm(factor), self.average.bound_mm(factor))
+        if self.average.has_spoken:
+            return self.average.bound_mm(factor)
+        return self.looks.largest_lower_mm(factor)
 
     def _as_stated(self) -> np.ndarray:
         return np.ones(self.ledger.candidates.points)

@@ -73,25 +73,21 @@ def guarded_upper_mm(
     by the direction in which the error points, so the limit is the largest over all directions. It
     is searched for all around, then ever closer about the best directions found.
     """
+    # Compiled code, which no campaign needs that is not guarded.
+    from kinacc.assess.guarded_kernels import largest_size
+
     count = len(readings_mm)
-    clip = clip_of(rate) if count > 1 else math.inf
+    # A first reading counts in full.
+    clip = clip_of(rate) if count > 1 else abs(deviations) + 1.0
     wanted = -deviations * math.sqrt(count)
     if wanted <= -clip * count:
         return math.inf
     number = min(max(_PRODUCTS // count, _FEWEST), _MOST)
-    directions = _units(np.vstack([readings_mm.mean(axis=0), _around(number)]))
+    around = np.vstack([readings_mm.mean(axis=0), _around(number)])
     apart = math.sqrt(4.0 * math.pi / number)
-    best, size = directions[:1], 0.0
-    for _ in range(_ROUNDS):
-        along = directions @ readings_mm.T
-        sigma = np.sqrt(np.einsum("qi,kij,qj->qk", directions, covariances_mm2, directions))
-        sizes = sizes_at(along, sigma, clip, wanted)
-        kept = np.argsort(-sizes)[:_KEPT]
-        best, size = directions[kept], max(size, float(sizes[kept[0]]))
-        near = best[:, None] + apart * _around(_NEAR)
-        directions = _units(np.vstack([best, near.reshape(-1, 3)]))
-        apart *= 0.5
-    return size
+    return largest_size(
+        readings_mm, covariances_mm2, around, _around(_NEAR), apart, clip, wanted, _ROUNDS, _KEPT
+    )
 
 
 def guarded_lower_mm(
@@ -118,10 +114,8 @@ def at_most_wrong(readings: int, rate: float, error: float) -> int:
 def sizes_at(along: np.ndarray, sigma: np.ndarray, clip: float, wanted: float) -> np.ndarray:
     """Largest sizes (q,) at which the scores of every row sum to ``wanted`` or more.
 
-    along, sigma: (q, k). The sum falls by straight pieces as the size grows; without a clip by one.
+    along, sigma: (q, k). The sum falls by straight pieces as the size grows.
     """
-    if math.isinf(clip):
-        return ((along / sigma).sum(axis=1) - wanted) / (1.0 / sigma).sum(axis=1)
     rows, count = along.shape
     bends = np.concatenate([along - clip * sigma, along + clip * sigma], axis=1)
     turns = np.concatenate([-1.0 / sigma, 1.0 / sigma], axis=1)
@@ -140,11 +134,6 @@ def sizes_at(along: np.ndarray, sigma: np.ndarray, clip: float, wanted: float) -
 
 def _below(deviate: float) -> float:
     return float(scipy.special.ndtr(deviate))
-
-
-def _units(vectors: np.ndarray) -> np.ndarray:
-    size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.where(size > 0.0, vectors / np.where(size > 0.0, size, 1.0), [0.0, 0.0, 1.0])
 
 
 @lru_cache
