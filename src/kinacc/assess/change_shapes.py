@@ -139,7 +139,7 @@ def likelier(square: np.ndarray, freedom: float) -> int:
     """
     likely = 0.5 * square if math.isinf(freedom) else -0.5 * freedom * np.log1p(-square)
     steps = likely[1:]
-    if not steps.size or likely[0] >= scipy.special.logsumexp(steps) - math.log(steps.size):
+    if not steps.size or likely[0] >= np.logaddexp.reduce(steps) - math.log(steps.size):
         return 0
     return 1 + int(np.argmax(steps))
 

@@ -36,9 +36,12 @@ def corrected(campaign, error: float, factor: float, freedom: float) -> Correcte
     looks = Looks(ledger, old.boundary, kept, old.shares, old.factor)
     looks.astray_mm = factor * drift.anywhere_mm(error, freedom)
     sums, latest = np.zeros(own.candidates.points), np.zeros(own.candidates.points)
-    for place, (row, reading, covariance) in enumerate(own.readings):
-        time = campaign.plan.time(place)
-        ledger.record(row, np.array(reading) - time * drift.slope_mm, covariance)
+    times = campaign.plan.time(np.arange(own.taken))
+    without_mm = np.array([each[1] for each in own.readings]) - times[:, None] * drift.slope_mm
+    for (row, _, covariance), time, reading_mm in zip(
+        own.readings, times.tolist(), without_mm, strict=True
+    ):
+        ledger.record(row, reading_mm, covariance)
         sums[row] += time
         latest[row] = time
         mean = sums[row] / ledger.count[row]

@@ -54,8 +54,8 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
     pseudo = _PSEUDO / scale.size
     weight = np.full(scale.size, 1.0 / scale.size)
     for _ in range(_ROUNDS):
-        share = by_bump * weight
-        weight = (share / share.sum(axis=1, keepdims=True)).sum(axis=0) + pseudo
+        # Every point's shares in the bumps, each in proportion to by_bump * weight, summed.
+        weight = weight * ((1.0 / (by_bump @ weight)) @ by_bump) + pseudo
         weight /= weight.sum()
     prior = weight @ bumps
     # In the memory of the likelihood: arrays so large are slow to get from the system.

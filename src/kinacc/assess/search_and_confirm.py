@@ -207,6 +207,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         self.noise = CampaignNoise(settings, self.noise_plan, self.ledger, self.blocks, first)
         self._told: tuple[int, Corrected | None] = (-1, None)
         self._alarmed: tuple[int, tuple[Reason, ...]] = (-1, ())  # after so many readings
+        self._changed: tuple[int, Change | None] = (-1, None)
         self._speaks_from = max(math.ceil(FIRST_SHARE * first), 1)
 
     def statements(self) -> tuple[Statement, ...]:
@@ -237,8 +238,11 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         """What the reference poses show of a drift or step; None where too few are read."""
         if self.ledger.taken < self.plan.poses or not self.plan.poses:
             return None
-        tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
-        return found(self.plan, planned_readings(self.plan, self.ledger), tested)
+        if self._changed[0] != self.ledger.taken:
+            tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
+            told = found(self.plan, planned_readings(self.plan, self.ledger), tested)
+            self._changed = self.ledger.taken, told
+        return self._changed[1]
 
     def point_limits(self) -> dict[int, tuple[float, float]]:
         """The limits that hold at every look, with the noise as bounds take it.

@@ -53,8 +53,10 @@ class Looks:
             return
         self._done[point] += 1
         mean, noise = self.ledger.mean_mm[point], self.ledger.noise(point)
-        self._even[point, look] = self.ledger.as_planned(point)
-        self._time[point, look] = time
+        if not self.ledger.as_planned(point):
+            self._even[point, look] = False
+        if time:
+            self._time[point, look] = time
         x, y, z = mean.tolist()
         self._size_mm[point, look] = math.sqrt(x * x + y * y + z * z)
         if isinstance(noise, float):

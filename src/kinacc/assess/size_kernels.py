@@ -28,19 +28,18 @@ def reading_densities(x, noise, true):
     """
     rows, columns = x.size, true.size
     found = np.zeros((rows, columns))
-    log, log_true = np.empty(columns), np.log(true)
     for i in range(rows):
-        best = -np.inf
+        # Beside the nearest size, as densities far from all of them are too small for numbers.
+        near, best = np.inf, 0.0
+        for j in range(columns):
+            near = min(near, abs(x[i] - true[j]) / noise[i])
         for j in range(columns):
             gap = (x[i] - true[j]) / noise[i]
-            log[j] = -0.5 * gap * gap - log_true[j]
-            # The other factor is at most 1: what is too small without it needs no more work.
-            if log[j] - best > -60.0:
+            log = 0.5 * (near * near - gap * gap)
+            if log > -60.0:
                 product = 2.0 * x[i] * true[j] / noise[i] ** 2
-                if product < 40.0:
-                    log[j] += math.log(-math.expm1(-product) + 1e-300)
-                best = max(best, log[j])
-        for j in range(columns):
-            if log[j] - best > -60.0:
-                found[i, j] = math.exp(log[j] - best)
+                away = -math.expm1(-product) if product < 40.0 else 1.0
+                found[i, j] = math.exp(log) * away / true[j]
+                best = max(best, found[i, j])
+        found[i] /= best
     return found

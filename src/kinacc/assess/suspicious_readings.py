@@ -86,11 +86,7 @@ def suspicious_readings(
     of_first = _limit(0.5 * false_alarm / points, noise)
     found = []
     for row, each in readings.items():
-        told = [
-            place
-            for block in _blocks(each)
-            if (place := _apart_in_block(each, block, in_block)) is not None
-        ]
+        told = _apart_in_blocks(each, in_block)
         if len(each.numbers) > _LATER and not any(place <= _LATER for place, _ in told):
             later = np.arange(1, _LATER + 1)
             first = float(_from_others(each, np.array([0]), later)[0])
@@ -100,39 +96,43 @@ def suspicious_readings(
     return tuple(sorted(found))
 
 
-def _blocks(each: PointReadings) -> list[np.ndarray]:
-    """Places of the readings of every block of two or more."""
-    places = (np.flatnonzero(each.blocks == block) for block in np.unique(each.blocks))
-    return [block for block in places if len(block) > 1]
-
-
-def _apart_in_block(
-    each: PointReadings, block: np.ndarray, limit: float
-) -> tuple[int, float] | None:
-    """Place and distance of the reading of a block that stands apart, None without one.
+def _apart_in_blocks(each: PointReadings, limit: float) -> list[tuple[int, float]]:
+    """Place and distance of the reading of every block that stands apart, if one does.
 
     Of two readings neither tells which it is: it is the one farther from the other readings.
     """
-    far = apart = _from_others(each, block, block)
-    if far.max() <= limit:
-        return None
-    if len(block) == 2:
-        apart = _from_others(each, block, np.delete(np.arange(len(each.numbers)), block))
-    return int(block[np.argmax(apart)]), float(far.max())
+    _, of_block, lengths = np.unique(each.blocks, return_inverse=True, return_counts=True)
+    total, spread = np.zeros((len(lengths), 3)), np.zeros((len(lengths), 3, 3))
+    np.add.at(total, of_block, each.readings_mm)
+    np.add.at(spread, of_block, each.covariances_mm2)
+    values, own, others = each.readings_mm, each.covariances_mm2, lengths[of_block] - 1
+    far = _distances(
+        values, own, total[of_block] - values, spread[of_block] - own, np.maximum(others, 1)
+    )
+    found = []
+    for number in np.unique(of_block[(far > limit) & (others > 0)]):
+        block = np.flatnonzero(of_block == number)
+        apart = far[block]
+        if len(block) == 2:
+            apart = _from_others(each, block, np.delete(np.arange(len(of_block)), block))
+        found.append((int(block[np.argmax(apart)]), float(far[block].max())))
+    return found
 
 
 def _from_others(each: PointReadings, some: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Distances of readings ``some`` from the mean of ``others``, each without itself.
+    """Distances of readings ``some`` from the mean of ``others``, of which none is one of them."""
+    values, spread = each.readings_mm, each.covariances_mm2
+    total, all_spread = values[others].sum(axis=0), spread[others].sum(axis=0)
+    return _distances(values[some], spread[some], total, all_spread, np.full(1, len(others)))
+
+
+def _distances(values, spread, total, total_spread, number) -> np.ndarray:
+    """Distances (k,) of readings from the mean of ``number`` others, their sums being ``total``.
 
     In standard deviations of the difference.
     """
-    values, spread = each.readings_mm[some], each.covariances_mm2[some]
-    own = (some[:, None] == others).any(axis=1).astype(float)
-    number = len(others) - own
-    mean = each.readings_mm[others].sum(axis=0) - own[:, None] * values
-    apart = values - mean / number[:, None]
-    rest = each.covariances_mm2[others].sum(axis=0) - own[:, None, None] * spread
-    covariance = spread + rest / number[:, None, None] ** 2
+    apart = values - total / number[:, None]
+    covariance = spread + total_spread / number[:, None, None] ** 2
     return np.sqrt(np.sum(apart * np.linalg.solve(covariance, apart[..., None])[..., 0], axis=1))
 
 
