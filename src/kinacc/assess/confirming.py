@@ -75,7 +75,7 @@ class ConfirmingCampaign(LedgerCampaign):
         self.blocks: list[int] = []  # of every reading in order the number of its block
         self._block, self._begins = 0, True
         self._direction = [1.0, 0.0, 0.0]
-        self._mean_mm = np.zeros((candidates.points, 3))  # at the ends of blocks
+        self._mean_mm = [[0.0] * 3] * candidates.points  # at the ends of blocks
         self._size_mm = np.full(candidates.points, -1.0)  # of these
 
     def boundary_of(self, error: float, freedom: float = math.inf):
@@ -119,8 +119,7 @@ class ConfirmingCampaign(LedgerCampaign):
         self.looks.update(point)
         # A planned reading ends a block only where the point is looked at.
         if is_due or not (self._left or is_planned):
-            self._mean_mm[point] = self.ledger.mean_mm[point]
-            x, y, z = self.ledger.mean_mm[point].tolist()
+            x, y, z = self._mean_mm[point] = self.ledger.mean_mm[point].tolist()
             self._size_mm[point] = math.sqrt(x * x + y * y + z * z)
         if not self._left and len(self.ledger.visited) >= self.first:
             left = self.settings.measurements - taken - 1 - self.plan.left(taken + 1)

@@ -49,10 +49,11 @@ class LowerAverage:
 
         ``time``: its place in the sequence over its length.
         """
+        (u, v, w), (x, y, z) = direction, reading_mm
         self._rows.append(row)
-        self._along_mm.append(sum(u * y for u, y in zip(direction, reading_mm, strict=True)))
+        self._along_mm.append(u * x + v * y + w * z)
         self._noise_mm.append(noise_mm)
-        self._turned.append([u * time for u in direction])
+        self._turned.append([u * time, v * time, w * time])
 
     @property
     def taken(self) -> int:
@@ -116,8 +117,7 @@ def stages(wanted: int) -> tuple[int, ...]:
     return tuple(sorted({max(math.ceil(share * wanted), 1) for share in _STAGES}))
 
 
-def direction_of(mean_mm: np.ndarray) -> list[float]:
+def direction_of(mean_mm: list[float]) -> list[float]:
     """The unit vector (3,) along a mean; the first axis where it is zero."""
-    values = mean_mm.tolist()
-    length = math.sqrt(sum(each * each for each in values))
-    return [each / length for each in values] if length > 0.0 else [1.0, 0.0, 0.0]
+    length = math.sqrt(sum(each * each for each in mean_mm))
+    return [each / length for each in mean_mm] if length > 0.0 else [1.0, 0.0, 0.0]

@@ -78,13 +78,13 @@ def heavy_over_normal(values: np.ndarray) -> float:
     numbers = values.size
     step = _STEP / math.sqrt(2.0 * numbers)
     log_scale = math.log(_scale(values)) + np.arange(-0.8, 0.8 + step, step)
-    square = values**2 * np.exp(-2.0 * log_scale)[:, None, None]
-    by_axis = _log_t(square, 1).sum(axis=(1, 2))
-    at_once = _log_t(square.sum(axis=2), 3).sum(axis=1)
+    square, per_square = values**2, np.exp(-2.0 * log_scale)[:, None]
+    by_axis = _log_t(square.reshape(-1) * per_square, 1).sum(axis=1)
+    at_once = _log_t(square.sum(axis=1) * per_square, 3).sum(axis=1)
     at_scale = np.logaddexp(by_axis, at_once) - math.log(2.0) - numbers * log_scale
     heavy = np.logaddexp.reduce(at_scale)
     half = numbers / 2.0
-    total = float(np.sum(values**2))
+    total = float(np.sum(square))
     normal = gammaln(half) - math.log(2.0) - half * math.log(math.pi * total)
     return float(heavy + math.log(step) - normal)
 

@@ -98,16 +98,17 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
         return Contrasts(none, none, np.zeros((0, 3)))
     rows, given, own = zip(*ledger.readings, strict=True)
     rows = np.array(rows)
-    order = np.argsort(np.asarray(blocks), kind="stable")
-    ordered = np.asarray(blocks)[order]
+    block = np.asarray(blocks)
+    order = np.argsort(block, kind="stable")
+    ordered = block[order]
     begins = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
     lengths = np.diff([*begins, len(order)])
     behind = np.arange(len(order)) - np.repeat(begins, lengths)
     values = np.empty((len(order), 3))
     values[order] = _of_planned(ledger.candidates, rows[order], np.array(given)[order], behind)
     unlike = np.array([each is not None for each in own])[order]
-    for block in np.flatnonzero(np.logical_or.reduceat(unlike, begins)):
-        of_block = order[begins[block] : begins[block] + lengths[block]]
+    for at in np.flatnonzero(np.logical_or.reduceat(unlike, begins)):
+        of_block = order[begins[at] : begins[at] + lengths[at]]
         values[of_block] = _of_unlike(ledger, of_block)
     inside = np.empty(len(order), dtype=bool)
     inside[order] = behind > 0
