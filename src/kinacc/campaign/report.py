@@ -149,7 +149,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
         f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
         "",
         *(f"- {each}" for each in words.statements(state)),
-        *(f"- {each}" for each in nearness.in_words(state)),
+        *_nearness(state),
         *(f"- {in_markdown(each)}" for each in words.begun_against(plan)),
         *(f"- {in_markdown(each)}" for each in read_above(state, found["campaign_points"])),
         "",
@@ -165,6 +165,14 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
     lines += [f"{head(opened, state)}."]
     return "\n".join(lines) + "\n"
+
+
+def _nearness(state: State) -> list[str]:
+    """How near the bounds are, as a list within the list."""
+    lines = []
+    for head, told in nearness.told(state):
+        lines += [f"- {head}:", *(f"  - {each}" for each in told)]
+    return lines
 
 
 def _conformity(state: State) -> list[str]:

@@ -65,7 +65,7 @@ def _sections(state: State, tables: Mapping[str, Columns]) -> tuple[Section, ...
             "something moved).",
             "Bounds that are too far apart at the end take more readings: kinacc plan-campaign "
             "says how many a new campaign needs.",
-            (*_lines(nearness.in_words(state)), *course(state, tables, "course")),
+            (*_nearness(state), *course(state, tables, "course")),
         ),
         Section(
             "points",
@@ -107,6 +107,11 @@ def _sections(state: State, tables: Mapping[str, Columns]) -> tuple[Section, ...
             scatter(state, "noise"),
         ),
     )
+
+
+def _nearness(state: State) -> tuple[Text, ...]:
+    """How near the bounds are, and how near they could be, a sentence each."""
+    return _lines([line for head, told in nearness.told(state) for line in (f"{head}:", *told)])
 
 
 def _population(state: State) -> str:
