@@ -221,7 +221,7 @@ def test_errors_can_be_scaled(errors_file):
     ("words", "said"),
     [
         (("--noise-mm", "0"), "no instrument is without noise"),
-        ((), "--noise-mm or --covariance-mm2"),
+        ((), "--noise-mm MM, or --covariance-mm2"),
         (("--covariance-mm2", "1,2,0,2,1,0,0,0,1"), "not positive definite"),
         (("--noise-mm", "0.1", "--errors", "nowhere"), "smooth, gravity"),
         (("--noise-mm", "0.1", "--width-mm", "-1"), "--width-mm"),
