@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinacc.campaign import begin, folder, journal, report
+from kinacc.assess.statement import CANDIDATES
+from kinacc.campaign import begin, folder, journal, report, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
@@ -228,3 +229,17 @@ def test_as_a_section_it_is_kept_apart_from_held_out_errors(whole):
     assert "12 candidates" in part.population
     assert "none of the held-out rows" in part.population
     assert all(each.key.startswith("campaign-1-") for each in blocks((part,), Picture))
+
+
+def test_an_estimate_for_candidates_that_are_not_all_measured_is_said_to_be_low(whole):
+    part = measured(points=40, budget=30)
+    left = 40 - len({each.reading.point for each in part.state.told})
+    assert left > 0
+    low = f"The estimate for all candidates tends to be too low: {left} of 40 are not measured."
+    for said in part.state.statements():
+        assert words.statement(said, part.state).endswith(low) == (said.target == CANDIDATES)
+    first = first_of(part)
+    assert sum(text.count(low) for text in first.answers) == 1
+    assert report.markdown(part.opened, part.state, part.tables, "picture").count(low) == 1
+    every = report.markdown(whole.opened, whole.state, whole.tables, "picture")
+    assert "tends to be too low" not in every

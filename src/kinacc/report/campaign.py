@@ -124,7 +124,9 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
     """The page of a campaign, by the state and the tables of ``campaign.report.tables``."""
     about, plan = state.plan.about, state.plan
     said = words.distinct(state)
-    lead = leading(state, said)
+    lead, told = leading(state, said), answers(state, None)
+    estimates = (words.of_the_estimate(each, state) for each in said)
+    low = [each for each in estimates if each not in " ".join(told)]  # none is in every text
     visited = len({each.reading.point for each in state.told})
     candidates = len(plan.points) - len(state.left_out)
     first = FirstScreen(
@@ -133,7 +135,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
         f"{len(state.told)} of {plan.assessor.measurements} readings, at {visited} of {candidates} "
         "candidates",
         _badge(state, said, lead),
-        (*answers(state, None), _MODEL_ERROR),
+        (*told, *low, _MODEL_ERROR),
         (_statements(state, said),),
         _notes(opened, state, tables, said, lead),
     )
