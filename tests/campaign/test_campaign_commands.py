@@ -279,7 +279,7 @@ def test_readings_of_a_file_that_has_grown_are_taken_once(begun, tmp_path):
         (("--covariance-mm2", "1,0,0,0,1,0,0,0,-1"), "not positive definite"),
         (("--instrument", "a=0.1,0.2"), "1 standard deviation, 3"),
         (("--instrument", "a=0.1", "--instrument", "a=0.2"), "is given twice"),
-        ((), "--noise-mm or --covariance-mm2, or --instrument NAME=.., or --repeatability"),
+        ((), "--noise-mm MM, or --covariance-mm2, or --instrument NAME=MM"),
         (
             ("--noise-mm", "0.1", "--budget", "0"),
             "--budget: 0; allowed: a whole number, at least 1",

@@ -136,7 +136,26 @@ def test_a_file_of_which_every_row_was_changed_is_asked_about(day):
     rows = [day.row(place) for place in range(5)]
     day.takes(rows[:3], 3)
     shifted = [other(each, 1, 0.5) for each in rows]
-    assert day.refuses(shifted).count("stands where reading") == 3
+    said = day.refuses(shifted)
+    assert "lines 2-4: stand where readings 1 to 3 were" in said
+    assert said.count("the file does not hold any more") == 1
+
+
+def test_a_file_written_over_with_new_readings_of_a_point_is_asked_about_once(day):
+    first, second = ([day.row(0) for _ in range(3)] for _ in range(2))
+    day.takes(first, 3)
+    said = day.refuses(second)
+    assert said.count("  - ") == 1
+    assert "stand where readings 1 to 3 were" in said
+    assert "in a file written over: record it again with --again" in said
+    assert f"kinacc campaign strike '{day.folder}' NUMBER --reason .." in said
+    day.takes(second, 3, "--again")
+    mixed = [second[0], *(day.row(0) for _ in range(2))]  # an old row and new ones
+    said = day.refuses(mixed)
+    assert said.count("  - ") == 1
+    assert "lines 3-4: stand where readings 5 to 6 were" in said
+    day.takes(mixed, 2, "--again")
+    assert day.taken() == 8
 
 
 def test_a_row_that_got_another_point_is_asked_about(day):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -50,12 +51,24 @@ def test_a_finished_campaign_is_told_what_more_skill_would_have_saved(measured, 
         assert each["attainable_mm"] == pytest.approx(true.attainable_mm, rel=0.15)
         assert each["proven_mm"] == pytest.approx(true.proven_mm, rel=0.15)
         assert each["lower_mm"] == pytest.approx(true.lower_mm, rel=1e-3)
-    (line,) = nearness.in_words(state)
-    shown = nearness.as_facts(state)[1]
-    assert "with all sizes known beforehand, 120 readings would give" in line
-    assert f"{shown['attainable_mm']:.3f} mm and {shown['lower_mm']:.3f} mm on average" in line
-    assert f"below {shown['proven_mm']:.3f} mm" in line
-    assert "(estimated)" in line
+    head, now, known, proven = nearness.in_words(state)
+    shown, said = nearness.as_facts(state)[1], state.statements()[1]
+    assert head == "how near the bounds are (all candidates, 120 readings):"
+    assert f"upper bound {said.upper_mm - said.value_mm:.3f} mm above the estimate" in now
+    assert f"lower bound {said.value_mm - said.lower_mm:.3f} mm below" in now
+    assert f"{shown['attainable_mm']:.3f} mm above, {shown['lower_mm']:.3f} mm below" in known
+    assert f"nearer than: {shown['proven_mm']:.3f} mm above" in proven
+    assert "(estimated)" in known
+    assert "(estimated)" in proven
+
+
+def test_a_line_tells_two_figures_at_most_and_fits_a_screen(measured):
+    plan, entries = measured(120)
+    lines = nearness.in_words(restore(plan, entries))
+    assert len(lines) == 4
+    for line in lines:
+        assert len(re.findall(r"\d+\.\d+", line)) <= 2
+        assert len(line) <= 100
 
 
 def test_nothing_is_told_of_bounds_that_are_not_stated(measured):
@@ -66,10 +79,10 @@ def test_nothing_is_told_of_bounds_that_are_not_stated(measured):
     assert nearness.in_words(restore(plan, [])) == []
 
 
-def test_status_and_report_say_it_in_one_line(begun):
+def test_status_report_and_page_say_the_same(begun):
     folder = begun("--noise-mm", "0.05", "--frame", "base", points=12, budget=20)
     rng, errors = np.random.default_rng(3), {}
-    lines = folder.parent / "readings.csv"
+    file = folder.parent / "readings.csv"
     while rows := json.loads(call("campaign", "next", folder, "--all", "--json").stdout).get(
         "rows"
     ):
@@ -78,15 +91,19 @@ def test_status_and_report_say_it_in_one_line(begun):
             error = errors.setdefault(row["pose"], rng.normal(0.0, 0.3, 3))
             at = [row[f"expected_{axis}_mm"] for axis in "xyz"] + error + rng.normal(0.0, 0.05, 3)
             text.append(",".join(map(str, [row["pose"], *at])))
-        lines.write_text("\n".join(text) + "\n")
-        assert call("campaign", "record", folder, lines).exit_code == 0
+        file.write_text("\n".join(text) + "\n")
+        assert call("campaign", "record", folder, file).exit_code == 0
     status = call("campaign", "status", folder)
-    (line,) = [each for each in status.output.splitlines() if each.startswith("how near")]
+    lines = status.output.splitlines()
+    (first,) = [at for at, each in enumerate(lines) if each.startswith("how near")]
+    head, *told = lines[first : first + 4]
     limits = json.loads(call("campaign", "status", folder, "--json").stdout)["limits"]
     assert [each["target"] for each in limits] == ["measured", "candidates"]
-    assert f"{limits[1]['attainable_mm']:.3f} mm" in line
+    assert f"{limits[1]['attainable_mm']:.3f} mm" in told[1]
     page = folder.parent / "page.html"
     done = call("campaign", "report", folder, "--page", page)
     assert done.exit_code == 0, done.output
-    assert f"- {line}" in (folder / "report" / "report.md").read_text()
-    assert line[1:] in page.read_text()
+    listed = "\n".join([f"- {head}", *(f"  - {each.strip()}" for each in told)])
+    assert listed in (folder / "report" / "report.md").read_text()
+    for each in (head, *told):
+        assert each.strip()[1:] in page.read_text()

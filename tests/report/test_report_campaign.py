@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinacc.campaign import begin, folder, journal, report
+from kinacc.assess.statement import CANDIDATES
+from kinacc.campaign import begin, folder, journal, report, without_drift, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
@@ -228,3 +229,44 @@ def test_as_a_section_it_is_kept_apart_from_held_out_errors(whole):
     assert "12 candidates" in part.population
     assert "none of the held-out rows" in part.population
     assert all(each.key.startswith("campaign-1-") for each in blocks((part,), Picture))
+
+
+def test_an_estimate_for_candidates_that_are_not_all_measured_is_said_to_be_low(whole):
+    part = measured(points=40, budget=30)
+    left = 40 - len({each.reading.point for each in part.state.told})
+    assert left > 0
+    low = f"The estimate for all candidates tends to be too low: {left} of 40 are not measured."
+    for said in part.state.statements():
+        assert words.statement(said, part.state).endswith(low) == (said.target == CANDIDATES)
+    first = first_of(part)
+    assert sum(text.count(low) for text in first.answers) == 1
+    assert report.markdown(part.opened, part.state, part.tables, "picture").count(low) == 1
+    every = report.markdown(whole.opened, whole.state, whole.tables, "picture")
+    assert "tends to be too low" not in every
+
+
+def test_readings_above_a_bound_that_a_drift_is_taken_from_are_explained_by_the_drift():
+    drift_mm = np.array([1.0, 0.0, 0.0]) / 80
+    found = measured(points=20, budget=80, off_mm=lambda number: number * drift_mm, references=40,
+                     correct_drift=True)  # fmt: skip
+    table, (said, _) = found.tables["campaign_points"], found.state.statements()
+    size, upper = (np.asarray(table[f"{name}_mm"], dtype=float) for name in ("error", "upper"))
+    assert size.max() > said.upper_mm
+    without_mm = without_drift.sizes_mm(found.state)
+    true_mm = np.linalg.norm(
+        np.random.default_rng(5).normal(0.0, TRUE_MM, (20, 3))[found.state.rows], axis=1
+    )
+    assert without_mm == pytest.approx(true_mm, abs=0.2)
+    assert (without_mm <= upper).all()
+    text = report.markdown(found.opened, found.state, found.tables, "picture")
+    top = int(np.argmax(size))
+    told = f"that holds the drift: without it the size is {without_mm[top]:.3f} mm"
+    assert f"point {table['point'][top]} the most, {size[top]:.3f} mm; {told}" in text
+    assert told in note(first_of(found), "CHECK")
+    beyond = text.split("Read above their own limit for the drift: ")[1].split(".")[0].split(", ")
+    shown = report.largest_read(table)
+    assert beyond == [table["point"][row] for row in shown if size[row] > upper[row]]
+    for wrong in ("own limit: ", "may be stated too large", "this is the mean of", "not explain"):
+        assert wrong not in text
+    blocks = section(found.state, found.tables, "here").blocks
+    assert any("their own limit for the drift" in getattr(each, "words", "") for each in blocks)

@@ -26,12 +26,19 @@ def limits_now(said: Statement, state: State) -> WidthLimits:
     return limits_of(said, ledger.visited, sizes_mm, noise_mm, ledger.taken)
 
 
-def in_words(state: State) -> list[str]:
-    """A sentence for every statement to tell that has an upper bound and could be nearer."""
+def told(state: State) -> list[tuple[str, tuple[str, ...]]]:
+    """A heading and its lines for every statement that has an upper bound and could be nearer."""
     return [
-        _sentence(said, limits, state.campaign.ledger.taken)
+        (_heading(said, state.campaign.ledger.taken), _lines(said, limits))
         for said in words.distinct(state)
         if math.isfinite((limits := limits_now(said, state)).attainable_mm)
+    ]
+
+
+def in_words(state: State) -> list[str]:
+    """The same as lines of a screen."""
+    return [
+        each for head, lines in told(state) for each in (f"{head}:", *(f"  {one}" for one in lines))
     ]
 
 
@@ -43,14 +50,20 @@ def as_facts(state: State) -> list[dict[str, object]]:
     ]
 
 
-def _sentence(said: Statement, limits: WidthLimits, readings: int) -> str:
+def _heading(said: Statement, readings: int) -> str:
     counted = "1 reading" if readings == 1 else f"{readings} readings"
+    return f"how near the bounds are ({words.target(said)}, {counted})"
+
+
+def _lines(said: Statement, limits: WidthLimits) -> tuple[str, ...]:
+    """One comparison a line, above and below: now, with sizes known, and what no rule beats."""
     return (
-        f"how near ({words.TARGETS[said.target]}): at most is "
-        f"{_mm(said.upper_mm - said.value_mm)} above the estimate, at least "
-        f"{_mm(said.value_mm - said.lower_mm)} below; with all sizes known beforehand, {counted} "
-        f"would give {_mm(limits.attainable_mm)} and {_mm(limits.lower_mm)} on average; no rule "
-        f"whose bounds hold gets below {_mm(limits.proven_mm)} from above (estimated)"
+        f"now: upper bound {_mm(said.upper_mm - said.value_mm)} above the estimate, lower bound "
+        f"{_mm(said.value_mm - said.lower_mm)} below",
+        f"with all sizes known beforehand: {_mm(limits.attainable_mm)} above, "
+        f"{_mm(limits.lower_mm)} below on average (estimated)",
+        f"no rule whose bounds hold gets nearer than: {_mm(limits.proven_mm)} above on average "
+        "(estimated)",
     )
 
 

@@ -13,7 +13,7 @@ from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
 from kinacc.assess.future_visit import SHARE as FUTURE
 from kinacc.assess.statement import MEAN, REGION
-from kinacc.campaign import consistency, nearness, words
+from kinacc.campaign import consistency, nearness, without_drift, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
 from kinacc.campaign.reading import covariance_mm2
@@ -149,7 +149,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
         f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
         "",
         *(f"- {each}" for each in words.statements(state)),
-        *(f"- {each}" for each in nearness.in_words(state)),
+        *_nearness(state),
         *(f"- {in_markdown(each)}" for each in words.begun_against(plan)),
         *(f"- {in_markdown(each)}" for each in read_above(state, found["campaign_points"])),
         "",
@@ -161,10 +161,18 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     points = found["campaign_points"]
     shown = largest_read(points)
     lines += ["## Largest errors", "", *_largest(points, shown), ""]
-    lines += beyond_limits(points, shown)
+    lines += beyond_limits(points, shown, without_mm=without_drift.sizes_mm(state))
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
     lines += [f"{head(opened, state)}."]
     return "\n".join(lines) + "\n"
+
+
+def _nearness(state: State) -> list[str]:
+    """How near the bounds are, as a list within the list."""
+    lines = []
+    for head, told in nearness.told(state):
+        lines += [f"- {head}:", *(f"  - {each}" for each in told)]
+    return lines
 
 
 def _conformity(state: State) -> list[str]:
@@ -232,31 +240,43 @@ def read_above(state: State, points: Columns) -> list[str]:
     """What is to be said where points read more than an upper bound that is stated."""
     size = _as_shown(points["error_mm"])
     measured = int(np.sum(~np.isnan(size)))
+    without_mm = without_drift.sizes_mm(state)
+    own = size if without_mm is None else _as_shown(without_mm)
     lines = []
     for said in words.distinct(state):
-        above = np.flatnonzero(size > round(said.upper_mm, _DECIMALS))
+        upper_mm = round(said.upper_mm, _DECIMALS)
+        above = np.flatnonzero(size > upper_mm)
         if not above.size:
             continue
-        top = above[np.argmax(size[above])]
+        # Where a drift is corrected for, the bound is on readings without it.
+        still = above[own[above] > upper_mm]
+        top = still[np.argmax(own[still])] if still.size else above[np.argmax(size[above])]
         noise_mm, count = float(points["noise_mm"][top]), int(points["readings"][top])
+        drift = "" if without_mm is None else f" ({own[top]:.3f} mm without the drift)"
+        most = "the most" if size[top] == size[above].max() else "one of them"
         if said.target == REGION:
             why = f"the bound leaves out {1.0 - said.share:.1%} of the region"
-        elif size[top] - said.upper_mm > _UNLIKELY * noise_mm:
+        elif not still.size:
             why = (
-                f"its noise, {noise_mm:.3f} mm per axis, does not explain that: the noise is "
-                "stated too small, or this is one of the few campaigns the confidence allows to be "
-                "wrong"
+                f"that holds the drift: without it the size is {own[top]:.3f} mm, and the bound is "
+                "on readings without it"
+            )
+        elif own[top] - said.upper_mm > _UNLIKELY * noise_mm:
+            why = (
+                f"its noise, {noise_mm:.3f} mm per axis, does not explain that{drift}: the noise "
+                "is stated too small, or this is one of the few campaigns the confidence allows to "
+                "be wrong"
             )
         else:
             readings = "1 reading" if count == 1 else f"{count} readings"
             why = (
                 "the bound is on the error that stays when a pose is measured again, and this is "
-                f"the mean of {readings} with noise of {noise_mm:.3f} mm per axis"
+                f"the mean of {readings} with noise of {noise_mm:.3f} mm per axis{drift}"
             )
         lines.append(
             f"At most {said.upper_mm:.3f} mm for {words.target(said)}: {above.size} of the "
-            f"{measured} measured points read more than that, point {points['point'][top]} the "
-            f"most, {size[top]:.3f} mm; {why}."
+            f"{measured} measured points read more than that, point {points['point'][top]} {most}, "
+            f"{size[top]:.3f} mm; {why}."
         )
     return lines
 
@@ -282,17 +302,31 @@ def _largest(points: Columns, shown: np.ndarray) -> list[str]:
 
 
 def beyond_limits(
-    points: Columns, shown: np.ndarray, written: Callable[[str], str] = in_markdown
+    points: Columns,
+    shown: np.ndarray,
+    written: Callable[[str], str] = in_markdown,
+    without_mm: np.ndarray | None = None,
 ) -> list[str]:
-    """What is to be said where rows that are shown read more than their limit, or limits cross."""
+    """What is to be said where rows that are shown read more than their limit, or limits cross.
+
+    ``without_mm``: the sizes without the drift that limits are corrected for, None where none is.
+    """
     size, lower, upper = (_as_shown(points[f"{name}_mm"])[shown] for name in _SIZES)
+    own = size if without_mm is None else _as_shown(without_mm)[shown]
     once = np.asarray(points["readings"], dtype=float)[shown] == 1.0
 
     def named(rows: np.ndarray) -> str:
         return ", ".join(written(points["point"][row]) for row in shown[rows])
 
     lines = []
-    if (above := size > upper).any():
+    if (drifted := (size > upper) & (own <= upper)).any():
+        lines += [
+            f"Read above their own limit for the drift: {named(drifted)}. A limit is on readings "
+            "without the drift, which is taken from all of them; the error shown is the mean of "
+            "what was read, with the drift.",
+            "",
+        ]
+    if (above := (size > upper) & (own > upper)).any():
         text = (
             f"Read above their own limit: {named(above)}. A limit is on the error that stays when "
             "a pose is measured again, and the narrowest of those at several looks; the "

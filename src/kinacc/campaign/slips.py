@@ -31,11 +31,7 @@ _LITTLE_NOISE = 0.8  # of the scatter that was measured
 _USUAL_READINGS = 10  # that say what size is usual
 _UNUSUAL = 6.0  # times the median size
 _FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
-MEASURE_IT = (
-    "visit 20 poses three times each, leaving them between: kinacc repeatability tells the noise "
-    "of these readings"
-)
-_TOO_FEW = f"too few repeats: {MEASURE_IT}"
+_TOO_FEW = "the calibration does not tell it: too few repeats"
 
 
 def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> list[Problem]:
@@ -66,6 +62,25 @@ def of_repeats(instruments: Sequence[Instrument], calibration: Path) -> list[Pro
     return of_little_noise(instruments, *known) if known else []
 
 
+def ways_to_noise(known: Sequence[str], several: bool) -> str:
+    """How to say what the noise is, in short lines, and what is ``known`` of it.
+
+    ``several``: instruments may be named.
+    """
+    named = ", or --instrument NAME=MM" if several else ""
+    return "\n".join(
+        [
+            "give it in one of three ways:",
+            "      a test (the surest): visit 20 poses three times each, leaving them between,",
+            "        run kinacc repeatability FILE -o noise.json, then --repeatability noise.json",
+            "      an estimate: --noise-mm MM --noise estimate",
+            "        (MM is a guess; the readings of the campaign then tell the noise)",
+            f"      a number: --noise-mm MM, or --covariance-mm2{named}",
+            *(f"    {each}" for each in known),
+        ]
+    )
+
+
 def noise_known(calibration: Path) -> str:
     """The same as :func:`noise_by_repeats` of a results folder."""
     known = _read(calibration, ("measurements", "pose_errors", "frames"))
@@ -73,7 +88,7 @@ def noise_known(calibration: Path) -> str:
 
 
 def noise_by_repeats(measured: Columns, errors: Columns, frames: Columns) -> str:
-    """What readings at equal joints tell of the noise, and what they do not; else how to find it.
+    """What readings at equal joints tell of the noise, and what they do not, in short lines.
 
     ``measured``, ``errors`` and ``frames``: ``measurements``, ``pose_errors`` and ``frames`` of the
     calibration.
@@ -82,9 +97,10 @@ def noise_by_repeats(measured: Columns, errors: Columns, frames: Columns) -> str
     if not brief:
         return _TOO_FEW
     return (
-        f"{brief} along x,y,z of the instrument: the noise is that or more, as they may have been "
-        "read back to back, without coming back to the pose, and hold no new set-up of instrument "
-        "or target"
+        f"of the calibration, {brief}\n"
+        "      along x,y,z of the instrument: the noise is that or more, as they may have been\n"
+        "      read back to back, without coming back to the pose, and hold no new set-up of\n"
+        "      instrument or target"
     )
 
 

@@ -171,7 +171,21 @@ def told_factor(plan: Plan) -> str:
 
 
 def statement(said: Statement, state: State) -> str:
-    """One sentence a person may quote."""
+    """One sentence a person may quote, and what is to be known of its estimate."""
+    return " ".join(filter(None, [_statement(said, state), of_the_estimate(said, state)]))
+
+
+def of_the_estimate(said: Statement, state: State) -> str:
+    """That the estimate for all candidates tends to be low while some are not measured."""
+    points = len(state.plan.points) - len(state.left_out)
+    left = points - _visited(state)
+    if said.target != CANDIDATES or math.isnan(said.value_mm) or not left:
+        return ""
+    unread = f"{left} of {points} {'is' if left == 1 else 'are'} not measured"
+    return f"The estimate for all candidates tends to be too low: {unread}."
+
+
+def _statement(said: Statement, state: State) -> str:
     whose = about(said, state)
     if said.withheld and math.isnan(said.upper_mm):
         seen = ""

@@ -43,11 +43,9 @@ def instruments(
         own = instrument.floored(tested.covariance_mm2, resolution_mm or 0.0)
         return (instrument.Instrument("instrument", own, frame, None, resolution_mm or 0.0),)
     if not texts:
-        allowed = "--noise-mm or --covariance-mm2"
-        allowed += "" if named is None else ", or --instrument NAME=.."
-        allowed += ", or --repeatability"
-        known = dict.fromkeys(map(slips.noise_known, calibrations)) or [slips.MEASURE_IT]
-        raise InputError(Problem("noise", "is not given", allowed, "; ".join(known)))
+        known = dict.fromkeys(map(slips.noise_known, calibrations))
+        fix = slips.ways_to_noise([*known], several=named is not None)
+        raise InputError(Problem("noise", "is not given", fix=fix))
     return instrument.instruments(texts, frame, resolution_mm or 0.0)
 
 

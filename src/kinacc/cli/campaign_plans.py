@@ -320,9 +320,10 @@ def _nearness(found: list[Row]) -> list[str]:
     most = max(row.budget for row in judged)
     worst = max((row for row in judged if row.budget == most), key=lambda row: row.excess_mm)
     return [
-        f"upper bounds after {most} readings are {worst.excess_mm:.2g} mm too high on average "
-        f"(errors: {worst.errors}); with every error known beforehand, {worst.attainable_mm:.2g} "
-        f"mm would be reached, and no rule whose bounds hold gets below {worst.proven_mm:.2g} mm"
+        f"how near upper bounds are after {most} readings (errors: {worst.errors}), on average:",
+        f"  simulated: {worst.excess_mm:.2g} mm too high",
+        f"  with every error known beforehand: {worst.attainable_mm:.2g} mm",
+        f"  no rule whose bounds hold gets below: {worst.proven_mm:.2g} mm",
     ]
 
 

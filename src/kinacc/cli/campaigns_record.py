@@ -20,7 +20,7 @@ from kinacc.cli.campaigns import say_doubts
 from kinacc.cli.campaigns_answers import as_facts
 from kinacc.cli.output import Output
 from kinacc.cli.rows import ANGLE, LENGTH, Quantities, open_table
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.measurements.table import RawTable, numbers_of
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
@@ -207,8 +207,7 @@ def _of_file(given: Asked, before: State) -> _Made:
             one = compared.known[number]
             wrong = _altered(row, where, one, readings[one], before)
         elif number in compared.changed:
-            one = compared.changed[number]
-            wrong = [_in_place(where, one, readings[one], given.folder, before)]
+            wrong = []  # told for all such rows together
         else:
             wrong = reading.problems_of(
                 before.plan, row, where, left_out, given.accept_implausible, unusual_mm
@@ -219,6 +218,10 @@ def _of_file(given: Asked, before: State) -> _Made:
         if isinstance(row, Reading):
             earlier.setdefault(imports.digits(row), called)
         problems += wrong
+    changed = {int(table.line[row]): one for row, one in sorted(compared.changed.items())}
+    if changed:
+        place_of = f"{table.path}, {table.row_names.spans(changed)}"
+        problems.append(_in_place(place_of, [*changed.values()], readings, given.folder, before))
     if not good and not problems:
         what = f"was recorded before: {_listed(compared.known.values())}, no row is new"
         fix = "a reading that is equal to another to the last digit is a further row of the file"
@@ -245,19 +248,38 @@ def _altered(row: Reading, where: str, number: int, known: Reading, before: Stat
     return [Problem(where, what, fix=fix)]
 
 
-def _in_place(where: str, number: int, known: Reading, path: str, before: State) -> Problem:
-    """The problem with a row that stands where another was when the file was recorded."""
-    seen = ", ".join(f"{each:g}" for each in known.position_mm)
+def _in_place(
+    where: str, numbers: Sequence[int], readings: Mapping[int, Reading], path: str, before: State
+) -> Problem:
+    """The problem with rows that stand where others were when the file was recorded."""
+    labels = [before.plan.points.label[readings[each].point] for each in numbers]
+    strike = ["kinacc", "campaign", "strike", path]
+    if len(numbers) == 1:
+        (number,) = numbers
+        seen = ", ".join(f"{each:g}" for each in readings[number].position_mm)
+        what = (
+            f"stands where reading {number} was, which the file does not hold any more: point "
+            f"{labels[0]}, ({seen}) mm"
+        )
+        fix = (
+            "bring the row back if it was changed by mistake; if it was wrong before, run "
+            f"`{shlex.join([*strike, str(number), '--reason', '..'])}` and record the file again; "
+            "give --again if this is a reading of its own"
+        )
+        return Problem(where, what, fix=fix)
+    points = first_few([*dict.fromkeys(labels)])
     what = (
-        f"stands where reading {number} was, which the file does not hold any more: point "
-        f"{before.plan.points.label[known.point]}, ({seen}) mm"
+        f"stand where {_listed(numbers)} were, which the file does not hold any more "
+        f"(point{'s' if len({*labels}) > 1 else ''} {points})"
     )
-    strike = shlex.join(["kinacc", "campaign", "strike", path, str(number), "--reason", ".."])
-    fix = (
-        "bring the row back if it was changed by mistake; if it was wrong before, run "
-        f"`{strike}` and record the file again; give --again if this is a reading of its own"
-    )
-    return Problem(where, what, fix=fix)
+    ways = [
+        "one of these:",
+        "      all are new readings, in a file written over: record it again with --again",
+        "      rows were changed by mistake: bring them back, and record the file again",
+        "      rows were wrong before: strike their readings, and record the file again:",
+        f"        {shlex.join(strike)} NUMBER --reason ..",
+    ]
+    return Problem(where, what, fix="\n".join(ways))
 
 
 def _listed(numbers: Iterable[int]) -> str:

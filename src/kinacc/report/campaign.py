@@ -65,7 +65,7 @@ def _sections(state: State, tables: Mapping[str, Columns]) -> tuple[Section, ...
             "something moved).",
             "Bounds that are too far apart at the end take more readings: kinacc plan-campaign "
             "says how many a new campaign needs.",
-            (*_lines(nearness.in_words(state)), *course(state, tables, "course")),
+            (*_nearness(state), *course(state, tables, "course")),
         ),
         Section(
             "points",
@@ -109,6 +109,11 @@ def _sections(state: State, tables: Mapping[str, Columns]) -> tuple[Section, ...
     )
 
 
+def _nearness(state: State) -> tuple[Text, ...]:
+    """How near the bounds are, and how near they could be, a sentence each."""
+    return _lines([line for head, told in nearness.told(state) for line in (f"{head}:", *told)])
+
+
 def _population(state: State) -> str:
     """The candidates a campaign is about, in words."""
     count = len(state.plan.points) - len(state.left_out)
@@ -119,7 +124,9 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
     """The page of a campaign, by the state and the tables of ``campaign.report.tables``."""
     about, plan = state.plan.about, state.plan
     said = words.distinct(state)
-    lead = leading(state, said)
+    lead, told = leading(state, said), answers(state, None)
+    estimates = (words.of_the_estimate(each, state) for each in said)
+    low = [each for each in estimates if each not in " ".join(told)]  # none is in every text
     visited = len({each.reading.point for each in state.told})
     candidates = len(plan.points) - len(state.left_out)
     first = FirstScreen(
@@ -128,7 +135,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
         f"{len(state.told)} of {plan.assessor.measurements} readings, at {visited} of {candidates} "
         "candidates",
         _badge(state, said, lead),
-        (*answers(state, None), _MODEL_ERROR),
+        (*told, *low, _MODEL_ERROR),
         (_statements(state, said),),
         _notes(opened, state, tables, said, lead),
     )

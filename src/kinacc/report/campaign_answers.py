@@ -32,6 +32,7 @@ def answers(state: State, stated: Tolerance | None) -> tuple[str, ...]:
             known.append(f"at least {lead.lower_mm:.3f} mm, a bound that is right as often")
         if known:
             lines.append(f"The largest error among them is {', and '.join(known)}.")
+            lines += filter(None, [words.of_the_estimate(lead, state)])
     return (*lines, *kept)
 
 

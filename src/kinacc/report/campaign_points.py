@@ -9,7 +9,7 @@ import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, HoverTool, IndexFilter
 
 from kinacc.artifacts.columns import Columns
-from kinacc.campaign import instrument
+from kinacc.campaign import instrument, without_drift
 from kinacc.campaign.report import beyond_limits, largest_read
 from kinacc.campaign.state import State
 from kinacc.report import pictures
@@ -44,10 +44,15 @@ def points(state: State, tables: Mapping[str, Columns], key: str) -> tuple[Block
         _sizes(state, data, hover, key),
         _in_space(state, table, data, hover, key),
         _table_of_points(table, largest, f"{key}-sizes", [place[int(row)] for row in largest]),
-        *(Text(each) for each in beyond_limits(table, largest, str) if each),
+        *(Text(each) for each in _beyond(state, table, largest)),
         *([_all_points(table, order)] if len(order) > len(largest) else []),
         *_not_measured(table),
     )
+
+
+def _beyond(state: State, table: Columns, largest: np.ndarray) -> list[str]:
+    without_mm = without_drift.sizes_mm(state)
+    return [each for each in beyond_limits(table, largest, str, without_mm) if each]
 
 
 def _point_data(
