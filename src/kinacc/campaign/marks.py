@@ -50,6 +50,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "92c21a4bb3ec2a38",
         "1f2b66209ee755c1",
         "bbaffb0b966dd2e9",
+        "d5dd40b6cafee31e",
     },
     "invalidation_calibrated": _BEFORE_ROOMS
     | {
@@ -59,6 +60,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "136d34131906ef05",
         "b607931e6f633d3a",
         "ae77007204b5a5d7",
+        "2c5cc81baff430c1",
     },
     "kinematic": _BEFORE_ROOMS
     | {
@@ -68,6 +70,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "8e1bb6d080eeda6f",
         "e13db065367f0d1a",
         "a3a306a7af20befb",
+        "24590e6c382d9ce2",
     },
     "model_invalidation_full": _BEFORE_ROOMS
     | {
@@ -77,6 +80,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "6c3f88d9087efb73",
         "ec7a1a87ea98390e",
         "5485300349a48fa1",
+        "b7886dc5a7e43eb3",
     },
     "region_share": _BEFORE_ROOMS
     | {
@@ -86,6 +90,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "9e5efc1a7d7755e5",
         "3985176744349931",
         "315c9ed2d8f5cf5b",
+        "dc7f051aec6d76aa",
     },
     "single_shot": _BEFORE_ROOMS
     | {
@@ -95,6 +100,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "0fd8bee355f51b05",
         "b26433629f82dbdb",
         "368fe70b6419f77d",
+        "c493ebfeef6e6e0e",
     },
     "two_stage": _BEFORE_ROOMS
     | {
@@ -104,6 +110,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "6de38d1bb0294859",
         "e9a469f2807caf7a",
         "e36479a8446a76f6",
+        "4dfe50642c439a13",
     },
 }
 
