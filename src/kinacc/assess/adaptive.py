@@ -85,6 +85,11 @@ class Candidates:
         return spread <= _SYMMETRY * self.sigma_mm**2
 
     @cached_property
+    def inverses(self) -> np.ndarray:
+        """Inverses (m, 3, 3) of the covariances."""
+        return np.linalg.inv(self.covariance_mm2)
+
+    @cached_property
     def weights(self) -> list[float]:
         """Of a reading of each point 1 / variance per axis; 0 where that is not equal in all."""
         variances = np.where(self.is_equal_noise, self.covariance_mm2[:, 0, 0], math.inf)
@@ -192,7 +197,8 @@ class Ledger:
         self.mean_mm = np.zeros((points, 3))
         self.noise_mm = np.full(points, math.inf)  # of the mean, per axis, root mean square
         self._weight = np.zeros(points)  # sum of 1 / variance where all noise was equal
-        self._information: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        # Where noise is not equal: sum of inverse covariances, that times readings, its inverse.
+        self._information: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def record(self, point: int, reading_mm, covariance_mm2=None, afresh: bool = False) -> None:
         """Take one reading, or raise InputError and take nothing.
@@ -221,19 +227,21 @@ class Ledger:
             return
         known = self._weight[point]
         before = (known * np.eye(3), known * self.mean_mm[point])
-        matrix, vector = self._information.get(point, before)
-        planned = self.candidates.covariance_mm2[point]
-        inverse = np.linalg.inv(planned if covariance_mm2 is None else np.asarray(covariance_mm2))
+        matrix, vector = self._information.get(point, before)[:2]
+        if covariance_mm2 is None:
+            inverse = self.candidates.inverses[point]
+        else:
+            inverse = np.linalg.inv(np.asarray(covariance_mm2, dtype=float))
         matrix, vector = matrix + inverse, vector + inverse @ np.array(reading)
-        self._information[point] = (matrix, vector)
         spread = np.linalg.inv(matrix)
+        self._information[point] = (matrix, vector, spread)
         self.mean_mm[point] = spread @ vector
         self.noise_mm[point] = math.sqrt(np.trace(spread) / 3.0)
 
     def noise(self, point: int) -> float | np.ndarray:
         """Noise of a point's mean: standard deviation per axis (mm), or covariance (3, 3)."""
         if point in self._information:
-            spread = np.linalg.inv(self._information[point][0])
+            spread = self._information[point][2]
             return 0.5 * (spread + spread.T)
         return float(self.noise_mm[point])
 

@@ -60,14 +60,15 @@ def largest_size(mean_mm: np.ndarray, covariance_mm2: np.ndarray, deviations: fl
     # x_i = t y_i / (t - s_i) for the t above the largest variance that meets the boundary.
     weight = variance * y * y
     wanted = deviations * deviations
+    parts = list(zip(weight.tolist(), variance.tolist(), strict=True))
     low, high = top, top + math.sqrt(3.0 * float(weight.max())) / deviations + 1e-300
-    while float(np.sum(weight / (high - variance) ** 2)) > wanted:
+    while _squared_steps(parts, high) > wanted:
         high = top + 2.0 * (high - top)
     for _ in range(200):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if float(np.sum(weight / (middle - variance) ** 2)) > wanted:
+        if _squared_steps(parts, middle) > wanted:
             low = middle
         else:
             high = middle
@@ -83,6 +84,18 @@ def largest_size(mean_mm: np.ndarray, covariance_mm2: np.ndarray, deviations: fl
         step += along * math.sqrt(left * top / float(along @ along))
     x = y + step
     return math.sqrt(float(x @ x))
+
+
+def _squared_steps(parts: list[tuple[float, float]], t: float) -> float:
+    """Sum of weight / (t - variance)^2, in plain numbers: three are too few for arrays to pay."""
+    total = 0.0
+    for weight, variance in parts:
+        square = (t - variance) * (t - variance)
+        if square > 0.0:
+            total += weight / square
+        else:
+            total += math.inf if weight > 0.0 else math.nan
+    return total
 
 
 class BallDistances:

@@ -84,6 +84,8 @@ class Looks:
 
         Infinite where a point was not looked at.
         """
+        if boundary is self.boundary and (factor == self.factor).all():
+            return self.upper_mm
         return self.corrected_limits_mm(boundary, factor, 0.0)
 
     def corrected_limits_mm(
