@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from types import SimpleNamespace
 
+import matplotlib.text
 import numpy as np
 import pytest
 
@@ -17,6 +18,7 @@ from kinacc.campaign.plan import Limits, assessor_of
 from kinacc.campaign.reading import Reading
 from kinacc.deployment.planning.candidates import spread
 from kinacc.deployment.record import nominal
+from kinacc.figures.campaign import draw
 from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.campaign import campaign_page, section
@@ -134,8 +136,25 @@ def test_a_reading_that_went_wrong_is_named_on_the_first_screen():
 def test_a_bound_on_all_but_some_says_so_in_promise_and_table():
     first = first_of(measured(points=60, budget=40, tolerance_mm=2.0))
     assert "no more than 3 of these 60 candidates are off" in first.answers[0]
-    assert [row[0] for row in first.tables[0].rows][-1] == "all candidates but 3"
+    assert [row[0] for row in first.tables[0].rows][-1] == "all but 3 candidates"
     assert first.badge == ("UNDECIDED", True)
+
+
+def test_course_picture_and_conformity_say_how_many_a_bound_leaves_out():
+    found = measured(points=60, budget=40, tolerance_mm=2.0)
+    about = found.tables["campaign_bounds"]
+    left = np.asarray(about["excepted"])
+    assert (left > 0).any()
+    every = blocks([section(found.state, found.tables, "here")], Table)
+    (table,) = [each for each in every if "course" in each.caption]
+    stated = [row for row in table.rows if row[2] != "measured points" and row[3] != "-"]
+    assert {row[2] for row in stated} == {"all but 3 candidates"}
+    drawn = draw(found.tables["campaign_points"], about, len(found.state.plan.route))
+    labels = [each.get_text() for each in drawn.findobj(matplotlib.text.Text)]
+    assert "bounds, all but 3 candidates" in labels
+    text = report.markdown(found.opened, found.state, found.tables, "picture")
+    assert "- all but 3 candidates: **undecided**" in text
+    assert "all candidates" not in text.split("## Conformity")[1].split("##")[0]
 
 
 def test_a_promise_names_what_was_asked_to_be_guarded_and_allowed_for():
@@ -268,5 +287,5 @@ def test_readings_above_a_bound_that_a_drift_is_taken_from_are_explained_by_the_
     assert beyond == [table["point"][row] for row in shown if size[row] > upper[row]]
     for wrong in ("own limit: ", "may be stated too large", "this is the mean of", "not explain"):
         assert wrong not in text
-    blocks = section(found.state, found.tables, "here").blocks
-    assert any("their own limit for the drift" in getattr(each, "words", "") for each in blocks)
+    texts = blocks([section(found.state, found.tables, "here")], page.Text)
+    assert any("their own limit for the drift" in each.words for each in texts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -387,10 +387,7 @@ def _by_settings(state: State) -> list[str]:
         else "nothing is allowed for what no repeat sees: frame, tool offset, the instrument's "
         "scale",
     ]  # fmt: skip
-    if not told.get("references", 0):
-        lines.append(
-            "nothing drifted or moved: no reference poses are read again that would show it"
-        )
+    lines.append(_of_the_frame(told))
     if "confidence" in told:
         sure = told["confidence"] - rate
         lines.append(
@@ -398,3 +395,15 @@ def _by_settings(state: State) -> list[str]:
             f"{max(2.0 * sure - 1.0, 0.0):.0%} at least"
         )
     return lines
+
+
+def _of_the_frame(told: Mapping[str, object]) -> str:
+    """What the bounds rest on where the frame may move, by an assessor's settings."""
+    if not told.get("references", 0):
+        return "nothing drifted or moved: no reference poses are read again that would show it"
+    if told.get("correct_drift", False):
+        return (
+            "the frame moved evenly with the readings, if at all: that drift is taken from all "
+            "readings, and the bounds are wider by what is not known of it"
+        )
+    return "nothing drifted or moved so little that the reference poses do not show it"

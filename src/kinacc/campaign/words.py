@@ -295,9 +295,16 @@ def _visited(state: State) -> int:
 
 def target(said: Statement) -> str:
     """What a statement is about, in a table."""
-    if said.target == REGION:
-        return f"{said.share:.1%} of the region"
-    return TARGETS[said.target] + (f" but {said.excepted}" if said.excepted else "")
+    return target_of(said.target, said.share, said.excepted)
+
+
+def target_of(named: str, share: float, excepted: int) -> str:
+    """The same by what ``campaign_bounds`` holds of a statement."""
+    if named == REGION:
+        return f"{share:.1%} of the region"
+    if excepted:
+        return f"all but {excepted} candidate{'s' if excepted > 1 else ''}"
+    return TARGETS[named]
 
 
 def about(said: Statement, state: State) -> str:

@@ -59,6 +59,8 @@ def _growth(ax: Axes, bounds: Columns, first_visit: int) -> None:
     for target in dict.fromkeys(bounds["target"]):
         words, colour, dashes = _TARGETS[target]
         rows = np.flatnonzero(np.asarray(bounds["target"]) == target)
+        if left := int(np.asarray(bounds["excepted"])[rows[-1]]):
+            words = f"all but {left} candidate{'s' if left > 1 else ''}"
         readings = np.asarray(bounds["readings"], dtype=float)[rows]
         lower, value, upper = (
             np.asarray(bounds[f"{which}_mm"], dtype=float)[rows]

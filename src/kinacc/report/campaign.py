@@ -38,7 +38,7 @@ def section(state: State, tables: Mapping[str, Columns], key: str) -> Section:
         "rows",
         "What readings at poses drawn beforehand allow to say of the largest error there.",
         "Good: bounds that close in as readings come, with the estimate between them. Bad: bounds "
-        "that cross, or readings of one point that scatter more than the noise stated.",
+        "that cross, or readings within a block that scatter more than the noise stated.",
         "Go on while points are asked for; where the bounds cannot be relied on, look at the noise "
         "and at what may have moved before you believe them.",
         (
@@ -97,9 +97,10 @@ def _sections(state: State, tables: Mapping[str, Columns]) -> tuple[Section, ...
         Section(
             "noise",
             "Noise as stated, and as seen",
-            "readings that one decision had taken at one point, but the first of them",
-            "How far repeated readings lie from the mean of those before, over what the noise "
-            "stated brings: 1 on average where it is as stated.",
+            "readings within a block (those that one decision had taken at one point), but the "
+            "first of each",
+            "How far readings lie from the mean of those before in their block, over what the "
+            "noise stated brings: 1 on average where it is as stated.",
             "Good: around 1, few above the dotted line, no trend. Bad: most above 1 (the noise is "
             "stated too small), a rise over the readings (something moves).",
             "Noise stated too small makes the bounds wrong: begin a new campaign with the noise as "

@@ -74,11 +74,17 @@ def course(state: State, tables: Mapping[str, Columns], key: str) -> tuple[Block
 
 
 def _statements(bounds: Columns) -> Iterator[tuple[str, np.ndarray]]:
-    """What statements are about, in words, and their rows."""
+    """What statements are about at the end, in words, and their rows."""
     target, share = np.asarray(bounds["target"]), np.asarray(bounds["share"], dtype=float)
     for each, part in dict.fromkeys(zip(target, share, strict=True)):
-        about = f"{part:.1%} of the region" if each == REGION else words.TARGETS[each]
-        yield about, np.flatnonzero((target == each) & (share == part))
+        rows = np.flatnonzero((target == each) & (share == part))
+        yield _about(bounds, int(rows[-1])), rows
+
+
+def _about(bounds: Columns, row: int) -> str:
+    """What a statement is about: how many candidates it leaves out changes with the readings."""
+    target, share, excepted = (bounds[name][row] for name in ("target", "share", "excepted"))
+    return words.target_of(str(target), float(share), int(excepted))
 
 
 def _moments(bounds: Columns, of_each: Mapping[str, np.ndarray], name: str) -> ColumnDataSource:
@@ -89,7 +95,7 @@ def _moments(bounds: Columns, of_each: Mapping[str, np.ndarray], name: str) -> C
     upper, value = columns["upper_mm"], columns["value_mm"]
     columns["mark_mm"] = np.where(np.isfinite(upper), upper, value)
     texts = {
-        "about": [about for about, mine in of_each.items() for _ in mine],
+        "about": [_about(bounds, int(row)) for row in rows],
         "right": [
             words.how_often(each) if np.isfinite(each) else "no campaign that is known"
             for each in np.asarray(bounds["confidence"], dtype=float)[rows]
@@ -151,7 +157,6 @@ def _as_table(bounds: Columns) -> Table:
     moments = np.unique(np.asarray(bounds["readings"]))
     spread = np.unique(np.linspace(0, len(moments) - 1, _MOMENTS).round().astype(int))
     kept = np.flatnonzero(np.isin(bounds["readings"], moments[spread]))
-    about = {int(row): said for said, rows in _statements(bounds) for row in rows}
     return Table(
         "The course in numbers: the largest error, mm",
         ("readings", "points", "of", *(said for _, said in _BOUNDS), "remark"),
@@ -159,7 +164,7 @@ def _as_table(bounds: Columns) -> Table:
             (
                 str(int(bounds["readings"][row])),
                 str(int(bounds["points_measured"][row])),
-                about[int(row)],
+                _about(bounds, int(row)),
                 *(mm(bounds[name][row]) for name, _ in _BOUNDS),
                 _rests(bounds, int(row)),
             )
@@ -206,9 +211,9 @@ def scatter(state: State, key: str) -> tuple[Block, ...]:
         "number": "reading {}",
         "instrument": "{}",
         "called": "point {}",
-        "apart": "{} times the noise stated from the mean of those before",
+        "apart": "{} times the noise stated from the mean of those before in its block",
     }
-    words_of = "Distances of repeated readings from the mean of those before."
+    words_of = "Distances of repeated readings from the mean of those before in their block."
     drawn = Picture(
         f"{key}-repeats", plot, f"{words_of} {caption}", caption, details=details,
         invitation="Select a reading to see which it is.",
