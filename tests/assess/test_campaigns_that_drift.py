@@ -183,6 +183,16 @@ def test_corrected_upper_limits_are_what_a_plain_reckoning_makes_of_the_readings
         assert upper_mm == pytest.approx(min(limits), abs=1e-9)
 
 
+def test_a_campaign_that_corrects_a_drift_is_asked_before_its_first_reading():
+    rng = np.random.default_rng(9)
+    campaign, _ = run(rng, errors(rng), references=20, correct_drift=True)
+    begun = campaign.settings.begin(campaign.ledger.candidates)
+    assert begun.point_limits() == {}
+    assert begun.change() is None
+    assert begun.suspicious() == ()
+    assert {each.withheld.code for each in begun.statements()} == {"first_visit"}
+
+
 def test_a_campaign_told_again_says_the_same():
     rng = np.random.default_rng(7)
     campaign, _ = run(rng, errors(rng), references=8, correct_drift=True)

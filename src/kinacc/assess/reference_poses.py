@@ -139,12 +139,11 @@ class Readings:
 def planned_readings(plan: Schedule, ledger: Ledger) -> Readings:
     """Of the readings of a ledger, those planned of reference poses."""
     place = [at for at in sorted(plan.row_at) if at < ledger.taken]
-    rows, vectors, covariances = zip(*(ledger.readings[at] for at in place), strict=True)
-    planned = ledger.candidates.covariance_mm2
-    covariance = [
-        planned[row] if own is None else own for row, own in zip(rows, covariances, strict=True)
-    ]
-    return Readings(np.array(place), np.array(rows), np.array(vectors), np.array(covariance))
+    read, planned = [ledger.readings[at] for at in place], ledger.candidates.covariance_mm2
+    rows = np.array([row for row, _, _ in read], dtype=np.intp)
+    vectors = np.array([vector for _, vector, _ in read]).reshape(-1, 3)
+    covariance = [planned[row] if own is None else own for row, _, own in read]
+    return Readings(np.array(place), rows, vectors, np.array(covariance).reshape(-1, 3, 3))
 
 
 @dataclass(frozen=True)
