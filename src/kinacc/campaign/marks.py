@@ -51,6 +51,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "1f2b66209ee755c1",
         "bbaffb0b966dd2e9",
         "d5dd40b6cafee31e",
+        "1d486d1c9f1a92c8",
     },
     "invalidation_calibrated": _BEFORE_ROOMS
     | {
@@ -61,6 +62,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "b607931e6f633d3a",
         "ae77007204b5a5d7",
         "2c5cc81baff430c1",
+        "53eae1347946df32",
     },
     "kinematic": _BEFORE_ROOMS
     | {
@@ -71,6 +73,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "e13db065367f0d1a",
         "a3a306a7af20befb",
         "24590e6c382d9ce2",
+        "25a6c4c362d81319",
     },
     "model_invalidation_full": _BEFORE_ROOMS
     | {
@@ -81,6 +84,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "ec7a1a87ea98390e",
         "5485300349a48fa1",
         "b7886dc5a7e43eb3",
+        "78523a5a6a88645a",
     },
     "region_share": _BEFORE_ROOMS
     | {
@@ -91,6 +95,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "3985176744349931",
         "315c9ed2d8f5cf5b",
         "dc7f051aec6d76aa",
+        "cf29ab329771140d",
     },
     "single_shot": _BEFORE_ROOMS
     | {
@@ -101,6 +106,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "b26433629f82dbdb",
         "368fe70b6419f77d",
         "c493ebfeef6e6e0e",
+        "3d79144dae3e6db8",
     },
     "two_stage": _BEFORE_ROOMS
     | {
@@ -111,6 +117,7 @@ _ALIKE: dict[str, frozenset[str]] = {
         "e9a469f2807caf7a",
         "e36479a8446a76f6",
         "4dfe50642c439a13",
+        "1f0309015ec09ed6",
     },
 }
 
