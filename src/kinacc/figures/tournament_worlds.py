@@ -46,10 +46,15 @@ def draw(rows: Sequence[Mapping], level: float) -> Figure:
                     fontsize=style.SMALL_PT)  # fmt: skip
             ax.axvline(level, color=style.INK, lw=0.8, ls=(0, (4, 2)), zorder=1)
             ax.set_title(f"{budget} readings", fontsize=style.SMALL_PT)
-            ax.set_xlabel("Campaigns without a false bound")
         names = [f"{setup}: {world}" for setup, world in reversed(kinds)]
         axes[0].set_yticks(np.arange(len(kinds)), names)
         handles, labels = axes[0].get_legend_handles_labels()
         once = dict(zip(labels, handles, strict=True))
-        figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=2)
+        figure.legend(
+            once.values(),
+            once.keys(),
+            loc="outside lower center",
+            ncols=2,
+            title="Share of campaigns without a false bound",
+        )
     return figure
