@@ -196,7 +196,7 @@ def of_stage(name: str, config: Mapping) -> Cost:
 
 def of_tournament(size: str) -> Cost:
     """What the tournament costs by the name of its size: minutes, hours, or days on many cores."""
-    seconds = {"default": 600.0, "workshop": 40_000.0, "full": 1e7}.get(size, 86_400.0)
+    seconds = {"default": 600.0, "workshop": 21_000.0, "full": 1e7}.get(size, 86_400.0)
     return Cost(seconds, 2e8, ("tournament.size",))
 
 
