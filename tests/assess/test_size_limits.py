@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from scipy.special import chndtr, ndtri
 from scipy.stats import ncx2
 
-from kinacc.assess import limits, plain_sizes
+from kinacc.assess import limits, plain_sizes, population
 from kinacc.assess.ellipsoid import largest_size, mahalanobis_beyond, nearest_in_ball
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.size_kernels import reading_below, reading_densities, size_at
@@ -220,3 +220,21 @@ def test_densities_of_readings_are_noncentral_chi_up_to_a_factor():
     for row in range(3):
         exact = ncx2.pdf((x[row] / noise[row]) ** 2, 3, (true / noise[row]) ** 2)
         assert ours[row] == pytest.approx(exact / exact.max(), rel=1e-6, abs=1e-15)
+
+
+def test_a_reading_of_no_size_has_the_density_of_a_small_one():
+    true = np.linspace(0.01, 1.5, 40)
+    zero, small = reading_densities(np.array([0.0, 1e-6]), np.full(2, 0.2), true)
+    assert zero == pytest.approx(np.exp(-0.5 * (true**2 - true[0] ** 2) / 0.2**2), rel=1e-9)
+    assert zero == pytest.approx(small, rel=1e-4)
+
+
+def test_the_largest_size_is_told_where_one_reading_is_as_predicted_to_the_last_digit():
+    noise_mm = np.full(4, 0.05)
+    with_zero = population.largest_size(np.array([0.0, 0.3, 0.2, 0.5]), noise_mm, 0).quantile_mm(
+        0.5
+    )
+    near_zero = population.largest_size(np.array([1e-5, 0.3, 0.2, 0.5]), noise_mm, 0).quantile_mm(
+        0.5
+    )
+    assert with_zero == pytest.approx(near_zero, rel=1e-3)

@@ -14,6 +14,8 @@ from numba.extending import register_jitable
 from kinacc.assess import plain_sizes
 from kinacc.compiled import compiled
 
+_NO_SIZE = 1e-12  # of the noise: what readings below it count as
+
 # Compiled from the very functions that serve where little is asked.
 reading_below = register_jitable(plain_sizes.reading_below)
 size_at = compiled(plain_sizes.size_at)
@@ -29,6 +31,8 @@ def reading_densities(x, noise, true):
     rows, columns = x.size, true.size
     found = np.zeros((rows, columns))
     for i in range(rows):
+        # Of a reading of 0, what is left of the factor 1 - exp(-2 x a) is in proportion to a.
+        size = max(x[i], _NO_SIZE * noise[i])
         # Beside the nearest size, as densities far from all of them are too small for numbers.
         near, best = np.inf, 0.0
         for j in range(columns):
@@ -37,7 +41,7 @@ def reading_densities(x, noise, true):
             gap = (x[i] - true[j]) / noise[i]
             log = 0.5 * (near * near - gap * gap)
             if log > -60.0:
-                product = 2.0 * x[i] * true[j] / noise[i] ** 2
+                product = 2.0 * size * true[j] / noise[i] ** 2
                 away = -math.expm1(-product) if product < 40.0 else 1.0
                 found[i, j] = math.exp(log) * away / true[j]
                 best = max(best, found[i, j])
