@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from kinacc.assess.statement import CANDIDATES
-from kinacc.campaign import begin, folder, journal, report, without_drift, words
+from kinacc.campaign import begin, folder, journal, report, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
@@ -271,7 +271,7 @@ def test_readings_above_a_bound_that_a_drift_is_taken_from_are_explained_by_the_
     table, (said, _) = found.tables["campaign_points"], found.state.statements()
     size, upper = (np.asarray(table[f"{name}_mm"], dtype=float) for name in ("error", "upper"))
     assert size.max() > said.upper_mm
-    without_mm = without_drift.sizes_mm(found.state)
+    without_mm = report.sizes_without_drift_mm(found.state)
     true_mm = np.linalg.norm(
         np.random.default_rng(5).normal(0.0, TRUE_MM, (20, 3))[found.state.rows], axis=1
     )

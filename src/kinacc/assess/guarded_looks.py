@@ -61,10 +61,10 @@ class GuardedLooks(Looks):
         )
         super().update(point, time)
 
-    def limits_mm(self, boundary: Boundary, factor: np.ndarray) -> np.ndarray:
-        """Upper limits (m,) of another boundary at the same counts, noise (m,) times as planned."""
-        if boundary is self.boundary and (factor == self.factor).all():
-            return self.upper_mm
+    def corrected_limits_mm(
+        self, boundary: Boundary, factor: np.ndarray, astray_mm: float
+    ) -> np.ndarray:
+        """As of :class:`Looks`; ``astray_mm`` is 0."""
         found = np.full(len(self.upper_mm), math.inf)
         for point in self.ledger.visited:
             own, looks = factor.item(point), range(self.done(point))

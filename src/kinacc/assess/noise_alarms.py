@@ -26,9 +26,8 @@ def scatter_alarm(
     ``tested``: degrees of freedom of the test that the noise stated comes from; ``margin``: how
     many times that noise the bounds allow for; ``false``: the probability that noise as stated is
     ever called larger. Ratio of two likelihoods: noise 1.2 times as large as allowed for (1.5 times
-    where it was tested) over noise as large. Where it is no larger the
-    ratio's mean never exceeds 1, so it ever exceeds 1/p with a probability of p at most (Ville's
-    inequality).
+    where it was tested) over noise as large. Where it is no larger the ratio's mean never exceeds
+    1, so it ever exceeds 1/p with a probability of p at most (Ville's inequality).
     """
     squares = np.sum(found.values**2, axis=1)
     if not squares.size:

@@ -85,20 +85,19 @@ class SearchAndConfirm(AdaptiveAssessor):
 
     Where too few readings are planned at points read before to check a noise that is stated as
     known, it is taken ``noise_margin`` times as large, and always at least as large as readings of
-    the same block show it. ``noise: estimated`` takes it as stated up
-    to one factor: estimated from readings of the same block, or from a test before with
-    ``noise_freedom`` degrees of freedom (:mod:`kinacc.assess.noise_factor`). Where readings
-    contradict what is stated, bounds are withheld (:mod:`kinacc.assess.noise_alarms`). ``error_of:
-    visit`` bounds what 95 % of future visits to the worst pose keep; ``arm_mm`` is the arm's own
-    standard deviation per axis, all of the noise where it is null. ``references`` readings return
-    to reference poses by plan; where these show a drift or step, bounds are withheld, or with
-    ``correct_drift`` a linear drift is taken from all readings and both bounds are wider by what is
-    not known of it (:mod:`kinacc.assess.reference_poses`). ``allowance_mm`` is what no repeat sees;
-    it widens both bounds. ``wrong_rate`` is the largest share of readings that go wrong and are
-    guarded against (:mod:`kinacc.assess.wrong_readings`): it is lost from the confidence. Without
-    it, bounds are withheld where a reading stands apart (:mod:`kinacc.assess.suspicious_readings`).
-    The value is the median of the posterior of
-    :mod:`kinacc.assess.population`.
+    the same block show it. ``noise: estimated`` takes it as stated up to one factor: estimated from
+    readings of the same block, or from a test before with ``noise_freedom`` degrees of freedom
+    (:mod:`kinacc.assess.noise_factor`). Where readings contradict what is stated, bounds are
+    withheld (:mod:`kinacc.assess.noise_alarms`). ``error_of: visit`` bounds what 95 % of future
+    visits to the worst pose keep; ``arm_mm`` is the arm's own standard deviation per axis, all of
+    the noise where it is null. ``references`` readings return to reference poses by plan; where
+    these show a drift or step, bounds are withheld, or with ``correct_drift`` a linear drift is
+    taken from all readings and both bounds are wider by what is not known of it
+    (:mod:`kinacc.assess.reference_poses`). ``allowance_mm`` is what no repeat sees; it widens both
+    bounds. ``wrong_rate`` is the largest share of readings that go wrong and are guarded against
+    (:mod:`kinacc.assess.wrong_readings`): it is lost from the confidence. Without it, bounds are
+    withheld where a reading stands apart (:mod:`kinacc.assess.suspicious_readings`). The value is
+    the median of the posterior of :mod:`kinacc.assess.population`.
     """
 
     measurements: int
@@ -253,7 +252,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
             return dict.fromkeys(self.ledger.visited, (0.0, math.inf))
         error = 1.0 - self.settings.confidence
         upper, single = self._limits_mm(error), self._single_factor()
-        looks = self._corrected.looks if self._corrected else self.looks
+        looks = self.without_drift.looks if self.without_drift else self.looks
         lower = looks.lower_limits_mm(single)
         if self.settings.wrong_rate:
             lower = np.zeros_like(lower)  # any single point may have been read wrong
@@ -270,7 +269,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         return of_future_visits(said, self.noise.arms_mm(noise))
 
     @property
-    def _corrected(self) -> Corrected | None:
+    def without_drift(self) -> Corrected | None:
         """The campaign without its drift, where that is wanted and all references are read."""
         if not self.settings.correct_drift or self.noise.missing():
             return None
@@ -288,7 +287,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
 
     def _limits_mm(self, error: float) -> np.ndarray:
         """Upper limits (m,) of single points for an allowed error."""
-        plan, told = self.noise_plan, self._corrected
+        plan, told = self.noise_plan, self.without_drift
         own, allowed = self.noise.taken(error).factor.own, plan.mean_share * error
         boundary = self.boundary_of((1.0 - self.drift_part) * allowed, plan.freedom)
         if told is None:
@@ -327,7 +326,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         factor = self.noise.taken(1.0 - self.settings.confidence).factor.value
         # Where all readings scatter more than stated, none is wrong for doing so too.
         factor = max(factor, self.noise.usual_scatter())
-        ledger = self._corrected.ledger if self._corrected else self.ledger
+        ledger = self.without_drift.ledger if self.without_drift else self.ledger
         return suspicious_readings(
             readings_by_row(ledger, self.blocks, self.counts),
             self.extra + self.settings.references,
@@ -348,7 +347,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         return largest + self.settings.allowance_mm
 
     def _lower_mm(self) -> float:
-        told = self._corrected
+        told = self.without_drift
         own = self.noise.taken(1.0 - self.settings.confidence).factor.own
         if not self.average.has_spoken:
             looks = told.looks if told else self.looks
@@ -395,8 +394,8 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
 
     def _posterior(self) -> LargestSize:
         # A drift that is not found is a worse guess of the drift than none.
-        change, ledger = self.change() if self._corrected else None, self.ledger
-        if self._corrected and change and change.is_found:
-            ledger = self._corrected.ledger
+        change, ledger = self.change() if self.without_drift else None, self.ledger
+        if self.without_drift and change and change.is_found:
+            ledger = self.without_drift.ledger
         unmeasured = ledger.candidates.points - len(ledger.visited)
         return largest_size(ledger.sizes_mm(), ledger.noise_mm[ledger.visited], unmeasured)

@@ -52,6 +52,8 @@ _ALIKE: dict[str, frozenset[str]] = {
         "bbaffb0b966dd2e9",
         "d5dd40b6cafee31e",
         "1d486d1c9f1a92c8",
+        "24fb0bd491682aec",
+        "10d052fde1b55234",
     },
     "invalidation_calibrated": _BEFORE_ROOMS
     | {
@@ -63,6 +65,8 @@ _ALIKE: dict[str, frozenset[str]] = {
         "ae77007204b5a5d7",
         "2c5cc81baff430c1",
         "53eae1347946df32",
+        "a9472d0cbe58c2e5",
+        "da4d0b5547c19315",
     },
     "kinematic": _BEFORE_ROOMS
     | {
@@ -74,6 +78,8 @@ _ALIKE: dict[str, frozenset[str]] = {
         "a3a306a7af20befb",
         "24590e6c382d9ce2",
         "25a6c4c362d81319",
+        "7e848690e904ccb6",
+        "f3f21bec9da43ed7",
     },
     "model_invalidation_full": _BEFORE_ROOMS
     | {
@@ -85,6 +91,8 @@ _ALIKE: dict[str, frozenset[str]] = {
         "5485300349a48fa1",
         "b7886dc5a7e43eb3",
         "78523a5a6a88645a",
+        "96f58be867418b04",
+        "92bfb6d205508f5d",
     },
     "region_share": _BEFORE_ROOMS
     | {
@@ -96,6 +104,8 @@ _ALIKE: dict[str, frozenset[str]] = {
         "315c9ed2d8f5cf5b",
         "dc7f051aec6d76aa",
         "cf29ab329771140d",
+        "4e3f0df198aa2d54",
+        "61fbace2f1dd1d6f",
     },
     "single_shot": _BEFORE_ROOMS
     | {
@@ -107,6 +117,8 @@ _ALIKE: dict[str, frozenset[str]] = {
         "368fe70b6419f77d",
         "c493ebfeef6e6e0e",
         "3d79144dae3e6db8",
+        "fae3e4547cf3d882",
+        "78e3f912c25b7d18",
     },
     "two_stage": _BEFORE_ROOMS
     | {
@@ -118,6 +130,8 @@ _ALIKE: dict[str, frozenset[str]] = {
         "e36479a8446a76f6",
         "4dfe50642c439a13",
         "1f0309015ec09ed6",
+        "5d745eeb0d516549",
+        "5f6765afb841d0cd",
     },
 }
 

@@ -13,7 +13,7 @@ from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
 from kinacc.assess.future_visit import SHARE as FUTURE
 from kinacc.assess.statement import MEAN, REGION
-from kinacc.campaign import consistency, nearness, without_drift, words
+from kinacc.campaign import consistency, nearness, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
 from kinacc.campaign.reading import covariance_mm2
@@ -161,7 +161,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     points = found["campaign_points"]
     shown = largest_read(points)
     lines += ["## Largest errors", "", *_largest(points, shown), ""]
-    lines += beyond_limits(points, shown, without_mm=without_drift.sizes_mm(state))
+    lines += beyond_limits(points, shown, without_mm=sizes_without_drift_mm(state))
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
     lines += [f"{head(opened, state)}."]
     return "\n".join(lines) + "\n"
@@ -240,7 +240,7 @@ def read_above(state: State, points: Columns) -> list[str]:
     """What is to be said where points read more than an upper bound that is stated."""
     size = _as_shown(points["error_mm"])
     measured = int(np.sum(~np.isnan(size)))
-    without_mm = without_drift.sizes_mm(state)
+    without_mm = sizes_without_drift_mm(state)
     own = size if without_mm is None else _as_shown(without_mm)
     lines = []
     for said in words.distinct(state):
@@ -299,6 +299,19 @@ def _largest(points: Columns, shown: np.ndarray) -> list[str]:
         label, readings = in_markdown(points["point"][row]), int(points["readings"][row])
         lines.append(f"| {label} | {readings} | {size:.3f} | {lower:.3f} | {upper:.3f} |")
     return lines
+
+
+def sizes_without_drift_mm(state: State) -> np.ndarray | None:
+    """Sizes of mean readings in the order of ``campaign_points``, NaN where unread.
+
+    Without the drift that bounds and limits are corrected for; None where there is none.
+    """
+    told = getattr(state.campaign, "without_drift", None)
+    if told is None:
+        return None
+    sizes = np.full(len(state.rows) + len(state.left_out), math.nan)
+    sizes[told.ledger.visited] = told.ledger.sizes_mm()
+    return sizes
 
 
 def beyond_limits(
