@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+# What a shell starts in the background has Ctrl-C ignored, and so has all that it starts.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Works in every pytest import mode, from tests/ and from any folder below it.
 TESTS = Path(__file__).resolve().parent
