@@ -1,12 +1,87 @@
-# The workflow stands in workflow/Snakefile, where the workflow catalogue looks for it.
-include: "workflow/Snakefile"
+"""kinacc: how large is the largest error of a calibrated robot model?
+
+measurements -> data_check -> fit_vec -> fit_dh -> residuals (Tables I to III) -> summary
+    -> accuracy_map (Fig. 3)
+    -> operating_points -> study_part .. -> study (Fig. 4), histories (Figs. 5, 6) -> claims
+    -> figures, map_figure, report, digests
+
+Every data set of the configuration goes through all of it, in results/<data set>/. Tables are
+Parquet; units and meanings stand in their metadata. `snakemake -c2` makes everything, `snakemake
+-c2 calibration` the models and their errors, `snakemake -c2 robustness` also the claims on further
+synthetic arms. `snakemake -c2 --until fit_dh` stops after a stage, `-R fit_dh` makes it anew.
+"""
+
+import os
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
+
+from kinacc.campaign.journal import of_results as campaigns_of
+from kinacc.errors import InputError
+from kinacc.workflow import running
+from kinacc.workflow.code import code_digest
+from kinacc.workflow.data_sets import RESULTS, campaign_files, digests, read_data_sets
+
+try:
+    if workflow.modifier.namespace:  # a module of another workflow, which hands over `config`
+        data = read_data_sets([], config, absolute=True)
+    else:
+        own = os.path.join(str(workflow.current_basedir), "config.yaml")
+        default = "config.yaml" if os.path.isfile("config.yaml") else own
+        data = read_data_sets(
+            workflow.configfiles or [default], workflow.config_settings.config
+        )
+except InputError as error:
+    raise WorkflowError(str(error)) from None
 
 
-# What an included file calls its default target does not count.
-rule everything:
-    """what a plain `snakemake` makes: all"""
+wildcard_constraints:
+    dataset="|".join(data.settings),
+
+
+scattergather:
+    study=data.parts,
+
+
+include: "workflow/rules/common.smk"
+
+
+rule all:
+    """every table, picture and page of every data set"""
     default_target: True
     input:
-        rules.all.input,
+        [calibration_of(dataset) + study_of(dataset) for dataset in data.settings],
     message:
         "every table and figure is up to date"
+
+
+rule calibration:
+    """the models of every data set and what is left of the errors"""
+    input:
+        [calibration_of(dataset) for dataset in data.settings],
+    message:
+        "every model is up to date"
+
+
+rule robustness:
+    """everything, and the claims on further synthetic arms, whose shares go into claims.parquet"""
+    input:
+        rules.all.input,
+        [table(dataset, "robustness") for dataset in data.told if not data.is_measured(dataset)],
+    message:
+        "every table and figure is up to date, with the claims on further synthetic arms"
+
+
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/assessment.smk"
+include: "workflow/rules/pages.smk"
+
+
+onstart:
+    running.hold(RESULTS)
+
+
+onsuccess:
+    for line in running.answers(RESULTS, data.told):
+        logger.info(line)

@@ -29,7 +29,7 @@ from kinacc.artifacts.columns import Artefact, Columns, joint_count, texts
 
 # What a table was made by and from, the same in all tables of a stage: its marks, and the digest
 # of each of its inputs, which `inputs_hash` folds.
-PROVENANCE_KEYS = ("kinacc_version", "config_hash", "code_hash", "inputs_hash", "seed")
+PROVENANCE_KEYS = ("kinacc_version", "config_hash", "seed")
 INPUTS_DIGESTS, COLUMNS_DIGEST = "inputs_digests", "columns_digest"
 METADATA_KEYS = (*PROVENANCE_KEYS, INPUTS_DIGESTS, COLUMNS_DIGEST)
 

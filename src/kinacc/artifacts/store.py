@@ -84,8 +84,7 @@ def arrow_schema(
     ]
     if provenance is None:
         return pa.schema(fields)
-    metadata = {key: str(provenance[key]) for key in PROVENANCE_KEYS}
-    return pa.schema(fields, metadata | {INPUTS_DIGESTS: provenance.get(INPUTS_DIGESTS, "{}")})
+    return pa.schema(fields, {key: str(provenance[key]) for key in PROVENANCE_KEYS})
 
 
 def to_table(
@@ -130,9 +129,7 @@ def to_table(
         problems.append(Problem(where, f"columns of different lengths: {lengths}"))
     refuse(problems, f"{artefact} does not fit its contract")
     schema = arrow_schema(artefact, joints, provenance, columns)
-    table = pa.Table.from_arrays(arrays, schema=schema)
-    digest = {COLUMNS_DIGEST.encode(): columns_digest(table).encode()}
-    return table.replace_schema_metadata({**schema.metadata, **digest})
+    return pa.Table.from_arrays(arrays, schema=schema)
 
 
 def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:

@@ -1,0 +1,94 @@
+"""Digests of what every stage left: ``sums/<rule>.sha256`` in the folder of a data set.
+
+The form is that of ``sha256sum``: a digest and a file a line, files as seen from the folder. Lines
+that begin with ``# read`` hold what the stage read, and are comments to ``sha256sum -c``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from kinacc.errors import InputError, Problem, refuse
+
+FOLDER = "sums"
+_READ = "# read "
+
+
+def digest(content: bytes) -> str:
+    """SHA-256 of a file's content, 64 hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def text_of(written: Mapping[str, bytes], read: Mapping[str, str]) -> bytes:
+    """Content of a sums file: contents ``written`` and digests ``read``, both by file name."""
+    lines = [f"{digest(content)}  {name}" for name, content in sorted(written.items())]
+    lines += [f"{_READ}{value}  {name}" for name, value in sorted(read.items())]
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
+def folder_of(path: Path | str) -> Path:
+    """Folder of the data set that a file belongs to: the nearest one above with sums."""
+    path = Path(path)
+    return next((each for each in path.parents if (each / FOLDER).is_dir()), path.parent)
+
+
+def stated(folder: Path | str) -> dict[str, str]:
+    """Digests of all files that the stages of a data set left, by name in its folder."""
+    found = {}
+    for name, value in _lines(Path(folder)):
+        if not value.startswith(_READ):
+            found[name] = value
+    return found
+
+
+def outdated(folder: Path | str) -> list[str]:
+    """Names of files made from other files than those the stages left since."""
+    folder, found, now = Path(folder), set[str](), stated(folder)
+    for path in sorted((folder / FOLDER).glob("*.sha256")):
+        own = dict(_parsed(path))
+        read = {name: value for name, value in own.items() if value.startswith(_READ)}
+        if any(now.get(name, value[len(_READ) :]) != value[len(_READ) :]
+               for name, value in read.items()):  # fmt: skip
+            found |= own.keys() - read.keys()
+    return sorted(found)
+
+
+def hold(path: Path | str, content: bytes) -> None:
+    """Raise InputError where a file is not as its stage left it."""
+    folder = folder_of(path)
+    name = Path(path).relative_to(folder).as_posix()
+    left = stated(folder).get(name)
+    fix = f"rm {path}, then run the workflow again"
+    if left is None and (folder / FOLDER).is_dir():
+        what = f"has no digest in {folder / FOLDER}"
+        raise InputError(Problem(str(path), what, fix=fix))
+    if left is not None and left != digest(content):
+        raise InputError(Problem(str(path), "changed since its stage wrote it", fix=fix))
+
+
+def changed(folder: Path | str) -> Iterable[Problem]:
+    """Every file of a data set that is missing or not as its stage left it."""
+    folder = Path(folder)
+    for name, left in stated(folder).items():
+        path = folder / name
+        fix = f"rm {path}, then run the workflow again"
+        if not path.is_file():
+            yield Problem(str(path), "missing", fix="run the workflow again")
+        elif digest(path.read_bytes()) != left:
+            yield Problem(str(path), "changed since its stage wrote it", fix=fix)
+
+
+def _lines(folder: Path) -> Iterable[tuple[str, str]]:
+    for path in sorted((folder / FOLDER).glob("*.sha256")):
+        yield from _parsed(path)
+
+
+def _parsed(path: Path) -> Iterable[tuple[str, str]]:
+    for line in path.read_text("utf-8", errors="replace").splitlines():
+        value, separator, name = line.partition("  ")
+        if not separator:
+            raise InputError(Problem(str(path), f"is not a list of digests: {line[:60]!r}",
+                                     fix=f"rm {path}, then run the workflow again"))  # fmt: skip
+        yield name, value

@@ -1,0 +1,55 @@
+"""Digests of code and settings, by content: what a job depends on beside its files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path, PurePath
+
+PACKAGE = Path(__file__).resolve().parents[1]
+SHOWN = ("figures", "report")  # rooms on which pictures and pages depend, and no table
+_LIBRARIES = ("numpy", "scipy", "numba", "pandas", "pyarrow", "matplotlib")
+
+
+def code_digest(script: Path | str, shown: bool = False) -> str:
+    """Digest of a script and of the package: all rooms but cli, or those that draw and show."""
+    digest = hashlib.sha256(_package_digest(shown).encode())
+    digest.update(Path(script).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _package_digest(shown: bool) -> str:
+    versions = [f"{name} {version(name)}" for name in _LIBRARIES]
+    digest = hashlib.sha256("\n".join([platform.python_version(), *versions]).encode())
+    for path in sorted(PACKAGE.rglob("*")):
+        room = path.relative_to(PACKAGE).parts[0]
+        if path.suffix in (".pyc", ".nbi", ".nbc") or not path.is_file() or room == "cli":
+            continue
+        if (room in SHOWN) == shown:
+            digest.update(path.relative_to(PACKAGE).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def config_hash(settings: Mapping[str, object]) -> str:
+    """Digest of the settings of a stage; files count by name, their contents are inputs."""
+    text = json.dumps(_placeless(settings), sort_keys=True, ensure_ascii=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def file_digest(path: Path | str) -> str:
+    """SHA-256 of a file's bytes."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def _placeless(settings: object, files: bool = False) -> object:
+    if isinstance(settings, Mapping):
+        return {
+            key: _placeless(value, files or key in ("robot", "path"))
+            for key, value in settings.items()
+        }
+    return PurePath(settings).name if files and isinstance(settings, str) else settings

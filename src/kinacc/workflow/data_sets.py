@@ -1,0 +1,142 @@
+"""The data sets of a configuration as the rules see them: settings, models, files from outside."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kinacc.artifacts.error_models import asked_for
+from kinacc.campaign.journal import JOURNAL, PLAN
+from kinacc.errors import Problem, refuse
+from kinacc.workflow.boundary import leading_out
+from kinacc.workflow.code import file_digest
+from kinacc.workflow.configured import in_use, words_read
+
+RESULTS = "results"
+Settings = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class DataSets:
+    """Settings of every data set by name, complete and without what it does not use.
+
+    ``parts`` is the number of parts of scattered work, ``formats`` those of pictures.
+    ``absolute`` names files from outside in full, as a module of another workflow needs them.
+    """
+
+    settings: Mapping[str, Settings]
+    parts: int
+    formats: tuple[str, ...]
+    absolute: bool = False
+
+    def chosen(self, dataset: str, *paths: str) -> dict[str, Any]:
+        """Settings of a data set at dotted paths, nested as in the configuration."""
+        found: dict[str, Any] = {}
+        for path in paths:
+            *sections, key = path.split(".")
+            source: Any = self.settings[dataset]
+            target = found
+            if (sections or [key])[0] not in source:
+                continue  # not in use
+            for section in sections:
+                source, target = source[section], target.setdefault(section, {})
+            if key in source:
+                target[key] = source[key]
+        return found
+
+    def models(self, dataset: str) -> tuple[str, ...]:
+        """Error models that a data set asks for, in the order they are fitted."""
+        return asked_for(self.settings[dataset]["calibration"])
+
+    def is_measured(self, dataset: str) -> bool:
+        """Whether the poses of a data set stand in a file."""
+        return self.settings[dataset]["measurements"]["source"] == "file"
+
+    def has_map(self, dataset: str) -> bool:
+        """Whether the evaluation space of a data set is a cylinder, which can be mapped."""
+        return self.settings[dataset]["evaluation"]["space"] == "cylinder"
+
+    def lines(self, dataset: str) -> list[str]:
+        """Data sets of the lines of a series by date; none where there is no series."""
+        return [line["name"] for line in self.settings[dataset].get("series", ())]
+
+    @property
+    def told(self) -> list[str]:
+        """Data sets that have a whole study: all but lines of a series, which are calibrated."""
+        return [name for name, own in self.settings.items() if "line_of" not in own]
+
+    def robot_files(self, dataset: str) -> dict[str, str]:
+        """A robot file of the user's own, and its URDF, by role."""
+        robot = self.settings[dataset]["robot"]
+        if not os.path.isfile(robot):
+            return {}
+        from kinacc.kinematics.robot import files
+
+        return self._located(dict(zip(("robot_file", "urdf_file"), files(robot), strict=False)))
+
+    def measured_files(self, dataset: str) -> dict[str, str]:
+        """Files with the measurements of a data set, by role."""
+        if not self.is_measured(dataset):
+            return {}
+        file = self.settings[dataset]["measurements"]["file"]
+        found = {"points_file": file["path"], "joints_file": file.get("joints", {}).get("path")}
+        return self._located({role: path for role, path in found.items() if path})
+
+    def _located(self, files: Mapping[str, object]) -> dict[str, str]:
+        place = os.path.abspath if self.absolute else str
+        return {role: place(str(path)) for role, path in files.items()}
+
+
+def read_data_sets(
+    paths: Sequence[str | os.PathLike[str]],
+    overrides: Settings | None = None,
+    results: str = RESULTS,
+    absolute: bool = False,
+) -> DataSets:
+    """The data sets of configuration files and of values given on the command line.
+
+    Raises InputError listing every problem in them.
+    """
+    from kinacc.config.schema import without_execution_keys
+    from kinacc.workflow.contradictions import load
+
+    full = load([Path(path) for path in paths], words_read(overrides or {}))
+    first = next(iter(full.values()))
+    problems = [
+        Problem(f"datasets.{name}.figures.formats", "differ from data set to data set", "one list")
+        for name, config in full.items()
+        if config["figures"]["formats"] != first["figures"]["formats"]
+    ]
+    refuse([*problems, *leading_out(results, full)])
+    found = DataSets(
+        {name: in_use(without_execution_keys(config)) for name, config in full.items()},
+        min(first["study"]["chunks"], *(each["study"]["repetitions"] for each in full.values())),
+        tuple(first["figures"]["formats"]),
+        absolute,
+    )
+    refuse(
+        Problem(path, "braces in its name would be a wildcard of Snakemake", fix="rename it")
+        for name in found.settings
+        for path in (*found.measured_files(name).values(), *found.robot_files(name).values())
+        if re.search(r"\{\s*\w.*\}", path)
+    )
+    return found
+
+
+def digests(files: Mapping[str, str]) -> dict[str, str]:
+    """Digests of files by role, by which a rule knows their content and not their dates."""
+    return {role: file_digest(path) for role, path in files.items()}
+
+
+def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
+    """Files of campaigns on the calibration of a data set, by role."""
+    found = {}
+    for number, campaign in enumerate(campaigns, 1):
+        found[f"campaign_{number}_file"] = str(campaign / PLAN)
+        if (campaign / JOURNAL).is_file():
+            found[f"readings_{number}_file"] = str(campaign / JOURNAL)
+    return found

@@ -1,0 +1,40 @@
+"""One run of the workflow at a time in a folder of results, and what it ends with."""
+
+from __future__ import annotations
+
+import fcntl
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TextIO
+
+from kinacc.errors import InputError
+
+_held: list[TextIO] = []  # until the process ends, however it ends
+FEW = 4  # data sets of which each is shown at the end of a run
+
+
+def hold(results: str) -> None:
+    """Hold the results for this process; leave with a line where another run holds them."""
+    Path(results).mkdir(parents=True, exist_ok=True)
+    file = open(Path(results) / ".lock", "w")  # noqa: SIM115 held until the process ends
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise SystemExit(f"another run holds {results}: wait until it has ended") from None
+    _held.append(file)
+
+
+def answers(results: str, datasets: Sequence[str]) -> Iterator[str]:
+    """What each data set's calibration is worth, after a run that made its summary."""
+    from kinacc.workflow.answer import answer, read
+
+    folders = [Path(results, name) for name in datasets]
+    made = [folder for folder in folders if (folder / "summary.parquet").is_file()]
+    if len(made) > FEW:
+        yield f"\n{len(made):,} data sets: kinacc summary {results} shows what each is worth"
+        return
+    for folder in made:
+        try:
+            yield from ["", *answer(folder, read(folder))]
+        except InputError as error:
+            yield str(error)

@@ -1,0 +1,151 @@
+"""What the scripts of the workflow share: inputs held to their digests, a log, outputs and sums.
+
+Import it first: it holds BLAS at one thread, since more threads change the last bits of a sum.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ.update(
+    dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+)
+
+from kinacc import __version__  # noqa: E402
+from kinacc.artifacts import store, sums  # noqa: E402
+from kinacc.artifacts.atomic import write_together  # noqa: E402
+from kinacc.artifacts.columns import Columns  # noqa: E402
+from kinacc.errors import InputError, KinaccError, Problem, gathered, refuse, refused  # noqa: E402
+from kinacc.progress import reporting  # noqa: E402
+from kinacc.workflow.code import config_hash  # noqa: E402
+
+Progress = Callable[..., Iterable]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One job: ``inputs`` are tables (columns) and other files (paths) by role.
+
+    ``read`` are the digests of its inputs by their name in the folder of the data set.
+    """
+
+    name: str
+    dataset: str
+    inputs: dict[str, Any]
+    settings: Mapping[str, Any]
+    outputs: Mapping[str, str]
+    folder: Path
+    read: Mapping[str, str]
+    progress: Progress
+
+    def marks(self) -> dict[str, str]:
+        """What the artefacts of this job are marked with, see the artefact contract."""
+        seed = str(self.settings.get("seed", ""))
+        own = config_hash(self.settings)
+        return {"kinacc_version": __version__, "config_hash": own, "seed": seed}
+
+    def write_tables(self, tables: Mapping[str, Mapping]) -> None:
+        """Check every table against its schema, then write all of them and their digests."""
+        marks = self.marks()
+        self.write_files(
+            {
+                name: store.content_of(store.to_table(name, columns, marks))
+                for name, columns in tables.items()
+            }
+        )
+
+    def write_files(self, contents: Mapping[str, bytes]) -> None:
+        """Write the files of this job by the names of its outputs, and their digests."""
+        found = {self.outputs[name]: content for name, content in contents.items()}
+        left = {os.path.relpath(path, self.folder): content for path, content in found.items()}
+        write_together(found | {self.outputs["sums"]: sums.text_of(left, self.read)})
+
+
+@contextmanager
+def stage(snakemake: Any) -> Iterator[Stage]:
+    """The job of a script. Errors and warnings go to its log, in one line each to the terminal."""
+    dataset, (log,) = snakemake.wildcards.dataset, snakemake.log
+    label = " ".join([dataset, snakemake.rule, snakemake.wildcards.get("scatteritem", "")]).strip()
+    with open(log, "w", encoding="utf-8", buffering=1) as file, warnings.catch_warnings():
+
+        def tell(text: str, details: str = "") -> None:
+            print(f"{label}: {text}", file=sys.stderr, flush=True)
+            file.write(f"{text}\n{details}")
+
+        def show(message, category, filename, lineno, *_) -> None:
+            is_plain = category is UserWarning
+            tell(str(message) if is_plain else f"{category.__name__}: {message}",
+                 "" if is_plain else f"{filename}:{lineno}\n")  # fmt: skip
+
+        warnings.simplefilter("default")
+        warnings.showwarning = show
+        try:
+            with reporting(label) as progress:
+                yield _opened(snakemake, dataset, progress)
+            return
+        except KinaccError as error:
+            tell(str(error), traceback.format_exc())
+        except OSError as error:
+            tell(str(refused(error)), traceback.format_exc())
+        except MemoryError as error:
+            tell(f"not enough memory: {error or 'ask for less'}", traceback.format_exc())
+        except Exception as error:
+            tell(f"{type(error).__name__}: {error} (a fault of kinacc; see {log})",
+                 traceback.format_exc())  # fmt: skip
+    raise SystemExit(1)
+
+
+def _opened(snakemake: Any, dataset: str, progress: Progress) -> Stage:
+    sums_file = Path(snakemake.output.sums)
+    folder = next(each for each in sums_file.parents if each.name == sums.FOLDER).parent
+    inputs, read = _read(dict(snakemake.input.items()), folder)
+    outputs = dict(snakemake.output.items())
+    settings = snakemake.params.settings
+    return Stage(snakemake.rule, dataset, inputs, settings, outputs, folder, read, progress)
+
+
+def _read(
+    paths: Mapping[str, str | Sequence[str]], folder: Path
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Tables of inputs by role, parts joined, other files as paths; and the digests of all."""
+    inputs: dict[str, Any] = {}
+    read: dict[str, str] = {}
+    problems: list[Problem] = []
+    for role, given in paths.items():
+        listed = [given] if isinstance(given, str) else list(given)
+        contents = [Path(path).read_bytes() for path in listed]
+        read |= {
+            os.path.relpath(path, folder): sums.digest(content)
+            for path, content in zip(listed, contents, strict=True)
+        }
+        if role.endswith("_file"):
+            inputs[role] = Path(listed[0])
+            continue
+        with gathered(problems):
+            parts = []
+            for path, content in zip(listed, contents, strict=True):
+                sums.hold(path, content)
+                parts.append(store.columns_in(store.read_table(path, content)))
+            inputs[role] = parts[0] if isinstance(given, str) else _joined(parts)
+    refuse(problems)
+    return inputs, read
+
+
+def _joined(parts: Sequence[Columns]) -> Columns:
+    import numpy as np
+
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def part_of(snakemake: Any) -> dict[str, int]:
+    """Number and count of the part that a scattered job computes."""
+    number, _, count = snakemake.wildcards.scatteritem.partition("-of-")
+    return {"number": int(number), "of": int(count)}

@@ -1,0 +1,276 @@
+# From measured poses to calibrated models and what is left of their errors (Tables I to III).
+
+
+rule measurements:
+    """measured poses, read from a file or simulated with the paper's synthetic arm"""
+    input:
+        unpack(lambda w: from_outside(w.dataset, "measured")),
+    output:
+        measurements="results/{dataset}/measurements.parquet",
+        robot="results/{dataset}/robot.parquet",
+        sums="results/{dataset}/sums/measurements.sha256",
+    params:
+        settings=values(
+            "seed",
+            "robot",
+            "measurements",
+            "evaluation.reference_orientation_deg",
+            "evaluation.reference_frame",
+        ),
+        files=content("measured"),
+        code=code("measurements.py"),
+    log:
+        "results/{dataset}/logs/measurements.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    message:
+        "{wildcards.dataset}: reading or simulating the measured poses"
+    script:
+        "../scripts/measurements.py"
+
+
+rule data_check:
+    """what is wrong with a measured file; findings that spoil a fit end the run here"""
+    input:
+        unpack(lambda w: from_outside(w.dataset, "measured")),
+    output:
+        data_check="results/{dataset}/data_check.parquet",
+        sums="results/{dataset}/sums/data_check.sha256",
+    params:
+        settings=values("robot", "measurements", "calibration", "data_check"),
+        files=content("measured"),
+        code=code("data_check.py"),
+    log:
+        "results/{dataset}/logs/data_check.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    message:
+        "{wildcards.dataset}: checking the measured file"
+    script:
+        "../scripts/data_check.py"
+
+
+rule fit_vec:
+    """the volumetric error compensation model, eqs. 5 and 6 (Table I)"""
+    input:
+        unpack(lambda w: from_outside(w.dataset) | checked(w.dataset)),
+        measurements="results/{dataset}/measurements.parquet",
+    output:
+        vec_model="results/{dataset}/vec_model.parquet",
+        vec_frames="results/{dataset}/vec_frames.parquet",
+        vec_fit="results/{dataset}/vec_fit.parquet",
+        vec_covariance="results/{dataset}/vec_covariance.parquet",
+        vec_orders="results/{dataset}/vec_orders.parquet",
+        sums="results/{dataset}/sums/fit_vec.sha256",
+    params:
+        settings=values(
+            "robot",
+            "calibration.rotation_weight_mm_per_rad",
+            "calibration.base_and_tool",
+            "calibration.frames",
+            "calibration.vec",
+        ),
+        files=content(),
+        code=code("fit_vec.py"),
+    log:
+        "results/{dataset}/logs/fit_vec.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    resources:
+        mem_mb=lambda w, attempt: 1000 * attempt,
+    message:
+        "{wildcards.dataset}: fitting the VEC model to the training poses"
+    script:
+        "../scripts/fit_vec.py"
+
+
+rule fit_compliance:
+    """the DH model with joints that bend under gravity, where calibration.compliance asks for it"""
+    input:
+        unpack(lambda w: from_outside(w.dataset) | checked(w.dataset)),
+        measurements="results/{dataset}/measurements.parquet",
+    output:
+        compliance_model="results/{dataset}/compliance_model.parquet",
+        compliance_frames="results/{dataset}/compliance_frames.parquet",
+        compliance_fit="results/{dataset}/compliance_fit.parquet",
+        compliance_covariance="results/{dataset}/compliance_covariance.parquet",
+        sums="results/{dataset}/sums/fit_compliance.sha256",
+    params:
+        settings=values(
+            "robot",
+            "calibration.rotation_weight_mm_per_rad",
+            "calibration.base_and_tool",
+            "calibration.frames",
+            "calibration.dh",
+            "calibration.compliance",
+        ),
+        files=content(),
+        code=code("fit_compliance.py"),
+    log:
+        "results/{dataset}/logs/fit_compliance.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    resources:
+        mem_mb=lambda w, attempt: 1000 * attempt,
+    message:
+        "{wildcards.dataset}: fitting the DH model with joints that bend"
+    script:
+        "../scripts/fit_compliance.py"
+
+
+rule fit_dh:
+    """the DH model, to the VEC model at the measured configurations or to the poses (Table II)"""
+    input:
+        unpack(lambda w: from_outside(w.dataset) | further_frames(w.dataset)),
+        measurements="results/{dataset}/measurements.parquet",
+        vec_model="results/{dataset}/vec_model.parquet",
+        vec_frames="results/{dataset}/vec_frames.parquet",
+    output:
+        dh_model="results/{dataset}/dh_model.parquet",
+        frames="results/{dataset}/frames.parquet",
+        dh_fit="results/{dataset}/dh_fit.parquet",
+        dh_covariance="results/{dataset}/dh_covariance.parquet",
+        dh_identified="results/{dataset}/dh_identified.parquet",
+        sums="results/{dataset}/sums/fit_dh.sha256",
+    params:
+        settings=values(
+            "robot",
+            "calibration.rotation_weight_mm_per_rad",
+            "calibration.base_and_tool",
+            "calibration.frames",
+            "calibration.dh",
+        ),
+        files=content(),
+        code=code("fit_dh.py"),
+    log:
+        "results/{dataset}/logs/fit_dh.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    message:
+        "{wildcards.dataset}: fitting the DH model"
+    script:
+        "../scripts/fit_dh.py"
+
+
+rule residuals:
+    """what is left of the errors, at training and at held-out poses (Tables I and III)"""
+    input:
+        unpack(lambda w: from_outside(w.dataset) | models(w.dataset)),
+        measurements="results/{dataset}/measurements.parquet",
+        vec_orders="results/{dataset}/vec_orders.parquet",
+    output:
+        residuals="results/{dataset}/residuals.parquet",
+        pose_errors="results/{dataset}/pose_errors.parquet",
+        model_selection="results/{dataset}/model_selection.parquet",
+        joint_bias="results/{dataset}/joint_bias.parquet",
+        worst_rows="results/{dataset}/worst_rows.parquet",
+        sums="results/{dataset}/sums/residuals.sha256",
+    params:
+        settings=values("robot", "calibration"),
+        files=content(),
+        code=code("residuals.py"),
+    log:
+        "results/{dataset}/logs/residuals.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    resources:
+        mem_mb=lambda w, attempt: 1000 * attempt,
+    message:
+        "{wildcards.dataset}: comparing models and measurements, at held-out poses too"
+    script:
+        "../scripts/residuals.py"
+
+
+rule excluded_rows:
+    """errors of the rows that the configuration excludes, which no fit has seen"""
+    input:
+        unpack(lambda w: from_outside(w.dataset, "measured") | models(w.dataset)),
+        measurements="results/{dataset}/measurements.parquet",
+    output:
+        excluded_rows="results/{dataset}/excluded_rows.parquet",
+        sums="results/{dataset}/sums/excluded_rows.sha256",
+    params:
+        settings=values("robot", "measurements"),
+        files=content("measured"),
+        code=code("excluded_rows.py"),
+    log:
+        "results/{dataset}/logs/excluded_rows.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    message:
+        "{wildcards.dataset}: errors of the excluded rows"
+    script:
+        "../scripts/excluded_rows.py"
+
+
+rule summary:
+    """what the calibration is worth, one figure a row"""
+    input:
+        unpack(
+            lambda w: from_outside(w.dataset)
+            | models(w.dataset)
+            | fit_tables(w.dataset)
+            | checked(w.dataset)
+            | excluded(w.dataset)
+        ),
+        measurements="results/{dataset}/measurements.parquet",
+        robot="results/{dataset}/robot.parquet",
+        pose_errors="results/{dataset}/pose_errors.parquet",
+        model_selection="results/{dataset}/model_selection.parquet",
+    output:
+        summary="results/{dataset}/summary.parquet",
+        sums="results/{dataset}/sums/summary.sha256",
+    params:
+        settings=values("robot", "tolerance"),
+        files=content(),
+        code=code("summary.py"),
+    log:
+        "results/{dataset}/logs/summary.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    message:
+        "{wildcards.dataset}: summing up what the calibration is worth"
+    script:
+        "../scripts/summary.py"
+
+
+rule history:
+    """the calibrations of a series held to one another, and their picture"""
+    input:
+        unpack(lambda w: lines_of(w.dataset)),
+    output:
+        history="results/{dataset}/history.parquet",
+        sums="results/{dataset}/sums/history.sha256",
+        **{
+            f"history_over_time_{kind}": f"results/{{dataset}}/figures/history_over_time.{kind}"
+            for kind in data.formats
+        },
+    params:
+        settings=values("seed", "series", "calibration", "tolerance.mm"),
+        code=code("history.py"),
+    log:
+        "results/{dataset}/logs/history.log",
+    conda:
+        "../envs/kinacc.yaml"
+    resources:
+        mem_mb=lambda w, attempt: 1000 * attempt,
+    message:
+        "{wildcards.dataset}: holding the calibrations of the series to one another"
+    script:
+        "../scripts/history.py"
