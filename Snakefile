@@ -22,6 +22,9 @@ from kinacc.errors import InputError
 from kinacc.workflow import running
 from kinacc.workflow.code import code_digest
 from kinacc.workflow.data_sets import RESULTS, campaign_files, digests, read_data_sets
+from kinacc.workflow.start import ONE_THREAD
+
+os.environ.update(ONE_THREAD)
 
 try:
     if workflow.modifier.namespace:  # a module of another workflow, which hands over `config`
@@ -29,9 +32,7 @@ try:
     else:
         own = os.path.join(str(workflow.current_basedir), "config.yaml")
         default = "config.yaml" if os.path.isfile("config.yaml") else own
-        data = read_data_sets(
-            workflow.configfiles or [default], workflow.config_settings.config
-        )
+        data = read_data_sets(workflow.configfiles or [default], workflow.config_settings.config)
 except InputError as error:
     raise WorkflowError(str(error)) from None
 

@@ -8,16 +8,27 @@ rule accuracy_map:
     output:
         accuracy_map="results/{dataset}/accuracy_map.parquet",
         sums="results/{dataset}/sums/accuracy_map.sha256",
-    params:
-        settings=values("robot", "evaluation.cylinder", "evaluation.reference_orientation_deg", "evaluation.reference_frame", "evaluation.rotation_deg", "evaluation.rotations", "evaluation.tool_mm", "evaluation.invert_with", "evaluation.travel_direction", "map"),
-        files=content(),
-        code=code("accuracy_map.py"),
     log:
         "results/{dataset}/logs/accuracy_map.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values(
+            "robot",
+            "evaluation.cylinder",
+            "evaluation.reference_orientation_deg",
+            "evaluation.reference_frame",
+            "evaluation.rotation_deg",
+            "evaluation.rotations",
+            "evaluation.tool_mm",
+            "evaluation.invert_with",
+            "evaluation.travel_direction",
+            "map",
+        ),
+        files=content(),
+        code=code("accuracy_map.py"),
     message:
         "{wildcards.dataset}: mapping the largest error (Fig. 3)"
     script:
@@ -33,16 +44,16 @@ rule operating_points:
     output:
         assessment_points="results/{dataset}/assessment_points.parquet",
         sums="results/{dataset}/sums/operating_points.sha256",
-    params:
-        settings=values("robot", "evaluation"),
-        files=content(),
-        code=code("operating_points.py"),
     log:
         "results/{dataset}/logs/operating_points.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values("robot", "evaluation"),
+        files=content(),
+        code=code("operating_points.py"),
     message:
         "{wildcards.dataset}: choosing the operating points of the study"
     script:
@@ -56,15 +67,22 @@ rule study_part:
     output:
         study_chunk="results/{dataset}/study_chunk/{scatteritem}.parquet",
         sums="results/{dataset}/sums/study_part.{scatteritem}.sha256",
-    params:
-        settings=values("seed", "study.noise_mm", "study.repetitions", "study.measurements", "study.alpha", "study.visiting_order"),
-        code=code("study_part.py"),
     log:
         "results/{dataset}/logs/study_part.{scatteritem}.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values(
+            "seed",
+            "study.noise_mm",
+            "study.repetitions",
+            "study.measurements",
+            "study.alpha",
+            "study.visiting_order",
+        ),
+        code=code("study_part.py"),
     message:
         "{wildcards.dataset}: simulating the assessors under noise, part {wildcards.scatteritem}"
     script:
@@ -81,15 +99,17 @@ rule study:
         study_summary="results/{dataset}/study_summary.parquet",
         readings="results/{dataset}/readings.parquet",
         sums="results/{dataset}/sums/study.sha256",
-    params:
-        settings=values("seed", "study.outlier_rule", "study.distance", "study.covariance", "study.search"),
-        code=code("study.py"),
     log:
         "results/{dataset}/logs/study.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values(
+            "seed", "study.outlier_rule", "study.distance", "study.covariance", "study.search"
+        ),
+        code=code("study.py"),
     message:
         "{wildcards.dataset}: summing up the study (Fig. 4)"
     script:
@@ -103,15 +123,23 @@ rule histories:
     output:
         histories="results/{dataset}/histories.parquet",
         sums="results/{dataset}/sums/histories.sha256",
-    params:
-        settings=values("seed", "study.measurements", "study.alpha", "study.distance", "study.covariance", "study.visiting_order", "histories"),
-        code=code("histories.py"),
     log:
         "results/{dataset}/logs/histories.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values(
+            "seed",
+            "study.measurements",
+            "study.alpha",
+            "study.distance",
+            "study.covariance",
+            "study.visiting_order",
+            "histories",
+        ),
+        code=code("histories.py"),
     message:
         "{wildcards.dataset}: following single model invalidations (Figs. 5 and 6)"
     script:
@@ -132,15 +160,15 @@ rule claims:
     output:
         claims="results/{dataset}/claims.parquet",
         sums="results/{dataset}/sums/claims.sha256",
-    params:
-        settings=values("robot"),
-        code=code("claims.py"),
     log:
         "results/{dataset}/logs/claims.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values("robot"),
+        code=code("claims.py"),
     message:
         "{wildcards.dataset}: holding the paper's claims to the results"
     script:
@@ -154,16 +182,26 @@ rule robustness_part:
     output:
         robustness_chunk="results/{dataset}/robustness_chunk/{scatteritem}.parquet",
         sums="results/{dataset}/sums/robustness_part.{scatteritem}.sha256",
-    params:
-        settings=values("seed", "robot", "measurements", "calibration", "evaluation", "map", "study", "histories", "robustness"),
-        files=content(),
-        code=code("robustness_part.py"),
     log:
         "results/{dataset}/logs/robustness_part.{scatteritem}.log",
     conda:
         "../envs/kinacc.yaml"
     resources:
         runtime=lambda w, attempt: 60 * attempt,
+    params:
+        settings=values(
+            "seed",
+            "robot",
+            "measurements",
+            "calibration",
+            "evaluation",
+            "map",
+            "study",
+            "histories",
+            "robustness",
+        ),
+        files=content(),
+        code=code("robustness_part.py"),
     message:
         "{wildcards.dataset}: the study on further synthetic arms, part {wildcards.scatteritem}"
     script:
@@ -177,13 +215,13 @@ rule robustness_table:
     output:
         robustness="results/{dataset}/robustness.parquet",
         sums="results/{dataset}/sums/robustness_table.sha256",
-    params:
-        settings=values("seed"),
-        code=code("robustness_table.py"),
     log:
         "results/{dataset}/logs/robustness_table.log",
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values("seed"),
+        code=code("robustness_table.py"),
     message:
         "{wildcards.dataset}: gathering the claims on further synthetic arms"
     script:

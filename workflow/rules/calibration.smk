@@ -9,6 +9,12 @@ rule measurements:
         measurements="results/{dataset}/measurements.parquet",
         robot="results/{dataset}/robot.parquet",
         sums="results/{dataset}/sums/measurements.sha256",
+    log:
+        "results/{dataset}/logs/measurements.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
     params:
         settings=values(
             "seed",
@@ -19,12 +25,6 @@ rule measurements:
         ),
         files=content("measured"),
         code=code("measurements.py"),
-    log:
-        "results/{dataset}/logs/measurements.log",
-    group:
-        "data_set"
-    conda:
-        "../envs/kinacc.yaml"
     message:
         "{wildcards.dataset}: reading or simulating the measured poses"
     script:
@@ -38,16 +38,16 @@ rule data_check:
     output:
         data_check="results/{dataset}/data_check.parquet",
         sums="results/{dataset}/sums/data_check.sha256",
-    params:
-        settings=values("robot", "measurements", "calibration", "data_check"),
-        files=content("measured"),
-        code=code("data_check.py"),
     log:
         "results/{dataset}/logs/data_check.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values("robot", "measurements", "calibration", "data_check"),
+        files=content("measured"),
+        code=code("data_check.py"),
     message:
         "{wildcards.dataset}: checking the measured file"
     script:
@@ -66,6 +66,14 @@ rule fit_vec:
         vec_covariance="results/{dataset}/vec_covariance.parquet",
         vec_orders="results/{dataset}/vec_orders.parquet",
         sums="results/{dataset}/sums/fit_vec.sha256",
+    log:
+        "results/{dataset}/logs/fit_vec.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    resources:
+        mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values(
             "robot",
@@ -76,14 +84,6 @@ rule fit_vec:
         ),
         files=content(),
         code=code("fit_vec.py"),
-    log:
-        "results/{dataset}/logs/fit_vec.log",
-    group:
-        "data_set"
-    conda:
-        "../envs/kinacc.yaml"
-    resources:
-        mem_mb=lambda w, attempt: 1000 * attempt,
     message:
         "{wildcards.dataset}: fitting the VEC model to the training poses"
     script:
@@ -101,6 +101,14 @@ rule fit_compliance:
         compliance_fit="results/{dataset}/compliance_fit.parquet",
         compliance_covariance="results/{dataset}/compliance_covariance.parquet",
         sums="results/{dataset}/sums/fit_compliance.sha256",
+    log:
+        "results/{dataset}/logs/fit_compliance.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
+    resources:
+        mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values(
             "robot",
@@ -112,14 +120,6 @@ rule fit_compliance:
         ),
         files=content(),
         code=code("fit_compliance.py"),
-    log:
-        "results/{dataset}/logs/fit_compliance.log",
-    group:
-        "data_set"
-    conda:
-        "../envs/kinacc.yaml"
-    resources:
-        mem_mb=lambda w, attempt: 1000 * attempt,
     message:
         "{wildcards.dataset}: fitting the DH model with joints that bend"
     script:
@@ -140,6 +140,12 @@ rule fit_dh:
         dh_covariance="results/{dataset}/dh_covariance.parquet",
         dh_identified="results/{dataset}/dh_identified.parquet",
         sums="results/{dataset}/sums/fit_dh.sha256",
+    log:
+        "results/{dataset}/logs/fit_dh.log",
+    group:
+        "data_set"
+    conda:
+        "../envs/kinacc.yaml"
     params:
         settings=values(
             "robot",
@@ -150,12 +156,6 @@ rule fit_dh:
         ),
         files=content(),
         code=code("fit_dh.py"),
-    log:
-        "results/{dataset}/logs/fit_dh.log",
-    group:
-        "data_set"
-    conda:
-        "../envs/kinacc.yaml"
     message:
         "{wildcards.dataset}: fitting the DH model"
     script:
@@ -175,10 +175,6 @@ rule residuals:
         joint_bias="results/{dataset}/joint_bias.parquet",
         worst_rows="results/{dataset}/worst_rows.parquet",
         sums="results/{dataset}/sums/residuals.sha256",
-    params:
-        settings=values("robot", "calibration"),
-        files=content(),
-        code=code("residuals.py"),
     log:
         "results/{dataset}/logs/residuals.log",
     group:
@@ -187,6 +183,10 @@ rule residuals:
         "../envs/kinacc.yaml"
     resources:
         mem_mb=lambda w, attempt: 1000 * attempt,
+    params:
+        settings=values("robot", "calibration"),
+        files=content(),
+        code=code("residuals.py"),
     message:
         "{wildcards.dataset}: comparing models and measurements, at held-out poses too"
     script:
@@ -201,16 +201,16 @@ rule excluded_rows:
     output:
         excluded_rows="results/{dataset}/excluded_rows.parquet",
         sums="results/{dataset}/sums/excluded_rows.sha256",
-    params:
-        settings=values("robot", "measurements"),
-        files=content("measured"),
-        code=code("excluded_rows.py"),
     log:
         "results/{dataset}/logs/excluded_rows.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values("robot", "measurements"),
+        files=content("measured"),
+        code=code("excluded_rows.py"),
     message:
         "{wildcards.dataset}: errors of the excluded rows"
     script:
@@ -234,16 +234,16 @@ rule summary:
     output:
         summary="results/{dataset}/summary.parquet",
         sums="results/{dataset}/sums/summary.sha256",
-    params:
-        settings=values("robot", "tolerance"),
-        files=content(),
-        code=code("summary.py"),
     log:
         "results/{dataset}/logs/summary.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values("robot", "tolerance"),
+        files=content(),
+        code=code("summary.py"),
     message:
         "{wildcards.dataset}: summing up what the calibration is worth"
     script:
@@ -255,21 +255,21 @@ rule history:
     input:
         unpack(lambda w: lines_of(w.dataset)),
     output:
-        history="results/{dataset}/history.parquet",
-        sums="results/{dataset}/sums/history.sha256",
         **{
             f"history_over_time_{kind}": f"results/{{dataset}}/figures/history_over_time.{kind}"
             for kind in data.formats
         },
-    params:
-        settings=values("seed", "series", "calibration", "tolerance.mm"),
-        code=code("history.py"),
+        history="results/{dataset}/history.parquet",
+        sums="results/{dataset}/sums/history.sha256",
     log:
         "results/{dataset}/logs/history.log",
     conda:
         "../envs/kinacc.yaml"
     resources:
         mem_mb=lambda w, attempt: 1000 * attempt,
+    params:
+        settings=values("seed", "series", "calibration", "tolerance.mm"),
+        code=code("history.py"),
     message:
         "{wildcards.dataset}: holding the calibrations of the series to one another"
     script:

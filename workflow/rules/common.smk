@@ -95,9 +95,7 @@ def study_of(dataset):
     """Every file of the study of a data set beside its calibration."""
     if dataset not in data.told:
         return []
-    found = tables(
-        dataset, "assessment_points", "study", "study_summary", "readings", "histories"
-    )
+    found = tables(dataset, "assessment_points", "study", "study_summary", "readings", "histories")
     found |= mapped(dataset)
     found |= {} if data.is_measured(dataset) else tables(dataset, "claims")
     drawn = ["fig1", "fig2", "fig4", "fig5", "fig6", *(["fig3"] if mapped(dataset) else [])]
@@ -129,9 +127,7 @@ def page_inputs(dataset):
     names = ("measurements", "robot", "pose_errors", "model_selection", "residuals", "worst_rows")
     found = tables(dataset, *names, "summary")
     found |= models(dataset) | fit_tables(dataset) | checked(dataset) | excluded(dataset)
-    found |= tables(
-        dataset, "assessment_points", "study", "study_summary", "readings", "histories"
-    )
+    found |= tables(dataset, "assessment_points", "study", "study_summary", "readings", "histories")
     found |= mapped(dataset)
     found |= {} if data.is_measured(dataset) else tables(dataset, "claims")
     found |= tables(dataset, "history") if data.lines(dataset) else {}

@@ -17,16 +17,23 @@ rule figures:
             for kind in data.formats
         },
         sums="results/{dataset}/sums/figures.sha256",
-    params:
-        settings=values("seed", "robot", "evaluation.space", "evaluation.cylinder", "evaluation.tool_mm", "measurements.source"),
-        files=content(),
-        code=code("figures.py", shown=True),
     log:
         "results/{dataset}/logs/figures.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values(
+            "seed",
+            "robot",
+            "evaluation.space",
+            "evaluation.cylinder",
+            "evaluation.tool_mm",
+            "measurements.source",
+        ),
+        files=content(),
+        code=code("figures.py", shown=True),
     message:
         "{wildcards.dataset}: drawing Figs. 1, 2, 4, 5 and 6"
     script:
@@ -40,15 +47,15 @@ rule map_figure:
     output:
         **{f"fig3_{kind}": f"results/{{dataset}}/figures/fig3.{kind}" for kind in data.formats},
         sums="results/{dataset}/sums/map_figure.sha256",
-    params:
-        settings=values("seed"),
-        code=code("map_figure.py", shown=True),
     log:
         "results/{dataset}/logs/map_figure.log",
     group:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
+    params:
+        settings=values("seed"),
+        code=code("map_figure.py", shown=True),
     message:
         "{wildcards.dataset}: drawing Fig. 3"
     script:
@@ -64,9 +71,6 @@ rule report:
             "results/{dataset}/report.html", category="{dataset}", labels={"file": "report.html"}
         ),
         sums="results/{dataset}/sums/report.sha256",
-    params:
-        settings=values("seed"),
-        code=code("report.py", shown=True),
     log:
         "results/{dataset}/logs/report.log",
     group:
@@ -75,6 +79,9 @@ rule report:
         "../envs/kinacc.yaml"
     resources:
         mem_mb=lambda w, attempt: 1000 * attempt,
+    params:
+        settings=values("seed"),
+        code=code("report.py", shown=True),
     message:
         "{wildcards.dataset}: writing the page"
     script:
@@ -89,9 +96,9 @@ rule digests:
         "results/{dataset}/SHA256SUMS",
     log:
         "results/{dataset}/logs/digests.log",
+    localrule: True
     conda:
         "../envs/kinacc.yaml"
-    localrule: True
     message:
         "{wildcards.dataset}: gathering digests"
     shell:

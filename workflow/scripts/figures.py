@@ -1,7 +1,7 @@
 """Draw Figs. 1, 2, 4, 5 and 6."""
 
-from kinacc.workflow.script import stage
 from kinacc.figures import fig1, fig2, fig4, fig5, fig6, save
+from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
     settings = {**job.settings, "dataset": job.dataset}

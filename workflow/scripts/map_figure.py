@@ -1,7 +1,7 @@
 """Draw Fig. 3, the accuracy maps."""
 
-from kinacc.workflow.script import stage
 from kinacc.figures import fig3, save
+from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
     formats = [each.removeprefix("fig3_") for each in job.outputs if each.startswith("fig3_")]

@@ -1,7 +1,7 @@
 """Write the page that shows what the results of a data set are worth."""
 
-from kinacc.workflow.script import stage
 from kinacc.report.page import html
+from kinacc.workflow.script import stage
 from kinacc.workflow.stages import report
 
 with stage(snakemake) as job:

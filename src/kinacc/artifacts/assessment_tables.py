@@ -264,3 +264,17 @@ ROBUSTNESS = Artefact(
     _DRAWS,
     ("draw", "claim"),
 )
+ALL = (
+    ACCURACY_MAP,
+    ASSESSMENT_POINTS,
+    STUDY_CHUNK,
+    STUDY,
+    STUDY_SUMMARY,
+    READINGS,
+    HISTORIES,
+    CLAIMS,
+    ROBUSTNESS_CHUNK,
+    ROBUSTNESS,
+    MAP_READINGS_CHUNK,
+    MAP_READINGS,
+)

@@ -27,11 +27,8 @@ from kinacc.artifacts import (
 )
 from kinacc.artifacts.columns import Artefact, Columns, joint_count, texts
 
-# What a table was made by and from, the same in all tables of a stage: its marks, and the digest
-# of each of its inputs, which `inputs_hash` folds.
+# What all tables of a stage are marked with.
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "seed")
-INPUTS_DIGESTS, COLUMNS_DIGEST = "inputs_digests", "columns_digest"
-METADATA_KEYS = (*PROVENANCE_KEYS, INPUTS_DIGESTS, COLUMNS_DIGEST)
 
 ARTEFACTS: dict[str, Artefact] = {
     artefact.name: artefact
@@ -45,18 +42,7 @@ ARTEFACTS: dict[str, Artefact] = {
         model_comparison_tables.WORST_ROWS,
         summary_table.SUMMARY,
         history_tables.HISTORY,
-        assessment_tables.ACCURACY_MAP,
-        assessment_tables.ASSESSMENT_POINTS,
-        assessment_tables.STUDY_CHUNK,
-        assessment_tables.STUDY,
-        assessment_tables.STUDY_SUMMARY,
-        assessment_tables.READINGS,
-        assessment_tables.HISTORIES,
-        assessment_tables.CLAIMS,
-        assessment_tables.ROBUSTNESS_CHUNK,
-        assessment_tables.ROBUSTNESS,
-        assessment_tables.MAP_READINGS_CHUNK,
-        assessment_tables.MAP_READINGS,
+        *assessment_tables.ALL,
         *choices_tables.ALL,
         *tournament_tables.ALL,
         *campaign_tables.ALL,

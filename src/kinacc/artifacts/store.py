@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -14,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from kinacc.artifacts import sums
 from kinacc.artifacts.atomic import write_together
 from kinacc.artifacts.columns import (
     JOINTS_MAX,
@@ -26,12 +26,8 @@ from kinacc.artifacts.columns import (
 )
 from kinacc.artifacts.contract import (
     ARTEFACTS,
-    COLUMNS_DIGEST,
-    INPUTS_DIGESTS,
-    METADATA_KEYS,
     PROVENANCE_KEYS,
 )
-from kinacc.artifacts.digests import columns_digest
 from kinacc.errors import InputError, Problem, first_few, refuse
 
 _ARROW_TYPES = {
@@ -93,9 +89,8 @@ def to_table(
     """Cast columns (each of shape (rows,)) to the artefact's Arrow table.
 
     NaN and None become null where the contract allows null; so do optional columns not given. Its
-    metadata are the provenance, the digests of the inputs (none unless given) and that of its own
-    columns. Raises InputError naming every missing or unknown column, null where none may be,
-    number that is not finite, and value of a wrong type.
+    metadata are the provenance. Raises InputError naming every missing or unknown column,
+    null where none may be, number that is not finite, and value of a wrong type.
     """
     contract = artefact_named(artefact)
     where = f"table {artefact}"
@@ -138,8 +133,12 @@ def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:
 
 
 def digest_of(artefact: str, columns: Mapping[str, Any]) -> str:
-    """Digest that the columns of an artefact have in whatever file they are written to."""
-    return columns_digest(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
+    """Digest of the columns of an artefact, whatever made them."""
+    table = to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-"))
+    written = pa.BufferOutputStream()
+    with pa.ipc.new_stream(written, table.schema) as stream:
+        stream.write_table(table)
+    return sums.digest(written.getvalue())
 
 
 def write(
@@ -180,25 +179,12 @@ def read(path: Path | str, any_type: bool = False) -> Columns:
     the file is absent or not Parquet, or if its columns are not those that it was written with.
     """
     try:
-        table = read_table(path, any_type=any_type)
-        if COLUMNS_DIGEST.encode() in (table.schema.metadata or {}):
-            verified_digest(table, path)
-        elif _has_a_record(Path(path)):
-            what = f"states no {COLUMNS_DIGEST}: another program has written it"
-            raise InputError(Problem(str(path), what, "the table that its stage left"))
-        return columns_in(table)
+        return columns_in(read_table(path, any_type=any_type))
     except (OverflowError, ValueError) as error:  # no UTF-8, or a day that no calendar has
         what = f"not a readable Parquet file: {error}"
         raise InputError(Problem(str(path), what, fix=remake(path))) from None
     except InputError as error:
         raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
-
-
-def _has_a_record(path: Path) -> bool:
-    """Whether the run that left a table has left a record too, as every run does since digests."""
-    is_part = re.fullmatch(r"\d+-of-\d+", path.stem) is not None
-    artefact, folder = (path.parent.name, path.parents[1]) if is_part else (path.stem, path.parent)
-    return artefact in ARTEFACTS and os.path.isdir(folder / "records")
 
 
 def read_table(path: Path | str, content: bytes | None = None, any_type: bool = False) -> pa.Table:
@@ -207,22 +193,6 @@ def read_table(path: Path | str, content: bytes | None = None, any_type: bool = 
     Checksums of pages are held to the pages. ``any_type`` and errors as of :func:`read`.
     """
     return _open(path, lambda file: _unpacked(file, path, any_type), content)
-
-
-def verified_digest(table: pa.Table, path: Path | str) -> str:
-    """The digest of a table's columns; InputError where its metadata state another one.
-
-    A table of an earlier version states none.
-    """
-    stated = (table.schema.metadata or {}).get(COLUMNS_DIGEST.encode())
-    try:
-        found = columns_digest(table)
-    except InputError as error:
-        raise InputError([replace(e, where=f"{path}, {e.where}") for e in error.problems]) from None
-    if stated is not None and stated != found.encode():
-        what = f"its columns are not those it was written with: {COLUMNS_DIGEST} is {found}"
-        raise InputError(Problem(str(path), what, stated.decode(errors="replace")))
-    return found
 
 
 def _unpacked(file: pq.ParquetFile, path: Path | str, any_type: bool) -> pa.Table:
@@ -265,11 +235,7 @@ def _refuse_long_texts(file: pq.ParquetFile, path: Path | str) -> None:
 
 def remake(path: Path | str) -> str:
     """What to do about an artefact that is of no use, for the message of who came upon it."""
-    folder = Path(path).parent
-    if re.fullmatch(r"\d+-of-\d+", Path(path).stem):
-        folder = folder.parent
-    command = shlex.join(["kinacc", "check-results", str(folder)])
-    return f"`{command}` prints the command that makes it again"
+    return f"rm {shlex.quote(str(path))}, then run the workflow again"
 
 
 def read_schema(path: Path | str) -> pa.Schema:
@@ -282,20 +248,6 @@ def read_metadata(path: Path | str) -> dict[str, str]:
 
     Raises InputError if the file is absent or not Parquet.
     """
-    metadata = _metadata(path)
-    metadata.pop(COLUMNS_DIGEST, None)
-    return metadata
-
-
-def stated_digest(path: Path | str) -> str | None:
-    """The digest that a table's file states of its columns; None where it is of an older version.
-
-    Raises InputError as :func:`read_metadata`.
-    """
-    return _metadata(path).get(COLUMNS_DIGEST)
-
-
-def _metadata(path: Path | str) -> dict[str, str]:
     raw = read_schema(path).metadata or {}
     return {key.decode(errors="replace"): raw[key].decode(errors="replace") for key in raw}
 
@@ -325,29 +277,14 @@ def columns_in(table: pa.Table) -> Columns:
 def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
     if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
         return texts(column.to_pylist())
-    nullable = field.nullable or column.null_count > 0
-    parts = [_numbers(chunk, nullable) for chunk in column.chunks]
-    dtype = np.float64 if nullable else field.type.to_pandas_dtype()
-    return np.concatenate(parts) if parts else np.empty(0, dtype)
-
-
-def _numbers(chunk: pa.Array, nullable: bool) -> np.ndarray:
-    """Numbers of one chunk; read from its buffers, because to_numpy imports pandas (0.5 s)."""
-    validity, data = chunk.buffers()
-    dtype = np.dtype(chunk.type.to_pandas_dtype())
-    values = np.frombuffer(data, dtype, len(chunk), chunk.offset * dtype.itemsize)
-    if not nullable:
-        return values.copy()
-    values = values.astype(np.float64)
-    if validity is not None:
-        bits = np.unpackbits(np.frombuffer(validity, np.uint8), bitorder="little")
-        values[bits[chunk.offset : chunk.offset + len(chunk)] == 0] = np.nan
-    return values
+    if field.nullable or column.null_count:
+        return column.cast(pa.float64()).to_numpy().astype(np.float64)
+    return np.array(column.to_numpy())
 
 
 def _provenance_problems(where: str, provenance: Mapping[str, object]) -> list[Problem]:
     missing = [key for key in PROVENANCE_KEYS if key not in provenance]
-    unknown = [key for key in provenance if key not in METADATA_KEYS]
+    unknown = [key for key in provenance if key not in PROVENANCE_KEYS]
     allowed = ", ".join(PROVENANCE_KEYS)
     return [Problem(where, f"provenance lacks {key}", allowed) for key in missing] + [
         Problem(where, f"provenance has an unknown key {key!r}", allowed) for key in unknown

@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem
 
 FOLDER = "sums"
 _READ = "# read "

@@ -166,12 +166,12 @@ def _is_configured(wanted: Region, calibration: Calibration) -> bool:
 
     One that was given has to be readable; one that only lies here need not be about this arm.
     """
-    from kinacc.workflow.plan import planned as read
+    from kinacc.workflow.data_sets import read_data_sets as read
 
     if wanted.config:
-        return calibration.name in read(wanted.config).datasets
+        return calibration.name in read(wanted.config).settings
     try:
-        return Path(CONFIG).is_file() and calibration.name in read((CONFIG,)).datasets
+        return Path(CONFIG).is_file() and calibration.name in read((CONFIG,)).settings
     except InputError:
         return False
 

@@ -168,18 +168,18 @@ def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> 
 
 def _configured(folder: str | Path, config: tuple[str, ...]) -> str:
     """What the configuration calls the robot of a results folder."""
-    from kinacc.workflow.plan import planned
+    from kinacc.workflow.data_sets import read_data_sets
 
     if not config and not Path(CONFIG).is_file():
         what = f"is not given, and there is no {CONFIG} here"
         raise InputError(Problem("--robot", what, "a shipped name, a robot file"))
-    plan = planned(config or (CONFIG,))
+    datasets = read_data_sets(config or (CONFIG,)).settings
     name = Path(folder).resolve().name
-    if name not in plan.datasets:
+    if name not in datasets:
         what = f"data set {name} is not in the configuration"
-        allowed = ", ".join(plan.datasets)
+        allowed = ", ".join(datasets)
         raise InputError(Problem(str(folder), what, allowed, "give --config or --robot"))
-    return plan.datasets[name]["robot"]
+    return datasets[name]["robot"]
 
 
 def calibration_of(

@@ -18,7 +18,7 @@ import click
 from kinacc import __version__
 from kinacc.cli.exit_codes import AGAINST, NOBODY_READS, STOPPED, TERMINATED, UNUSABLE
 from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
-from kinacc.starting import ONE_THREAD, without_tools_of_numpy
+from kinacc.workflow.start import ONE_THREAD
 
 _AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
 _HELP = ("-h", "--help")
@@ -171,7 +171,6 @@ class Commands(Lazy):
             with _listening(came):
                 if not context.meta[_ASKS_HELP]:
                     os.environ.update(ONE_THREAD)
-                    without_tools_of_numpy()
                 return super().invoke(context)
         except (Exception, KeyboardInterrupt) as error:
             usage = isinstance(error, click.UsageError) and not context.meta[_AS_JSON]
@@ -246,7 +245,6 @@ SECTIONS = {
     "The study": {
         "study": "everything beside: maps, the assessors under noise, claims",
         "show": "any table of results in the terminal, or as CSV",
-        "run": "run one stage of the workflow by hand",
         "check-results": "hold a results folder to its contract",
         "draw-robots": "search synthetic arms like the paper's",
     },

@@ -48,13 +48,8 @@ def plan_campaign(out, **given) -> None:
     """
     from kinacc.cli import campaign_plans
     from kinacc.progress import reporting
-    from kinacc.workflow import cost
 
     asked = campaign_plans.question(given)
-    budgets = [each.measurements for each in asked.assessors]
-    ahead = cost.of_campaigns(asked.points, budgets, len(asked.fields), asked.repetitions)
-    for line in cost.expected({("", "plan-campaign"): ahead}):
-        click.echo(line, err=True)
     with reporting("plan-campaign", bar=True) as progress:
         found = campaign_plans.answer(asked, progress)
     if out.picture is not None:

@@ -59,12 +59,8 @@ def plan_poses(out, **given) -> None:
     """
     from kinacc.cli import planned
     from kinacc.progress import reporting
-    from kinacc.workflow import cost
 
     asked = planned.question(given)
-    ahead = cost.of_chosen_poses(len(asked.joints), asked.count)
-    for line in cost.expected({("", "plan-poses"): ahead}):
-        click.echo(line, err=True)
     with reporting("plan-poses", bar=True) as progress:
         found = planned.answer(asked, progress)
         if out.picture is not None:

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from kinacc.cli.output import Output, answers
-
-if TYPE_CHECKING:
-    from kinacc.workflow.runner import Job
 
 _PAGE = "report.html"
 
@@ -49,46 +44,22 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
 
     ``without``: tables to leave out. Raises InputError naming all tables missing.
     """
-    from kinacc.workflow.runner import perform
-
-    job = _job(Path(folder), out or str(Path(folder) / _PAGE), without)
-    perform(job)
-    return Path(job.outputs["html"])
-
-
-def _job(folder: Path, out: str, without: Collection[str]) -> Job:
-    from kinacc.artifacts import records
-    from kinacc.artifacts.store import read_metadata
+    from kinacc import __version__
+    from kinacc.artifacts import sums
+    from kinacc.artifacts.atomic import write_whole
     from kinacc.campaign.journal import of_results
-    from kinacc.workflow.answer import read
-    from kinacc.workflow.catalogue import STAGES
-    from kinacc.workflow.plan import RESULTS, campaign_files
-    from kinacc.workflow.runner import Job
-    from kinacc.workflow.verification.lineage import outdated
+    from kinacc.report.page import html
+    from kinacc.workflow.answer import ON_PAGE, PAGE_TABLES, read
+    from kinacc.workflow.data_sets import campaign_files
+    from kinacc.workflow.stages import report
 
-    stage = STAGES["report"]
-    read(folder, stage.inputs)
-    old = outdated(folder, set(stage.optional) - set(without))
-    shown = [name for name in (*stage.inputs, *stage.optional) if name not in {*without, *old}]
-    paths = {name: folder / f"{name}.parquet" for name in shown}
-    inputs = {name: str(path) for name, path in paths.items() if path.is_file()}
-    inputs |= campaign_files(of_results(folder))
-    settings: dict[str, object] = {"dataset": folder.resolve().name}
-    if folder != Path(RESULTS) / folder.resolve().name:
-        settings["folder"] = str(folder)
-    if old:
-        settings["outdated"] = sorted(old)
-    seed = int(read_metadata(paths["summary"])["seed"])
-    uses = stage.used(settings, inputs)
-    own = os.path.abspath(out) == os.path.abspath(folder / _PAGE)
-    return Job(
-        stage.module,
-        inputs,
-        {"html": out},
-        settings,
-        seed,
-        label="report",
-        uses=uses,
-        stage=stage.name,
-        record=records.place(folder, stage.name) if own else "",
-    )
+    place = Path(folder)
+    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem}
+    tables = read(place, PAGE_TABLES, ON_PAGE)
+    shown = {name: table for name, table in tables.items() if name not in {*without, *old}}
+    campaigns = {role: Path(path) for role, path in campaign_files(of_results(place)).items()}
+    settings = {"dataset": place.resolve().name, "folder": folder, "outdated": sorted(old)}
+    path = Path(out or place / _PAGE)
+    page = report.run({**shown, **campaigns}, settings)
+    write_whole(path, html(page, {"kinacc_version": __version__}).encode())
+    return path

@@ -7,7 +7,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinacc.artifacts import campaign_tables, store
+from kinacc.artifacts import assessment_tables, store
 from kinacc.artifacts.columns import texts
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.campaign.journal import PLAN
@@ -15,8 +15,6 @@ from kinacc.cli.sheet import Field, Sheet
 from kinacc.cli.show_pictures import PICTURES
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, first_few
-from kinacc.workflow.catalogue import CALIBRATION, FIGURE_FOLDER, STAGES
-from kinacc.workflow.verification.check import not_there
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ def _by_numbers(name: str) -> tuple[int, str]:
 
 def _of_tables(folder: Path, names: list[str]) -> Listing:
     part_of = ARTEFACTS.get(folder.name)
-    rows: list[tuple[str, int | None, str | None, str | None]] = []
+    rows: list[tuple[str, int | None, str | None]] = []
     for name in names:
         artefact = ARTEFACTS.get(name, part_of)
         what = None if artefact is None else _short(artefact.meaning)
@@ -104,7 +102,7 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
             count = _rows(folder / f"{name}.parquet")
         except InputError as error:
             count, what = None, error.problems[0].what
-        rows.append((name, count, what, _maker(artefact.name) if artefact else None))
+        rows.append((name, count, what))
     sheet = Sheet(
         f"{folder}: {len(names)} table{'s' if len(names) != 1 else ''}",
         {"folder": str(folder)},
@@ -112,44 +110,29 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
             Field("table", texts(row[0] for row in rows), "", "name of the table"),
             Field("rows", texts(row[1] for row in rows), "", "number of its rows"),
             Field("what it is", texts(row[2] for row in rows), "", "what it holds"),
-            Field("made by", texts(row[3] for row in rows), "", "stage or command that does"),
         ],
     )
     below = [f"{_typed('show', folder, names[0])} shows one; --describe says what its columns mean"]
     if drawn := [name for name in names if name in PICTURES]:
         below.append(f"--plot draws {', '.join(drawn)}")
-    pictures = sorted({each.stem for each in (folder / FIGURE_FOLDER).glob("*.*")})
+    pictures = sorted({each.stem for each in (folder / "figures").glob("*.*")})
     if pictures:
-        below.insert(0, f"{FIGURE_FOLDER}/: {', '.join(pictures)}")
-    if _of_dataset(folder):
-        below[:0] = _missing_in_words(folder)
+        below.insert(0, f"figures/: {', '.join(pictures)}")
     return Listing(sheet, tuple(below))
-
-
-def _missing_in_words(folder: Path) -> list[str]:
-    """Which tables are not there, by the command that makes them."""
-    by_command: dict[str, list[str]] = {}
-    for name in not_there(folder):
-        by_command.setdefault(_command(name), []).append(name)
-    return [f"not there: {', '.join(names)}; made by {command}"
-            for command, names in by_command.items()]  # fmt: skip
 
 
 def _of_folders(folder: Path, within: list[Path]) -> Listing:
     rows = []
     for each in within:
-        is_dataset = _of_dataset(each)
-        absent = not_there(each) if is_dataset else ()
         rows.append(
             (
                 each.name,
                 _robot(each),
                 _count(each / "measurements.parquet"),
                 len(_tables(each)),
-                ", ".join(absent) or None,
             )
         )
-    columns = [texts(row[i] for row in rows) for i in range(5)]
+    columns = [texts(row[i] for row in rows) for i in range(4)]
     sheet = Sheet(
         f"{folder}: {len(within)} folder{'s' if len(within) != 1 else ''} with tables",
         {"folder": str(folder)},
@@ -158,7 +141,6 @@ def _of_folders(folder: Path, within: list[Path]) -> Listing:
             Field("robot", columns[1], "", "its arm"),
             Field("readings", columns[2], "", "rows of its measurements"),
             Field("tables", columns[3], "", "number of tables"),
-            Field("not there", columns[4], "", "tables that other data sets would have"),
         ],
     )
     below = [f"{_typed('show', within[0])} lists the tables of one"]
@@ -205,20 +187,7 @@ def _short(meaning: str) -> str:
     return head if " " in head else sentence
 
 
-def _stage(name: str) -> str | None:
-    return next((each.name for each in STAGES.values() if name in each.outputs), None)
-
-
-def _maker(name: str) -> str | None:
-    is_campaign = any(name == each.name for each in campaign_tables.ALL)
-    return "campaign report" if is_campaign else _stage(name)
-
-
 def _command(name: str) -> str:
     """The command that makes a table of the workflow."""
-    stage = STAGES.get(_stage(name) or "")
-    if stage is None or stage.joint:
-        return ""
-    if stage.on_request:
-        return f"kinacc run {stage.name}"
-    return "kinacc calibrate" if stage.name in (*CALIBRATION, "compliance") else "kinacc study"
+    studied = any(name == each.name for each in assessment_tables.ALL)
+    return "kinacc study" if studied else "kinacc calibrate"

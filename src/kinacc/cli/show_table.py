@@ -19,7 +19,6 @@ from kinacc.cli.screen import decimals_of, number
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.workflow.catalogue import STAGES
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -150,7 +149,7 @@ def words(shown: Shown, describe: bool) -> tuple[list[str], list[str]]:
     """What is said above and below the table."""
     above, below = list(shown.remarks), []
     if shown.artefact is not None:
-        above.append(shown.artefact.meaning + _made_by(shown.artefact.name))
+        above.append(shown.artefact.meaning)
     if describe:
         below += [f"{key}: {shown.provenance[key]}" for key in store.PROVENANCE_KEYS
                   if key in shown.provenance]  # fmt: skip
@@ -159,13 +158,6 @@ def words(shown: Shown, describe: bool) -> tuple[list[str], list[str]]:
         if " " in each.unit and not each.unit.startswith("see "):
             below.append(f"unit of {each.name}: {each.unit}")
     return above, below
-
-
-def _made_by(name: str) -> str:
-    for stage in STAGES.values():
-        if name in stage.outputs:
-            return f" Made by stage {stage.name}, {stage.message}."
-    return ""
 
 
 def _no_table(path: Path, error: InputError) -> list[Problem]:

@@ -42,9 +42,9 @@ def without_dataset() -> Settings:
 def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:
     """The settings of a configured data set. Raises InputError."""
     from kinacc.calibration.dh_estimator import hayati_joints
-    from kinacc.workflow.plan import planned
+    from kinacc.workflow.data_sets import read_data_sets
 
-    datasets = planned(config or (CONFIG,)).datasets
+    datasets = read_data_sets(config or (CONFIG,)).settings
     if dataset not in datasets:
         what = f"{dataset!r} is not in the configuration"
         raise InputError(Problem("--dataset", what, ", ".join(datasets)))

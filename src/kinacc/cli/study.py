@@ -27,22 +27,23 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
     from kinacc.workflow.answer import answer, read
+    from kinacc.workflow.data_sets import RESULTS
     from kinacc.workflow.fleet import FEW
-    from kinacc.workflow.plan import SNAKEFILE
+    from kinacc.workflow.start import SNAKEFILE
 
     paper = SNAKEFILE.parent / "config.yaml"
-    configs, plan = carried_out("all", words, cores, default=paper)
-    if plan is None:
+    configs, data = carried_out("all", words, cores, default=paper)
+    if data is None:
         return
     if as_json:
-        click.echo(json.dumps({"results": [f"{plan.results}/{name}" for name in plan.told]}))
+        click.echo(json.dumps({"results": [f"{RESULTS}/{name}" for name in data.told]}))
         return
     options = [word for name in configs for word in ("--config", name)]
-    check = shlex.join(["kinacc", "check-results", plan.results, *options])
-    if len(plan.told) > FEW:
-        show_many([f"{plan.results}/{name}" for name in plan.told], [check])
+    check = shlex.join(["kinacc", "check-results", RESULTS, *options])
+    if len(data.told) > FEW:
+        show_many([f"{RESULTS}/{name}" for name in data.told], [check])
         return
-    for dataset in plan.told:
-        folder = f"{plan.results}/{dataset}"
+    for dataset in data.told:
+        folder = f"{RESULTS}/{dataset}"
         lines = answer(folder, read(folder), following=[check])
         click.echo("\n".join(["", *lines, f"tables and figures are in {folder}"]))

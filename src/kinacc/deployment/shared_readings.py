@@ -11,6 +11,7 @@ import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
 from kinacc.deployment.record import Calibration
+from kinacc.errors import Problem
 
 _COINCIDENCE = 0.01  # of the smaller set: equal digits of so few readings may be chance
 _DIGITS = 6  # of mm; angles are held to as many and three more
@@ -100,3 +101,20 @@ def _readings(table: Mapping, rows: np.ndarray) -> _Readings:
 
 def _common(first: list[tuple], second: list[tuple]) -> int:
     return (Counter(first) & Counter(second)).total()
+
+
+def repeated_problems(path: str, own: Mapping, before: str, other: Mapping) -> list[Problem]:
+    """That a file of a series holds readings of an earlier line: it says nothing new by them.
+
+    A tracker's export that goes on holds the old readings among the new ones; the history would
+    hold them against themselves.
+    """
+    count, rows = repeated(other, own), len(own["subset"])
+    if not count:
+        return []
+    if count == rows:
+        return [Problem(path, f"holds the readings of {before}, which is a line already",
+                        "new readings")]  # fmt: skip
+    what = f"{count} of its {rows} readings are those of {before}, which is a line already"
+    fix = "leave those rows out of the file: a change would be held against readings before it"
+    return [Problem(path, what, "new readings alone", fix)]

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from kinacc.artifacts import pictures
 from kinacc.artifacts.atomic import write_together
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
@@ -29,14 +28,8 @@ _METADATA = {
 }
 
 
-def render(
-    figure: Figure, formats: Iterable[str], read: Mapping[str, str] | None = None
-) -> dict[str, bytes]:
-    """Return the file content for each format.
-
-    ``read``: digests of what it was drawn from, by role; the files state them. Raises InputError
-    for formats other than svg, png and pdf.
-    """
+def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
+    """Return the file content for each format; InputError for others than svg, png and pdf."""
     formats = tuple(formats)
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
@@ -45,7 +38,7 @@ def render(
         )
     with style.house():
         settle(figure)
-        return {name: _bytes(figure, name, read) for name in formats}
+        return {name: _bytes(figure, name) for name in formats}
 
 
 def settle(figure: Figure) -> None:
@@ -63,14 +56,11 @@ def write(figure: Figure, paths: Mapping[str, Path]) -> None:
     write_together({path: contents[name] for name, path in paths.items()})
 
 
-def _bytes(figure: Figure, name: str, read: Mapping[str, str] | None) -> bytes:
+def _bytes(figure: Figure, name: str) -> bytes:
     buffer = BytesIO()
-    metadata: dict[str, str | None] = {**_METADATA[name]}
-    if read is not None:
-        metadata |= pictures.metadata(name, read)
     dpi = PNG_DPI if name == "png" else RASTER_DPI
     with _lean_pdf() if name == "pdf" else nullcontext():
-        figure.savefig(buffer, format=name, dpi=dpi, metadata=metadata)
+        figure.savefig(buffer, format=name, dpi=dpi, metadata=_METADATA[name])
     return buffer.getvalue()
 
 

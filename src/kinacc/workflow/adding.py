@@ -14,12 +14,13 @@ from kinacc.artifacts.atomic import write_whole
 from kinacc.config.reading import read
 from kinacc.config.series import FLAGS, MOVED, SAME
 from kinacc.config.series_text import as_text, with_line
+from kinacc.deployment.shared_readings import repeated_problems
 from kinacc.errors import InputError, Problem, first_few, gathered, refuse
 from kinacc.kinematics import robot
 from kinacc.measurements import times
 from kinacc.measurements.files import load as loaded
 from kinacc.measurements.written import Written
-from kinacc.workflow import calibration_settings, measured_files
+from kinacc.workflow import calibration_settings
 from kinacc.workflow.contradictions import load
 from kinacc.workflow.stages import measurements
 
@@ -109,7 +110,7 @@ def misfits(path: str, arm: Arm, tool: str | None) -> list[Problem]:
         for member in arm.members:
             with suppress(InputError):
                 other = _measured(member.path, arm)
-                problems += measured_files.repeated(path, own, member.path, other)
+                problems += repeated_problems(path, own, member.path, other)
         if other is not None:
             problems += _of_targets(path, own, other, arm, tool)
     return problems

@@ -26,19 +26,29 @@ from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 from kinacc.study.summary import claims_counted, claims_that_differ, differences
-from kinacc.workflow.catalogue import FIGURE_FOLDER, HISTORY, STAGES
 
 IF_THERE = (
     *(f"{kind}_model" for kind in ERROR_MODELS),
     *("summary", "data_check", "excluded_rows", "vec_orders", "accuracy_map"),
     *("assessment_points", "claims", "history"),
 )
+# What the page shows: it needs the first, and shows of the others what is there.
+PAGE_TABLES = (*summary.TABLES, "dh_model", "vec_model", "residuals", "worst_rows", "summary")
+ON_PAGE = (
+    *IF_THERE,
+    *(f"{kind}_{what}" for kind in ERROR_MODELS for what in ("fit", "covariance")),
+    *("study", "study_summary", "readings", "histories"),
+)
 _READINGS = 300  # for the 200 candidates that are drawn: bounds as wide as repeats make them
 _LEAST_RANGE, _METRE_MM = 1e-9, 1e3
 Tables = Mapping[str, Columns]
 
 
-def read(folder: Path | str, needed: Collection[str] = summary.TABLES) -> dict[str, Columns]:
+def read(
+    folder: Path | str,
+    needed: Collection[str] = summary.TABLES,
+    optional: Collection[str] = IF_THERE,
+) -> dict[str, Columns]:
     """The tables an answer is made from. Raises InputError naming all ``needed`` ones missing."""
     folder = Path(folder)
     if (folder / journal.PLAN).is_file():
@@ -53,7 +63,7 @@ def read(folder: Path | str, needed: Collection[str] = summary.TABLES) -> dict[s
         ],
         f"{folder} holds no calibration that is complete",
     )
-    paths = {name: folder / f"{name}.parquet" for name in dict.fromkeys((*needed, *IF_THERE))}
+    paths = {name: folder / f"{name}.parquet" for name in dict.fromkeys((*needed, *optional))}
     return {name: store.read(path) for name, path in paths.items() if path.is_file()}
 
 
@@ -219,10 +229,8 @@ def _claims(folder: Path, facts: Sequence[Fact], tables: Tables) -> dict[str, li
     if "claims" not in tables or not _is_synthetic(facts):
         return {}
     claims = tables["claims"]
-    plain = (stage for stage in STAGES.values() if stage.is_figure and not stage.on_request)
-    figures = [stage.name for stage in plain if stage.name not in HISTORY]
     return {
         "claims": [claims_counted(claims), f"{folder}/claims.parquet has each of them"],
         "differ": [", ".join(claims_that_differ(claims))],
-        "figures": [f"{folder}/{FIGURE_FOLDER}: {figures[0]} to {figures[-1]}"],
+        "figures": [f"{folder}/figures: fig1 to fig6"],
     }

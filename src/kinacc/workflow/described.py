@@ -11,15 +11,15 @@ from typing import Any
 
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.contradictions import load
-from kinacc.workflow.plan import Plan, planned
+from kinacc.workflow.data_sets import DataSets, read_data_sets
 
 CONFIG = "config.yaml"
 _OF_A_LINE = re.compile(r"-\d{4}-\d{2}-\d{2}$")
 _FILES = 20  # beside results, looked through for a configuration
 
 
-def beside(results: Path, dataset: str) -> Iterator[tuple[Path, Plan]]:
-    """Configurations beside the folder of all results that name a data set, and their plans.
+def beside(results: Path, dataset: str) -> Iterator[tuple[Path, DataSets]]:
+    """Configurations beside the folder of all results that name a data set, and its data sets.
 
     That of a line of a series stands there by the name of the series.
     """
@@ -31,8 +31,8 @@ def beside(results: Path, dataset: str) -> Iterator[tuple[Path, Plan]]:
 
 
 @cache
-def _planned(path: str, changed_ns: int) -> Plan:
-    return planned([path])
+def _planned(path: str, changed_ns: int) -> DataSets:
+    return read_data_sets([path])
 
 
 def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
     folder = folder.resolve()
     found: dict[str, dict[str, Any]] = {}
     for path, plan in beside(folder.parent, folder.name):
-        if folder.name in plan.datasets:
+        if folder.name in plan.settings:
             own = _of_file(load([path])[folder.name], readings)
             if own is not None and own not in found.values():
                 found[path.name] = own

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from kinacc.artifacts import store
+from kinacc.artifacts import store, sums
 from kinacc.artifacts.error_models import model_name
 from kinacc.assess.conformity import UNDECIDED
 from kinacc.assess.statement import CANDIDATES, Statement
@@ -18,13 +18,10 @@ from kinacc.campaign import journal, of_calibration, tolerance, words
 from kinacc.campaign.of_calibration import Sought
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import STAGES, TOURNAMENT
-from kinacc.workflow.verification.lineage import made_of_these, outdated
 
 FEW = 4  # data sets of which each is told of at the end of a run
 BOUND, HELD_OUT = "bound", "held-out"
 _TOLERANCE_OF = {BOUND: "bound", HELD_OUT: "quantile_99"}
-_SUMMARY = STAGES["summary"]
 _DAY = 10  # characters of a time
 
 
@@ -163,7 +160,7 @@ def data_sets(folders: Iterable[Path]) -> list[Path]:
 
 
 def _may_be_one(folder: Path) -> bool:
-    hidden = folder.name.startswith(".") or folder.name == TOURNAMENT
+    hidden = folder.name.startswith(".")
     return folder.is_dir() and not hidden and not (folder / journal.PLAN).is_file()
 
 
@@ -185,9 +182,7 @@ def _standing(folder: Path, campaigns: Sequence[Path]) -> Standing:
         fix = "kinacc calibrate FILE.yaml, with the file of this data set, makes one"
         raise InputError(Problem(str(folder), "holds no summary.parquet", fix=fix))
     robot, model, held_out, tolerance = _told(path)
-    # The quick question first; a robot file of one's own, which is not here, takes the longer one.
-    own = store.read_metadata(path)
-    if not made_of_these(folder, _SUMMARY, own) and outdated(folder, _SUMMARY.outputs):
+    if path.name in sums.outdated(folder):
         what = "was made from other tables than those now beside it"
         raise InputError(Problem(str(path), what, fix=store.remake(path)))
     tables = results.read_tables(folder, "robot") if campaigns else {}

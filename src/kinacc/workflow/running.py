@@ -10,7 +10,6 @@ from typing import TextIO
 from kinacc.errors import InputError
 
 _held: list[TextIO] = []  # until the process ends, however it ends
-FEW = 4  # data sets of which each is shown at the end of a run
 
 
 def hold(results: str) -> None:
@@ -27,6 +26,7 @@ def hold(results: str) -> None:
 def answers(results: str, datasets: Sequence[str]) -> Iterator[str]:
     """What each data set's calibration is worth, after a run that made its summary."""
     from kinacc.workflow.answer import answer, read
+    from kinacc.workflow.fleet import FEW
 
     folders = [Path(results, name) for name in datasets]
     made = [folder for folder in folders if (folder / "summary.parquet").is_file()]

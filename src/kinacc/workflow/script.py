@@ -1,7 +1,4 @@
-"""What the scripts of the workflow share: inputs held to their digests, a log, outputs and sums.
-
-Import it first: it holds BLAS at one thread, since more threads change the last bits of a sum.
-"""
+"""What the scripts of the workflow share: inputs held to their digests, a log, outputs and sums."""
 
 from __future__ import annotations
 
@@ -15,17 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-os.environ.update(
-    dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-)
-
-from kinacc import __version__  # noqa: E402
-from kinacc.artifacts import store, sums  # noqa: E402
-from kinacc.artifacts.atomic import write_together  # noqa: E402
-from kinacc.artifacts.columns import Columns  # noqa: E402
-from kinacc.errors import InputError, KinaccError, Problem, gathered, refuse, refused  # noqa: E402
-from kinacc.progress import reporting  # noqa: E402
-from kinacc.workflow.code import config_hash  # noqa: E402
+from kinacc import __version__
+from kinacc.artifacts import store, sums
+from kinacc.artifacts.atomic import write_together
+from kinacc.artifacts.columns import Columns
+from kinacc.errors import KinaccError, Problem, gathered, refuse, refused
+from kinacc.progress import reporting
+from kinacc.workflow.code import config_hash
 
 Progress = Callable[..., Iterable]
 
