@@ -1,41 +1,71 @@
-"""``kinacc check-results``: a results folder held to its contract."""
+"""``kinacc check-results``: a results folder held to its schemas, thresholds and accepted run."""
 
 from __future__ import annotations
 
-import sys
+from pathlib import Path
 
 import click
 
-from kinacc.cli.output import Output, answers
-from kinacc.workflow.plan import planned
-from kinacc.workflow.results_lock import refuse_while_running
-from kinacc.workflow.verification import check
+from kinacc.cli.choice import CONFIG
 
 
 @click.command("check-results")
-@click.argument("folder", type=click.Path(), default="results")
-@answers("Print the findings as JSON.")
-@click.option("--config", multiple=True, help="Configuration the results should come from.")
+@click.argument("results", type=click.Path(path_type=Path), default="results")
 @click.option(
-    "--all", "every", is_flag=True, help="Compute all simulations and cells again, not a sample."
+    "--config", multiple=True, metavar="FILE", help=f"Configuration with thresholds.  [{CONFIG}]"
 )
-@click.option("--expect", metavar="DIGEST", help="Digest of all records that has to be found.")
+@click.option("--against", type=click.Path(path_type=Path), metavar="FOLDER", help="Accepted run.")
+@click.option("--dataset", "datasets", multiple=True, metavar="NAME", help="Data sets checked.")
+@click.option(
+    "--accept",
+    "accepted",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Folder of the accepted run, made from RESULTS where nothing fails.",
+)
+@click.option("--reason", default="", help="Reason for --accept.")
+@click.option("--json", "as_json", is_flag=True, help="Output as JSON.")
+@click.option(
+    "--out",
+    "-o",
+    "files",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Further output file: .json, metrics.json, .xml (JUnit), .md or .txt.",
+)
 def check_results(
-    folder: str, config: tuple[str, ...], every: bool, expect: str | None, out: Output
+    results: Path,
+    config: tuple[str, ...],
+    against: Path | None,
+    datasets: tuple[str, ...],
+    accepted: Path | None,
+    reason: str,
+    as_json: bool,
+    files: tuple[Path, ...],
 ) -> None:
-    """Check every artefact in FOLDER: there, as the contract says, made from one another.
+    """Check tables, digests, thresholds and, with --against, an accepted run.
 
-    Numbers are computed again from the tables they were made from. With --config also that every
-    data set of the configuration is there and was made with these values. The digest of all records
-    is printed: kept elsewhere, it tells with --expect whether anything was written anew. Exit code
-    0 if all is well, 1 if anything is not.
+    Exit code 0 where nothing failed, 1 where something did, 2 where the input cannot be used.
 
     \b
     Example:
-      kinacc check-results results/
-      kinacc check-results results/ --config config.yaml --config my-robot.yaml --json
+      kinacc check-results results --config tracker.yaml --against accepted --out check.xml
     """
-    refuse_while_running(folder)
-    report = check.check_results(folder, planned(config) if config else None, config, every, expect)
-    out.say(report.to_dict(), str(report))
-    sys.exit(report.exit_code)
+    from kinacc.artifacts import sums
+    from kinacc.gate import accepted as runs
+    from kinacc.gate import check, outputs
+    from kinacc.workflow.contradictions import load
+
+    if (results / sums.FOLDER).is_dir():  # one data set was named in place of the folder of all
+        results, datasets = results.resolve().parent, (*datasets, results.resolve().name)
+    configs = config or ((CONFIG,) if Path(CONFIG).is_file() else ())
+    report = check.check_results(results, load(configs) if configs else {}, against, datasets)
+    for path in files:
+        outputs.write(report, path)
+    click.echo(outputs.as_json(report) if as_json else outputs.as_text(report), nl=not as_json)
+    if not report.passed:
+        raise SystemExit(1)
+    if accepted is not None:
+        names = list(datasets) or check.data_sets_in(results)
+        note = runs.accept(results, accepted, names, reason)
+        click.echo(f"accepted: {', '.join(note['datasets'])} in {accepted}", err=as_json)

@@ -264,10 +264,6 @@ SECTIONS = {
         "campaign": "measure: what next, what was read, what may be said",
         "tournament": "hold all assessors to errors that are known",
     },
-    "In a pipeline": {
-        "gate": "hold results to what is good enough, and to the accepted run",
-        "accept": "make a run the accepted one, by a person",
-    },
 }
 
 

@@ -128,7 +128,7 @@ def _change(
 ) -> Outcome:
     if accepted is None or not accepted.folder.is_dir():
         says = f"there is no accepted run of {dataset} to hold it against"
-        fix = 'a person accepts one: kinacc accept RESULTS --reason ".."'
+        fix = 'accept one: kinacc check-results RESULTS --accept FOLDER --reason ".."'
         return _outcome(gate, dataset, FAILED, says, fix)
     now, before = figure(gate["value"], tables, gate), figure(gate["value"], accepted, gate)
     asked = gate["beyond_chance"]
@@ -157,7 +157,7 @@ def _change(
     if found.difference and found.least != found.difference:
         says += f"; with {100.0 * asked:g} % confidence {_at_least(now, found)}, {found.drawn}"
     failed = found.least > allowed
-    fix = f"what changed is named by: kinacc gate --against {accepted.folder.parent}"
+    fix = f"kinacc check-results --against {accepted.folder.parent} lists what changed"
     return _outcome(gate, dataset, FAILED if failed else PASSED, says, fix, figures)
 
 

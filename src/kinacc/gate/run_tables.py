@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts import store
+from kinacc.artifacts import assessment_tables, store
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.calibration.summary import selected
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import CALIBRATION, maker_of
 
 SELECTED = "selected"
 
@@ -45,10 +43,8 @@ def maker_of_table(artefact: str) -> str:
     """The command that makes a table, in words."""
     if artefact == "history":
         return "give the data set a series (docs/history.md) and calibrate it"
-    stage = maker_of(artefact)
-    calibrated = stage.name in CALIBRATION or stage.fits
-    command = shlex.join(["kinacc", "calibrate" if calibrated else "study", "FILE.yaml"])
-    return f"`{command}`, with the configuration of the data set, makes it"
+    studied = any(artefact == each.name for each in assessment_tables.ALL)
+    return f"kinacc {'study' if studied else 'calibrate'} FILE.yaml makes it"
 
 
 def errors_of(

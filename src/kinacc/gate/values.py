@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from kinacc.artifacts import sums
 from kinacc.artifacts.error_models import model_name
-from kinacc.artifacts.store import stated_digest
 from kinacc.config.gate_rules import COMPARED, units
 from kinacc.errors import Problem
 from kinacc.gate import chance
@@ -107,7 +107,7 @@ def change_of(
 
 
 def _digest(tables: RunTables) -> str | None:
-    return stated_digest(tables.folder / "measurements.parquet")
+    return sums.stated(tables.folder).get("measurements.parquet")
 
 
 def _sample(tables: RunTables, name: str, gate: Mapping[str, Any]) -> chance.Sample:

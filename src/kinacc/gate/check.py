@@ -1,0 +1,104 @@
+"""Check of a results folder: digests, schemas, thresholds of the configuration, an accepted run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from kinacc.artifacts import sums
+from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.errors import InputError, Problem, and_more
+from kinacc.gate.accepted import compared
+from kinacc.gate.conformity import check_file
+from kinacc.gate.gates import judged
+from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
+
+_NEEDED = ("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors")
+_SHOWN = 20
+
+
+def check_results(
+    results: Path,
+    configurations: Mapping[str, Mapping[str, Any]],
+    against: Path | None = None,
+    datasets: Sequence[str] = (),
+) -> CheckReport:
+    """Check the data sets of a results folder.
+
+    Parameters
+    ----------
+    results
+        Folder with a folder for each data set.
+    configurations
+        Complete settings by data set, whose section ``gates`` holds the thresholds.
+    against
+        An accepted run, or any other results, to compare with.
+    datasets
+        Names of the only data sets checked; all that are configured or there if empty.
+
+    Raises
+    ------
+    InputError
+        Where there is no such folder or data set.
+    """
+    names = list(datasets) or sorted({*configurations, *data_sets_in(results)})
+    if not names:
+        raise InputError(Problem(str(results), "holds no data set", "a folder of results"))
+    outcomes = [check_files(results / name) for name in names]
+    broken = {each.dataset for each in outcomes if each.verdict == FAILED}
+    chosen = {name: own for name, own in configurations.items() if name in names}
+    outcomes += judged(results, chosen, against, broken)
+    for name in names if against is not None else ():
+        if name not in broken:
+            outcomes += compared(results / name, against / name)
+    return CheckReport(str(results), str(against or ""), tuple(outcomes))
+
+
+def data_sets_in(results: Path) -> list[str]:
+    """Names of the data sets in a results folder."""
+    if not results.is_dir():
+        raise InputError(Problem(str(results), "no such folder", fix="name a results folder"))
+    return sorted(each.parent.name for each in results.glob(f"*/{sums.FOLDER}"))
+
+
+def check_files(folder: Path) -> Outcome:
+    """Whether every file of a data set is there, as its stage left it, and fits its schema."""
+    problems = list(_problems(folder))
+    name = folder.name
+    if problems:
+        says = "; ".join(map(str, problems[:_SHOWN])) + and_more(len(problems) - _SHOWN)
+        return Outcome(name, "files", "files", FAILED, says, figures={"problems": len(problems)})
+    count = len(sums.stated(folder))
+    if old := sums.outdated(folder):
+        says = f"{len(old)} files were made from files that have changed since: {', '.join(old)}"
+        return Outcome(name, "files", "files", WARNED, says, "run the workflow again")
+    says = f"{count} files are as their stages left them, and tables fit their schemas"
+    return Outcome(name, "files", "files", PASSED, says, figures={"files": count})
+
+
+def _problems(folder: Path) -> Iterator[Problem]:
+    if not (folder / sums.FOLDER).is_dir():
+        yield Problem(str(folder), f"has no {sums.FOLDER}", fix="run the workflow")
+        return
+    whole = folder / "SHA256SUMS"
+    parts = b"".join(sorted(each.read_bytes() for each in (folder / sums.FOLDER).glob("*.sha256")))
+    if whole.is_file():
+        lines = set(parts.splitlines())
+        for line in whole.read_bytes().splitlines():
+            if line not in lines:
+                what = f"lists {line.decode(errors='replace')!r}, which no stage left"
+                yield Problem(str(whole), what, fix="run the workflow again")
+    left = sums.stated(folder)
+    yield from sums.changed(folder)
+    for name in _NEEDED:
+        if f"{name}.parquet" not in left:
+            yield Problem(str(folder / f"{name}.parquet"), "missing", fix="run the workflow")
+    for path in sorted(folder.rglob("*.parquet")):
+        relative = path.relative_to(folder)
+        artefact = ARTEFACTS.get(relative.stem if len(relative.parts) == 1 else relative.parts[0])
+        if artefact is None or relative.as_posix() not in left:
+            fix = f"rm {path}"
+            yield Problem(str(path), "is none of the tables that the stages left", fix=fix)
+            continue
+        yield from check_file(path, artefact)[1]
