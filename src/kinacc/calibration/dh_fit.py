@@ -9,7 +9,12 @@ import numpy as np
 from kinacc.calibration import reweighted, robust, variances
 from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
 from kinacc.calibration.constraints import free_parameters  # noqa: F401 (the usual mask of a fit)
-from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameCoordinates, Frames
+from kinacc.calibration.frames import (
+    ANGLE_UNIT_RAD,
+    FrameCoordinates,
+    Frames,
+    with_stated_orientations,
+)
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.held import (
     Kept,
@@ -205,6 +210,8 @@ def _placed(
     if frames is not None:
         return known_frames(observations, frames)
     begin = closed_form_start(observations, dh.forward(start, observations.q_rad))
+    if terms is not None:
+        begin = with_stated_orientations(begin, terms.stated, observations)
     return placed(
         observations, lambda at: unknowns.flange.pose(unknowns.nominal, at), begin, terms, weight
     )

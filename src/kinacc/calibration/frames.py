@@ -187,12 +187,25 @@ def coordinates(
 
     A session that nothing was measured in keeps its base, a target never seen its place.
     """
-    turns = np.zeros(anchor.count, dtype=bool)
-    turns[np.unique(observations.target[observations.has_rotation])] = True
+    turns = orientations_measured(observations)
     centroid = np.zeros((anchor.sessions, 3))
     for session in np.unique(observations.session):
         centroid[session] = observations.position_mm[observations.session == session].mean(axis=0)
     return FrameCoordinates(anchor, base_free, targets_free, turns, centroid)
+
+
+def orientations_measured(observations: Observations) -> np.ndarray:
+    """True (T,) for targets of which any orientation was measured."""
+    found = np.zeros(len(observations.target_names), dtype=bool)
+    found[np.unique(observations.target[observations.has_rotation])] = True
+    return found
+
+
+def with_stated_orientations(frames: Frames, stated: Frames, observations: Observations) -> Frames:
+    """``frames`` whose targets have the ``stated`` orientation where none was measured."""
+    measured = orientations_measured(observations)[:, None, None]
+    rotation = np.where(measured, frames.targets.rotation, stated.targets.rotation)
+    return Frames(frames.bases, Pose(rotation, frames.targets.position_mm))
 
 
 def left_jacobian(w_rad: np.ndarray) -> np.ndarray:

@@ -90,6 +90,7 @@ def predicted(
     ]
     point = point or calibration.default_point
     title = f"{calibration.name}: {point} in the {frame} frame by the {calibration.choice} model"
+    title += orientation_remark(calibration, point)
     return Sheet(title, facts(calibration, frame, point), fields)
 
 
@@ -101,7 +102,14 @@ def facts(calibration: Calibration, frame: str, point: str) -> dict[str, object]
         "model": calibration.choice,
         "frame": frame,
         "point": point,
+        "orientation": calibration.orientation_source(point),
     }
+
+
+def orientation_remark(calibration: Calibration, point: str) -> str:
+    """Where the orientation of a point comes from, if no reading has it, for a title."""
+    stated = calibration.orientation_source(point) == "stated"
+    return " (orientation as stated in the robot file)" if stated else ""
 
 
 def joint_fields(prismatic: np.ndarray, joints: np.ndarray) -> list[Field]:

@@ -9,7 +9,14 @@ import numpy as np
 from kinacc.cli import rows
 from kinacc.cli.rows import Rows
 from kinacc.cli.sheet import Field, Sheet
-from kinacc.cli.tables import UNLIKE, facts, joint_fields, joints_in_words, pose_fields
+from kinacc.cli.tables import (
+    UNLIKE,
+    facts,
+    joint_fields,
+    joints_in_words,
+    orientation_remark,
+    pose_fields,
+)
 from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.compensate import Compensation, programmed
 from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, PoseStatus
@@ -104,6 +111,7 @@ def compensated(
     ]
     model = calibration.choice
     title = f"{calibration.name}: joints for the {point} in the {frame} frame by the {model} model"
+    title += orientation_remark(calibration, point)
     return Sheet(title, facts(calibration, frame, point), fields)
 
 

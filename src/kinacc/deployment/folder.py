@@ -143,6 +143,7 @@ def calibration(
         residual=residual(tables, choice),
         fitted_range_rad=bounded.domain,
         fitted=_fitted(tables, robot),
+        orientation_measured=_with_orientation(tables),
     )
 
 
@@ -150,6 +151,14 @@ def targets_of(frames: Mapping, model: str) -> list[str]:
     """Names of the targets that a model was fitted with, from the table ``frames``."""
     of_model = np.asarray(frames["model"]) == model
     return [str(each) for each in np.asarray(frames["frame"])[of_model] if each != "base"]
+
+
+def _with_orientation(tables: Tables) -> frozenset[str]:
+    """Targets of which any orientation was measured."""
+    if "measurements" not in tables:
+        return frozenset()
+    turned = np.isfinite(np.asarray(tables["measurements"]["qw"], dtype=float))
+    return frozenset(map(str, np.asarray(tables["measurements"]["target"])[turned]))
 
 
 def _fitted(tables: Tables, robot: Robot) -> JointState | None:

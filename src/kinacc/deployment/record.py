@@ -20,6 +20,7 @@ MODELS = (*ERROR_MODELS, NOMINAL)
 FRAMES = ("base", "instrument")
 POSES = dict(zip(SUBSETS, ("training poses", "held-out poses"), strict=True))
 FLANGE, TOOL = "flange", "tool"
+MEASURED, STATED = "measured", "stated"  # where an orientation comes from
 _LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
 
 
@@ -57,6 +58,8 @@ class Calibration:
     turn or shift base and tool against each other by mm and no measured pose shows it, so the
     robot's own base, the tool programs mean, and what poses leave open are those of the DH model.
     ``left_open`` says in sentences what that is; None where nobody asked.
+    ``orientation_measured`` are the targets with a measured orientation; the others, and without
+    any the flange too, have the orientation that the robot file states.
     """
 
     name: str
@@ -72,6 +75,14 @@ class Calibration:
     anchor: Calibration | None = None
     fitted: JointState | None = None
     left_open: tuple[str, ...] | None = None
+    orientation_measured: frozenset[str] = frozenset()
+
+    def orientation_source(self, point: str | None = None) -> str:
+        """``measured`` or ``stated`` (by the robot file), of a target by name or the flange."""
+        name = point or self.default_point
+        if name == FLANGE:
+            return MEASURED if self.orientation_measured else STATED
+        return MEASURED if name in self.orientation_measured else STATED
 
     @property
     def default_point(self) -> str:

@@ -82,7 +82,8 @@ def test_json_and_csv_say_the_same_of_every_joint():
     assert content["joints"][0]["std_d_mm"] is None
     assert rows[0]["std_d_mm"] == ""
     told = [row["undetermined"] for row in rows]
-    assert told == ["", said[0], said[0], "", "", said[1]]
+    assert told[:5] == ["", said[0], said[0], "", ""]
+    assert told[5].startswith(said[1])
     for joint, row in zip(content["joints"], rows, strict=True):
         assert float(row["d_mm"]) == pytest.approx(joint["d_mm"], rel=1e-11)
         alpha = np.rad2deg(joint["alpha_rad"])

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinacc.config.names import csv_text, in_csv
-from kinacc.deployment.record import TOOL, Calibration
+from kinacc.deployment.record import STATED, TOOL, Calibration
 from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import as_yaml
@@ -46,9 +46,18 @@ def robot_yaml(calibration: Calibration) -> str:
     heading = (
         f"{robot.name} as calibrated by data set {calibration.name} ({calibration.choice} model).",
         f"{CONVENTION}; angles in rad, lengths in mm.",
+        *orientation_lines(calibration),
         *left_open_lines(calibration),
     )
     return as_yaml(calibrated, heading)
+
+
+def orientation_lines(calibration: Calibration) -> list[str]:
+    """Targets whose orientation no reading has, for a comment; nothing where there are none."""
+    names = [each for each in calibration.targets if calibration.orientation_source(each) == STATED]
+    if not names:
+        return []
+    return [f"Orientation as stated in the robot file, not measured: {', '.join(names)}."]
 
 
 def left_open_lines(calibration: Calibration) -> list[str]:
@@ -97,6 +106,9 @@ def robot_json(
         "targets_in_last_dh_frame": {
             name: _frame_record(pose) for name, pose in calibration.targets.items()
         },
+        "orientation_of_targets": {
+            name: calibration.orientation_source(name) for name in calibration.targets
+        },
         "residual": left
         and {
             "subset": left.subset,
@@ -130,7 +142,9 @@ def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> st
         cells = np.concatenate([fitted[joint], std[joint] * factor, given[joint]])
         kind = _kind(dh, joint)
         numbers = ("" if np.isnan(x) else f"{x:.12g}" for x in cells)
-        left_open = in_csv("; ".join(_of_joint(calibration, joint)))
+        told = _of_joint(calibration, joint)
+        told += orientation_lines(calibration) if joint + 1 == dh.joints else []
+        left_open = in_csv("; ".join(told))
         rows.append([joint + 1, kind, *numbers, left_open])
     return csv_text(rows)
 

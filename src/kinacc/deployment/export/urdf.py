@@ -12,7 +12,11 @@ import numpy as np
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.deployment.export.description import left_open_lines, robot_name
+from kinacc.deployment.export.description import (
+    left_open_lines,
+    orientation_lines,
+    robot_name,
+)
 from kinacc.deployment.record import TOOL, Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import (
@@ -52,7 +56,7 @@ def generated(calibration: Calibration, dh_joints: bool = False) -> str:
     about = f"calibrated from {robot.name} with data set {calibration.name}"
     about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
     root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
-    for line in left_open_lines(calibration):
+    for line in [*orientation_lines(calibration), *left_open_lines(calibration)]:
         root.append(etree.Comment(f" {line} "))
     etree.SubElement(root, "link", name="base_link")
     low, high = robot.q_min_rad, robot.q_max_rad
