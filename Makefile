@@ -12,7 +12,6 @@
 # make mutants     faults planted in the code one by one, what the tests notice, and the page about it
 # make planted     two hundred changes planted in runs, and whether the gate tells and explains them
 # make recipes     the recipes for build servers in full, with an environment of their own (needs the network)
-# make versions    the study with the oldest and newest supported packages, and the page about it (needs uv)
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
 # make lock        renew requirements/*.txt (needs uv)
@@ -22,7 +21,7 @@
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
 .PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults mutants \
-  planted recipes versions docs docs-links audit sbom lock clean distclean
+  planted recipes docs docs-links audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -100,9 +99,6 @@ planted: $(KINACC) $(TOOLS)
 
 recipes: $(KINACC) $(TOOLS)
 	KINACC_RECIPES_IN_FULL=1 $(PY) -m pytest tests/integration/test_recipes_in_full.py
-
-versions: $(KINACC)
-	$(PY) tools/versions.py .versions
 
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
 docs: $(KINACC) $(TOOLS)
@@ -190,4 +186,4 @@ clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv .venv-bench .venv-audit .versions .planted
+	rm -rf .venv .venv-bench .venv-audit .planted
