@@ -9,7 +9,6 @@
 # make kills       runs that are killed at every phase, and carried on (as root, also on a Slurm that it starts)
 # make corrupt     a thousand corruptions of a study's results, and what the check finds of them
 # make faults      every command on full and read-only disks and beside other faults (as root)
-# make mutants     faults planted in the code one by one, what the tests notice, and the page about it
 # make planted     two hundred changes planted in runs, and whether the gate tells and explains them
 # make recipes     the recipes for build servers in full, with an environment of their own (needs the network)
 # make audit       known vulnerabilities of every locked package, asked of their database
@@ -20,8 +19,8 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults mutants \
-  planted recipes docs docs-links audit sbom lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults planted \
+  recipes docs docs-links audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -87,11 +86,6 @@ corrupt: $(KINACC) $(TOOLS)
 faults: $(KINACC) $(TOOLS)
 	unshare -m $(PY) tests/faults/matrix.py
 	$(PY) tests/faults/interrupts.py
-
-mutants: $(KINACC) $(TOOLS)
-	$(PY) tools/mutate.py cover
-	$(PY) tools/mutate.py run 1000
-	$(PY) tools/mutate.py page
 
 PLANTED = .planted
 planted: $(KINACC) $(TOOLS)
