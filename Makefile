@@ -9,7 +9,6 @@
 # make kills       runs that are killed at every phase, and carried on (as root, also on a Slurm that it starts)
 # make corrupt     a thousand corruptions of a study's results, and what the check finds of them
 # make faults      every command on full and read-only disks and beside other faults (as root)
-# make planted     two hundred changes planted in runs, and whether the gate tells and explains them
 # make recipes     the recipes for build servers in full, with an environment of their own (needs the network)
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
@@ -19,8 +18,8 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults planted \
-  recipes docs docs-links audit sbom lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults recipes \
+  docs docs-links audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -86,10 +85,6 @@ corrupt: $(KINACC) $(TOOLS)
 faults: $(KINACC) $(TOOLS)
 	unshare -m $(PY) tests/faults/matrix.py
 	$(PY) tests/faults/interrupts.py
-
-PLANTED = .planted
-planted: $(KINACC) $(TOOLS)
-	$(PY) tools/planted --into $(PLANTED)
 
 recipes: $(KINACC) $(TOOLS)
 	KINACC_RECIPES_IN_FULL=1 $(PY) -m pytest tests/integration/test_recipes_in_full.py
@@ -180,4 +175,4 @@ clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv .venv-bench .venv-audit .planted
+	rm -rf .venv .venv-bench .venv-audit

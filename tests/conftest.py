@@ -85,7 +85,6 @@ SLOW = (
     "figures/test_figures.py",
     "kinematics/inverse/test_any_arm.py",
     "measurements/test_what_files_hold.py",
-    "planted",
     "report/test_in_a_browser.py",
     "report/test_tolerance_on_the_first_screen.py",
     "study/tournament/test_tournament.py",
