@@ -42,7 +42,6 @@ SLOW = (
     "assess/test_oracle_invalidation.py",
     "assess/test_size_limits.py",
     "artifacts/test_check.py",
-    "corruption",
     "benchmarks",
     "calibration/test_chosen_order.py",
     "calibration/test_convergence.py",
