@@ -6,8 +6,6 @@
 # make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make fuzz        what reads files, given files that nobody would write; FUZZ="--minutes 600" for longer
-# make kills       runs that are killed at every phase, and carried on (as root, also on a Slurm that it starts)
-# make faults      every command on full and read-only disks and beside other faults (as root)
 # make recipes     the recipes for build servers in full, with an environment of their own (needs the network)
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
@@ -17,8 +15,8 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test bench fuzz kills faults recipes docs \
-  docs-links audit sbom lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test bench fuzz recipes docs docs-links \
+  audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -74,13 +72,6 @@ bench: $(PEERS)
 FUZZ = --inputs 100000
 fuzz: $(KINACC) $(TOOLS)
 	$(PY) tests/fuzz/run.py $(FUZZ)
-
-kills: $(KINACC) $(TOOLS) $(CLUSTER)
-	$(PY) tests/kills/kill_runs.py --work study cached calibrate tournament slurm
-
-faults: $(KINACC) $(TOOLS)
-	unshare -m $(PY) tests/faults/matrix.py
-	$(PY) tests/faults/interrupts.py
 
 recipes: $(KINACC) $(TOOLS)
 	KINACC_RECIPES_IN_FULL=1 $(PY) -m pytest tests/integration/test_recipes_in_full.py
