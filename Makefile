@@ -6,13 +6,7 @@
 # make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make fuzz        what reads files, given files that nobody would write; FUZZ="--minutes 600" for longer
-# make kills       runs that are killed at every phase, and carried on (as root, also on a Slurm that it starts)
-# make corrupt     a thousand corruptions of a study's results, and what the check finds of them
-# make faults      every command on full and read-only disks and beside other faults (as root)
-# make mutants     faults planted in the code one by one, what the tests notice, and the page about it
-# make planted     two hundred changes planted in runs, and whether the gate tells and explains them
 # make recipes     the recipes for build servers in full, with an environment of their own (needs the network)
-# make versions    the study with the oldest and newest supported packages, and the page about it (needs uv)
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
 # make lock        renew requirements/*.txt (needs uv)
@@ -21,8 +15,8 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test bench fuzz kills corrupt faults mutants \
-  planted recipes versions docs docs-links audit sbom lock clean distclean
+.PHONY: reproduce robustness public-robots lint check test bench fuzz recipes docs docs-links \
+  audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
 # Each file to one worker, which makes what its tests share once; tests/conftest.py orders the files.
@@ -79,30 +73,8 @@ FUZZ = --inputs 100000
 fuzz: $(KINACC) $(TOOLS)
 	$(PY) tests/fuzz/run.py $(FUZZ)
 
-kills: $(KINACC) $(TOOLS) $(CLUSTER)
-	$(PY) tests/kills/kill_runs.py --work study cached calibrate tournament slurm
-
-corrupt: $(KINACC) $(TOOLS)
-	$(PY) tools/corrupt --cases 1000 --seed 1
-
-faults: $(KINACC) $(TOOLS)
-	unshare -m $(PY) tests/faults/matrix.py
-	$(PY) tests/faults/interrupts.py
-
-mutants: $(KINACC) $(TOOLS)
-	$(PY) tools/mutate.py cover
-	$(PY) tools/mutate.py run 1000
-	$(PY) tools/mutate.py page
-
-PLANTED = .planted
-planted: $(KINACC) $(TOOLS)
-	$(PY) tools/planted --into $(PLANTED)
-
 recipes: $(KINACC) $(TOOLS)
 	KINACC_RECIPES_IN_FULL=1 $(PY) -m pytest tests/integration/test_recipes_in_full.py
-
-versions: $(KINACC)
-	$(PY) tools/versions.py .versions
 
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
 docs: $(KINACC) $(TOOLS)
@@ -190,4 +162,4 @@ clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv .venv-bench .venv-audit .versions .planted
+	rm -rf .venv .venv-bench .venv-audit

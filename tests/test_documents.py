@@ -104,7 +104,6 @@ REFERENCE = (
     "command-line",
     "claims",
     "configuration",
-    "mutants",
     "reading-the-paper",
     "tournament",
 )

@@ -1,5 +1,7 @@
 """A user changes one thing and runs again: what depends on it is remade, and nothing else."""
 
+import shutil
+
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -195,3 +197,16 @@ def test_the_shares_are_in_the_claims_after_one_command(project):
     assert np.isfinite(pq.read_table(claims)["share"].to_numpy()).any()
     assert project.to_do() == {}
     assert "Nothing to be done" in project.snakemake("robustness", options=("--dry-run",))
+
+
+def test_other_settings_are_noticed_where_snakemake_knows_nothing_of_a_file(project):
+    """As where the machine that submitted was lost, and its jobs went on."""
+    shutil.rmtree(project.folder / ".snakemake")
+    before = project.digests()
+    project.snakemake("results/own/histories.parquet")
+    assert project.digests() == before
+    shutil.rmtree(project.folder / ".snakemake")
+    project.configure("histories: {noise_mm: 0.2}")
+    project.snakemake("results/own/histories.parquet")
+    differ = {name for name, digest in project.digests().items() if digest != before.get(name)}
+    assert differ == {"own/histories.parquet", "own/records/histories.json"}

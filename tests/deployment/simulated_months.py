@@ -3,21 +3,11 @@
 Errors of its table, gears that err once and twice a turn, an arm that lengthens as it warms up
 (each for another time; by WARMER_K months are of another temperature too, which readings do not
 tell), joints that come back by so much, a laser tracker that stands elsewhere where asked for.
-``python tests/planted/simulated_months.py 20`` counts alarms in 20 years of an arm to which nothing
-happens.
 """
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
-
-if __name__ == "__main__":
-    ROOT = Path(__file__).resolve().parents[2]
-    sys.path[:0] = [str(ROOT / "src"), str(ROOT / "tests")]
-
 from oracles.kinematics import UR10, dh_link, rot_x, rot_y, rot_z, trans
 
 from kinacc.artifacts.columns import Columns
@@ -110,19 +100,3 @@ def year_of(
         knocked = np.broadcast_to(knock_rad if number == months else 0.0, 6)
         lines.append(session(month(year, number, other_poses, moved, knocked), number, moved))
     return drift.history(lines, WEIGHT_MM_PER_RAD, seed=year)
-
-
-def main() -> None:
-    """Count years with an alarm, of an arm to which nothing happens."""
-    years = int(sys.argv[1])
-    for other_poses, moved in ((False, False), (True, False), (True, True)):
-        alarms = 0
-        for year in range(years):
-            verdicts = list(year_of(year, other_poses=other_poses, moved=moved)["verdict"])
-            alarms += drift.RECALIBRATE in verdicts
-        poses, tracker = ("other" if each else "the same" for each in (other_poses, moved))
-        print(f"{poses} poses, {tracker} tracker place: {alarms} of {years} years with an alarm")
-
-
-if __name__ == "__main__":
-    main()
