@@ -5,6 +5,10 @@ from __future__ import annotations
 from inspect import cleandoc
 from pathlib import Path
 
+from kinacc.artifacts.digests import columns_digest
+from kinacc.workflow.catalogue import STAGES
+from kinacc.workflow.verification import recomputation
+
 from kinacc.artifacts.columns import (
     BY_POSES,
     BY_ROW,
@@ -16,9 +20,6 @@ from kinacc.artifacts.columns import (
     Column,
 )
 from kinacc.artifacts.contract import ARTEFACTS, METADATA_KEYS
-from kinacc.artifacts.digests import columns_digest
-from kinacc.workflow.catalogue import STAGES
-from kinacc.workflow.verification import recomputation
 
 _HEAD = """\
 # Artefacts

@@ -28,6 +28,7 @@ rule accuracy_map:
             "map",
         ),
         files=content(),
+        seed=seed,
         code=code("accuracy_map.py"),
     message:
         "{wildcards.dataset}: mapping the largest error (Fig. 3)"
@@ -53,6 +54,7 @@ rule operating_points:
     params:
         settings=values("robot", "evaluation"),
         files=content(),
+        seed=seed,
         code=code("operating_points.py"),
     message:
         "{wildcards.dataset}: choosing the operating points of the study"
@@ -82,6 +84,7 @@ rule study_part:
             "study.alpha",
             "study.visiting_order",
         ),
+        seed=seed,
         code=code("study_part.py"),
     message:
         "{wildcards.dataset}: simulating the assessors under noise, part {wildcards.scatteritem}"
@@ -109,6 +112,7 @@ rule study:
         settings=values(
             "seed", "study.outlier_rule", "study.distance", "study.covariance", "study.search"
         ),
+        seed=seed,
         code=code("study.py"),
     message:
         "{wildcards.dataset}: summing up the study (Fig. 4)"
@@ -139,6 +143,7 @@ rule histories:
             "study.visiting_order",
             "histories",
         ),
+        seed=seed,
         code=code("histories.py"),
     message:
         "{wildcards.dataset}: following single model invalidations (Figs. 5 and 6)"
@@ -168,6 +173,7 @@ rule claims:
         "../envs/kinacc.yaml"
     params:
         settings=values("robot"),
+        seed=seed,
         code=code("claims.py"),
     message:
         "{wildcards.dataset}: holding the paper's claims to the results"
@@ -201,6 +207,7 @@ rule robustness_part:
             "robustness",
         ),
         files=content(),
+        seed=seed,
         code=code("robustness_part.py"),
     message:
         "{wildcards.dataset}: the study on further synthetic arms, part {wildcards.scatteritem}"
@@ -220,7 +227,8 @@ rule robustness_table:
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("seed"),
+        settings=values(),
+        seed=seed,
         code=code("robustness_table.py"),
     message:
         "{wildcards.dataset}: gathering the claims on further synthetic arms"

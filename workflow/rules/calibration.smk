@@ -24,6 +24,7 @@ rule measurements:
             "evaluation.reference_frame",
         ),
         files=content("measured"),
+        seed=seed,
         code=code("measurements.py"),
     message:
         "{wildcards.dataset}: reading or simulating the measured poses"
@@ -47,6 +48,7 @@ rule data_check:
     params:
         settings=values("robot", "measurements", "calibration", "data_check"),
         files=content("measured"),
+        seed=seed,
         code=code("data_check.py"),
     message:
         "{wildcards.dataset}: checking the measured file"
@@ -83,6 +85,7 @@ rule fit_vec:
             "calibration.vec",
         ),
         files=content(),
+        seed=seed,
         code=code("fit_vec.py"),
     message:
         "{wildcards.dataset}: fitting the VEC model to the training poses"
@@ -119,6 +122,7 @@ rule fit_compliance:
             "calibration.compliance",
         ),
         files=content(),
+        seed=seed,
         code=code("fit_compliance.py"),
     message:
         "{wildcards.dataset}: fitting the DH model with joints that bend"
@@ -155,6 +159,7 @@ rule fit_dh:
             "calibration.dh",
         ),
         files=content(),
+        seed=seed,
         code=code("fit_dh.py"),
     message:
         "{wildcards.dataset}: fitting the DH model"
@@ -186,6 +191,7 @@ rule residuals:
     params:
         settings=values("robot", "calibration"),
         files=content(),
+        seed=seed,
         code=code("residuals.py"),
     message:
         "{wildcards.dataset}: comparing models and measurements, at held-out poses too"
@@ -210,6 +216,7 @@ rule excluded_rows:
     params:
         settings=values("robot", "measurements"),
         files=content("measured"),
+        seed=seed,
         code=code("excluded_rows.py"),
     message:
         "{wildcards.dataset}: errors of the excluded rows"
@@ -243,6 +250,7 @@ rule summary:
     params:
         settings=values("robot", "tolerance"),
         files=content(),
+        seed=seed,
         code=code("summary.py"),
     message:
         "{wildcards.dataset}: summing up what the calibration is worth"
@@ -269,6 +277,7 @@ rule history:
         mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values("seed", "series", "calibration", "tolerance.mm"),
+        seed=seed,
         code=code("history.py"),
     message:
         "{wildcards.dataset}: holding the calibrations of the series to one another"

@@ -13,6 +13,10 @@ def values(*paths):
     return lambda wildcards: data.chosen(wildcards.dataset, *paths)
 
 
+def seed(wildcards):
+    return data.settings[wildcards.dataset]["seed"]
+
+
 def content(*kinds):
     """Digests of the files from outside that a job reads: their dates do not count."""
     return lambda wildcards: digests(outside(wildcards.dataset, *kinds))

@@ -33,6 +33,7 @@ rule figures:
             "measurements.source",
         ),
         files=content(),
+        seed=seed,
         code=code("figures.py", shown=True),
     message:
         "{wildcards.dataset}: drawing Figs. 1, 2, 4, 5 and 6"
@@ -54,7 +55,8 @@ rule map_figure:
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("seed"),
+        settings=values(),
+        seed=seed,
         code=code("map_figure.py", shown=True),
     message:
         "{wildcards.dataset}: drawing Fig. 3"
@@ -80,7 +82,8 @@ rule report:
     resources:
         mem_mb=lambda w, attempt: 1000 * attempt,
     params:
-        settings=values("seed"),
+        settings=values(),
+        seed=seed,
         code=code("report.py", shown=True),
     message:
         "{wildcards.dataset}: writing the page"

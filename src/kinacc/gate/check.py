@@ -15,7 +15,7 @@ from kinacc.gate.gates import judged
 from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
 
 _NEEDED = ("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors")
-_SHOWN = 20
+_SHOWN = 3
 
 
 def check_results(

@@ -34,6 +34,7 @@ class Stage:
     dataset: str
     inputs: dict[str, Any]
     settings: Mapping[str, Any]
+    seed: int
     outputs: Mapping[str, str]
     folder: Path
     read: Mapping[str, str]
@@ -41,9 +42,8 @@ class Stage:
 
     def marks(self) -> dict[str, str]:
         """What the artefacts of this job are marked with, see the artefact contract."""
-        seed = str(self.settings.get("seed", ""))
         own = config_hash(self.settings)
-        return {"kinacc_version": __version__, "config_hash": own, "seed": seed}
+        return {"kinacc_version": __version__, "config_hash": own, "seed": str(self.seed)}
 
     def write_tables(self, tables: Mapping[str, Mapping]) -> None:
         """Check every table against its schema, then write all of them and their digests."""
@@ -101,8 +101,18 @@ def _opened(snakemake: Any, dataset: str, progress: Progress) -> Stage:
     folder = next(each for each in sums_file.parents if each.name == sums.FOLDER).parent
     inputs, read = _read(dict(snakemake.input.items()), folder)
     outputs = dict(snakemake.output.items())
-    settings = snakemake.params.settings
-    return Stage(snakemake.rule, dataset, inputs, settings, outputs, folder, read, progress)
+    params = snakemake.params
+    return Stage(
+        snakemake.rule,
+        dataset,
+        inputs,
+        params.settings,
+        params.seed,
+        outputs,
+        folder,
+        read,
+        progress,
+    )
 
 
 def _read(

@@ -1,0 +1,189 @@
+"""Two results compared table by table, within the tolerances of their columns.
+
+Counts, codes, verdicts and words are compared exactly, numbers within the tolerance of their unit
+(:data:`kinacc.artifacts.columns.SAME_WITHIN`), rows by the key of their table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from kinacc.artifacts import store
+from kinacc.artifacts.columns import (
+    BY_POSES,
+    BY_ROW,
+    BY_STD,
+    SAME_AMONG,
+    SAME_WITHIN,
+    Artefact,
+    Column,
+    joint_count,
+)
+from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.errors import InputError, Problem
+
+_RELATIVE = 1e-6  # of variances, which have the units of both parameters
+_KEY_DIGITS = 9
+# Rows of a fit that rounding alone decides.
+_ROUNDING = ("last_step", "gap", "undetermined_direction")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One column that differs, or (``column`` empty) rows or a file that only one side has.
+
+    ``row`` is the first row by its key, ``before`` and ``now`` its values; ``largest`` is the
+    largest difference of numbers in ``unit``.
+    """
+
+    table: str
+    column: str
+    what: str
+    rows: int = 0
+    row: str = ""
+    before: object = None
+    now: object = None
+    largest: float | None = None
+    unit: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.table}, column {self.column}" if self.column else self.table
+        if not self.row:
+            return f"{place}: {self.what}"
+        text = (
+            f"{place}: {self.rows} rows differ, first {self.row}: {self.before!r} -> {self.now!r}"
+        )
+        return text if self.largest is None else f"{text}, at most {self.largest:.3g} {self.unit}"
+
+
+def compare_folders(
+    before: Path, now: Path, tolerances: Mapping[str, float] | None = None
+) -> Iterator[Difference]:
+    """Differences of all tables below two folders; see :func:`compare_tables`.
+
+    Tables that only ``now`` has do not count. Raises InputError where ``before`` has no table.
+    """
+    paths = sorted(before.rglob("*.parquet"))
+    if not paths:
+        raise InputError(Problem(str(before), "holds no table", "a folder of results"))
+    for path in paths:
+        other = now / path.relative_to(before)
+        if not other.is_file():
+            yield Difference(str(path.relative_to(before)), "", "missing")
+            continue
+        yield from compare_tables(path, other, tolerances)
+
+
+def compare_tables(
+    before: Path, now: Path, tolerances: Mapping[str, float] | None = None
+) -> Iterator[Difference]:
+    """Differences of two tables of one artefact.
+
+    ``tolerances`` by ``<table>.<column>`` or ``<table>`` replace those of the contract. Raises
+    InputError for a file that is no table.
+    """
+    name = before.stem if before.stem in ARTEFACTS else before.parent.name
+    artefact = ARTEFACTS.get(name)
+    tables = [store.columns_in(store.read_table(path, any_type=True)) for path in (before, now)]
+    old, new = (pd.DataFrame(table) for table in tables)
+    for column in [*old.columns.difference(new.columns), *new.columns.difference(old.columns)]:
+        which = "missing" if column in old else "new"
+        yield Difference(name, str(column), which)
+    joints = joint_count(artefact, old.columns) if artefact else 0
+    known = {each.name: each for each in artefact.for_joints(joints)} if artefact else {}
+    key = [each for each in (artefact.key if artefact else ()) if each in old and each in new]
+    old, new = (_keyed(table, key, artefact) for table in (old, new))
+    for which, one, other in (("missing", old, new), ("new", new, old)):
+        only = one.index.difference(other.index)
+        if len(only):
+            yield Difference(name, "", f"{len(only)} rows {which}, first {_row(key, only[0])}")
+    common = old.index.intersection(new.index)
+    old, new = old.loc[common], new.loc[common]
+    for column in old.columns.intersection(new.columns):
+        if column in key:
+            continue
+        allowed = _tolerance(name, str(column), known.get(column), old, tolerances or {})
+        found = _column(name, str(column), old[column], new[column], allowed, key)
+        if found is not None:
+            unit = known[column].unit if column in known else ""
+            yield found if found.largest is None else _with_unit(found, unit)
+
+
+def _with_unit(found: Difference, unit: str) -> Difference:
+    return Difference(**{**found.__dict__, "unit": "" if unit == "1" else unit})
+
+
+def _keyed(table: pd.DataFrame, key: list[str], artefact: Artefact | None) -> pd.DataFrame:
+    """Rows by their key and, where several share one, a running number."""
+    if "quantity" in table and artefact is not None and artefact.name.endswith("_fit"):
+        table = table[~table["quantity"].isin(_ROUNDING)]
+    columns = [
+        table[name].round(_KEY_DIGITS) if table[name].dtype.kind == "f" else table[name]
+        for name in key
+    ]
+    if not columns:
+        return table.reset_index(drop=True)
+    keys = pd.DataFrame(dict(zip(key, columns, strict=True)))
+    running = keys.astype(object).where(keys.notna(), "").groupby(key, dropna=False).cumcount()
+    index = pd.MultiIndex.from_frame(
+        keys.astype(object).where(keys.notna(), "").assign(running=running)
+    )
+    return table.set_index(index)
+
+
+def _row(key: list[str], values: object) -> str:
+    values = values if isinstance(values, tuple) else (values,)
+    told = [f"{name}={value}" for name, value in zip(key, values, strict=False) if value != ""]
+    return ", ".join(told) or str(values[0])
+
+
+def _tolerance(
+    table: str, name: str, column: Column | None, rows: pd.DataFrame, own: Mapping[str, float]
+) -> np.ndarray | float:
+    for place in (f"{table}.{name}", table):
+        if place in own:
+            return own[place]
+    if column is None or column.kind == "text":
+        return 0.0
+    within = column.same_within
+    if not isinstance(within, str):
+        return within
+    if within == BY_STD:
+        return _RELATIVE * float(np.nanmax(np.abs(rows[name].to_numpy(float)), initial=0.0))
+    if within in (BY_ROW, BY_POSES) and column.unit not in SAME_WITHIN:
+        if "error" in rows:
+            lengths = rows["error"].astype(str).str.startswith("delta")
+            return np.where(lengths, SAME_WITHIN["mm"], SAME_WITHIN["rad"])
+        units = rows["unit"] if "unit" in rows else pd.Series("", index=rows.index)
+        return units.map(lambda unit: SAME_AMONG.get(str(unit), _RELATIVE)).to_numpy(float)
+    return SAME_WITHIN.get(column.unit, _RELATIVE)
+
+
+def _column(
+    table: str,
+    name: str,
+    old: pd.Series,
+    new: pd.Series,
+    allowed: np.ndarray | float,
+    key: list[str],
+) -> Difference | None:
+    null = old.isna().to_numpy() != new.isna().to_numpy()
+    both = old.notna().to_numpy() & new.notna().to_numpy()
+    if old.dtype.kind in "fiu" and new.dtype.kind in "fiu":
+        apart = np.abs(new.to_numpy(float) - old.to_numpy(float))
+        differs = null | (both & ~(apart <= allowed))
+        largest = float(np.max(apart[differs & both], initial=0.0))
+    else:
+        differs = null | (both & (old.to_numpy() != new.to_numpy()))
+        largest = None
+    if not differs.any():
+        return None
+    first = int(np.argmax(differs))
+    row = _row(key, old.index[first])
+    count = int(differs.sum())
+    return Difference(table, name, "", count, row, old.iloc[first], new.iloc[first], largest)
