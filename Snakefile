@@ -22,6 +22,7 @@ from kinacc.errors import InputError
 from kinacc.workflow import running
 from kinacc.workflow.code import code_digest
 from kinacc.workflow.data_sets import RESULTS, campaign_files, digests, read_data_sets
+from kinacc.workflow.outdated import CALIBRATION
 from kinacc.workflow.start import ONE_THREAD
 
 os.environ.update(ONE_THREAD)

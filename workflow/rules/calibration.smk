@@ -248,7 +248,7 @@ rule summary:
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("robot", "tolerance"),
+        settings=values(*CALIBRATION),
         files=content(),
         seed=seed,
         code=code("summary.py"),

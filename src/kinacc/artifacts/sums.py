@@ -7,7 +7,8 @@ that begin with ``# read`` hold what the stage read, and are comments to ``sha25
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from kinacc.errors import InputError, Problem
@@ -44,15 +45,34 @@ def stated(folder: Path | str) -> dict[str, str]:
 
 
 def outdated(folder: Path | str) -> list[str]:
-    """Names of files made from other files than those the stages left since."""
-    folder, found, now = Path(folder), set[str](), stated(folder)
+    """Names of files that were made from files which have changed since, or are gone."""
+    return sorted({made for _, whole in _changed_reads(Path(folder)) for made in whole})
+
+
+def changed_since(folder: Path | str) -> list[str]:
+    """Names of files that changed since stages read them, as seen from the current folder."""
+    folder = Path(folder)
+    names = {name for name, _ in _changed_reads(folder)}
+    return sorted(os.path.relpath(folder / name) for name in names)
+
+
+def _changed_reads(folder: Path) -> Iterator[tuple[str, list[str]]]:
+    """Each file that changed since a stage read it, with what that stage left."""
+    now = stated(folder)
     for path in sorted((folder / FOLDER).glob("*.sha256")):
-        own = dict(_parsed(path))
-        read = {name: value for name, value in own.items() if value.startswith(_READ)}
-        if any(now.get(name, value[len(_READ) :]) != value[len(_READ) :]
-               for name, value in read.items()):  # fmt: skip
-            found |= own.keys() - read.keys()
-    return sorted(found)
+        lines = list(_parsed(path))
+        left = [name for name, value in lines if not value.startswith(_READ)]
+        for name, value in lines:
+            if value.startswith(_READ) and value != f"{_READ}{_digest_now(folder, name, now)}":
+                yield name, left
+
+
+def _digest_now(folder: Path, name: str, stated_now: Mapping[str, str]) -> str:
+    """Digest of a file as its stage left it or, of one from outside, as it is now."""
+    if name in stated_now or not name.startswith(".."):
+        return stated_now.get(name, "")
+    path = folder / name
+    return digest(path.read_bytes()) if path.is_file() else ""
 
 
 def hold(path: Path | str, content: bytes) -> None:

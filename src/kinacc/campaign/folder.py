@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from kinacc import __version__
 from kinacc.artifacts.atomic import write_whole
 from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
@@ -90,6 +91,26 @@ def writing(folder: Path | str) -> Iterator[Opened]:
     open_(folder)  # no lock file where there is no campaign
     with journal.writing(Path(folder)):
         yield open_(folder)
+
+
+def marks_of(opened: Opened) -> dict[str, object]:
+    """What the tables of a campaign are marked with: the plan counts as the configuration."""
+    own = {"kinacc_version": __version__, "config_hash": opened.digest}
+    return {**own, "seed": opened.plan.seed}
+
+
+def doubts(opened: Opened) -> list[str]:
+    """What to know of a campaign as it was read: another version, a last line that was cut off."""
+    lines = []
+    begun = opened.plan.about.get("kinacc_version", "an earlier version")
+    if begun != __version__:
+        lines.append(f"begun with kinacc {begun}, this is {__version__}: bounds may differ")
+    if opened.journal.cut_off:
+        lines.append(
+            "the last entry was cut off while it was written and never confirmed; it is left out: "
+            "look whether the last reading has to be recorded again"
+        )
+    return lines
 
 
 def held_to(opened: Opened, head: str | None, readings: int | None) -> list[Problem]:

@@ -15,7 +15,7 @@ from kinacc.artifacts import store
 from kinacc.assess.conformity import decide
 from kinacc.calibration import summary
 from kinacc.campaign import folder as folders
-from kinacc.campaign import marks, words
+from kinacc.campaign import words
 from kinacc.campaign.folder import open_
 from kinacc.campaign.plan import Limits
 from kinacc.campaign.state import readings_in
@@ -78,7 +78,6 @@ def start(given: Mapping, out: Output) -> None:
         "point": given["point"] or calibration.default_point,
         "candidates": found.source,
         "kinacc_version": __version__,
-        "assessor_code": marks.assessor_code(assessor),
     }
     begun = begin.plan_of(
         calibration, points, assessor, instruments, limits, given["seed"], joints_now, about,
@@ -212,7 +211,7 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
         state, tables = report.tables(opened, progress)
     if not state.told:
         raise InputError(Problem(str(opened.folder), "no reading was asked for and taken yet"))
-    made = marks.marks_of(opened)
+    made = folders.marks_of(opened)
     contents = {
         at: content_of(to_table(name, tables[name], made)) for name, at in tables_to.items()
     }
@@ -267,5 +266,5 @@ def verify(path: str, head: str | None, readings: int | None, out: Output) -> No
 
 def say_doubts(opened: folders.Opened) -> None:
     """Tell on the error stream what speaks against the folder as it was read."""
-    for line in marks.doubts(opened):
+    for line in folders.doubts(opened):
         click.echo(line, err=True)

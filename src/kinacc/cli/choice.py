@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -194,4 +194,16 @@ def calibration_of(
 
     tables = results.read_tables(folder)
     name = Path(folder).resolve().name
-    return results.calibration(tables, robot_of(folder, robot, config), model, name, session)
+    arm = robot_of(folder, robot, config)
+    found = results.calibration(tables, arm, model, name, session)
+    return replace(found, outdated=say_outdated(folder))
+
+
+def say_outdated(folder: str | Path) -> str:
+    """Print why results are outdated, if they are; returns the reason, empty where they are not."""
+    from kinacc.workflow.outdated import outdated_reason
+
+    reason = outdated_reason(folder)
+    if reason:
+        click.echo(f"{folder} is {reason}; run kinacc calibrate again", err=True)
+    return reason

@@ -74,7 +74,9 @@ def export(
         model,
     )
     paths = write(made, target, out.force)
-    out.say({"files": paths}, "\n".join(paths))
+    reason = choice.say_outdated(folder)
+    facts = {"files": paths, **({"outdated": reason} if reason else {})}
+    out.say(facts, "\n".join(paths))
     for said in (warning(folder), note(folder, model)):
         if said:
             click.echo(said, err=True)

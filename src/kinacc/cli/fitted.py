@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, NOMINAL, PLAINEST
+from kinacc.cli import choice
 from kinacc.cli.output import Output, answers, plain
 
 if TYPE_CHECKING:
@@ -41,8 +42,9 @@ def fitted(folder: str, whole: bool, out: Output) -> None:
     """
     from kinacc.workflow.answer import answer
 
+    reason = choice.say_outdated(folder)
     if out.as_json:
-        out.say(summary(folder), "")
+        out.say({**summary(folder), **({"outdated": reason} if reason else {})}, "")
         return
     tables = read(folder, whole)
     lines = answer(folder, tables, whole)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from kinacc.cli import choice
 from kinacc.cli.output import Output, answers
 
 _PAGE = "report.html"
@@ -47,6 +48,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     from kinacc import __version__
     from kinacc.artifacts import sums
     from kinacc.artifacts.atomic import write_whole
+    from kinacc.calibration import summary
     from kinacc.campaign.journal import of_results
     from kinacc.report.page import html
     from kinacc.workflow.answer import ON_PAGE, PAGE_TABLES, read
@@ -54,11 +56,17 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     from kinacc.workflow.stages import report
 
     place = Path(folder)
-    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem}
+    reason = choice.say_outdated(folder)
+    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem, *summary.TABLES}
     tables = read(place, PAGE_TABLES, ON_PAGE)
     shown = {name: table for name, table in tables.items() if name not in {*without, *old}}
     campaigns = {role: Path(path) for role, path in campaign_files(of_results(place)).items()}
-    settings = {"dataset": place.resolve().name, "folder": folder, "outdated": sorted(old)}
+    settings = {
+        "dataset": place.resolve().name,
+        "folder": folder,
+        "outdated": sorted(old),
+        "reason": reason,
+    }
     path = Path(out or place / _PAGE)
     page = report.run({**shown, **campaigns}, settings)
     write_whole(path, html(page, {"kinacc_version": __version__}).encode())

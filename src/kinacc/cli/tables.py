@@ -103,6 +103,7 @@ def facts(calibration: Calibration, frame: str, point: str) -> dict[str, object]
         "frame": frame,
         "point": point,
         "orientation": calibration.orientation_source(point),
+        **({"outdated": calibration.outdated} if calibration.outdated else {}),
     }
 
 

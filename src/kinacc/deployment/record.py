@@ -59,7 +59,8 @@ class Calibration:
     robot's own base, the tool programs mean, and what poses leave open are those of the DH model.
     ``left_open`` says in sentences what that is; None where nobody asked.
     ``orientation_measured`` are the targets with a measured orientation; the others, and without
-    any the flange too, have the orientation that the robot file states.
+    any the flange too, have the orientation that the robot file states. ``outdated`` is why the
+    calibration is not that of the files and settings there now; empty where it is.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Calibration:
     fitted: JointState | None = None
     left_open: tuple[str, ...] | None = None
     orientation_measured: frozenset[str] = frozenset()
+    outdated: str = ""
 
     def orientation_source(self, point: str | None = None) -> str:
         """``measured`` or ``stated`` (by the robot file), of a target by name or the flange."""

@@ -11,7 +11,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import model_name
 from kinacc.assess.conformity import ACCEPT, REJECT, decide
 from kinacc.assess.statement import Statement
-from kinacc.campaign import consistency, marks, nearness, words
+from kinacc.campaign import consistency, folder, nearness, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.reasons import ADVICE
 from kinacc.campaign.report import facts, grounds, head, read_above
@@ -140,7 +140,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
         (_statements(state, said),),
         _notes(opened, state, tables, said, lead),
     )
-    made = {name: str(value) for name, value in marks.marks_of(opened).items()}
+    made = {name: str(value) for name, value in folder.marks_of(opened).items()}
     return Page(first, (*_sections(state, tables), _grounds(opened, state)), made)
 
 
@@ -181,7 +181,7 @@ def _notes(
 ) -> tuple[tuple[str, tuple[Text, ...]], ...]:
     about, plan = state.plan.about, state.plan
     check = [
-        *marks.doubts(opened),
+        *folder.doubts(opened),
         *words.begun_against(plan),
         *read_above(state, tables["campaign_points"]),
     ]

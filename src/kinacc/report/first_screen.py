@@ -43,7 +43,8 @@ class Answers:
 
     ``claims`` on the paper by name, ``other`` errors of other populations, ``largest`` what there
     is to say of the largest error, ``campaign`` the sentences of a campaign, none without one;
-    ``outdated`` tables are not shown; ``tolerance`` says whether that of the configuration is kept,
+    ``outdated`` tables are not shown, ``reason`` is why all results are outdated, empty where they
+    are not; ``tolerance`` says whether that of the configuration is kept,
     where the campaign does not; ``history`` is what a series says of the one in force.
     """
 
@@ -53,6 +54,7 @@ class Answers:
     campaign: Sequence[str]
     following: Sequence[str]
     outdated: Sequence[str]
+    reason: str
     more: str
     tolerance: str = ""
     history: str = ""
@@ -189,6 +191,8 @@ def _notes(
     data = [_of_delivered(each) for each in told["data"][1:]]  # the first stands in the title
     notes.append(("DATA", data))
     notes.append(("CHECK", [*_sized_by(told["check"]), *map(_without_code, told["check"])]))
+    if answers.reason:
+        notes.insert(0, ("OUTDATED", [answers.reason, "run kinacc calibrate again"]))
     if answers.outdated:
         names = ", ".join(answers.outdated)
         words = f"{names}: made from other tables than those here, so not shown"

@@ -19,7 +19,12 @@ from kinacc.workflow.answer import Tables, Told, told
 
 
 def first_screen(
-    folder: Path, name: str, tables: Tables, bound: Sought, outdated: Sequence[str]
+    folder: Path,
+    name: str,
+    tables: Tables,
+    bound: Sought,
+    outdated: Sequence[str],
+    reason: str = "",
 ) -> tuple[FirstScreen, Told]:
     """The first screen of the results in ``folder``, and what else there is to tell of them.
 
@@ -34,6 +39,7 @@ def first_screen(
         campaign=answers(bound.assessed.state, stated) if bound.assessed else (),
         following=found.following,
         outdated=outdated,
+        reason=reason,
         more=shlex.join(["kinacc", "fitted", str(folder), "--all"]),
         tolerance=_kept(stated, found.facts, bound),
         history=first_words(tables["history"]) if "history" in tables else "",

@@ -27,7 +27,8 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
     place = Path(settings.get("folder", f"results/{name}"))
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     outdated = settings.get("outdated", ())
-    first, found = first_screen(place, name, tables, bound, outdated)
+    reason = settings.get("reason", "")
+    first, found = first_screen(place, name, tables, bound, outdated, reason)
     section = _campaign(bound.assessed) if bound.assessed else None
     return dataset.page(first, tables, arm, found.facts, section)
 
