@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 from command_line import call
+from kinacc.workflow.plan import planned
 
 from kinacc.config.series_text import with_line
 from kinacc.errors import InputError
 from kinacc.workflow import measured_files
 from kinacc.workflow.contradictions import load
-from kinacc.workflow.plan import planned
 
 ROOT = Path(__file__).parents[2]
 MEASURED = ROOT / "examples" / "data" / "ur10_tmac" / "series_B.csv"

@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 import yaml
 from command_line import call, small_study
+from kinacc.workflow.last_words import last_words
+from kinacc.workflow.plan import SNAKEFILE, planned
 
 from kinacc.artifacts import store
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import JOURNAL
 from kinacc.workflow import answer
-from kinacc.workflow.last_words import last_words
-from kinacc.workflow.plan import SNAKEFILE, planned
 
 COLUMNS = ("bound_mm", "confidence", "campaign", "campaign_date", "verdict")
 

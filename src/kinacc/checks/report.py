@@ -93,7 +93,7 @@ class Report:
             if each.kind in self.accepted:
                 lines.append(f"    accepted (data_check.accept): {self.accepted[each.kind]}")
             elif each.level == STOPS:
-                lines.append(f"    stops the workflow. {each.to_go_on}")
+                lines.append("    stops the workflow")
         return "\n".join(lines)
 
 

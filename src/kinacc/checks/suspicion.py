@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from kinacc.artifacts.allowed import LEFT_OUT
@@ -43,7 +43,6 @@ _WRONG = {
 }
 _NEVER_STOP = {"largest_rows", "thin_coverage", LEFT_OUT}
 _OF_ROWS = {"outliers", "repeated_reading", "duplicate_rows", "outside_limits", "target_swapped"}
-_LINES_SHOWN = 20
 STOPPING = tuple(kind for kind in KINDS if kind not in _NEVER_STOP)  # some of them by their size
 
 
@@ -69,15 +68,13 @@ class Suspicion:
         """The lines in words."""
         return self.row_names.spans(self.lines)
 
-    @property
-    def to_go_on(self) -> str:
-        """What to write into the configuration where the file stays as it is."""
-        accept = f"data_check: {{accept: {{{self.kind}: the reason}}}}"
-        if self.kind not in _OF_ROWS or not 0 < len(self.lines) <= _LINES_SHOWN:
-            return f"To go on all the same, give {accept}"
-        lines = ", ".join(map(str, self.lines))
-        rows = f"measurements: {{file: {{exclude: [{{lines: [{lines}], reason: ..}}]}}}}"
-        return f"To go on without these rows, give {rows}; with them, {accept}"
+    def commands(self, config: str = "FILE.yaml") -> list[str]:
+        """Commands to go on with: without the rows, where it is about rows, and all the same."""
+        start = f"kinacc check-data {config} --accept {self.kind}"
+        found = [f'{start} --reason ".."']
+        if self.kind in _OF_ROWS and self.lines:
+            found.insert(0, f'kinacc exclude {config} --lines {_ranges(self.lines)} --reason ".."')
+        return found
 
     def held_to(self, gross: Iterable[int]) -> Suspicion:
         """The suspicion with its level; rows at the lines ``gross`` are too far off for any fit."""
@@ -85,6 +82,17 @@ class Suspicion:
             return self
         stops = self.kind in _WRONG or not set(gross).isdisjoint(self.lines)
         return replace(self, level=STOPS if stops else WARNING)
+
+
+def _ranges(lines: Sequence[int]) -> str:
+    """Line numbers in order as text: 12,15-18."""
+    parts: list[list[int]] = []
+    for line in lines:
+        if parts and line == parts[-1][-1] + 1:
+            parts[-1][1:] = [line]
+        else:
+            parts.append([line])
+    return ",".join("-".join(map(str, part)) for part in parts)
 
 
 def suspicion(kind: str, what: str, lines: Iterable[int], fix: str = "", **values) -> Suspicion:

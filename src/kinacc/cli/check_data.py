@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from dataclasses import asdict
+from pathlib import Path
 
 import click
 
@@ -19,12 +20,16 @@ from kinacc.cli.choice import CONFIG
 )
 @click.option("--force", is_flag=True, help="Replace a picture that is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+@click.option("--accept", metavar="FINDING", help="Finding to go on with, kept in FILE.yaml.")
+@click.option("--reason", default="", help="Reason for --accept.")
 def check_data(
     files: tuple[str, ...],
     dataset: tuple[str, ...],
     picture: str | None,
     force: bool,
     as_json: bool,
+    accept: str | None,
+    reason: str,
 ) -> None:
     """Check measured files before anything is fitted: what is there, and what looks wrong.
 
@@ -41,6 +46,8 @@ def check_data(
     from kinacc.errors import InputError
 
     try:
+        if accept is not None:
+            _accept(files or (CONFIG,), dataset, accept, reason)
         sections = _sections(files or (CONFIG,), dataset)
         _check_picture(picture, force, list(sections))
     except InputError as error:
@@ -48,25 +55,52 @@ def check_data(
             raise
         click.echo(to_json([_unusable(", ".join(files or (CONFIG,)), "", error)]))
         sys.exit(UNUSABLE)
-    code = report_on(sections, as_json, picture)
+    stopped: list[str] = []
+    code = report_on(sections, as_json, picture, stopped, shlex.join((files or (CONFIG,))[:1]))
     if not as_json and code < UNUSABLE:
-        click.echo(f"next:\n  {shlex.join(['kinacc', 'calibrate', *(files or (CONFIG,))])}")
+        following = stopped or [shlex.join(["kinacc", "calibrate", *(files or (CONFIG,))])]
+        click.echo("\n  ".join(["next:", *following]))
     sys.exit(code)
 
 
-def report_on(sections: dict[str, dict], as_json: bool, picture: str | None = None) -> int:
-    """Check every data set (complete configurations by name), print, and say the exit code."""
+def _accept(files: tuple[str, ...], dataset: tuple[str, ...], kind: str, reason: str) -> None:
+    """Write to the configuration that the workflow goes on with a finding."""
+    from kinacc.artifacts.atomic import write_whole
+    from kinacc.cli.exclude import measured_data_set
+    from kinacc.config.edit import with_added
+    from kinacc.errors import Problem, refuse
+
+    problems = [] if reason.strip() else [Problem("--reason", "is empty", "why, in words")]
+    problems += [] if len(files) == 1 else [Problem("--accept", "needs one FILE.yaml")]
+    refuse(problems)
+    name, _ = measured_data_set(files[0], next(iter(dataset), None))
+    path = ("datasets", name, "data_check", "accept")
+    text = with_added(Path(files[0]).read_text("utf-8"), path, {kind: reason}, files[0])
+    write_whole(files[0], text.encode())
+
+
+def report_on(
+    sections: dict[str, dict],
+    as_json: bool,
+    picture: str | None = None,
+    stopped: list[str] | None = None,
+    config: str = "FILE.yaml",
+) -> int:
+    """Check data sets (complete configurations by name) and print; returns the exit code.
+
+    ``stopped`` takes the commands to go on with after findings that stop the workflow.
+    """
     from kinacc.checks.report import UNUSABLE, to_json
     from kinacc.errors import InputError
     from kinacc.progress import reporting
     from kinacc.workflow.stages.data_check import examined
 
     worst, told = 0, []
-    for name, config in sections.items():
-        file = config["measurements"]["file"]
+    for name, settings in sections.items():
+        file = settings["measurements"]["file"]
         try:
             with reporting(f"check-data {name}", bar=True) as progress:
-                report = examined(config, name, progress)
+                report = examined(settings, name, progress)
         except InputError as error:
             worst = UNUSABLE
             told.append(_unusable(name, file["path"], error))
@@ -77,6 +111,8 @@ def report_on(sections: dict[str, dict], as_json: bool, picture: str | None = No
         if picture is not None:
             _draw(report, picture)
         told.append(report.as_dict())
+        for each in report.stopping:
+            (stopped if stopped is not None else []).extend(each.commands(config))
         if not as_json:
             click.echo(report.as_text() + "\n")
     if as_json:

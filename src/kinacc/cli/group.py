@@ -238,6 +238,7 @@ SECTIONS = {
     "Measured data": {
         "init": "describe a file of measurements, and its robot",
         "check-data": "look for mistakes before anything is fitted",
+        "exclude": "rows that no fit shall use",
         "plan-poses": "choose poses for a calibration, in a short order",
         "calibrate": "fit the models, and say what they are worth",
         "add": "new readings of the same arm, to its series",

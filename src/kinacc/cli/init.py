@@ -95,7 +95,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     name = options["name"] or plain_name(guess.table.path)
     folder = Path(options["folder"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
-    _refuse(paths, name, out.force)
+    _refuse(paths[: 1 if _is_robot_file(options["robot"]) else 2], name, out.force)
     seen = poses_to_ask_about(guess) if ask else []
     _show(seen, out)
     if ask:
@@ -132,6 +132,11 @@ def _show(shown: list[dict], out: Output) -> None:
 
 
 _FOLDS_UNKNOWN = 60
+
+
+def _is_robot_file(robot: str | None) -> bool:
+    """Whether a robot file was given, which is used where it stands and not written."""
+    return robot is not None and Path(robot).suffix in (".yaml", ".yml") and Path(robot).is_file()
 
 
 def _robot_file(robot: str | None, joints: int, name: str, path: Path) -> tuple[str, str | None]:

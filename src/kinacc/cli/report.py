@@ -48,7 +48,6 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     from kinacc import __version__
     from kinacc.artifacts import sums
     from kinacc.artifacts.atomic import write_whole
-    from kinacc.calibration import summary
     from kinacc.campaign.journal import of_results
     from kinacc.report.page import html
     from kinacc.workflow.answer import ON_PAGE, PAGE_TABLES, read
@@ -57,7 +56,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
 
     place = Path(folder)
     reason = choice.say_outdated(folder)
-    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem, *summary.TABLES}
+    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem, *PAGE_TABLES}
     tables = read(place, PAGE_TABLES, ON_PAGE)
     shown = {name: table for name, table in tables.items() if name not in {*without, *old}}
     campaigns = {role: Path(path) for role, path in campaign_files(of_results(place)).items()}

@@ -44,8 +44,8 @@ class Answers:
     ``claims`` on the paper by name, ``other`` errors of other populations, ``largest`` what there
     is to say of the largest error, ``campaign`` the sentences of a campaign, none without one;
     ``outdated`` tables are not shown, ``reason`` is why all results are outdated, empty where they
-    are not; ``tolerance`` says whether that of the configuration is kept,
-    where the campaign does not; ``history`` is what a series says of the one in force.
+    are not; ``tolerance`` says whether that of the configuration is kept, where the campaign does
+    not; ``history`` is what a series says of the one in force.
     """
 
     claims: Mapping[str, Sequence[str]]

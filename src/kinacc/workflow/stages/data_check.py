@@ -49,7 +49,9 @@ def examined(settings: Mapping, dataset: str, progress: Progress) -> Report:
 
 def _problem(path: str, each: Suspicion) -> Problem:
     where = f"{path}, {each.where}" if each.lines else path
-    return Problem(where, f"{each.kind}: {each.what}", fix=f"{each.fix}. {each.to_go_on}")
+    return Problem(
+        where, f"{each.kind}: {each.what}", fix="; or ".join([each.fix, *each.commands()])
+    )
 
 
 def _columns(report: Report) -> Columns:

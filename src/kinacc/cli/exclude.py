@@ -1,0 +1,75 @@
+"""``kinacc exclude``: rows of a measured file that no fit uses, named in the configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command("exclude")
+@click.argument("file", metavar="FILE.yaml")
+@click.option("--lines", required=True, metavar="12,15-18", help="Lines of the measured file.")
+@click.option("--reason", required=True, help="Reason, kept in the configuration.")
+@click.option("--dataset", metavar="NAME", help="Data set; needed where FILE.yaml has several.")
+def exclude(file: str, lines: str, reason: str, dataset: str | None) -> None:
+    """Exclude rows of a measured file from all fits and figures.
+
+    \b
+    Example:
+      kinacc exclude tracker.yaml --lines 12,15-18 --reason "reflector moved"
+    """
+    from kinacc.artifacts.atomic import write_whole
+    from kinacc.config.edit import with_added
+    from kinacc.kinematics import robot
+    from kinacc.measurements.reader import excluded_lines, read
+
+    name, settings = measured_data_set(file, dataset)
+    section = settings["measurements"]["file"]
+    numbers = _numbers(lines, excluded_lines(section), reason)
+    item = {"lines": numbers, "reason": reason}
+    read({**section, "exclude": [*section["exclude"], item]}, robot.load(settings["robot"]))
+    path = ("datasets", name, "measurements", "file", "exclude")
+    text = with_added(Path(file).read_text("utf-8"), path, [item], file)
+    write_whole(file, text.encode())
+    count = f"{len(numbers)} line{'s' if len(numbers) > 1 else ''}"
+    click.echo(f"{file}: {count} of {section['path']} excluded\nnext:\n  kinacc check-data {file}")
+
+
+def measured_data_set(file: str, dataset: str | None) -> tuple[str, dict]:
+    """Name and settings of a measured data set; InputError where it is not clear which."""
+    from kinacc.errors import InputError, Problem
+    from kinacc.workflow.contradictions import load
+
+    full = load([file])
+    names = [
+        name
+        for name, own in full.items()
+        if own["measurements"]["source"] == "file" and "line_of" not in own and "series" not in own
+    ]
+    if dataset not in (names if dataset or len(names) != 1 else [None]):
+        what = "is not given" if dataset is None else f"{dataset!r} is not a data set of one file"
+        raise InputError(Problem("--dataset", what, ", ".join(names) or "a measured file"))
+    name = dataset or names[0]
+    return name, full[name]
+
+
+def _numbers(text: str, known: dict[int, str], reason: str) -> list[int]:
+    """Line numbers of a text such as 12,15-18. InputError for others, and for those excluded."""
+    from kinacc.errors import InputError, Problem, first_few, refuse
+
+    found: list[int] = []
+    try:
+        for part in text.split(","):
+            first, _, last = part.partition("-")
+            found += range(int(first), int(last or first) + 1)
+    except ValueError:
+        found = []
+    if not found or len(found) > 100_000:
+        raise InputError(Problem("--lines", repr(text), "numbers and ranges such as 12,15-18"))
+    numbers = sorted(set(found))
+    there = [each for each in numbers if each in known]
+    problems = [Problem("--lines", f"{first_few(there)} excluded already")] if there else []
+    problems += [] if reason.strip() else [Problem("--reason", "is empty", "why, in words")]
+    refuse(problems)
+    return numbers

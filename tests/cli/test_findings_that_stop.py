@@ -1,0 +1,91 @@
+"""A finding that stops the workflow: commands to exclude its rows or to go on all the same."""
+
+import re
+import shlex
+
+import pytest
+import yaml
+from click.testing import CliRunner
+from tracked_arm import table, tracked
+
+from kinacc.cli.group import main
+from kinacc.workflow.contradictions import load
+
+
+def call(*words, code=0):
+    done = CliRunner().invoke(main, [str(each) for each in words])
+    assert done.exit_code == code, done.output
+    return done.output
+
+
+@pytest.fixture
+def two_slips(tmp_path, monkeypatch):
+    """A file of which lines 6 and 7 are 25 mm off, as init describes it."""
+    monkeypatch.chdir(tmp_path)
+    arm = tracked(poses=60)
+    arm.point[4:6] += [0.0, 25.0, 0.0]
+    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
+    (tmp_path / "seen.csv").write_text(table(names, arm.q, arm.point))
+    call("init", "seen.csv", "--robot", "ur10", "--yes")
+    return tmp_path
+
+
+def next_commands(printed):
+    return [shlex.split(line) for line in printed.split("next:")[1].splitlines() if line.strip()]
+
+
+def test_the_command_after_outliers_excludes_their_rows_and_keeps_the_rest_of_the_file(two_slips):
+    before = (two_slips / "seen.yaml").read_text()
+    (words, accepting) = next_commands(call("check-data", "seen.yaml", code=1))
+    assert words[1:3] == ["exclude", "seen.yaml"]
+    assert accepting[1:] == ["check-data", "seen.yaml", "--accept", "outliers", "--reason", ".."]
+    call(*words[1:])
+    after = (two_slips / "seen.yaml").read_text()
+    section = load(["seen.yaml"])["seen"]["measurements"]["file"]
+    assert section["exclude"] == [{"lines": [6, 7], "reason": ".."}]
+    kept = [line for line in after.splitlines() if line in before.splitlines()]
+    assert kept == before.splitlines()
+    (following,) = next_commands(call("check-data", "seen.yaml"))
+    assert following == ["kinacc", "calibrate", "seen.yaml"]
+
+
+def test_the_command_that_goes_on_all_the_same_accepts_the_finding(two_slips):
+    *_, words = next_commands(call("check-data", "seen.yaml", code=1))
+    call(*[word.replace("..", "the arm jumps there") for word in words[1:]], code=1)
+    accepted = load(["seen.yaml"])["seen"]["data_check"]["accept"]
+    assert accepted == {"outliers": "the arm jumps there"}
+
+
+def test_further_rows_join_those_excluded_before(two_slips):
+    call("exclude", "seen.yaml", "--lines", "6", "--reason", "first")
+    call("exclude", "seen.yaml", "--lines", "10-12,7", "--reason", "second")
+    section = load(["seen.yaml"])["seen"]["measurements"]["file"]
+    assert [each["lines"] for each in section["exclude"]] == [[6], [7, 10, 11, 12]]
+
+
+@pytest.mark.parametrize("lines", ["6", "9999", "abc", "", "5-3"])
+def test_lines_that_are_excluded_already_or_none_leave_the_file_as_it_is(two_slips, lines):
+    call("exclude", "seen.yaml", "--lines", "6", "--reason", "first")
+    before = (two_slips / "seen.yaml").read_bytes()
+    assert "Traceback" not in call(
+        "exclude", "seen.yaml", "--lines", lines, "--reason", "x", code=2
+    )
+    assert (two_slips / "seen.yaml").read_bytes() == before
+
+
+def test_rows_are_excluded_in_a_file_written_in_flow_style_too(two_slips):
+    settings = yaml.safe_load((two_slips / "seen.yaml").read_text())
+    text = yaml.safe_dump(settings, default_flow_style=True, width=10_000)
+    (two_slips / "seen.yaml").write_text(f"# by hand\n{text}")
+    call("exclude", "seen.yaml", "--lines", "6-7", "--reason", "by hand: 5 mm")
+    assert (two_slips / "seen.yaml").read_text().startswith("# by hand\n")
+    section = load(["seen.yaml"])["seen"]["measurements"]["file"]
+    assert section["exclude"] == [{"lines": [6, 7], "reason": "by hand: 5 mm"}]
+
+
+def test_init_beside_a_robot_file_of_the_same_name_uses_it(two_slips):
+    robot = (two_slips / "seen.robot.yaml").read_bytes()
+    (two_slips / "seen.yaml").unlink()
+    call("init", "seen.csv", "--robot", "seen.robot.yaml", "--yes")
+    assert (two_slips / "seen.robot.yaml").read_bytes() == robot
+    assert re.search(r"robot: seen\.robot\.yaml", (two_slips / "seen.yaml").read_text())
