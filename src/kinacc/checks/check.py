@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -79,7 +79,7 @@ def check(
         raw = replace(raw, earlier=equal[first])
         if fitted.jumps and _turned_well(fitted):
             known = [each for each in known if each.kind != NO_TURN]
-        known += [_jump(fitted, jump) for jump in fitted.jumps]
+        known += _moved_frames(fitted)
         known += _commanded(fitted, reading, raw, first, robot)
         known += rows.found(fitted, raw)
         known += _largest(fitted)
@@ -252,6 +252,29 @@ def _of_other_lengths(one: Cells, fitted: Fitted, robot: Robot) -> list[Suspicio
             largest_mm=float(far[0][0]),
         )
     ]
+
+
+def _moved_frames(fitted: Fitted) -> Iterator[Suspicion]:
+    """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
+    seen = fitted.seen.cells
+    drifts = {
+        float(session): fitting.drift_mm(fitted, session) for session in np.unique(seen.session)
+    }
+    for session, drifted in drifts.items():
+        if drifted is None:
+            continue
+        far = ", ".join(f"{value:+.3g}" for value in drifted)
+        yield suspicion(
+            "drift",
+            f"the base frame drifts slowly, by {far} mm (x, y, z) in the order of the file",
+            seen.line[seen.session == session],
+            "let arm and instrument warm up and measure again; sessions do not help. To use the "
+            "file, hold out blocks of time (measurements.fold_by: time_block)",
+            drift_mm=[float(value) for value in drifted],
+        )
+    for jump in fitted.jumps:
+        if jump.target is not None or drifts[float(seen.session[jump.row])] is None:
+            yield _jump(fitted, jump)
 
 
 def _jump(fitted: Fitted, jump: Jump) -> Suspicion:

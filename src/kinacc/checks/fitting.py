@@ -292,6 +292,30 @@ def _measured(fitted: Fitted, jump: Jump) -> Jump:
     return replace(jump, shift_mm=shift)
 
 
+def drift_mm(fitted: Fitted, session: float) -> np.ndarray | None:
+    """How far the base of a session drifted (3,), mm; None where it jumped or stayed.
+
+    A jump leaves no trend on either side of it. A steady drift that is split leaves one in every
+    part: together as far as the frame drifted, which is more than the parts are apart.
+    """
+    seen, arm = fitted.seen, fitted.trial.arm
+    rows = np.flatnonzero(seen.cells.session == session)
+    parts = list(dict.fromkeys(seen.base[rows].tolist()))
+    if len(parts) < 2:
+        return None
+    within = np.zeros(3)
+    for part in parts:
+        own = rows[(seen.base[rows] == part) & ~fitted.bad[rows]]
+        if len(own) >= _FEWEST:
+            time = np.linspace(-0.5, 0.5, len(own))
+            within -= time @ fitted.left.position_mm[own] / np.sum(time**2)
+    middle = fitted.left.predicted.position_mm[rows].mean(axis=0)
+    first, last = ((arm.base.rotation[each], arm.base.position_mm[each]) for each in
+                   (parts[0], parts[-1]))  # fmt: skip
+    apart = last[0] @ (first[0].T @ (middle - first[1])) + last[1] - middle
+    return within if within @ apart > 0.5 * (apart @ apart) else None
+
+
 def _before(base: np.ndarray, row: int, session: np.ndarray) -> int:
     same = np.flatnonzero(session[:row] == session[row])
     return int(base[same[-1]])

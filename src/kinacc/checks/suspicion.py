@@ -26,6 +26,7 @@ KINDS = {
     "target_moved": "a target that moved",
     "target_swapped": "targets taken for one another",
     "base_jump": "a base frame that jumps",
+    "drift": "a base frame that drifts",
     "commanded_joints": "joints as commanded, not as read back",
     "outliers": "readings far from all the others",
     "largest_rows": "readings on which the largest error hangs",
@@ -39,7 +40,7 @@ STOPS, WARNING, NOTE = "stops", "warning", "note"
 _WRONG = {
     *("joint_units", "length_units", "angle_units", "left_handed", "transposed_rotation"),
     *("euler_convention", "orientations", "joint_sign", "joint_coupling", "joint_zero"),
-    *("joint_order", "target_moved", "base_jump", "does_not_fit", "few_poses"),
+    *("joint_order", "target_moved", "base_jump", "drift", "does_not_fit", "few_poses"),
 }
 _NEVER_STOP = {"largest_rows", "thin_coverage", LEFT_OUT}
 _OF_ROWS = {"outliers", "repeated_reading", "duplicate_rows", "outside_limits", "target_swapped"}

@@ -82,9 +82,8 @@ def question(given: Mapping) -> Simulation:
     for budget in sorted(set(budgets)):
         with gathered(problems):
             asked = campaign_options.workshop(given)
-            assessors.append(
-                campaign_options.assessor(name, budget, *method, asked=asked, tested=tested)
-            )
+            made = campaign_options.assessor(name, budget, *method, asked=asked, tested=tested)
+            assessors.append(campaign_options.with_references(made, points, given["references"]))
     for errors in named:
         with gathered(problems):
             chosen.append(field_of(errors, given["point"]))

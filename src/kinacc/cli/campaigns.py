@@ -58,6 +58,8 @@ def start(given: Mapping, out: Output) -> None:
         calibration, found.joints, found.label, found.directions, given["point"]
     )
     instruments = begin.placed(calibration, instruments, points)
+    count = len(points.labels) if hasattr(points, "labels") else len(found.joints)
+    assessor = campaign_options.with_references(assessor, count, given["references"])
     joints_now = np.zeros(calibration.robot.dh.joints)
     if given["from_deg"] is not None:
         joints_now = rows.of_arguments(

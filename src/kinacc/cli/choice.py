@@ -113,9 +113,10 @@ campaign_options = together(
     option("--wrong-readings", help="Largest share of readings that go wrong, e.g. 1%.  [none]"),
     option(
         "--references",
-        default=0,
+        default=None,
         type=click.IntRange(0, 10_000),
-        help="Readings that return to reference poses by plan, to see drifts and steps; 20 do.",
+        help="Readings at reference poses, to find drifts and steps.  [20 where the budget is at "
+        "least 1.4 times the candidates, else 0]",
     ),
     option("--correct-drift", is_flag=True, help="Take a linear drift from all readings."),
     option(
