@@ -12,7 +12,7 @@ import numpy as np
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
-from kinacc.calibration import summary
+from kinacc.calibration import noise, summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
 from kinacc.campaign import journal, of_calibration, slips
@@ -25,6 +25,7 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
+from kinacc.kinematics.robot import Robot
 from kinacc.study.summary import claims_counted, claims_that_differ, differences
 from kinacc.workflow.catalogue import FIGURE_FOLDER, HISTORY, STAGES
 
@@ -97,13 +98,13 @@ def told(
     ``campaign`` and ``exported`` are names for folders that the commands would make.
     """
     facts, arm = facts_of(tables), _arm(tables)
-    noise = _noise(facts, tables)
+    asked = _noise(facts, tables, arm.robot)
     commands = [] if bound.assessed is None else [bound.assessed.next_command]
     return Told(
         facts,
         _claims(folder, facts, tables),
         _other_errors(facts, tables, whole),
-        _bound(bound, folder, arm, noise, campaign),
+        _bound(bound, folder, arm, asked, campaign),
         [*commands, *_uses(folder, arm, tables, exported)],
     )
 
@@ -163,13 +164,12 @@ def _arm(tables: Tables) -> Calibration:
     return results.calibration(tables, known)
 
 
-def _noise(facts: Sequence[Fact], tables: Tables) -> str:
+def _noise(facts: Sequence[Fact], tables: Tables, arm: Robot) -> str:
     """What a campaign has to be told of the noise, and what the readings tell of it."""
     asked = "NOISE: standard deviation of one reading, mm"
     if _is_synthetic(facts):
         return asked
-    known = (tables[name] for name in ("measurements", "pose_errors", "frames"))
-    least = slips.scatter_in_brief(*known)
+    least = slips.noise_in_brief(noise.of_measurements(tables["measurements"], arm))
     return f"{asked}, at least this: {least}" if least else "NOISE: std of ten visits to a pose, mm"
 
 
