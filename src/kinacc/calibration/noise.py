@@ -48,6 +48,9 @@ def per_axis_mm(std_mm: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(std_mm))))
 
 
+UNKNOWN = Noise(np.full(3, np.nan), 0, 0, 0)
+
+
 def of_measurements(columns: Mapping[str, np.ndarray], robot: Robot) -> Noise:
     """Noise of the table ``measurements``, see :func:`of_readings`."""
     return of_readings(from_columns(columns, robot), robot.dh)
@@ -83,7 +86,7 @@ def of_readings(observations: Observations, nominal: DHModel) -> Noise:
     group = np.unique(label, axis=0, return_inverse=True)[1].ravel()
     rows = np.flatnonzero(np.bincount(group)[group] > 1)
     if not rows.size:
-        return Noise(np.full(3, np.nan), 0, 0, 0)
+        return UNKNOWN
     distance = np.linalg.norm(error_mm[rows] - _medians(error_mm[rows], group[rows]), axis=1)
     rows = rows[distance <= _GROSS * max(float(np.median(distance)), 1e-12)]
     rows = rows[np.bincount(group)[group[rows]] > 1]

@@ -10,6 +10,7 @@ import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
+from kinacc.calibration.misfit import Misfit
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
@@ -56,7 +57,8 @@ class Calibration:
     model of the same data where this is another one fitted with its base: errors of a VEC model can
     turn or shift base and tool against each other by mm and no measured pose shows it, so the
     robot's own base, the tool programs mean, and what poses leave open are those of the DH model.
-    ``left_open`` says in sentences what that is; None where nobody asked.
+    ``left_open`` says in sentences what that is; None where nobody asked. ``misfit``: what the
+    standard deviations of ``known`` are worth; None where nothing was fitted, or nobody asked.
     """
 
     name: str
@@ -72,6 +74,7 @@ class Calibration:
     anchor: Calibration | None = None
     fitted: JointState | None = None
     left_open: tuple[str, ...] | None = None
+    misfit: Misfit | None = None
 
     @property
     def default_point(self) -> str:

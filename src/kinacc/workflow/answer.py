@@ -12,7 +12,7 @@ import numpy as np
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
-from kinacc.calibration import noise, summary
+from kinacc.calibration import misfit, noise, summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
 from kinacc.campaign import journal, of_calibration, slips
@@ -60,7 +60,7 @@ def read(folder: Path | str, needed: Collection[str] = summary.TABLES) -> dict[s
 
 def facts_of(tables: Tables) -> list[Fact]:
     """The facts of ``summary`` from the tables of a results folder."""
-    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    arm = _robot(tables)
     known = tables.get("summary", {"topic": [], "value": []})
     share = np.asarray(known["value"])[np.asarray(known["topic"]) == "like_measured"]
     found = summary.facts(tables, arm, float(share[0]) if len(share) else np.nan)
@@ -122,11 +122,13 @@ def answer(
     more = shlex.join(["kinacc", "fitted", str(folder), "--all"])
     own = 0 if bound.assessed is None else 1  # a campaign's next command goes first
     commands = [*found.following[:own], *following, *found.following[own:]]
+    fits = misfit.misfits(tables, _robot(tables))
     claims = [line for each in found.claims.items() for line in paragraph(*each)]
     return [
         *([f"{name}: the paper reproduced", *claims, ""] if claims else []),
         f"{name}: what its calibration is worth",
         *half_page(found.facts, more, whole),
+        *paragraph("deviations", [f"standard deviations are {misfit.in_words(fits)}"]),
         *paragraph("other errors", found.other),
         *paragraph("largest error", found.largest),
         *paragraph("history", [sentence(tables["history"])] if "history" in tables else []),
@@ -160,8 +162,11 @@ def _is_synthetic(facts: Sequence[Fact]) -> bool:
 
 def _arm(tables: Tables) -> Calibration:
     """The calibration that the commands of campaigns and poses would use."""
-    known = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    return results.calibration(tables, known)
+    return results.calibration(tables, _robot(tables))
+
+
+def _robot(tables: Tables) -> Robot:
+    return robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
 
 
 def _noise(facts: Sequence[Fact], tables: Tables, arm: Robot) -> str:
