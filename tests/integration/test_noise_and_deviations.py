@@ -155,7 +155,7 @@ def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric
     for text in marked:
         text = " ".join(text.split())
         assert "valid given the model" in text
-        assert re.search(rf"\(\S+ mm per axis\): DH {re.escape(f'{ratio:.3g}')}\b", text)
+        assert re.search(rf"\(\S+ mm\): DH {re.escape(f'{ratio:.3g}')}\b", text)
     for each in (
         told("show", results, "dh_model")["standard_deviations"],
         json.loads(next(tmp_path.glob("*.json")).read_text())["standard_deviations"],

@@ -70,10 +70,11 @@ def over_noise(found: Sequence[Misfit]) -> str:
     """Held-out errors of models over the noise of their readings, in words."""
     noise = found[0].noise
     if not noise.per_axis_mm > 0.0:
-        listed = ", ".join(f"{_named(each)} {_known(each.held_out_mm)}" for each in found)
-        return f"noise unknown (no configuration was read twice), held-out error in mm: {listed}"
-    listed = ", ".join(f"{_named(each)} {_known(each.ratio)}" for each in found)
-    return f"held-out error over noise ({noise.per_axis_mm:.3g} mm per axis): {listed}"
+        return "noise unknown (no configuration was read twice)"
+    ratios = (f"{each.ratio:.3g}" if math.isfinite(each.ratio) else "unknown" for each in found)
+    pairs = zip((model_name(each.model) for each in found), ratios, strict=True)
+    listed = ", ".join(map(" ".join, pairs))
+    return f"held-out error over noise ({noise.per_axis_mm:.3g} mm): {listed}"
 
 
 def _held_out_mm(tables: Mapping[str, Columns], model: str) -> float:
@@ -84,11 +85,3 @@ def _held_out_mm(tables: Mapping[str, Columns], model: str) -> float:
 
 def _noise_of(tables: Mapping[str, Columns], robot: Robot) -> Noise:
     return of_measurements(tables["measurements"], robot) if "measurements" in tables else UNKNOWN
-
-
-def _named(found: Misfit) -> str:
-    return model_name(found.model)
-
-
-def _known(number: float) -> str:
-    return f"{number:.3g}" if math.isfinite(number) else "unknown"

@@ -128,7 +128,7 @@ def answer(
         *([f"{name}: the paper reproduced", *claims, ""] if claims else []),
         f"{name}: what its calibration is worth",
         *half_page(found.facts, more, whole),
-        *paragraph("deviations", [f"standard deviations are {misfit.in_words(fits)}"]),
+        *paragraph("std deviations", [misfit.in_words(fits)]),
         *paragraph("other errors", found.other),
         *paragraph("largest error", found.largest),
         *paragraph("history", [sentence(tables["history"])] if "history" in tables else []),
