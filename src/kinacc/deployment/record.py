@@ -10,6 +10,7 @@ import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
+from kinacc.calibration.misfit import Misfit
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
@@ -59,7 +60,8 @@ class Calibration:
     robot's own base, the tool programs mean, and what poses leave open are those of the DH model.
     ``left_open`` says in sentences what that is; None where nobody asked.
     ``orientation_measured`` are the targets with a measured orientation; the others, and without
-    any the flange too, have the orientation that the robot file states.
+    any the flange too, have the orientation that the robot file states. ``misfit``: what the
+    standard deviations of ``known`` are worth; None where nothing was fitted, or nobody asked.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Calibration:
     fitted: JointState | None = None
     left_open: tuple[str, ...] | None = None
     orientation_measured: frozenset[str] = frozenset()
+    misfit: Misfit | None = None
 
     def orientation_source(self, point: str | None = None) -> str:
         """``measured`` or ``stated`` (by the robot file), of a target by name or the flange."""
