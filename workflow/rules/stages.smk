@@ -11,20 +11,19 @@ environment = "../envs/kinacc.yaml"
 if not {"{", "}"}.isdisjoint(here := str(workflow.current_basedir)):
     environment = re.sub(r"([{}])", r"\1\1", os.path.join(here, environment))
 
-gone_through = {name for dataset in [*plan.datasets, TOURNAMENT] for name in plan.stages(dataset)}
+gone_through = {name for dataset in plan.datasets for name in plan.stages(dataset)}
 
 for stage in STAGES.values():
     if stage.name not in gone_through:
         continue
     part = "{part}" if stage.scattered else None
-    folder = TOURNAMENT if stage.joint else whose
 
     rule:
         name:
             stage.name
         input:
             unpack(
-                lambda w, name=stage.name, folder=folder: files_read(
+                lambda w, name=stage.name, folder=whose: files_read(
                     name, w.get("dataset", folder), w.get("part")
                 )
             ),
@@ -36,23 +35,23 @@ for stage in STAGES.values():
                     else report(
                         path,
                         caption="../report/made.rst",
-                        category=folder,
+                        category=whose,
                         subcategory=stage.leaves,
                         labels={"file": os.path.basename(path), "step": stage.message},
                     )
                 )
-                for role, path in plan.outputs(stage.name, folder, part).items()
+                for role, path in plan.outputs(stage.name, whose, part).items()
             },
-            record=plan.record(stage.name, folder, part),
+            record=plan.record(stage.name, whose, part),
         log:
-            plan.log(stage.name, folder, part),
+            plan.log(stage.name, whose, part),
         cache: stage.shared and workflow.enable_cache
         # What most waits for goes first, figures last: fewer cores are idle at the end.
         priority: stages_below(stage.name)
         # On a cluster stages of a data set share a job, and inside it start without further ado.
         group:
             (
-                lambda w, name=stage.name, folder=folder: cluster.group(
+                lambda w, name=stage.name, folder=whose: cluster.group(
                     plan, name, w.get("dataset", folder)
                 )
             )
@@ -69,7 +68,7 @@ for stage in STAGES.values():
             ),
             runtime=(
                 (
-                    lambda w, attempt, name=stage.name, folder=folder: cluster.runtime_min(
+                    lambda w, attempt, name=stage.name, folder=whose: cluster.runtime_min(
                         plan, name, w.get("dataset", folder), attempt
                     )
                 )
@@ -78,15 +77,15 @@ for stage in STAGES.values():
             ),
         # The content of files is a parameter, so that one copied here with an old date is noticed.
         params:
-            job=lambda w, name=stage.name, folder=folder: plan.job_text(
+            job=lambda w, name=stage.name, folder=whose: plan.job_text(
                 name, w.get("dataset", folder), w.get("part"), with_robustness()
             ),
-            contents=lambda w, name=stage.name, folder=folder: plan.contents(
+            contents=lambda w, name=stage.name, folder=whose: plan.contents(
                 name, w.get("dataset", folder)
             ),
-            label=label(stage.name, folder, part),
+            label=label(stage.name, whose, part),
         message:
-            plan.message(stage.name, folder)
+            plan.message(stage.name, whose)
         shell:
             COMMAND
 
@@ -99,27 +98,3 @@ rule robustness:
         [plan.targets(dataset, also=["robustness_table"]) for dataset in plan.datasets],
     message:
         "every table and figure is up to date, and robustness.parquet with the claims on further draws"
-
-
-rule readings_of_maps:
-    """the sentences on Fig. 3 under every reading of it, each over arms drawn anew"""
-    input:
-        [plan.targets(dataset, only=(), also=MAP_READINGS) for dataset in plan.datasets],
-    message:
-        "the sentences on Fig. 3 under every reading of it are in map_readings.parquet"
-
-
-rule choices:
-    """the claims over every choice that the paper leaves open: each alone, and all at once"""
-    input:
-        [plan.targets(dataset, only=(), also=CHOICES) for dataset in plan.datasets],
-    message:
-        "choices.parquet has the claims over every open choice, claim_reasons.parquet what decides them"
-
-
-rule tournament:
-    """the verdicts on every assessor, over the arms of the paper and of the tournament"""
-    input:
-        list(plan.outputs("tournament_tables", TOURNAMENT).values()),
-    message:
-        "the verdicts on every assessor are in tournament_verdicts.parquet"

@@ -17,13 +17,11 @@ from kinacc.artifacts import (
     assessment_tables,
     calibration_tables,
     campaign_tables,
-    choices_tables,
     data_check_tables,
     history_tables,
     model_comparison_tables,
     robot_table,
     summary_table,
-    tournament_tables,
 )
 from kinacc.artifacts.columns import Artefact, Columns, joint_count, texts
 
@@ -55,10 +53,6 @@ ARTEFACTS: dict[str, Artefact] = {
         assessment_tables.CLAIMS,
         assessment_tables.ROBUSTNESS_CHUNK,
         assessment_tables.ROBUSTNESS,
-        assessment_tables.MAP_READINGS_CHUNK,
-        assessment_tables.MAP_READINGS,
-        *choices_tables.ALL,
-        *tournament_tables.ALL,
         *campaign_tables.ALL,
     )
 }

@@ -42,9 +42,7 @@ def _stage_command(name: str) -> click.Command:
 
 @click.group(
     cls=Lazy,
-    sections={  # the tournament has a command of its own
-        "Commands": {n: stage.message for n, stage in STAGES.items() if not stage.joint}
-    },
+    sections={"Commands": {name: stage.message for name, stage in STAGES.items()}},
     make=_stage_command,
 )
 def run() -> None:

@@ -217,7 +217,7 @@ def _maker(name: str) -> str | None:
 def _command(name: str) -> str:
     """The command that makes a table of the workflow."""
     stage = STAGES.get(_stage(name) or "")
-    if stage is None or stage.joint:
+    if stage is None:
         return ""
     if stage.on_request:
         return f"kinacc run {stage.name}"

@@ -16,7 +16,6 @@ from kinacc.artifacts.error_models import ALWAYS, FITTED
 
 FIGURE_FOLDER = "figures"
 TABLES, FIGURE, PAGE = "tables", "figure", "page"  # what a stage leaves
-TOURNAMENT = "tournament"  # folder of the joint stages, a name no data set can have
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,6 @@ class Stage:
     be there, where the data set has them, and are not read. ``scattered`` stages run once per
     part of the work; an input that is scattered arrives as one table. ``on_request`` stages are not
     part of a plain run; ``measured`` ones are of data sets whose measurements stand in a file;
-    ``joint`` ones are about all data sets at once and have a folder of their own: they read the
-    ``inputs`` of every data set (``measured_inputs`` where it is measured) and of joint stages;
     those ``of_lines`` read the ``inputs`` of the data set of every line of the series;
     ``fits`` is the kind of error model a stage fits;
     ``shared`` ones take long enough to be kept for other folders (Snakemake's cache);
@@ -56,9 +53,7 @@ class Stage:
     scattered: bool = False
     on_request: bool = False
     measured: bool = False
-    joint: bool = False
     of_lines: bool = False
-    measured_inputs: tuple[str, ...] = ()
     shared: bool = False
     fits: str = ""
     leaves: str = TABLES
@@ -85,8 +80,7 @@ class Stage:
     ) -> tuple[str, ...]:
         """``uses`` with the values of settings put in; those of settings not given are left out.
 
-        A list of names that is empty stands for all names of a registry. ``inputs``: artefacts it
-        reads, where optional ones are among them.
+        ``inputs``: artefacts it reads, where optional ones are among them.
         """
         found: dict[str, None] = {}
         read = self.inputs if inputs is None else (role.rpartition("/")[2] for role in inputs)
@@ -96,9 +90,6 @@ class Stage:
         for use in self.uses:
             (key,) = re.findall(r"{(\w+)}", use) or ("",)
             values: Any = settings.get(key, ()) if key else ("",)
-            if key in settings and not values:
-                values, use = ("",), use.removesuffix(f"[{{{key}}}]")
-            values = values.values() if isinstance(values, Mapping) else values
             values = [values] if isinstance(values, str) else values
             found |= dict.fromkeys(use.replace(f"{{{key}}}", value) for value in values)
         return tuple(found)
@@ -111,7 +102,6 @@ def _figure(
     settings: tuple[str, ...] = (),
     files: tuple[str, ...] = (),
     uses: tuple[str, ...] = (),
-    on_request: bool = False,
 ) -> Stage:
     """The stage that draws ``figures/<name>`` by the ``run`` of ``kinacc.figures.<name>``."""
     return Stage(
@@ -122,7 +112,6 @@ def _figure(
         settings,
         files=files,
         uses=uses,
-        on_request=on_request,
         leaves=FIGURE,
     )
 
@@ -131,38 +120,12 @@ _ROBOT = "kinematics/robots/{robot}.yaml"
 _DRAWS = "synthetic/accepted_draws.csv"
 _READINGS = ("study.outlier_rule", "study.distance", "study.covariance", "study.search")
 _ATTITUDE = ("evaluation.reference_orientation_deg", "evaluation.reference_frame")
-_CONTEST = ("seed", "size", "assessors", "noise_mm", "robots", "study.alpha", *_READINGS)
-_FIELDS = ("kinematics/robots/{robots}.yaml", "kinematics/robots/mh180.yaml", _DRAWS)
-_FITTED_AND_MAPPED = ("seed", "robot", "measurements", "calibration", "evaluation", "map")
-_WHOLE_STUDY = (*_FITTED_AND_MAPPED, "study", "histories", "robustness")
 _MODELS = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 _FITS_OF_ALL = tuple(f"{kind}_{what}" for kind in FITTED for what in ("fit", "covariance"))
 _FURTHER = tuple(f"{kind}_model" for kind in FITTED if kind not in ALWAYS)
 _MODEL = "kinacc.artifacts.error_models:MODELS[{models}]"
 _ESTIMATOR = "kinacc.artifacts.error_models:ESTIMATORS"
 _FITS = (_ROBOT, _MODEL, f"{_ESTIMATOR}[{{fits}}]")
-
-
-def _over_arms(
-    name: str,
-    message: str,
-    settings: tuple[str, ...],
-    outputs: tuple[str, ...] = (),
-    draws: tuple[str, ...] = (_DRAWS,),
-) -> Stage:
-    """A stage on request that goes through fits and more with many synthetic arms, in parts."""
-    return Stage(
-        name,
-        message,
-        (),
-        outputs or (name,),
-        settings,
-        files=("robot",),
-        uses=(_ROBOT, *draws, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
-        scattered=True,
-        on_request=True,
-        shared=True,
-    )
 
 
 STAGES: dict[str, Stage] = {
@@ -433,10 +396,20 @@ STAGES: dict[str, Stage] = {
             ),
             leaves=PAGE,
         ),
-        _over_arms(
+        Stage(
             "robustness_chunk",
             "going through fits, study and claims with further draws of the arm",
-            _WHOLE_STUDY,
+            (),
+            ("robustness_chunk",),
+            (
+                *("seed", "robot", "measurements", "calibration", "evaluation", "map"),
+                *("study", "histories", "robustness"),
+            ),
+            files=("robot",),
+            uses=(_ROBOT, _DRAWS, *(f"{_ESTIMATOR}[{kind}]" for kind in ALWAYS)),
+            scattered=True,
+            on_request=True,
+            shared=True,
         ),
         Stage(
             "robustness_table",
@@ -444,77 +417,6 @@ STAGES: dict[str, Stage] = {
             ("robustness_chunk",),
             ("robustness",),
             on_request=True,
-        ),
-        _over_arms(
-            "map_readings_chunk",
-            "judging the sentences on Fig. 3 under another reading, over arms drawn anew",
-            (*_FITTED_AND_MAPPED, "map_readings"),
-            draws=(),
-        ),
-        Stage(
-            "map_readings",
-            "gathering the sentences on Fig. 3 under its readings",
-            ("map_readings_chunk",),
-            ("map_readings",),
-            on_request=True,
-        ),
-        _figure(
-            "fig3_readings",
-            "drawing what holds of Fig. 3 under its readings",
-            ("map_readings",),
-            ("dataset",),
-            on_request=True,
-        ),
-        _over_arms(
-            "choices_chunk",
-            "going through fits, study and claims with every choice the paper leaves open",
-            (*_WHOLE_STUDY, "choices"),
-            ("choices_chunk", "choices_factors_chunk"),
-        ),
-        Stage(
-            "choices_table",
-            "gathering the claims over the paper's open choices",
-            ("choices_chunk", "choices_factors_chunk"),
-            ("choices", "choices_factors"),
-            on_request=True,
-        ),
-        Stage(
-            "choices_reasons",
-            "saying what every claim hangs on",
-            ("choices", "choices_factors"),
-            ("claim_shares", "claim_reasons"),
-            on_request=True,
-        ),
-        _figure(
-            "claims_over_choices",
-            "drawing which claims hold whatever one chooses, and which hang on what",
-            ("claim_shares", "claim_reasons"),
-            on_request=True,
-        ),
-        Stage(
-            "tournament_chunk",
-            "campaigns of every assessor",
-            ("assessment_points",),
-            ("tournament_chunk",),
-            _CONTEST,
-            files=("robot",),
-            uses=(*_FIELDS, "kinacc.assess.registry:PLACES[{assessors}]"),
-            scattered=True,
-            on_request=True,
-            joint=True,
-            measured_inputs=("pose_errors", "measurements"),
-        ),
-        Stage(
-            "tournament_tables",
-            "gathering the cells and judging every assessor",
-            ("assessment_points", "tournament_chunk"),
-            ("tournament_cells", "tournament_verdicts", "tournament_fields"),
-            _CONTEST,
-            files=("robot",),
-            uses=_FIELDS,
-            on_request=True,
-            joint=True,
-            measured_inputs=("pose_errors", "measurements", "tournament_chunk"),
         ),
     )
 }
@@ -532,10 +434,6 @@ CALIBRATION = (
     "summary",
     *HISTORY,
 )
-# Made on request beside the claims on further draws: Fig. 3 under every reading of it.
-MAP_READINGS = ("map_readings_chunk", "map_readings", "fig3_readings")
-# The claims over every choice that the paper leaves open, made on request.
-CHOICES = ("choices_chunk", "choices_table", "choices_reasons", "claims_over_choices")
 
 
 @cache

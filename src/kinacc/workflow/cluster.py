@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING
 
 from kinacc.workflow import cost
-from kinacc.workflow.catalogue import STAGES, TOURNAMENT, maker_of
+from kinacc.workflow.catalogue import STAGES, maker_of
 
 if TYPE_CHECKING:
     from kinacc.workflow.plan import Plan
@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 ALONE_S = 60.0  # a part of scattered work that takes longer has a job of its own
 _MARGIN = 4.0  # slower nodes, a shared file system, kernels compiled at first use
 _MEMORY_MB = 600  # measured: 100 to 280 in a stage, 150 in the Snakemake of its job
-# The first four grow with the poses: 100,000 of them fit.
-_MORE_MEMORY_MB = dict.fromkeys(
-    ("vec", "compliance", "residuals", "history", "choices_chunk"), 1000
-)
+# These grow with the poses: 100,000 of them fit.
+_MORE_MEMORY_MB = dict.fromkeys(("vec", "compliance", "residuals", "history"), 1000)
 _STAGE_S = 3.0
 
 
@@ -32,7 +30,7 @@ def _simulations(config: Mapping) -> float:
     return cost.simulations(config) * config["study"]["measurements"] / 200
 
 
-# Seconds of all parts together, by the configuration of the data set, or by `tournament`.
+# Seconds of all parts together, by the configuration of the data set.
 _SECONDS: Mapping[str, Callable[[Mapping], float]] = {
     "vec": lambda config: 60.0 if config["calibration"]["vec"]["order"] == "auto" else 5.0,
     "compliance": lambda config: 10.0,
@@ -40,15 +38,14 @@ _SECONDS: Mapping[str, Callable[[Mapping], float]] = {
     "accuracy_map": lambda config: 2.0 + 3e-4 * cost.cells(config),
     "study_chunk": lambda config: 0.01 * _simulations(config),
     "report": lambda config: 5.0,
-    **{name: partial(cost.over_many, name) for name in cost.MANY},
-    "tournament_chunk": lambda section: cost.of_tournament(section["size"]).seconds,
+    "robustness_chunk": lambda config: cost.of_stage("robustness_chunk", config).seconds,
 }
 
 
 def seconds(plan: Plan, name: str, dataset: str) -> float:
     """About how long one run of a stage takes on one core, a part where it is scattered."""
     work = _SECONDS.get(name, lambda config: 0.0)
-    whole = work(plan.tournament if dataset == TOURNAMENT else plan.datasets[dataset])
+    whole = work(plan.datasets[dataset])
     return _STAGE_S + whole / len(plan.part_names(name, dataset))
 
 
@@ -70,8 +67,6 @@ def group(plan: Plan, name: str, dataset: str) -> str | None:
     """
     if _is_alone(plan, name, dataset) or STAGES[name].of_lines:  # lines have a job each
         return None
-    if dataset == TOURNAMENT:  # it connects all data sets, which have a job each
-        return TOURNAMENT
     if STAGES[name].on_request:  # what the data set's job reads of it has to be there at its start
         return "on_request"
     if not STAGES[name].inputs and STAGES[name].is_figure:

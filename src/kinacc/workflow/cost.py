@@ -159,18 +159,9 @@ def _histories(config: Mapping) -> Cost:
     return Cost(seconds, 1.8e8 + 2.0 * world_bytes(points, visits), keys)
 
 
-# Stages over many arms or configurations: seconds of each, and the key of how many there are.
-MANY = {
-    "robustness_chunk": (5.0, "robustness.draws"),
-    "map_readings_chunk": (100.0, "map_readings.arms"),
-    "choices_chunk": (8.0, "choices.runs"),
-}
-
-
-def over_many(name: str, config: Mapping) -> float:
-    """Seconds of a stage over many arms or configurations."""
-    each, key = MANY[name]
-    return each * _at(config, key)
+def _robustness(config: Mapping) -> Cost:
+    inside = [each(config).bytes for each in (_vec, _map, _study_chunk)]
+    return Cost(5.0 * _at(config, "robustness.draws"), max(inside), ("robustness.draws",))
 
 
 _STAGES: Mapping[str, Callable[[Mapping], Cost]] = {
@@ -184,20 +175,13 @@ _STAGES: Mapping[str, Callable[[Mapping], Cost]] = {
     "study": _study,
     "histories": _histories,
 }
+_ON_REQUEST = {"robustness_chunk": _robustness}
 
 
 def of_stage(name: str, config: Mapping) -> Cost:
     """What a stage of a data set costs, all of its parts together, by its full configuration."""
-    if name in MANY:
-        inside = [_STAGES[each](config).bytes for each in ("vec", "accuracy_map", "study_chunk")]
-        return Cost(over_many(name, config), max(inside), (MANY[name][1],))
-    return _STAGES[name](config) if name in _STAGES else Cost(0.0, 0.0, ())
-
-
-def of_tournament(size: str) -> Cost:
-    """What the tournament costs by the name of its size: minutes, hours, or days on many cores."""
-    seconds = {"default": 600.0, "workshop": 21_000.0, "full": 1e7}.get(size, 86_400.0)
-    return Cost(seconds, 2e8, ("tournament.size",))
+    of = {**_STAGES, **_ON_REQUEST}.get(name)
+    return of(config) if of else Cost(0.0, 0.0, ())
 
 
 def of_campaigns(points: int, budgets: Sequence[int], fields: int, repetitions: int) -> Cost:

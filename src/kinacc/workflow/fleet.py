@@ -18,7 +18,7 @@ from kinacc.campaign import journal, of_calibration, tolerance, words
 from kinacc.campaign.of_calibration import Sought
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.catalogue import STAGES, TOURNAMENT
+from kinacc.workflow.catalogue import STAGES
 from kinacc.workflow.verification.lineage import made_of_these, outdated
 
 FEW = 4  # data sets of which each is told of at the end of a run
@@ -141,7 +141,7 @@ def _against(campaigns: Sought) -> list[str]:
 def data_sets(folders: Iterable[Path]) -> list[Path]:
     """Results folders of data sets among the ``folders`` and in them, in the order of their names.
 
-    Campaigns and the tournament are none. Raises InputError for each folder that holds nothing.
+    Campaigns are none. Raises InputError for each folder that holds nothing.
     """
     found: dict[Path, None] = {}
     problems = []
@@ -163,8 +163,11 @@ def data_sets(folders: Iterable[Path]) -> list[Path]:
 
 
 def _may_be_one(folder: Path) -> bool:
-    hidden = folder.name.startswith(".") or folder.name == TOURNAMENT
-    return folder.is_dir() and not hidden and not (folder / journal.PLAN).is_file()
+    return (
+        folder.is_dir()
+        and not folder.name.startswith(".")
+        and not (folder / journal.PLAN).is_file()
+    )
 
 
 def standings(folders: Sequence[Path]) -> list[Standing]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, cached_property, wraps
 from pathlib import Path
 from typing import Any
@@ -23,10 +23,8 @@ from kinacc.workflow.catalogue import (
     CALIBRATION,
     FIGURE_FOLDER,
     HISTORY,
-    MAP_READINGS,
     PAGE,
     STAGES,
-    TOURNAMENT,
     Stage,
     maker_of,
 )
@@ -56,7 +54,6 @@ def planned(
     full = load(paths, words_read(overrides or {}))
     formats = {name: tuple(config["figures"]["formats"]) for name, config in full.items()}
     first = next(iter(formats.values()))
-    tournament = next(iter(full.values()))["tournament"]
     problems = [
         Problem(
             f"datasets.{name}.figures.formats",
@@ -65,21 +62,13 @@ def planned(
         )
         for name, own in formats.items()
         if own != first
-    ] + [
-        Problem(f"datasets.{name}.tournament", "differs from data set to data set", "one for all")
-        for name, config in full.items()
-        if config["tournament"] != tournament
     ]
-    refuse([*problems, *leading_out(results, (*full, TOURNAMENT))])
+    refuse([*problems, *leading_out(results, full)])
     return Plan(
         {name: in_use(without_execution_keys(config)) for name, config in full.items()},
-        {
-            name: {section: config[section]["chunks"] for section in ("study", "choices")}
-            for name, config in full.items()
-        },
+        {name: config["study"]["chunks"] for name, config in full.items()},
         first,
         results,
-        tournament,
     )
 
 
@@ -104,50 +93,19 @@ class Plan:
     """The validated configuration of every data set, and where results go.
 
     ``datasets`` maps a data set's name to its complete configuration (defaults filled in, without
-    values that only say how a run is carried out); ``parts`` to the numbers of parts its scattered
-    stages are computed in, those of the study and those of the choices; ``formats`` are the
-    picture formats; ``tournament`` is the configuration's section of that name, which is one for
-    all data sets. ``files_absolute``: files from outside are named in full, as a module of another
-    workflow needs them, whose results may have a folder put before them. ``known`` keeps what was
-    worked out, and which tables were up to date when that was asked first.
+    values that only say how a run is carried out); ``parts`` to the number of parts its scattered
+    stages are computed in; ``formats`` are the picture formats. ``files_absolute``: files from
+    outside are named in full, as a module of another workflow needs them, whose results may have a
+    folder put before them. ``known`` keeps what was worked out, and which tables were up to date
+    when that was asked first.
     """
 
     datasets: Mapping[str, Mapping[str, object]]
-    parts: Mapping[str, Mapping[str, int]]
+    parts: Mapping[str, int]
     formats: tuple[str, ...]
     results: str = RESULTS
-    tournament: Mapping[str, object] = field(default_factory=dict)
     files_absolute: bool = False
     known: dict[tuple, object] = field(default_factory=dict, init=False, repr=False, compare=False)
-
-    def contest(
-        self,
-        size: str | None = None,
-        parts: int | None = None,
-        assessors: Sequence[str] = (),
-        noise_mm: Sequence[float] = (),
-    ) -> Plan:
-        """The plan with another tournament; what is not given is as configured.
-
-        ``size`` is a name of the sizes of :mod:`kinacc.study.tournament.contest`; ``parts`` has no
-        influence on the results; ``assessors`` are those that take part, all if empty; ``noise_mm``
-        is the only noise simulated, all of the size if empty. Raises InputError for an assessor
-        that does not exist.
-        """
-        if assessors:
-            from kinacc.study.tournament.contest import CONTESTANTS
-
-            allowed = ", ".join(CONTESTANTS)
-            problems = [
-                Problem(f"assessor {name}", "unknown", allowed)
-                for name in assessors
-                if name not in CONTESTANTS
-            ]
-            refuse(problems)
-            assessors = [name for name in CONTESTANTS if name in assessors]
-        given = {"size": size, "chunks": parts, "assessors": assessors, "noise_mm": noise_mm}
-        own = {name: value for name, value in given.items() if value}
-        return replace(self, tournament={**self.tournament, **own})
 
     @cached_property
     def told(self) -> list[str]:
@@ -161,13 +119,9 @@ class Plan:
 
     @_once
     def stages(self, dataset: str) -> dict[str, Stage]:
-        """The stages a data set, or the tournament, goes through, in order."""
-        if dataset == TOURNAMENT:
-            return {name: stage for name, stage in STAGES.items() if stage.joint}
+        """The stages a data set goes through, in order."""
         missing = self.left_out(dataset)
-        return {
-            name: stage for name, stage in STAGES.items() if name not in missing and not stage.joint
-        }
+        return {name: stage for name, stage in STAGES.items() if name not in missing}
 
     @_once
     def left_out(self, dataset: str) -> dict[str, str]:
@@ -182,12 +136,12 @@ class Plan:
         if not self.lines(dataset):
             reasons |= dict.fromkeys(HISTORY, "the data set has no series")
         if space != "cylinder":
-            for name in ("accuracy_map", "fig3", *MAP_READINGS):
+            for name in ("accuracy_map", "fig3"):
                 reasons[name] = f"no map: the evaluation space is '{space}', not a cylinder"
         if config["measurements"]["source"] != "synthetic":
             reasons["claims"] = "the paper's claims are about the paper's arm"
             for name, stage in STAGES.items():
-                if stage.on_request and not stage.joint:
+                if stage.on_request:
                     reasons[name] = "no further draws of a measured arm"
             if "exclude" not in config["measurements"]["file"]:
                 reasons["excluded_rows"] = "no row is excluded"
@@ -222,8 +176,8 @@ class Plan:
         where ``on_request`` says that this run makes it.
         """
         stage = STAGES[name]
-        if stage.joint or stage.of_lines:
-            return self._inputs_of_others(stage, dataset)
+        if stage.of_lines:
+            return self._inputs_of_lines(stage, dataset)
         there = (each for each in stage.optional if self._is_there(each, dataset, on_request))
         found = {artefact: self._made(artefact, dataset) for artefact in (*stage.inputs, *there)}
         return found | self._files(stage, dataset)
@@ -248,8 +202,7 @@ class Plan:
 
         Those of the stages whose tables it reads are among them.
         """
-        of_others = STAGES[name].joint or STAGES[name].of_lines
-        stages = {} if of_others else self.stages(dataset)
+        stages = {} if STAGES[name].of_lines else self.stages(dataset)
         made = {each: stage for stage in stages.values() for each in stage.outputs}
         found: dict[str, None] = {}
         waiting, seen = [STAGES[name]], {name}
@@ -310,7 +263,7 @@ class Plan:
         Where a machine was lost, jobs of a cluster leave files that Snakemake knows nothing of, and
         would take for made by whatever settings it is asked for next.
         """
-        for dataset in (*self.datasets, TOURNAMENT):
+        for dataset in self.datasets:
             for name in self.stages(dataset):
                 for part in self.part_names(name, dataset):
                     path = self.record(name, dataset, part)
@@ -346,7 +299,7 @@ class Plan:
         found: dict[str, None] = {}
         for whose, _, artefact in (role.rpartition("/") for role in roles):
             maker = maker_of(artefact)
-            owner = TOURNAMENT if maker.joint else whose or dataset
+            owner = whose or dataset
             parts = self.part_names(maker.name, owner)
             found |= dict.fromkeys(self.record(maker.name, owner, part) for part in parts)
         return [*found]
@@ -355,20 +308,9 @@ class Plan:
         """Names of the parts a stage is computed in: 1-of-2, 2-of-2; None where it is whole."""
         if not STAGES[name].scattered:
             return [None]
-        if STAGES[name].joint:
-            count = self.tournament["chunks"]
-        elif name == "map_readings_chunk":
-            from kinacc.study.map_readings import READINGS
-
-            count = len(READINGS)
-        elif name == "choices_chunk":
-            count = self.parts[dataset]["choices"]
-        else:
-            config = self.datasets[dataset]
-            draws, repetitions = config["robustness"]["draws"], config["study"]["repetitions"]
-            count = min(
-                self.parts[dataset]["study"], draws if "robustness" in name else repetitions
-            )
+        config = self.datasets[dataset]
+        draws, repetitions = config["robustness"]["draws"], config["study"]["repetitions"]
+        count = min(self.parts[dataset], draws if "robustness" in name else repetitions)
         return [f"{number}-of-{count}" for number in range(1, count + 1)]
 
     def message(self, name: str, dataset: str) -> str:
@@ -384,8 +326,8 @@ class Plan:
     @_once
     def settings(self, name: str, dataset: str) -> dict[str, object]:
         """The configuration values a stage depends on, nested as in the configuration."""
-        config, chosen, stage = self._config(dataset), {}, STAGES[name]
-        synthetic = not stage.joint and config["measurements"]["source"] == "synthetic"
+        config, chosen, stage = self.datasets[dataset], {}, STAGES[name]
+        synthetic = config["measurements"]["source"] == "synthetic"
         for path in (*stage.settings, *(stage.synthetic_settings if synthetic else ())):
             if path == "dataset" or path.partition(".")[0] in config:  # else it is not in use
                 _copy({**config, "dataset": dataset}, chosen, path.split("."))
@@ -426,40 +368,16 @@ class Plan:
         return stage_code_hash(stage.module, used)
 
     def seed(self, dataset: str) -> int:
-        """Seed of the data set; the tournament has that of the first one."""
-        return self._config(dataset)["seed"]
+        """Seed of the data set."""
+        return self.datasets[dataset]["seed"]
 
-    def _config(self, dataset: str) -> Mapping[str, object]:
-        """Configuration of a data set, or what the tournament depends on beside tables."""
-        if dataset != TOURNAMENT:
-            return self.datasets[dataset]
-        from kinacc.config.schema import defaults
-
-        chosen = {name: list(self.tournament.get(name, ())) for name in ("assessors", "noise_mm")}
-        return {
-            "seed": next(iter(self.datasets.values()))["seed"],
-            "size": self.tournament["size"],
-            "robots": {name: self.datasets[name]["robot"] for name in self.told},
-            "study": defaults()["study"],  # of no data set: all are assessed alike
-            **chosen,
-        }
-
-    def _others(self, stage: Stage, dataset: str) -> list[str]:
-        """Data sets that a stage reads which is not about one: all, or the lines of a series."""
-        return self.told if stage.joint else self.lines(dataset)
-
-    def _inputs_of_others(self, stage: Stage, dataset: str) -> dict[str, str | list[str]]:
-        """Tables of other data sets, ``<data set>/<artefact>``, their files, joint tables."""
+    def _inputs_of_lines(self, stage: Stage, dataset: str) -> dict[str, str | list[str]]:
+        """Tables of the lines of a series, ``<data set>/<artefact>``, and their files."""
         found: dict[str, str | list[str]] = {}
-        for other in self._others(stage, dataset):
-            measured = self.datasets[other]["measurements"]["source"] == "file"
-            read = stage.measured_inputs if measured and stage.joint else stage.inputs
+        for other in self.lines(dataset):
             there = (each for each in stage.optional if self._is_there(each, other, False))
-            for artefact in (*read, *there):
-                if maker_of(artefact).joint:
-                    found[artefact] = self._made(artefact, TOURNAMENT)
-                else:
-                    found[f"{other}/{artefact}"] = self._made(artefact, other)
+            for artefact in (*stage.inputs, *there):
+                found[f"{other}/{artefact}"] = self._made(artefact, other)
         return found | self._files(stage, dataset)
 
     def _made(self, artefact: str, dataset: str) -> str | list[str]:
@@ -481,10 +399,10 @@ class Plan:
 
     def _files(self, stage: Stage, dataset: str) -> dict[str, str]:
         """Files from outside by role; of stages about several data sets ``<data set>/<role>``."""
-        if not (stage.joint or stage.of_lines):
+        if not stage.of_lines:
             return self._own_files(stage, dataset)
         # Campaigns of a series may have been begun on what was the newest line then.
-        whose = self.told if stage.joint else [dataset, *self.lines(dataset)]
+        whose = [dataset, *self.lines(dataset)]
         return {
             f"{name}/{role}": path
             for name in whose
@@ -534,8 +452,6 @@ def _fix(role: str, dataset: str | bool) -> str:
     whose, _, artefact = role.rpartition("/")
     if artefact.endswith("_file"):
         return "check the path"
-    if artefact == "tournament_chunk":
-        return "make it first: kinacc tournament"
     where = f" --dataset {whose or dataset}" if whose or dataset else ""
     return f"make it first: kinacc run {maker_of(artefact).name}{where}"
 

@@ -66,7 +66,7 @@ def job_of(
 
 def label(name: str, dataset: str, part: str | None = None) -> str:
     """What lines on screen about one run of a stage begin with."""
-    return " ".join(filter(None, [dataset, None if STAGES[name].joint else name, part]))
+    return " ".join(filter(None, [dataset, name, part]))
 
 
 def doing(name: str, dataset: str, part: str | None = None) -> str:

@@ -9,8 +9,6 @@ import numpy as np
 from kinacc.artifacts.allowed import ASSESSORS, COVARIANCES, DISTANCES, OUTLIER_RULES, SEARCHES
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.errors import Problem
-from kinacc.study.choices.open_choices import DEFAULT, SAMPLES
-from kinacc.study.choices.reasons import shares
 from kinacc.workflow.verification.rule import TOLERANCE, Columns, Rule, Tables, mark
 
 
@@ -205,28 +203,6 @@ def _shares(tables: Tables) -> Iterator[Problem]:
             yield Problem(f"claims.parquet, row {i}", f"share {share:g} of {claim}", allowed)
 
 
-def _choices(tables: Tables) -> Iterator[Problem]:
-    table, factors = tables["choices"], tables["choices_factors"]
-    several = np.isin(table["choice"], (DEFAULT, *SAMPLES))
-    unstated = np.array([value is None for value in table["value"]], dtype=bool)
-    yield from mark("choices", unstated != several, "value null", "null where no single one is")
-    unsaid = np.array([why is None for why in table["why"]], dtype=bool)
-    wrong = unsaid & ~np.isin(table["run"], factors["run"]) & (table["choice"] != DEFAULT)
-    yield from mark("choices", wrong, "a run of which nothing is known", "choices_factors.parquet")
-
-
-def _claim_shares(tables: Tables) -> Iterator[Problem]:
-    found, right = tables["claim_shares"], shares(tables["choices"])
-    if list(found["claim"]) != list(right["claim"]):
-        yield Problem("claim_shares.parquet", "other claims", "those of choices.parquet, in order")
-        return
-    for name in ("verdict", "holds"):
-        yield from mark("claim_shares", found[name] != right[name], name, "as in choices.parquet")
-    for name in (each for each in right if each.endswith(("_share", "_runs"))):
-        wrong = ~np.isclose(found[name], right[name], rtol=0.0, atol=TOLERANCE, equal_nan=True)
-        yield from mark("claim_shares", wrong, name, "counted from choices.parquet")
-
-
 RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("accuracy_map",), _accuracy_map),
     (("assessment_points",), _assessment_points),
@@ -237,6 +213,4 @@ RULES: tuple[tuple[tuple[str, ...], Rule], ...] = (
     (("claims",), _claims),
     (("robustness", "claims"), _robustness),
     (("robustness", "claims"), _shares),
-    (("choices", "choices_factors"), _choices),
-    (("claim_shares", "choices"), _claim_shares),
 )

@@ -11,14 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts import campaign_tables, store, tournament_tables
+from kinacc.artifacts import campaign_tables, store
 from kinacc.artifacts.campaign_tables import ALL as CAMPAIGN
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import ARTEFACTS, INPUTS_DIGESTS
 from kinacc.artifacts.error_models import ALWAYS
 from kinacc.artifacts.pictures import as_text
 from kinacc.artifacts.records import Record
-from kinacc.artifacts.tournament_tables import FOLDER as TOURNAMENT
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.catalogue import (
@@ -162,8 +161,6 @@ def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: boo
         return Report(str(folder), (), (problem,))
     if (folder / f"{CAMPAIGN[0].name}.parquet").is_file():
         return _advised(Report(str(folder), (check_campaign(folder),)), folder)
-    if folder.name == TOURNAMENT:
-        return _advised(Report(str(folder), (check_tournament(folder),)), folder)
     if is_dataset(folder):
         if plan is not None and folder.name not in plan.datasets:
             allowed = ", ".join(plan.datasets)
@@ -172,9 +169,7 @@ def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: boo
         report = Report(str(folder), (check_dataset(folder, plan, every),), digest=folded([folder]))
         return _advised(report, folder.parent, plan, configs)
     names = sorted(
-        path.name
-        for path in folder.iterdir()
-        if path.is_dir() and not path.name.startswith(".") and path.name != TOURNAMENT
+        path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")
     )
     problems, missing = [], []
     if plan is not None:
@@ -184,8 +179,6 @@ def _checked(folder: Path, plan: Plan | None, configs: Sequence[str], every: boo
     elif not names:
         problems = [Problem(str(folder), "holds no data set", "one folder for each data set")]
     reports = [check_dataset(folder / name, plan, every) for name in names]
-    if (folder / TOURNAMENT).is_dir():
-        reports.append(check_tournament(folder / TOURNAMENT))
     digest = folded([folder / each.name for each in reports])
     report = Report(str(folder), tuple(reports), tuple(problems), digest=digest)
     return _advised(report, folder, plan, configs, missing)
@@ -261,7 +254,7 @@ def check_dataset(
     for name, picture in _pictures(folder, plan, absent, known):
         checked += [str(picture)] if picture.exists() else []
         found += [(problem, (Doubt(name),)) for problem in check_picture(picture)]
-    kept = [s for s in STAGES.values() if not (s.joint or {*s.outputs} & {*behind})]
+    kept = [s for s in STAGES.values() if not {*s.outputs} & {*behind}]
     names = {stage.name for stage in kept} - set(left_out)
     known = {unit: record for unit, record in known.items() if unit[0] in names}
     wrong_files = {problem.where.partition(", column")[0] for problem, _ in found}
@@ -316,33 +309,6 @@ def not_there(folder: Path) -> tuple[str, ...]:
                 tables |= {name: store.read(path)} if name in ("measurements", "frames") else {}
     left_out = _left_out(folder, marks, tables, None)
     return tuple(Path(problem.where).stem for problem, _ in _missing(folder, left_out))
-
-
-def check_tournament(folder: Path) -> DatasetReport:
-    """Check the folder of the tournament: every table whole and as the contract says."""
-    checked, problems, marks = [], [], {}
-    for name, path in _tables_there(folder):
-        checked.append(str(path))
-        problems += check_file(path, ARTEFACTS[name])[1]
-        if path.parent == folder:
-            with suppress(InputError):
-                marks[name] = store.read_metadata(path)
-    gathered = [each.name for each in tournament_tables.ALL[1:]]
-    problems += [
-        Problem(str(folder / f"{name}.parquet"), "missing")
-        for name in gathered
-        if name not in marks and any(other in marks for other in gathered)
-    ]
-    known, found = records_there(folder)
-    joint = [stage for stage in STAGES.values() if stage.joint]
-    doubted = {problem.where.partition(", column")[0] for problem in problems}
-    found += check_records(folder, joint, known, doubted)
-    problems += [problem for problem, _ in found]
-    leftovers = [f"{path}: left over from a run that was stopped" for path in _leftovers(folder)]
-    advice = "To mend the tournament, run `kinacc tournament` again with the options it had."
-    return DatasetReport(
-        folder.name, tuple(checked), tuple(problems), tuple(leftovers), advice=advice
-    )
 
 
 def check_campaign(folder: Path) -> DatasetReport:
@@ -451,11 +417,7 @@ def _not_studied(folder: Path) -> set[str]:
 
     The page is no sign of a study: a calibration may leave it too.
     """
-    beyond = [
-        stage
-        for stage in STAGES.values()
-        if not (stage.name in CALIBRATION or stage.fits or stage.joint)
-    ]
+    beyond = [stage for stage in STAGES.values() if not (stage.name in CALIBRATION or stage.fits)]
     recorded = {stage for stage, _ in records_there(folder)[0]}
     there = {
         stage.name: stage.leaves

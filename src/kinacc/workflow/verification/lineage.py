@@ -38,8 +38,6 @@ def check_lineage(
     outside: set[str] = set()
     now = _Now(folder)
     for stage in STAGES.values():
-        if stage.joint:
-            continue  # not of this data set alone
         units = _units(stage, marks)
         torn = [each for made in units.values() for each in _one_run(folder, made, marks)]
         found += [(problem, (Doubt(stage.name),)) for problem in torn]
@@ -135,7 +133,7 @@ class _Now(dict[str, tuple[str, ...]]):
 def strays(folder: Path, marks: Marks) -> Iterator[Found]:
     """Parts of tables that are of another run than what was made from them."""
     for stage in STAGES.values():
-        for artefact in stage.outputs if stage.scattered and not stage.joint else ():
+        for artefact in stage.outputs if stage.scattered else ():
             read = [digests_read(own).get(artefact) for own in marks.values()]
             whole = parts(folder, artefact)
             right = []

@@ -41,10 +41,6 @@ _DIRECTION, _EXACT = "undetermined_direction", 1e9
 REPETITIONS, CELLS, ROWS = 5, 500, 5000  # computed again without --all
 NOT_AGAIN = {
     "robustness_chunk": "every draw is a calibration and a study of its own",
-    "map_readings_chunk": "every arm is a calibration of its own",
-    "choices_chunk": "every run is a calibration and a study of its own",
-    "tournament_chunk": "every cell is hundreds of campaigns",
-    "tournament_tables": "is about all data sets",
 }
 _FITTED_ROWS = ("vec", "dh", "compliance", "residuals", "data_check", "summary", "history")
 
