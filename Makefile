@@ -3,6 +3,7 @@
 # make public-robots  every measured arm in examples/data calibrated blind, and the page about it
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
+# make size        AST nodes and lines of every room, words of the docs, beside their budgets
 # make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make fuzz        what reads files, given files that nobody would write; FUZZ="--minutes 600" for longer
@@ -15,7 +16,7 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test bench fuzz recipes docs docs-links \
+.PHONY: reproduce robustness public-robots lint check test size bench recipes docs docs-links \
   audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
@@ -62,6 +63,10 @@ test: lint $(CLUSTER)
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PYTEST)
+
+# Needs no package: the standard library counts.
+size:
+	@$$(sh requirements/find-python $(PYTHON)) tools/size.py
 
 # The other libraries have an environment of their own: nothing else needs them.
 bench: $(PEERS)

@@ -84,7 +84,7 @@ SLOW = (
     "measurements/test_what_files_hold.py",
     "report/test_in_a_browser.py",
     "report/test_tolerance_on_the_first_screen.py",
-    "study/tournament/test_tournament.py",
+    "research",
     "synthetic/test_accepted.py",
     "test_accuracy_map.py",
     "test_accuracy_map_oracle.py",
@@ -98,12 +98,9 @@ SLOW = (
     "test_strangers_text.py",
     "test_study_oracle.py",
     "workflow/test_calibration_stages.py",
-    "workflow/test_choices.py",
     "workflow/test_cost.py",
-    "workflow/test_map_readings.py",
     "workflow/test_robustness.py",
     "workflow/test_stopping.py",
-    "workflow/test_tournament_command.py",
 )
 _SLOW = tuple(TESTS / name for name in SLOW)
 

@@ -18,6 +18,8 @@ import pytest
 from command_line import call
 
 import kinacc
+from kinacc.calibration.misfit import Misfit
+from kinacc.calibration.noise import UNKNOWN
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.errors import InputError, Problem
 from kinacc.figures import campaign_plan
@@ -53,8 +55,10 @@ def test_a_table_of_a_calibrated_arm_holds_no_formula(monkeypatch):
     arm = robot.load("mh180")
     given = type("Calibrated", (), {"robot": arm, "left_open": ("=HYPERLINK(1)",)})
     given.model = type("Model", (), {"table": arm.dh})
-    text = description.robot_csv(given, np.full((6, 5), np.nan), arm.dh)
-    assert [row[-1] for row in csv.reader(io.StringIO(text))][-1] == "'=HYPERLINK(1)"
+    text = description.robot_csv(given, np.full((6, 5), np.nan), arm.dh, Misfit("dh", 0.1, UNKNOWN))
+    assert [row["undetermined"] for row in csv.DictReader(io.StringIO(text))][
+        -1
+    ] == "'=HYPERLINK(1)"
 
 
 @pytest.mark.parametrize("name", ["$\\frac$", "$x$", "_left out", "a--><script>1</script>"])

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import paper_settings as paper
 import pytest
+from kinacc.assess.sequential import Sequential
+from kinacc.assess.two_stage import TwoStage
 
 from kinacc.artifacts.provenance import imported_names
 from kinacc.assess.adaptive import Candidates, Ledger
@@ -20,11 +22,9 @@ from kinacc.assess.population import largest_size
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.sequential import Sequential
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS, Reason
-from kinacc.assess.two_stage import TwoStage
 from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError
 from kinacc.kinematics import robot

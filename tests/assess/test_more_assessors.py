@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kinacc.assess.kinematic import Kinematic
+from kinacc.assess.kinematic_model import Basis, fitted_scales
 from scipy.stats import binom, gamma
 
 from kinacc.assess.adaptive import Candidates
@@ -16,8 +18,6 @@ from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.gamma_quantile import GammaQuantile
 from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, boundary
 from kinacc.assess.invalidation_full import ModelInvalidationFull
-from kinacc.assess.kinematic import Kinematic
-from kinacc.assess.kinematic_model import Basis, fitted_scales
 from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from kinacc.assess.sequential import Sequential
 from scipy.stats import binom, chi2, f, kstest, ncx2, norm, t
 
 from kinacc.assess.adaptive import Candidates, Ledger
@@ -28,7 +29,6 @@ from kinacc.assess.noise_factor import (
     planned_freedom,
 )
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.sequential import Sequential
 from kinacc.assess.simulate import carry_on
 
 

@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 from command_line import call
+from kinacc.study.tournament.fields import ErrorField
 from scipy.stats import ncx2
 
 from kinacc.assess.attainable import width_limits
@@ -23,7 +24,6 @@ from kinacc.campaign.power import Aim, Row, repetitions_to_show, rows, smallest_
 from kinacc.campaign.simulate import Outcome, outcomes
 from kinacc.cli.campaign_plans import Simulation, as_sheet, in_words
 from kinacc.errors import InputError
-from kinacc.study.tournament.fields import ErrorField
 
 
 def field(count=100, seed=0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -11,9 +12,13 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import call, small_study
 
+from kinacc.calibration import noise
+from kinacc.calibration.observations import full_poses
 from kinacc.campaign import folder as folders
 from kinacc.campaign import of_calibration, slips
 from kinacc.campaign.instrument import instruments
+from kinacc.geometry import Pose, exp_so3
+from kinacc.kinematics import dh, robot
 
 
 @pytest.fixture(scope="module")
@@ -172,52 +177,40 @@ def test_a_page_of_a_campaign_stands_beside_its_report_and_is_not_overwritten(vi
 
 
 def readings_of(poses, times, std_mm, sessions=1, seed=3):
-    """``measurements`` and ``pose_errors`` of poses read several times, bases of sessions apart."""
-    rng = np.random.default_rng(seed)
-    pose = np.tile(np.repeat(np.arange(poses), times), sessions)
+    """Positions of poses read several times, with a base of its own in each session."""
+    rng, arm = np.random.default_rng(seed), robot.load("irb120")
+    at = np.tile(np.repeat(np.arange(poses), times), sessions)
     session = np.repeat(np.arange(sessions), poses * times)
-    q = rng.uniform(-1, 1, (poses, 6))[pose] + rng.normal(size=(len(pose), 6)) * 1e-4
-    left = rng.normal(size=(poses, 3))[pose] + 0.5 * session[:, None]
-    left = left + rng.normal(size=left.shape) * std_mm
-    measured = {f"q{i + 1}": q[:, i] for i in range(6)}
-    measured |= {"pose": np.arange(len(pose)), "session": session.astype(str).astype(object)}
-    measured["target"] = np.array(["tool"] * len(pose), dtype=object)
-    errors = {f"e{axis}_mm": left[:, i] for i, axis in enumerate("xyz")}
-    errors |= {"row": np.arange(len(pose))}
-    errors["comparison"] = np.array(["dh_vs_measured"] * len(pose), dtype=object)
-    errors["estimate"] = np.array(["cross_validated"] * len(pose), dtype=object)
-    return measured, errors
+    q = rng.uniform(-1, 1, (poses, 6))[at] + rng.normal(size=(len(at), 6)) * 1e-4
+    flange = dh.forward(arm.dh, q)
+    point = flange.position_mm + flange.rotation @ [50.0, 20.0, 80.0]
+    bases = exp_so3(rng.normal(size=(sessions, 3)))[session]
+    measured = (bases @ point[..., None])[..., 0] + rng.normal(size=point.shape) * std_mm
+    read = full_poses(q, Pose(np.full_like(bases, np.nan), measured))
+    return replace(read, session=session, session_names=tuple(map(str, range(sessions))))
+
+
+def noise_of(*given, **options):
+    """The noise of :func:`readings_of`."""
+    return noise.of_readings(readings_of(*given, **options), robot.load("irb120").dh)
 
 
 @pytest.mark.parametrize("sessions", [1, 2])
 def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(sessions):
-    tables = readings_of(30, 4, 0.06, sessions)
-    found = slips.scatter(*tables)
-    assert found.freedom == 90 * sessions
-    assert found.std_mm == pytest.approx(0.06, rel=0.25)
-    (problem,) = slips.of_little_noise(instruments(["tracker=0.03"], "base"), *tables)
+    known = noise_of(30, 4, 0.06, sessions)
+    assert known.freedom == 90 * sessions
+    assert known.std_mm == pytest.approx(0.06, rel=0.25)
+    (problem,) = slips.of_little_noise(instruments(["tracker=0.03"], "base"), known)
     assert "scatter by 0.0" in problem.what
-    assert not slips.of_little_noise(instruments(["tracker=0.06"], "base"), *tables)
+    assert not slips.of_little_noise(instruments(["tracker=0.06"], "base"), known)
 
 
 def test_poses_that_were_read_once_say_nothing_of_the_noise():
-    assert not slips.of_little_noise(instruments(["t=0.03"], "base"), *readings_of(120, 1, 0.06))
+    assert not slips.of_little_noise(instruments(["t=0.03"], "base"), noise_of(120, 1, 0.06))
 
 
 def test_repeats_are_offered_as_noise_along_the_axes_of_the_instrument():
-    measured, errors = readings_of(50, 6, np.array([0.05, 0.1, 0.2]), sessions=2)
-    half = np.sqrt(0.5)
-    # Bases a quarter turn about z and x away from the instrument's axes.
-    turned = {"qw": [half, half], "qx": [0.0, half], "qy": [0.0, 0.0], "qz": [half, 0.0]}
-    frames = {"model": ["dh"] * 2, "frame": ["base"] * 2, "session": ["0", "1"], **turned}
-    frames |= {f"{axis}_mm": [0.0, 0.0] for axis in "xyz"}
-    for names, quarter in (("xy", 0), ("yz", 1)):
-        own = measured["session"].astype(int) == quarter
-        one, other = (f"e{axis}_mm" for axis in names)
-        kept = errors[one].copy()
-        errors[one] = np.where(own, errors[other], kept)
-        errors[other] = np.where(own, -kept, errors[other])
-    told = slips.noise_by_repeats(measured, errors, frames)
+    told = slips.noise_by_repeats(noise_of(50, 6, np.array([0.05, 0.1, 0.2]), sessions=2))
     count, groups, std_mm = re.search(
         r"(\d+) readings at (\d+) .* scatter by (\S+) mm", told
     ).groups()
@@ -227,12 +220,9 @@ def test_repeats_are_offered_as_noise_along_the_axes_of_the_instrument():
     assert "no new set-up of instrument or target" in " ".join(told.split())
 
 
-@pytest.mark.parametrize("readings", [readings_of(120, 1, 0.06), readings_of(9, 2, 0.06)])
-def test_where_hardly_any_joints_were_read_again_the_calibration_tells_no_noise(readings):
-    quarter = {"qw": [1.0], "qx": [0.0], "qy": [0.0], "qz": [0.0]}
-    frames = {"model": ["dh"], "frame": ["base"], "session": ["0"], **quarter}
-    frames |= {f"{axis}_mm": [0.0] for axis in "xyz"}
-    told = slips.noise_by_repeats(*readings, frames)
+@pytest.mark.parametrize(("poses", "times"), [(120, 1), (9, 2)])
+def test_where_hardly_any_joints_were_read_again_the_calibration_tells_no_noise(poses, times):
+    told = slips.noise_by_repeats(noise_of(poses, times, 0.06))
     assert "scatter by" not in told
     assert "too few repeats" in told
 
@@ -295,20 +285,30 @@ def test_a_campaign_begun_against_nothing_is_written_and_opens_as_before(visited
 @pytest.fixture
 def reflectors(tmp_path):
     """A results folder of 30 poses read four times with two reflectors, scatter 0.06 mm."""
-    measured, errors = readings_of(30, 4, 0.06)
-    rows = len(measured["pose"])
-    measured["pose"] = np.repeat(np.arange(30), 4)
+    read, rng = readings_of(30, 4, 0.06), np.random.default_rng(1)
+    rows = len(read)
+    targets = np.repeat(np.array(["smr_b", "smr_a"], dtype=object), rows)
+    errors_mm = np.repeat(rng.normal(size=(30, 3)), 4, axis=0)
+    both = {f"q{i + 1}": np.tile(read.q_rad[:, i], 2) for i in range(6)}
+    both |= {f"s{i + 1}": np.zeros(2 * rows, np.int8) for i in range(6)}
+    both |= {f"{axis}_mm": np.tile(read.position_mm[:, i], 2) for i, axis in enumerate("xyz")}
+    both |= {f"q{part}": np.full(2 * rows, np.nan) for part in "wxyz"}
+    both |= {name: np.zeros(2 * rows, int) for name in ("repeat", "fold")}
+    both |= {"pose": np.tile(np.repeat(np.arange(30), 4), 2), "target": targets}
+    both["session"] = np.full(2 * rows, "0", dtype=object)
+    errors = {"row": np.arange(2 * rows), "target": targets, "pose": both["pose"]}
+    errors |= {"session": both["session"]}
+    errors |= {
+        f"e{axis}_mm": np.concatenate([errors_mm[:, i], 2.0 * errors_mm[:, i]])
+        for i, axis in enumerate("xyz")
+    }
+    errors["comparison"] = np.full(2 * rows, "dh_vs_measured", dtype=object)
+    errors["estimate"] = np.full(2 * rows, "cross_validated", dtype=object)
+    described = {"description": [robot.as_yaml(robot.load("irb120"))]}
     folder = tmp_path / "cell"
     folder.mkdir()
-    for name, columns in (("measurements", measured), ("pose_errors", errors)):
-        both = {key: np.concatenate([values, values]) for key, values in columns.items()}
-        both["target"] = np.repeat(np.array(["smr_b", "smr_a"], dtype=object), rows)
-        both["pose"] = np.tile(measured["pose"], 2)
-        if name == "pose_errors":
-            both["row"] = np.arange(2 * rows)
-            for axis in "xyz":
-                both[f"e{axis}_mm"] = both[f"e{axis}_mm"] * np.repeat([1.0, 2.0], rows)
-        table = pa.table({key: pa.array(list(values)) for key, values in both.items()})
+    for name, columns in (("measurements", both), ("pose_errors", errors), ("robot", described)):
+        table = pa.table({key: pa.array(list(values)) for key, values in columns.items()})
         pq.write_table(table, folder / f"{name}.parquet")
     return folder
 

@@ -97,7 +97,7 @@ def test_repeats_scatter_by_the_number_a_campaign_is_held_to(configuration):
     config = configuration(read_five_times, [*names, "b_x_mm", "b_y_mm", "b_z_mm"])
     done = call("check-data", config)
     told = json.loads(call("check-data", config, "--json").stdout)["datasets"][0]["facts"]
-    spread = np.array(told["noise_from_repeats"]["std_mm"])
+    spread = np.array(told["noise"]["std_mm"])
     assert f"repeats scatter by {np.sqrt(np.mean(spread**2)):.3g} mm per axis" in done.output
 
 
@@ -131,5 +131,5 @@ def test_the_noise_of_poses_read_again_is_said_axis_by_axis_and_of_which_frame(c
     number = r"\d[\d.e-]*"
     assert re.fullmatch(rf"x {number}, y {number}, z {number} \(axes of the instrument\)", said)
     told = json.loads(call("check-data", config, "--json").stdout)["datasets"][0]["facts"]
-    spread = next(fact["std_mm"] for name, fact in told.items() if name.startswith("noise_from"))
+    spread = told["noise"]["std_mm"]
     assert said.startswith(f"x {spread[0]:.3g}, y {spread[1]:.3g}, z {spread[2]:.3g} ")

@@ -30,6 +30,7 @@ def measurements(joints, repeats: int = 1, **columns) -> dict:
     found = {
         "pose": np.arange(count) // repeats,
         **{f"q{n + 1}": joints[:, n] for n in range(4)},
+        **{f"s{n + 1}": np.zeros(count, np.int8) for n in range(4)},
         "target": np.full(count, "tool", dtype=object),
         **{f"{axis}_mm": np.zeros(count) for axis in "xyz"},
         "qw": np.ones(count),

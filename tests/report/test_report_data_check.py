@@ -83,30 +83,26 @@ def test_rows_left_out_are_told_with_their_reason_and_the_selected_models_error(
 def test_repeats_show_the_noise_with_its_degrees_of_freedom():
     readings = measurements(np.zeros((3, 4)) + 0.1 * np.arange(3)[:, None], repeats=2)
     readings["x_mm"] = np.array([-0.01, 0.01, 5.01, 4.99, 7.01, 6.99])
-    told = measured(section(measurements=readings))["noise from repeats"]
+    told = measured(section(measurements=readings))["noise of a reading"]
     # Each of three pairs leaves 2 (0.01 mm)^2 to one degree of freedom.
     assert "x 0.014, y 0, z 0 mm" in told
-    assert "3 poses (each target by itself) with 6 readings (3 degrees of freedom)" in told
+    assert "3 configurations with 6 readings (3 degrees of freedom)" in told
 
 
-def test_configurations_the_arm_came_back_to_show_noise_and_repeatability():
-    there = np.array([[0.0] * 4, [0.5] * 4, [0.0] * 4, [2e-5] * 4])
-    errors = pose_errors(rows=4)
-    mine = errors["comparison"] == "vec_vs_measured"
-    errors["ex_mm"][mine] = [0.31, 9.0, 0.29, 0.30]
-    found = section(measurements=measurements(there), pose_errors=errors)
-    told = measured(found)["noise from revisits"]
+def test_a_configuration_the_arm_came_back_to_is_one_of_repeated_readings():
+    there = np.array([[0.0] * 4, [0.5] * 4, [0.0] * 4, [0.0] * 4])
+    readings = measurements(there, x_mm=np.array([0.31, 9.0, 0.29, 0.30]))
+    told = measured(section(measurements=readings))["noise of a reading"]
     # 2 (0.01 mm)^2 on two degrees of freedom along x, nothing along y and z.
-    assert told.startswith("standard deviation 0.0058 mm per axis")
-    assert "1 configuration the arm came back to, with 3 readings (2 degrees of freedom)" in told
-    assert "noise from revisits" not in measured(section())
+    assert "x 0.01, y 0, z 0 mm" in told
+    assert "1 configuration with 3 readings (2 degrees of freedom)" in told
 
 
 def test_nothing_measured_twice_shows_no_noise_and_a_file_may_state_some():
     readings = measurements([[0.0] * 4, [0.1] * 4], std_x_mm=np.array([0.02, np.nan]))
     readings["std_y_mm"] = readings["std_z_mm"] = np.array([0.03, 0.03])
     told = measured(section(measurements=readings))
-    assert "no target was read twice" in told["noise from repeats"]
+    assert told["noise of a reading"].startswith("unknown")
     stated = told["noise as the file states it"]
     assert stated == "standard deviation x 0.02, y 0.03, z 0.03 mm (the middle one of 1 reading)"
 

@@ -23,7 +23,3 @@ COVARIANCES = ("r", "sqrt_r")
 SEARCHES = ("from_above", "from_below", "bisection")
 EXAMPLES = ("rejected", "rejected_larger_eta", "not_rejected")
 VERDICTS = ("agrees", "differs", "not comparable")
-HOLDS = (
-    *("everywhere", "hangs on the arm", "hangs on a choice", "hangs on both", "nowhere"),
-    "not comparable",
-)

@@ -233,31 +233,6 @@ _DRAWS = (
 ROBUSTNESS_CHUNK = Artefact(
     "robustness_chunk", "Every claim on some of the further draws.", _DRAWS, ("draw", "claim")
 )
-_MAP_READINGS = (
-    text("reference_frame", "frame that keeps the flange's orientation", ("slice", "base")),
-    text("reference_orientation", "orientation before the turns, intrinsic XYZ angles in deg"),
-    text("rotations", "turns about the flange's axes", ("signs_and_zero", "all_27")),
-    whole("seed", "seed of the arm, drawn and accepted under this reading"),
-    magnitude("reached", "1", "share of the map's combinations that the arm reaches", 1.0),
-    text("claim", "identifier of the sentence, as in claims", pattern=IDENTIFIER_PATTERN),
-    real("reproduced", "see claims", "statistic that tests it, null without one", nullable=True),
-    text("verdict", "agrees, differs or not comparable", VERDICTS),
-)
-_MAP_READINGS_KEY = ("reference_frame", "reference_orientation", "rotations", "seed", "claim")
-MAP_READINGS_CHUNK = Artefact(
-    "map_readings_chunk",
-    "The sentences on Fig. 3 under some of its readings; empty where no arm was found.",
-    _MAP_READINGS,
-    _MAP_READINGS_KEY,
-    may_be_empty=True,
-)
-MAP_READINGS = Artefact(
-    "map_readings",
-    "The sentences on Fig. 3 under every reading of it, each over arms drawn anew.",
-    _MAP_READINGS,
-    _MAP_READINGS_KEY,
-    may_be_empty=True,
-)
 ROBUSTNESS = Artefact(
     "robustness",
     "Every claim on further accepted draws of the synthetic arm.",

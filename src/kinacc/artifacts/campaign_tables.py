@@ -18,9 +18,9 @@ from kinacc.artifacts.columns import (
     unstated,
     whole,
 )
-from kinacc.artifacts.tournament_tables import TARGETS
 from kinacc.errors import Problem
 
+TARGETS = ("measured", "candidates", "region")
 CAMPAIGN_POINTS = Artefact(
     "campaign_points",
     "Candidates of a measuring campaign, in the order in which they are visited.",

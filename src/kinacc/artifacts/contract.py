@@ -17,13 +17,11 @@ from kinacc.artifacts import (
     assessment_tables,
     calibration_tables,
     campaign_tables,
-    choices_tables,
     data_check_tables,
     history_tables,
     model_comparison_tables,
     robot_table,
     summary_table,
-    tournament_tables,
 )
 from kinacc.artifacts.columns import Artefact, Columns, joint_count, texts
 
@@ -43,8 +41,6 @@ ARTEFACTS: dict[str, Artefact] = {
         summary_table.SUMMARY,
         history_tables.HISTORY,
         *assessment_tables.ALL,
-        *choices_tables.ALL,
-        *tournament_tables.ALL,
         *campaign_tables.ALL,
     )
 }

@@ -16,15 +16,13 @@ CHOOSING = {
     "gamma_quantile": "kinacc.assess.gamma_quantile:GammaQuantile",
     "region_share": "kinacc.assess.region_share:RegionShare",
     "single_shot": "kinacc.assess.single_shot:SingleShot",
-    "two_stage": "kinacc.assess.two_stage:TwoStage",
-    "sequential": "kinacc.assess.sequential:Sequential",
     "model_invalidation_full": "kinacc.assess.invalidation_full:ModelInvalidationFull",
     "invalidation_calibrated": "kinacc.assess.invalidation_calibrated:InvalidationCalibrated",
-    "kinematic": "kinacc.assess.kinematic:Kinematic",
     "search_and_confirm": "kinacc.assess.search_and_confirm:SearchAndConfirm",
 }
 PLACES = LOOKING_BACK | CHOOSING
 RECOMMENDED = "search_and_confirm"
+IN_RESEARCH = ("two_stage", "sequential", "kinematic")  # no better anywhere, and not shipped
 
 
 class Registry(Mapping[str, type]):

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
-from kinacc.assess.conditions import CONDITIONS, STATED, Course
 from kinacc.assess.future_visit import SHARE
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.registry import ADAPTIVE, ASSESSORS
-from kinacc.assess.statement import CANDIDATES, MEASURED, VISIT, Reason, Statement
+from kinacc.assess.statement import CANDIDATES, MEASURED, VISIT, Statement
 from kinacc.assess.world import World, drawn_world
-from kinacc.config.records import of_section
 
 Reading = Callable[[int, int], np.ndarray]  # (row, how often it was read before): (3,), mm
 
@@ -42,20 +38,10 @@ def carry_on(
     return done
 
 
-def conduct(
-    assessor: AdaptiveAssessor, world: World, condition: str = STATED, **known: np.ndarray
-) -> Campaign:
-    """Run a campaign to its end on the readings of a world; ``known`` as in :class:`Candidates`.
-
-    ``condition``: how readings come about, a name of :data:`kinacc.assess.conditions.CONDITIONS`.
-    """
-    if condition == STATED:
-        campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **known))
-        carry_on(campaign, world.reading_mm)
-        return campaign
-    course = Course(CONDITIONS[condition], world, assessor.measurements)
-    campaign = assessor.begin(Candidates.with_equal_noise(course.stated_mm(), **known))
-    carry_on(campaign, course.reading_mm)
+def conduct(assessor: AdaptiveAssessor, world: World, **known: np.ndarray) -> Campaign:
+    """Run a campaign to its end on the readings of a world; ``known`` as in :class:`Candidates`."""
+    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **known))
+    carry_on(campaign, world.reading_mm)
     return campaign
 
 
@@ -68,38 +54,6 @@ def noisy(errors_mm: np.ndarray, noise_root: np.ndarray, visits: int, *entropy: 
     root = np.broadcast_to(noise_root, (len(errors_mm), 3, 3))
     deviates = drawn_world(np.zeros((len(errors_mm), 3)), 1.0, key_of(*entropy), max(visits, 1))
     return lambda row, visit: errors_mm[row] + root[row] @ deviates.reading_mm(row, visit)
-
-
-class Assessed(NamedTuple):
-    """What an assessor says in the end, what it took; rows read (None: it looks back); alarms."""
-
-    statements: tuple[Statement, ...]
-    measurements: int
-    points_visited: int
-    visited: list[int] | None
-    alarms: tuple[Reason, ...] = ()
-
-
-def assessed(
-    name: str,
-    settings: Mapping[str, object],
-    world: World,
-    condition: str = STATED,
-    **known: np.ndarray,
-) -> Assessed:
-    """What an assessor of the registry says of a world, whichever its interface.
-
-    ``settings``: values of which it takes those that it has. One that looks back has readings as
-    stated, whatever the ``condition``.
-    """
-    assessor = of_section(ASSESSORS[name], settings)
-    if name in ADAPTIVE:
-        campaign = conduct(assessor, world, condition, **known)
-        taken, rows = campaign.ledger.taken, campaign.ledger.visited
-        return Assessed(campaign.statements(), taken, len(rows), rows, campaign.alarms())
-    found = assessor.assess(world)
-    said = Statement(CANDIDATES, found.assessed_mm)
-    return Assessed((said,), found.measurements, found.points_visited, None)
 
 
 def truth_mm(

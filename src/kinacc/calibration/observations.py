@@ -133,6 +133,7 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
     sessions = columns.get("session", np.full(len(names), None))
     session_names = tuple(dict.fromkeys(sessions))
     session_index = {name: number for number, name in enumerate(session_names)}
+    fold = columns.get("fold", np.full(len(names), np.nan))
     payload = None
     if PAYLOAD_COLUMNS[0] in columns:
         payload = np.stack([np.asarray(columns[name], float) for name in PAYLOAD_COLUMNS], axis=1)
@@ -144,7 +145,7 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
         pose=np.asarray(columns["pose"]).astype(np.int64),
         target=np.array([index[str(name)] for name in names], dtype=np.int64),
         repeat=np.asarray(columns["repeat"]).astype(np.int64),
-        fold=np.nan_to_num(np.asarray(columns["fold"], dtype=float), nan=-1.0).astype(np.int64),
+        fold=np.nan_to_num(np.asarray(fold, dtype=float), nan=-1.0).astype(np.int64),
         target_names=target_names,
         session=np.array([session_index[name] for name in sessions], dtype=np.int64),
         session_names=session_names,

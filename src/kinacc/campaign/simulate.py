@@ -13,7 +13,7 @@ from kinacc.assess.attainable import NONE, WidthLimits, limits_of
 from kinacc.assess.simulate import carry_on, is_broken, noisy, truth_mm
 from kinacc.assess.statement import Statement
 from kinacc.errors import Problem, refuse
-from kinacc.study.tournament.fields import ErrorField
+from kinacc.study.fields import ErrorField
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.artifacts.allowed import ESTIMATES
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison
 from kinacc.campaign import words
 from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
 from kinacc.errors import Problem
 
 if TYPE_CHECKING:
-    from kinacc.checks.noise import Revisits
+    from kinacc.calibration.noise import Noise
 
 _NEAREST_M, _FARTHEST_M = 0.3, 80.0  # at which laser trackers measure
 _NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads to nothing
@@ -58,8 +55,8 @@ def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> li
 
 def of_repeats(instruments: Sequence[Instrument], calibration: Path) -> list[Problem]:
     """The same as :func:`of_little_noise` of a results folder; nothing where it has no readings."""
-    known = _read(calibration, ("measurements", "pose_errors"))
-    return of_little_noise(instruments, *known) if known else []
+    known = _noise_of(calibration)
+    return of_little_noise(instruments, known) if known else []
 
 
 def ways_to_noise(known: Sequence[str], several: bool) -> str:
@@ -83,17 +80,13 @@ def ways_to_noise(known: Sequence[str], several: bool) -> str:
 
 def noise_known(calibration: Path) -> str:
     """The same as :func:`noise_by_repeats` of a results folder."""
-    known = _read(calibration, ("measurements", "pose_errors", "frames"))
-    return noise_by_repeats(*known) if known else _TOO_FEW
+    known = _noise_of(calibration)
+    return noise_by_repeats(known) if known else _TOO_FEW
 
 
-def noise_by_repeats(measured: Columns, errors: Columns, frames: Columns) -> str:
-    """What readings at equal joints tell of the noise, and what they do not, in short lines.
-
-    ``measured``, ``errors`` and ``frames``: ``measurements``, ``pose_errors`` and ``frames`` of the
-    calibration.
-    """
-    brief = scatter_in_brief(measured, errors, frames)
+def noise_by_repeats(known: Noise) -> str:
+    """The noise of the readings of a calibration, and what it does not contain, in short lines."""
+    brief = noise_in_brief(known)
     if not brief:
         return _TOO_FEW
     return (
@@ -104,78 +97,46 @@ def noise_by_repeats(measured: Columns, errors: Columns, frames: Columns) -> str
     )
 
 
-def scatter_in_brief(measured: Columns, errors: Columns, frames: Columns) -> str:
-    """By how much readings at equal joints scatter; empty where there are too few to tell."""
-    again = scatter(measured, errors, frames)
-    if again.freedom < _USUAL_READINGS or not (again.std_mm > 0.0).all():
+def noise_in_brief(known: Noise) -> str:
+    """By how much readings of one configuration scatter; empty where there are too few."""
+    if known.freedom < _USUAL_READINGS or not (known.std_mm > 0.0).all():
         return ""
-    std_mm = ",".join(f"{each:.2g}" for each in again.std_mm)
-    where = f"{again.readings} readings at {again.configurations} configurations"
+    std_mm = ",".join(f"{each:.2g}" for each in known.std_mm)
+    where = f"{known.readings} readings at {known.configurations} configurations"
     return f"{where} scatter by {std_mm} mm"
 
 
-def _read(calibration: Path, names: Sequence[str]) -> list[Columns]:
-    """Tables of a results folder, none where one is not there."""
+def _noise_of(calibration: Path) -> Noise | None:
+    """The noise of the readings in a results folder; None where it has no readings."""
     from kinacc.artifacts import store
+    from kinacc.calibration.noise import of_measurements
+    from kinacc.kinematics import robot
 
-    paths = [calibration / f"{name}.parquet" for name in names]
-    return [store.read(path) for path in paths] if all(p.is_file() for p in paths) else []
+    paths = [calibration / f"{name}.parquet" for name in ("measurements", "robot")]
+    if not all(path.is_file() for path in paths):
+        return None
+    measured, described = map(store.read, paths)
+    arm = robot.of_text(str(described["description"][0]), "robot.parquet")
+    return of_measurements(measured, arm)
 
 
-def of_little_noise(
-    instruments: Sequence[Instrument], measured: Columns, errors: Columns
-) -> list[Problem]:
-    """Noise smaller than the scatter of readings at configurations that were read again.
-
-    ``measured`` and ``errors``: ``measurements`` and ``pose_errors`` of the calibration.
-    """
-    from kinacc.checks.noise import per_axis_mm
-
-    again = scatter(measured, errors)
-    scatter_mm = per_axis_mm(again.std_mm)
+def of_little_noise(instruments: Sequence[Instrument], known: Noise) -> list[Problem]:
+    """Noise stated smaller than that of the readings of the calibration."""
     problems = []
     for each in instruments:
         std_mm = math.sqrt(float(np.trace(each.covariance_mm2)) / 3.0)
-        if again.freedom < _USUAL_READINGS or std_mm >= _LITTLE_NOISE * scatter_mm:
+        if known.freedom < _USUAL_READINGS or std_mm >= _LITTLE_NOISE * known.per_axis_mm:
             continue
         what = (
             f"{noise(each)}: readings of the calibration at equal joints scatter by "
-            f"{scatter_mm:.3g} mm per axis ({again.freedom} degrees of freedom)"
+            f"{known.per_axis_mm:.3g} mm per axis ({known.freedom} degrees of freedom)"
         )
         fix = (
-            f"the noise has to hold how the arm repeats a pose: give {scatter_mm:.2g}, or more; "
-            "--sure takes it as it is"
+            f"the noise has to hold how the arm repeats a pose: give {known.per_axis_mm:.2g}, or "
+            "more; --sure takes it as it is"
         )
         problems.append(Problem(f"noise of {each.name}", what, fix=fix))
     return problems
-
-
-def scatter(measured: Columns, errors: Columns, frames: Columns | None = None) -> Revisits:
-    """Scatter of what the plainest model leaves of readings at one configuration.
-
-    Held-out errors where there are: readings of a configuration are held out together. Per axis of
-    the robot's base, with ``frames`` per axis of the instrument.
-    """
-    from kinacc.checks.noise import revisits
-    from kinacc.kinematics.tables import frame
-    from kinacc.measurements import folds
-
-    own = np.asarray(errors["comparison"]) == Comparison(MEASURED, PLAINEST).name
-    held_out = own & (np.asarray(errors["estimate"]) == ESTIMATES[1])
-    used = held_out if held_out.any() else own
-    row = np.asarray(errors["row"])[used].astype(int)
-    left_mm = np.stack([np.asarray(errors[f"e{axis}_mm"])[used] for axis in "xyz"], axis=1)
-    if frames is not None:
-        sessions = np.asarray(measured["session"])[row]
-        for each in {*sessions}:
-            base = frame(frames, PLAINEST, "base", each)
-            left_mm[sessions == each] = left_mm[sessions == each] @ base.rotation.T
-    session, target = (
-        np.unique(np.asarray(measured[name]).astype(str), return_inverse=True)[1].ravel()
-        for name in ("session", "target")
-    )
-    same = folds.configurations_of(measured)
-    return revisits(session[row], target[row], left_mm, same[row])
 
 
 def of_distance(begun: Plan) -> list[Problem]:

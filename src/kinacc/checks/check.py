@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinacc.calibration.noise import of_measurements
 from kinacc.checks import (
     cells,
     changes,
@@ -63,9 +64,9 @@ def check(
     first = np.unique(cell, return_index=True)[1]
     repeats = noise.repeats(every, cell)
     distances = noise.distances(every)
-    scatter = noise.per_axis_mm(repeats.std_mm) if repeats.groups else np.nan
+    scatter = of_measurements(reading.columns, robot)
     equal = doubles.earlier(every)
-    found = doubles.found(every, scatter)
+    found = doubles.found(every, scatter.per_axis_mm)
     moved, numbers = targets.found(every, distances)
     fitted, raw, global_ones = _meant(one, reading, layout, robot, first, progress)
     known = global_ones + found + moved
@@ -84,14 +85,14 @@ def check(
         known += rows.found(fitted, raw)
         known += _largest(fitted)
     known += _scattered(every, repeats)
-    known += doubles.stale(every, equal, scatter)
+    known += doubles.stale(every, equal, scatter.per_axis_mm)
     gross = _gross_lines(fitted)
-    facts = facts_of(every, robot, repeats, distances, fitted)
+    facts = facts_of(every, robot, scatter, distances, fitted)
     return Report(
         dataset,
         path,
         facts,
-        remarks_of(every, repeats, distances),
+        remarks_of(every, repeats, scatter, distances),
         tuple(
             replace(each.held_to(gross), row_names=reading.row_names)
             for each in _once(known, np.unique(every.line).size)

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.artifacts.allowed import LEFT_OUT
+from kinacc.calibration.noise import Noise
 from kinacc.checks.cells import Cells
 from kinacc.checks.fitting import Fitted
-from kinacc.checks.noise import Distance, Repeats, Revisits, per_axis_mm, revisits
+from kinacc.checks.noise import Distance, Repeats
 from kinacc.checks.suspicion import NOTE, Suspicion
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.reader import MeasuredFile
 
 _WEAK = 0.1  # of a joint's range
-_SAME_RAD = np.deg2rad(0.01)  # joints nearer than this are one configuration
 
 
 def facts_of(
     every: Cells,
     robot: Robot,
-    repeats: Repeats,
+    noise: Noise,
     distances: list[Distance],
     fitted: Fitted | None,
 ) -> dict[str, object]:
@@ -41,17 +41,13 @@ def facts_of(
             for i, name in enumerate(every.session_names)
         }
     facts["joint_coverage"] = _coverage(every, robot)
-    if repeats.groups:
-        facts["noise_from_repeats"] = {
-            "std_mm": [float(value) for value in repeats.std_mm],
-            "readings": repeats.readings,
-            "configurations_and_targets": repeats.groups,
-        }
-    if fitted is not None and (again := _revisits(fitted)).configurations:
-        facts["noise_from_revisits"] = {
-            "std_mm": [float(value) for value in again.std_mm],
-            "readings": again.readings,
-            "configurations": again.configurations,
+    if noise.freedom:
+        facts["noise"] = {
+            "std_mm": [float(value) for value in noise.std_mm],
+            "per_axis_mm": noise.per_axis_mm,
+            "readings": noise.readings,
+            "configurations": noise.configurations,
+            "degrees_of_freedom": noise.freedom,
         }
     if distances:
         facts["target_distances"] = [
@@ -72,25 +68,6 @@ def facts_of(
         if np.isfinite(fitted.trial.sigma_rad):
             facts["quick_fit"]["left_per_axis_mrad"] = 1e3 * fitted.trial.sigma_rad
     return facts
-
-
-def _revisits(fitted: Fitted) -> Revisits:
-    return revisited(fitted.seen.cells, fitted.left.position_mm, ~fitted.bad)
-
-
-def revisited(cells: Cells, left_mm: np.ndarray, used: np.ndarray) -> Revisits:
-    """Scatter at configurations that several poses came back to, turns of a joint apart.
-
-    ``left_mm`` (n, 3) is what a model leaves of the cells; only those ``used`` (n,) count.
-    """
-    from kinacc.measurements.folds import configurations
-
-    poses = np.unique(cells.pose).size
-    same = configurations(cells.pose, cells.q, _SAME_RAD) if poses > 1 else cells.pose
-    first = np.unique(np.column_stack([same, cells.pose]), axis=0)[:, 0]
-    came_back = np.isin(same, np.flatnonzero(np.bincount(first) > 1)) & used
-    session, target = cells.session[came_back], cells.target[came_back]
-    return revisits(session, target, left_mm[came_back], same[came_back])
 
 
 def _coverage(every: Cells, robot: Robot) -> list[dict[str, object]]:
@@ -138,7 +115,9 @@ def left_out(reading: MeasuredFile) -> tuple[Suspicion, ...]:
     return tuple(Suspicion(LEFT_OUT, words, (), level=NOTE) for words in told)
 
 
-def remarks_of(every: Cells, repeats: Repeats, distances: list[Distance]) -> tuple[str, ...]:
+def remarks_of(
+    every: Cells, repeats: Repeats, noise: Noise, distances: list[Distance]
+) -> tuple[str, ...]:
     """What else to know about the file, in words."""
     remarks = []
     if len(every.target_names) > 1:
@@ -152,7 +131,7 @@ def remarks_of(every: Cells, repeats: Repeats, distances: list[Distance]) -> tup
         )
     if repeats.groups and distances:
         between = float(np.median([each.std_mm for each in distances])) / np.sqrt(2.0)
-        whole = per_axis_mm(repeats.std_mm)
+        whole = noise.per_axis_mm
         if between < 0.5 * whole:
             remarks.append(
                 f"repeats scatter by {whole:.3g} mm per axis, targets against each other by only "

@@ -1,4 +1,4 @@
-"""What repeats and the distances between targets say about the instrument's noise."""
+"""Readings repeated at one pose, and the distances between targets."""
 
 from __future__ import annotations
 
@@ -11,35 +11,25 @@ from kinacc.checks.cells import Cells
 _MEDIAN_1D = 0.6744897501960817  # median of |x| of a standard normal number
 
 
-def per_axis_mm(std_mm: np.ndarray) -> float:
-    """One number for standard deviations (3,) of the axes: their rms, as for equal axes."""
-    return float(np.sqrt(np.mean(np.square(std_mm))))
-
-
 @dataclass(frozen=True)
 class Repeats:
-    """Scatter of readings taken at one configuration.
+    """Readings taken at one pose.
 
-    ``std_mm`` (3,) pooled per axis of the instrument, of ``freedom`` degrees each; ``groups``
-    configurations and targets with more than one reading, ``readings`` in them; ``deviation_mm``
-    (n, 3) of every reading from the median of the others there, NaN where it is alone; ``common``
-    correlation of the deviations of different targets, NaN for one target.
+    ``groups``: poses and targets with more than one reading; ``deviation_mm`` (n, 3) of every
+    reading from the median of the others there, NaN where it is alone; ``common``: correlation of
+    the deviations of different targets, NaN for one target.
     """
 
-    std_mm: np.ndarray
-    freedom: int
     groups: int
-    readings: int
     deviation_mm: np.ndarray
     common: float
 
 
 def repeats(cells: Cells, cell: np.ndarray) -> Repeats:
-    """Scatter within the cells (n,) of the readings, one per configuration and target."""
+    """Readings that share a cell (n,), one per pose and target."""
     deviation = np.full(cells.position_mm.shape, np.nan)
     centred = np.full(cells.position_mm.shape, np.nan)
     counts = np.bincount(cell)
-    squares, freedom = np.zeros(3), 0
     order = np.argsort(cell, kind="stable")
     ends = np.cumsum(counts)
     for number in np.flatnonzero(counts > 1):
@@ -48,15 +38,7 @@ def repeats(cells: Cells, cell: np.ndarray) -> Repeats:
         centred[rows] = points - points.mean(axis=0)
         for place, row in enumerate(rows):
             deviation[row] = points[place] - np.median(np.delete(points, place, axis=0), axis=0)
-        # Pooled by medians of pairs would waste readings; gross ones are cut at six medians.
-        length = np.linalg.norm(centred[rows], axis=1)
-        good = length <= 6.0 * max(np.median(length), 1e-12)
-        squares += np.sum((points[good] - points[good].mean(axis=0)) ** 2, axis=0)
-        freedom += int(good.sum()) - 1
-    groups = int(np.sum(counts > 1))
-    std = np.sqrt(squares / freedom) if freedom > 0 else np.full(3, np.nan)
-    readings = int(counts[counts > 1].sum())
-    return Repeats(std, freedom, groups, readings, deviation, _common(cells, centred))
+    return Repeats(int(np.sum(counts > 1)), deviation, _common(cells, centred))
 
 
 def _common(cells: Cells, centred: np.ndarray) -> float:
@@ -82,44 +64,6 @@ def _side_by_side(cells: Cells, values: np.ndarray) -> np.ndarray:
     sides = np.full((number.max() + 1, len(cells.target_names), 3), np.nan)
     sides[number, cells.target] = values
     return sides
-
-
-@dataclass(frozen=True)
-class Revisits:
-    """Scatter of what a fit leaves at configurations that were gone to more than once.
-
-    ``std_mm`` (3,) pooled per axis of the instrument, NaN where none was, of ``freedom`` degrees;
-    it holds the arm's own repeatability besides the instrument's noise.
-    """
-
-    std_mm: np.ndarray
-    configurations: int
-    readings: int
-    freedom: int
-
-
-def revisits(
-    session: np.ndarray, target: np.ndarray, left_mm: np.ndarray, same: np.ndarray
-) -> Revisits:
-    """Scatter of residuals ``left_mm`` (n, 3) of poses of one configuration ``same`` (n,).
-
-    Those of one ``session`` (n,) and ``target`` (n,) are compared, given as numbers; the fit takes
-    out what little the joints differ.
-    """
-    label = np.column_stack([same, session, target])
-    number = np.unique(label, axis=0, return_inverse=True)[1].ravel()
-    counts = np.bincount(number)
-    again = counts[number] > 1
-    if not again.any():
-        return Revisits(np.full(3, np.nan), 0, 0, 0)
-    sums = np.stack([np.bincount(number, left_mm[:, axis]) for axis in range(3)], axis=1)
-    centred = (left_mm - (sums / counts[:, None])[number])[again]
-    length = np.linalg.norm(centred, axis=1)
-    good = length <= 6.0 * max(np.median(length), 1e-12)
-    used = number[again][good]
-    freedom = len(used) - np.unique(used).size
-    std = np.sqrt(np.sum(centred[good] ** 2, axis=0) / max(freedom, 1))
-    return Revisits(std, int(np.unique(same[again]).size), int(again.sum()), freedom)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.calibration.noise import means, scatter
+
 # Levels at which axes, and poses, are taken to differ. Axes that are wrongly averaged make bounds
 # too small along one: at this level 5 % become 6.0 at worst of 40 degrees of freedom, 6.5 of 20.
 EQUAL, UNEQUAL = 0.2, 0.01
@@ -104,7 +106,7 @@ class Group:
 
 def visits_of(read: Repeated) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean (v, 3) of every visit, its number of readings (v,) and its side (v,)."""
-    mean, count = _means(read.position_mm, read.visit)
+    mean, count = means(read.position_mm, read.visit)
     return mean, count, _of_group(read.visit, read.side)
 
 
@@ -113,14 +115,14 @@ def parts(read: Repeated) -> Parts:
     within = _within(read.position_mm, read.visit)
     visit_mm, readings, side_of = visits_of(read)
     between = _within(visit_mm, side_of)
-    side_mm, visits = _means(visit_mm, side_of)
+    side_mm, visits = means(visit_mm, side_of)
     pose_of = _of_group(read.side, read.pose)
     across = _within(side_mm, pose_of)
     # What part of the variance of a level below is in the mean square of each level.
     per_visit = 1.0 / readings
     of_visit = _average(per_visit, side_of, between.freedom)
     of_side = _average(1.0 / visits, pose_of, across.freedom)
-    deeper = _means(per_visit[:, None], side_of)[0][:, 0] / visits
+    deeper = means(per_visit[:, None], side_of)[0][:, 0] / visits
     of_side_below = _average(deeper, pose_of, across.freedom)
     unknown = np.full((3, 3), np.nan)
     seen, returned = within.freedom > 0, between.freedom > 0
@@ -198,7 +200,7 @@ def differ_by_pose(read: Repeated, resolution_mm: np.ndarray) -> tuple[float, np
         return math.nan, np.full(read.pose.max() + 1, np.nan)
     floor = np.diag(resolution_mm**2 / 12.0) + 1e-24 * np.eye(3)
     root = np.linalg.cholesky(pooled.mean_square_mm2 + floor)
-    mean, count = _means(values, group)
+    mean, count = means(values, group)
     white = np.linalg.solve(root, (values - mean[group]).T).T
     square = np.bincount(pose_of[group], np.sum(white**2, axis=1))
     freedom = 3.0 * np.bincount(pose_of, count - 1)
@@ -240,7 +242,7 @@ def pooled_rp(read: Repeated) -> tuple[float, float]:
     The standard deviation is pooled. NaN without a pose that was visited thrice from one side.
     """
     visit_mm, _, side_of = visits_of(read)
-    mean, count = _means(visit_mm, side_of)
+    mean, count = means(visit_mm, side_of)
     many = count[side_of] >= _FEWEST_VISITS
     length, own = np.linalg.norm(visit_mm - mean[side_of], axis=1)[many], side_of[many]
     if not len(own):
@@ -253,7 +255,7 @@ def pooled_rp(read: Repeated) -> tuple[float, float]:
 def between_sides_mm(read: Repeated) -> float:
     """ISO 9283's vAP: largest distance of a pose's middle from one side to that from another."""
     visit_mm, _, side_of = visits_of(read)
-    side_mm, pose_of = _means(visit_mm, side_of)[0], _of_group(read.side, read.pose)
+    side_mm, pose_of = means(visit_mm, side_of)[0], _of_group(read.side, read.pose)
     apart = [
         np.linalg.norm(side_mm[one] - side_mm[other])
         for one in range(len(side_mm))
@@ -294,23 +296,14 @@ def _of_group(group: np.ndarray, larger: np.ndarray) -> np.ndarray:
     return found
 
 
-def _means(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (g, k) of values (n, k) in every group, and how many there are (g,)."""
-    count = np.bincount(group)
-    sums = [np.bincount(group, column) for column in values.T]
-    return np.stack(sums, axis=1) / count[:, None], count
-
-
 def _within(values: np.ndarray, group: np.ndarray) -> Scatter:
     """Scatter of values (n, k) about the means of their groups."""
-    mean, count = _means(values, group)
-    centred, freedom = values - mean[group], int(np.sum(count - 1))
-    return Scatter(centred.T @ centred / max(freedom, 1), freedom)
+    return Scatter(*scatter(values, group))
 
 
 def _average(part: np.ndarray, group: np.ndarray, freedom: int) -> float:
     """Mean of what each member (n,) of a group brings to the mean square of ``_within``."""
-    _, count = _means(part[:, None], group)
+    _, count = means(part[:, None], group)
     return float(np.sum(part * (1.0 - 1.0 / count[group])) / max(freedom, 1))
 
 

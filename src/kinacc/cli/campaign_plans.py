@@ -20,8 +20,8 @@ from kinacc.cli.sheet import Field, Sheet
 from kinacc.deployment.record import default_point
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.table import numbers
-from kinacc.study.tournament import fields
-from kinacc.study.tournament.fields import ErrorField
+from kinacc.study import fields
+from kinacc.study.fields import ErrorField
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

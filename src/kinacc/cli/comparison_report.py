@@ -14,6 +14,7 @@ from kinacc.cli.sheet import Field, Sheet
 from kinacc.deployment import shared_readings
 from kinacc.deployment.compare import Difference, require_alike
 from kinacc.deployment.compare_words import remarks, short_names, shown_in, verdict
+from kinacc.deployment.folder import misfit_of
 from kinacc.deployment.record import Calibration, nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
 from kinacc.errors import InputError, Problem
@@ -26,7 +27,8 @@ def source(place: str, model: str, robot: str | None, config: tuple[str, ...]) -
     """A calibration from a results folder or a robot file."""
     path = Path(place)
     if path.is_dir():
-        return replace(choice.calibration_of(path, model, robot, config), name=place)
+        found = choice.calibration_of(path, model, robot, config)
+        return replace(found, name=place, misfit=misfit_of(path, found.choice))
     if path.is_file() or place in robots.shipped():
         return replace(nominal(robots.load(place), place), choice="dh")
     raise InputError(Problem(place, "is not there", "a results folder, a robot file"))
@@ -95,6 +97,9 @@ def answer(found: Difference, calibrations: Sequence[Calibration], measured: np.
         "statistic": found.statistic,
         "directions": found.directions,
         "probability": found.probability,
+        "standard_deviations": [
+            None if each.misfit is None else each.misfit.as_facts() for each in calibrations
+        ],
     }
     for name, shift in (("", found.as_they_stand), ("_apart_from_frames", found.apart_from_frames)):
         facts |= {

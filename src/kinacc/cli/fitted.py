@@ -65,7 +65,9 @@ def read(folder: Path | str, whole: bool = True) -> dict[str, dict]:
 def summary(folder: Path | str) -> dict:
     """The answer as plain values: errors in mm by model and subset, selection, statements, rows."""
     from kinacc.calibration import blind_words
+    from kinacc.calibration.misfit import misfits
     from kinacc.calibration.summary import bending, findings, left_out, of, selected
+    from kinacc.deployment.folder import recorded_robot
     from kinacc.measurements.row_names import RowNames
     from kinacc.workflow.answer import campaign_of, facts_of
 
@@ -108,6 +110,9 @@ def summary(folder: Path | str) -> dict:
         },
         "gains_mm2": _gains(choice),
         "bending": bending(tables.get("compliance_model")),
+        "standard_deviations": {
+            each.model: each.as_facts() for each in misfits(tables, recorded_robot(folder))
+        },
         "largest_error": None if bound is None else bound.as_facts(),
     }
 

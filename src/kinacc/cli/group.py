@@ -17,6 +17,7 @@ import click
 
 from kinacc import __version__
 from kinacc.cli.exit_codes import AGAINST, NOBODY_READS, STOPPED, TERMINATED, UNUSABLE
+from kinacc.cli.removed import REMOVED_COMMANDS
 from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
 from kinacc.workflow.start import ONE_THREAD
 
@@ -96,6 +97,8 @@ class InOrder(click.Group):
         word = args[0]
         if word in self.commands or word.startswith("-"):
             return super().resolve_command(context, args)
+        if word in REMOVED_COMMANDS:
+            raise click.UsageError(f"{word} is gone: {REMOVED_COMMANDS[word]}", context)
         names = self.list_commands(context)
         meant = _MEANT.get(word.lower(), "")
         if meant.partition(" ")[0] not in names:
@@ -247,7 +250,6 @@ SECTIONS = {
         "study": "everything beside: maps, the assessors under noise, claims",
         "show": "any table of results in the terminal, or as CSV",
         "check-results": "hold a results folder to its contract",
-        "draw-robots": "search synthetic arms like the paper's",
     },
     "A calibrated arm": {
         "fitted": "what the fits are worth, and what the poses leave open",
@@ -263,7 +265,6 @@ SECTIONS = {
         "repeatability": "poses read again and again: what noise a reading has",
         "plan-campaign": "how many readings a wanted bound takes",
         "campaign": "measure: what next, what was read, what may be said",
-        "tournament": "hold all assessors to errors that are known",
     },
 }
 

@@ -26,7 +26,8 @@ def predict(
     q1_deg or q1_rad and so on (q1_mm where a joint slides), or any file that `kinacc init` reads.
 
     \b
-    std_*           standard deviation by the covariance of the fitted parameters
+    std_*           standard deviation by the covariance of the fitted parameters, valid given the
+                    model
     unexplained_*   rms of what the model left of held-out measurements: add it in mind
     undetermined_*  movement per mm or mrad along what the calibration could not see, the same by
                     every model

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.assess.noise_factor import ENOUGH, FEWEST
+from kinacc.calibration.noise import per_axis_mm
 from kinacc.campaign.known_noise import FORMAT
 from kinacc.checks import repeatability as checks
-from kinacc.checks.noise import per_axis_mm
 from kinacc.checks.repeatability import Group, Noise, Parts
 from kinacc.cli.repeated_rows import Rows
 from kinacc.cli.sheet import Field, Sheet

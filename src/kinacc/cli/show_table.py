@@ -14,10 +14,13 @@ import numpy as np
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import SLIDES, Artefact, joint_count, texts
 from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.artifacts.error_models import ERROR_MODELS
+from kinacc.calibration.misfit import in_words
 from kinacc.cli.output import plain
 from kinacc.cli.screen import decimals_of, number
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.config.values import nearest
+from kinacc.deployment.folder import misfit_of
 from kinacc.errors import InputError, Problem, first_few, refuse
 
 if TYPE_CHECKING:
@@ -71,6 +74,11 @@ def read(path: Path) -> Shown:
     metadata = {key.decode(errors="replace"): value.decode(errors="replace")
                 for key, value in (schema.metadata or {}).items()}  # fmt: skip
     facts = {"table": str(path), "meaning": artefact.meaning if artefact else None}
+    model = artefact.name.partition("_")[0] if artefact else ""
+    if model in ERROR_MODELS and any(each.startswith("std") for each in schema.names):
+        known = misfit_of(path.parent, model)
+        facts["standard_deviations"] = known.as_facts()
+        remarks = (f"Standard deviations are {in_words([known])}.",)
     count = len(next(iter(columns.values()), ()))
     title = f"{path}: {_counted(count, 'row')}, {_counted(len(fields), 'column')}"
     return Shown(path, artefact, Sheet(title, facts, fields, with_units=True), metadata, remarks)

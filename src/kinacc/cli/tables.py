@@ -62,7 +62,7 @@ def predicted(
 ) -> Sheet:
     """The sheet of ``kinacc predict``; ``measured`` (n,): where the calibration was measured."""
     std = found.std * np.array([1.0, 1.0, 1.0, _MRAD, _MRAD, _MRAD])
-    by = "standard deviation by the covariance of the fitted parameters"
+    by = "standard deviation by the covariance of the fitted parameters, valid given the model"
     seen = "movement per mm or mrad of displacement along directions the calibration cannot see"
     poses = calibration.residual.poses if calibration.residual else "no poses"
     left = f"rms of what the model left of {poses}"

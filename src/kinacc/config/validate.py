@@ -10,6 +10,7 @@ from typing import Any
 
 from kinacc.config.names import LONGEST
 from kinacc.config.reading import KeyPath
+from kinacc.config.removed import REMOVED_KEYS
 from kinacc.config.schema import DATASET_NAME, Key, Section, defaults, settings
 from kinacc.config.values import INVALID, Place, check, nearest, shown, unknown_key
 from kinacc.errors import Problem, first_few
@@ -44,7 +45,9 @@ def check_section(
         return {}, [Problem(place(path), what, ", ".join(section.names))]
     for name, value in content.items():
         here, entry = (*path, name), section.entry(name)
-        if entry is None:
+        if entry is None and name in REMOVED_KEYS:
+            problems.append(Problem(place(here), f"{name} is gone", fix=REMOVED_KEYS[name]))
+        elif entry is None:
             what, fix = unknown_key(name, section, settings())
             problems.append(Problem(place(here), what, ", ".join(section.names), fix))
         elif isinstance(entry, Section):
@@ -65,9 +68,6 @@ def check_dataset_name(name: Any, place: Place) -> list[Problem]:
     if not isinstance(name, str):
         fix = "put the name in quotes"
         return [Problem(where, f"the data set's name {shown(name)} is not text", allowed, fix)]
-    if name == "tournament":
-        what = "'tournament' is the folder of the tournament of all data sets"
-        return [Problem(where, what, f"another name of {allowed}")]
     if not re.fullmatch(DATASET_NAME, name) or len(name) > LONGEST:
         return [Problem(where, f"{shown(name)} cannot be the name of a data set", allowed)]
     return []

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts.error_models import model_name
+from kinacc.calibration.misfit import GIVEN, over_noise
 from kinacc.calibration.uncertainty import unit_of
 from kinacc.deployment.compare import Difference, Parameters, Shift
 from kinacc.deployment.record import Calibration
@@ -51,10 +52,19 @@ def in_words(found: Difference, calibrations: Sequence[Calibration], measured: n
         )
         if has_changed(found) and is_in_doubt(measured):
             lines.append(f"{AGAIN}, before anything is changed at the robot")
+    lines += of_deviations(calibrations)
     words = "flange poses differ" if found.shared.all_of_both else "flange poses moved"
     lines.append(moved(words, found.as_they_stand))
     lines.append(moved("after the best base and tool", found.apart_from_frames))
     return "\n".join(lines)
+
+
+def of_deviations(calibrations: Sequence[Calibration]) -> list[str]:
+    """What the standard deviations of both are worth, where both were fitted."""
+    names = short_names(calibrations)
+    pairs = zip(names, (each.misfit for each in calibrations), strict=True)
+    fits = [f"{name}: {over_noise([each])}" for name, each in pairs if each is not None]
+    return [f"standard deviations are {GIVEN}; {'; '.join(fits)}"] if fits else []
 
 
 def verdict(

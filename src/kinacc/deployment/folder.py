@@ -11,6 +11,8 @@ from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.columns import joint_count
 from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.calibration import blind_words
+from kinacc.calibration.misfit import Misfit, misfit
+from kinacc.calibration.noise import UNKNOWN
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.record import MODELS, Calibration, Residual
@@ -101,6 +103,19 @@ def recorded_robot(folder: Path | str) -> Robot | None:
     if not path.is_file():
         return None
     return robot.of_text(str(_Table.of("robot", path)["description"][0]), str(path))
+
+
+def misfit_of(folder: Path | str, model: str) -> Misfit:
+    """What the standard deviations of a model in a results folder are worth."""
+    from kinacc.artifacts import store
+
+    robot = recorded_robot(folder)
+    if robot is None:
+        return Misfit(model, np.nan, UNKNOWN)
+    paths = {name: Path(folder) / f"{name}.parquet" for name in ("measurements", "model_selection")}
+    return misfit(
+        {name: store.read(at) for name, at in paths.items() if at.is_file()}, robot, model
+    )
 
 
 def calibration(

@@ -10,6 +10,7 @@ import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
+from kinacc.calibration.misfit import Misfit
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
@@ -60,7 +61,8 @@ class Calibration:
     ``left_open`` says in sentences what that is; None where nobody asked.
     ``orientation_measured`` are the targets with a measured orientation; the others, and without
     any the flange too, have the orientation that the robot file states. ``outdated`` is why the
-    calibration is not that of the files and settings there now; empty where it is.
+    calibration is not that of the files and settings there now; empty where it is. ``misfit``: what
+    the standard deviations of ``known`` are worth; None where nothing was fitted, or nobody asked.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Calibration:
     left_open: tuple[str, ...] | None = None
     orientation_measured: frozenset[str] = frozenset()
     outdated: str = ""
+    misfit: Misfit | None = None
 
     def orientation_source(self, point: str | None = None) -> str:
         """``measured`` or ``stated`` (by the robot file), of a target by name or the flange."""

@@ -16,6 +16,7 @@ from kinacc.deployment.compare_words import (
     number,
     of_both,
     of_covered,
+    of_deviations,
     of_readings,
     says_nothing,
     short_names,
@@ -158,7 +159,11 @@ def _notes(
     each = case.found.parameters
     notes = {
         "CHECK": check,
-        "PARAMETERS": _largest(each) if each is not None and case.found.same_robot else [],
+        "PARAMETERS": (
+            _largest(each) + of_deviations(calibrations)
+            if each is not None and case.found.same_robot
+            else []
+        ),
         "VALID": [
             "for these poses of the flange in the robot's base, as the models have them; nothing "
             "was measured for this page"

@@ -10,11 +10,9 @@ from bokeh.transform import log_cmap
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import MEASURED, Comparison, model_name
-from kinacc.calibration import summary
+from kinacc.artifacts.error_models import model_name
+from kinacc.calibration import noise, summary
 from kinacc.calibration.summary_words import counted
-from kinacc.checks import cells, noise
-from kinacc.checks.facts import revisited
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report import pictures
@@ -114,8 +112,7 @@ def _measured(tables: Mapping[str, Columns], robot: Robot) -> Table:
     count = len(measurements["pose"])
     fitted = int(np.sum(np.asarray(measurements["subset"]) == SUBSETS[0]))
     rest = f"{fitted} of {count}; {count - fitted} held out (measurements.validation_fold)"
-    every = cells.of_columns(measurements, robot.dh.joints, RowNames.of_columns(measurements))
-    sessions = len(every.session_names) > 1
+    sessions = len({*_texts(measurements["session"])}) > 1
     rows = (
         ("robot", f"{robot.name}: {robot.source}" if robot.source else robot.name),
         ("readings", str(count)),
@@ -124,8 +121,7 @@ def _measured(tables: Mapping[str, Columns], robot: Robot) -> Table:
         ("sessions", _named(measurements["session"]) if sessions else ""),
         ("orientation", _turned(measurements)),
         ("fitted by the delivered models", "all" if fitted == count else rest),
-        ("noise from repeats", _repeats(every)),
-        ("noise from revisits", _revisits(tables, every)),
+        ("noise of a reading", _noise(measurements, robot)),
         ("noise as the file states it", _stated(measurements)),
     )
     return Table("What was measured", ("property", "value"), tuple(row for row in rows if row[1]))
@@ -149,43 +145,17 @@ def _turned(measurements: Columns) -> str:
     return "not measured: how the tool is turned is judged nowhere on this page"
 
 
-def _repeats(every: cells.Cells) -> str:
-    """Noise that readings of one pose and target show, in words."""
-    found = noise.repeats(every, cells.merged(every)[1])
+def _noise(measurements: Columns, robot: Robot) -> str:
+    """The noise of one reading, in words."""
+    found = noise.of_measurements(measurements, robot)
     if not found.freedom:
-        return "unknown: no target was read twice at a pose"
+        return "unknown: no configuration was read twice"
     axes = ", ".join(f"{axis} {each:.2g}" for axis, each in zip("xyz", found.std_mm, strict=True))
-    groups = "one pose" if found.groups == 1 else f"{found.groups} poses (each target by itself)"
     return (
-        f"standard deviation {axes} mm, pooled over {groups} with {found.readings} readings "
-        f"({_degrees(found.freedom)}); it holds the instrument, and what arm and set-up move "
-        "meanwhile"
-    )
-
-
-def _revisits(tables: Mapping[str, Columns], every: cells.Cells) -> str:
-    """Noise at configurations the arm came back to, in words; empty where it never did.
-
-    The selected model takes out what little the joints differ; poses of one configuration are held
-    out together, so that the same fit speaks of all of them.
-    """
-    table = tables["pose_errors"]
-    model = summary.selected(tables["model_selection"])
-    mine = np.asarray(table["comparison"]) == Comparison(MEASURED, model).name
-    held_out = mine & (np.asarray(table["estimate"]) == "cross_validated")
-    rows = np.flatnonzero(held_out if held_out.any() else mine)
-    left = np.full((len(every), 3), np.nan)
-    left[np.asarray(table["row"])[rows]] = np.stack(
-        [np.asarray(table[f"e{axis}_mm"], dtype=float)[rows] for axis in "xyz"], axis=1
-    )
-    found = revisited(every, left, np.isfinite(left[:, 0]))
-    if not found.freedom:
-        return ""
-    return (
-        f"standard deviation {noise.per_axis_mm(found.std_mm):.2g} mm per axis, pooled over "
-        f"{counted(found.configurations, 'configuration')} the arm came back to, with "
-        f"{found.readings} readings ({_degrees(found.freedom)}); it holds the arm's repeatability "
-        "besides"
+        f"standard deviation {axes} mm (axes of the instrument), pooled over "
+        f"{counted(found.configurations, 'configuration')} with {found.readings} readings "
+        f"({_degrees(found.freedom)}); contains how well the arm repeats a configuration where it "
+        "came back to one"
     )
 
 

@@ -13,6 +13,7 @@ from kinacc.calibration import blind_words, summary
 from kinacc.calibration.blind_groups import of_arm
 from kinacc.calibration.blind_words import parameter_name, short_name
 from kinacc.calibration.identified import FIXED, IDENTIFIED, PRIOR, UNDETERMINED
+from kinacc.calibration.misfit import Misfit, in_words, misfit
 from kinacc.calibration.summary_words import counted
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.kinematics.robot import Robot
@@ -52,7 +53,7 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
             *_open(told, tables["measurements"], robot),
             *_rank(tables.get("dh_fit")),
             *((_heat_map(pairs), pairs.closest()) if len(pairs.names) > 1 else ()),
-            _every(told),
+            _every(told, misfit(tables, robot, "dh")),
         ),
     )
 
@@ -204,7 +205,7 @@ def _cells(pairs: _Pairs, short: list[str]) -> ColumnDataSource:
     return pictures.source("correlations", columns)
 
 
-def _every(told: Columns) -> Table:
+def _every(told: Columns, fits: Misfit) -> Table:
     rows = []
     for name, status, std, why in zip(
         *(told[each] for each in ("parameter", "status", "std", "statement")), strict=True
@@ -213,4 +214,5 @@ def _every(told: Columns) -> Table:
         known = f"{scale * std:.3g} {unit}" if np.isfinite(std) else _NONE
         rows.append((parameter_name(str(name)), str(status), known, str(why or _NONE)))
     heads = ("parameter", "status", "standard deviation", "why it is not identified")
-    return Table("Status of every parameter", heads, tuple(rows), frozenset({2}), folded=True)
+    caption = f"Status of every parameter; standard deviations are {in_words([fits])}"
+    return Table(caption, heads, tuple(rows), frozenset({2}), folded=True)

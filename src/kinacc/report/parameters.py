@@ -14,6 +14,7 @@ from kinacc.artifacts.error_models import model_name
 from kinacc.calibration import summary
 from kinacc.calibration.blind_words import parameter_name, short_name
 from kinacc.calibration.identified import FIXED, IDENTIFIED, PRIOR, UNDETERMINED
+from kinacc.calibration.misfit import Misfit, in_words, misfit, misfits
 from kinacc.calibration.summary_words import counted
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.deployment.folder import uncertainty
@@ -53,14 +54,15 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
         "each value may be off; then what the VEC model adds that no DH table can say.",
         "Good: bars shorter than their distance from zero; tenths of a mm, a few mrad, as making "
         "explains. Bad: many mm or degrees (a wrong robot file, unit or zero); curves "
-        "that rise at an end, where few poses hold them. Where a model leaves errors that "
-        "neighbouring poses share, bars and bands are too short.",
+        "that rise at an end, where few poses hold them. Standard deviations, bars and bands are "
+        f"{in_words(misfits(tables, robot))}. Where a model leaves errors that neighbouring poses "
+        "share, they are too short.",
         "Check large differences against the robot file first. More poses, spread further, "
         "shorten the bars. Load values only as a set (kinacc export): single ones make up for "
         "each other.",
         (
             *(_differences(found, unit) for unit in ("mm", "mrad")),
-            _table(found),
+            _table(found, misfit(tables, robot, "dh")),
             *_bending(tables.get("compliance_model")),
             *(curves.picture(kind) for kind in _KINDS),
             curves.largest(),
@@ -184,7 +186,7 @@ def _differences(found: Sequence[Parameter], unit: str) -> Picture:
     return Picture(f"differences-{what}", plot, words, caption, details=details)
 
 
-def _table(found: Sequence[Parameter]) -> Table:
+def _table(found: Sequence[Parameter], fits: Misfit) -> Table:
     rows = tuple(
         (
             parameter_name(each.name),
@@ -196,7 +198,7 @@ def _table(found: Sequence[Parameter]) -> Table:
         for each in found
     )
     heads = ("parameter", "nominal", "calibrated", "difference", "standard deviation", "status")
-    caption = "DH parameters, nominal and calibrated"
+    caption = f"DH parameters, nominal and calibrated; standard deviations are {in_words([fits])}"
     return Table(caption, heads, rows, frozenset({1, 2, 3, 4}), folded=True)
 
 

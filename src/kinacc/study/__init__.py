@@ -1,1 +1,1 @@
-"""The study of the paper: points, maps, simulations, histories, claims; and the tournament."""
+"""The study of the paper: points, maps, simulations, histories, claims."""

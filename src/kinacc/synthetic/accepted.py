@@ -54,7 +54,7 @@ def accepted_draw(number: int) -> AcceptedDraw:
                 "measurements.synthetic.draw",
                 f"there is no accepted draw {number}",
                 f"0 to {len(table) - 1}",
-                "kinacc draw-robots searches for more",
+                "the rule arms of research/Snakefile searches for more",
             )
         )
     row = table[number]
@@ -78,7 +78,7 @@ def further_draws(own: int, count: int) -> list[int]:
                 "robustness.draws",
                 f"{count} further draws are wanted",
                 f"at most {len(others)}",
-                "kinacc draw-robots searches for more",
+                "the rule arms of research/Snakefile searches for more",
             )
         )
     return others[:count]

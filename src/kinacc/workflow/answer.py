@@ -12,7 +12,7 @@ import numpy as np
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
-from kinacc.calibration import summary
+from kinacc.calibration import misfit, noise, summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
 from kinacc.campaign import journal, of_calibration, slips
@@ -25,6 +25,7 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
+from kinacc.kinematics.robot import Robot
 from kinacc.study.summary import claims_counted, claims_that_differ, differences
 
 IF_THERE = (
@@ -69,7 +70,7 @@ def read(
 
 def facts_of(tables: Tables) -> list[Fact]:
     """The facts of ``summary`` from the tables of a results folder."""
-    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    arm = _robot(tables)
     known = tables.get("summary", {"topic": [], "value": []})
     share = np.asarray(known["value"])[np.asarray(known["topic"]) == "like_measured"]
     found = summary.facts(tables, arm, float(share[0]) if len(share) else np.nan)
@@ -107,13 +108,13 @@ def told(
     ``campaign`` and ``exported`` are names for folders that the commands would make.
     """
     facts, arm = facts_of(tables), _arm(tables)
-    noise = _noise(facts, tables)
+    asked = _noise(facts, tables, arm.robot)
     commands = [] if bound.assessed is None else [bound.assessed.next_command]
     return Told(
         facts,
         _claims(folder, facts, tables),
         _other_errors(facts, tables, whole),
-        _bound(bound, folder, arm, noise, campaign),
+        _bound(bound, folder, arm, asked, campaign),
         [*commands, *_uses(folder, arm, tables, exported)],
     )
 
@@ -131,11 +132,13 @@ def answer(
     more = shlex.join(["kinacc", "fitted", str(folder), "--all"])
     own = 0 if bound.assessed is None else 1  # a campaign's next command goes first
     commands = [*found.following[:own], *following, *found.following[own:]]
+    fits = misfit.misfits(tables, _robot(tables))
     claims = [line for each in found.claims.items() for line in paragraph(*each)]
     return [
         *([f"{name}: the paper reproduced", *claims, ""] if claims else []),
         f"{name}: what its calibration is worth",
         *half_page(found.facts, more, whole),
+        *paragraph("std deviations", [misfit.in_words(fits)]),
         *paragraph("other errors", found.other),
         *paragraph("largest error", found.largest),
         *paragraph("history", [sentence(tables["history"])] if "history" in tables else []),
@@ -169,17 +172,19 @@ def _is_synthetic(facts: Sequence[Fact]) -> bool:
 
 def _arm(tables: Tables) -> Calibration:
     """The calibration that the commands of campaigns and poses would use."""
-    known = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    return results.calibration(tables, known)
+    return results.calibration(tables, _robot(tables))
 
 
-def _noise(facts: Sequence[Fact], tables: Tables) -> str:
+def _robot(tables: Tables) -> Robot:
+    return robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+
+
+def _noise(facts: Sequence[Fact], tables: Tables, arm: Robot) -> str:
     """What a campaign has to be told of the noise, and what the readings tell of it."""
     asked = "NOISE: standard deviation of one reading, mm"
     if _is_synthetic(facts):
         return asked
-    known = (tables[name] for name in ("measurements", "pose_errors", "frames"))
-    least = slips.scatter_in_brief(*known)
+    least = slips.noise_in_brief(noise.of_measurements(tables["measurements"], arm))
     return f"{asked}, at least this: {least}" if least else "NOISE: std of ten visits to a pose, mm"
 
 

@@ -56,7 +56,6 @@ def contradictions(
         yield from _synthetic(robot, full["calibration"], place)
     yield from _space(full, place)
     yield from _study(full, place)
-    yield from _choices(full["choices"]["names"], place)
     if robot is not None:
         yield from _arm(robot, full, place, folder)
 
@@ -118,16 +117,6 @@ def _study(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:
             f"{histories['eta_ratio_larger']:g} is not larger than eta_ratio_rejected",
             f"above {histories['eta_ratio_rejected']:g}",
         )
-
-
-def _choices(names: Sequence[str], place: Place) -> Iterator[Problem]:
-    from kinacc.study.choices.open_choices import OPEN
-
-    known = [choice.name for choice in OPEN]
-    for name in names:
-        if name not in known:
-            what = f"{name}: there is no such choice"
-            yield Problem(place("choices", "names"), what, ", ".join(known))
 
 
 def _work(full: Mapping[str, Any], place: Place) -> Iterator[Problem]:

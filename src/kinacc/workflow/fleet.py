@@ -138,7 +138,7 @@ def _against(campaigns: Sought) -> list[str]:
 def data_sets(folders: Iterable[Path]) -> list[Path]:
     """Results folders of data sets among the ``folders`` and in them, in the order of their names.
 
-    Campaigns and the tournament are none. Raises InputError for each folder that holds nothing.
+    Campaigns are none. Raises InputError for each folder that holds nothing.
     """
     found: dict[Path, None] = {}
     problems = []

@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from kinacc.calibration.misfit import Misfit
+from kinacc.calibration.noise import UNKNOWN
 from kinacc.cli.group import main
 from kinacc.deployment.export import description, tables
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.geometry import Pose, compose, exp_so3, rotation_from_quaternion, rotation_x, rotation_z
 from kinacc.kinematics import dh, robot
 from kinacc.kinematics.model import JointState
+
+FITS = Misfit("dh", 0.1, UNKNOWN)
 
 
 def bent(name, seed=0):
@@ -75,8 +79,8 @@ def test_json_and_csv_say_the_same_of_every_joint():
     arm = replace(bent("ur10"), left_open=said)
     std = np.abs(np.random.default_rng(2).normal(0.0, 1e-3, (6, 5)))
     std[0, 1] = np.nan
-    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {"seed": "1"}))
-    rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh))))
+    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {"seed": "1"}, FITS))
+    rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh, FITS))))
     assert content["provenance"] == {"seed": "1"}
     assert content["undetermined"] == list(said)
     assert content["joints"][0]["std_d_mm"] is None
@@ -181,8 +185,8 @@ dh:
 """
     arm = replace(nominal(robot.of_text(text, "down.yaml")), choice="dh")
     std = np.full((4, 5), np.nan)
-    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {}))
-    rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh))))
+    content = json.loads(description.robot_json(arm, std, arm.robot.dh, {}, FITS))
+    rows = list(csv.DictReader(io.StringIO(description.robot_csv(arm, std, arm.robot.dh, FITS))))
     assert [row["type"] for row in rows] == [joint["type"] for joint in content["joints"]]
     q = np.array([0.3, -0.7, 120.0, 0.2])
     frame = content["first_dh_frame_in_base"]

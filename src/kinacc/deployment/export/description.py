@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinacc.calibration.misfit import Misfit, in_words
 from kinacc.config.names import csv_text, in_csv
 from kinacc.deployment.record import STATED, TOOL, Calibration
 from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
@@ -71,11 +72,13 @@ def robot_json(
     std: np.ndarray,
     nominal: DHModel,
     provenance: Mapping[str, str],
+    fits: Misfit,
     table: Mapping[str, np.ndarray] | None = None,
 ) -> str:
     """Everything the calibration says of the arm: parameters, deviations, frames, residuals.
 
-    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined. ``table``: the columns of a model
+    ``std`` (k, 5) as ``dh.PARAMETERS``, NaN where undetermined; ``fits``: what they are worth.
+    ``table``: the columns of a model
     that says more than DH parameters, which then are those of the arm its errors act on.
     """
     dh = calibration.model.dh
@@ -115,6 +118,7 @@ def robot_json(
             "position_rms_mm": _number(left.position_mm),
             "orientation_rms_mrad": _number(1e3 * left.orientation_rad),
         },
+        "standard_deviations": fits.as_facts(),
         "undetermined": calibration.left_open,
         "provenance": dict(provenance),
     }
@@ -124,15 +128,18 @@ def robot_json(
     return json.dumps(content, indent=1) + "\n"
 
 
-def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> str:
+def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel, fits: Misfit) -> str:
     """One row per joint: fitted values, their standard deviations and the nominal values.
 
-    Last what the poses leave open of the joint; of base and tool in the row of the last one.
+    Then what the poses leave open of the joint, of base and tool in the row of the last one, and
+    what the standard deviations are worth.
     """
     dh = _dh_of(calibration)
     names = [name.replace("_rad", "_deg") for name in PARAMETERS]
     stds, nominals = ([f"{which}_{name}" for name in names] for which in ("std", "nominal"))
-    rows: list[list[object]] = [["joint", "type", *names, *stds, *nominals, "undetermined"]]
+    rows: list[list[object]] = [
+        ["joint", "type", *names, *stds, *nominals, "undetermined", "std_note"]
+    ]
     factor = np.array([180.0 / np.pi if name.endswith("_rad") else 1.0 for name in PARAMETERS])
     fitted, given = (
         np.stack([getattr(model, name) for name in PARAMETERS], axis=1) * factor
@@ -145,7 +152,7 @@ def robot_csv(calibration: Calibration, std: np.ndarray, nominal: DHModel) -> st
         told = _of_joint(calibration, joint)
         told += orientation_lines(calibration) if joint + 1 == dh.joints else []
         left_open = in_csv("; ".join(told))
-        rows.append([joint + 1, kind, *numbers, left_open])
+        rows.append([joint + 1, kind, *numbers, left_open, in_csv(in_words([fits]))])
     return csv_text(rows)
 
 

@@ -12,6 +12,7 @@ from kinacc.artifacts.atomic import replacing
 from kinacc.artifacts.error_models import PLAINEST, model_name
 from kinacc.calibration import blind_words
 from kinacc.calibration.identified import FIXED
+from kinacc.calibration.misfit import misfit
 from kinacc.config import names
 from kinacc.deployment import folder as results
 from kinacc.deployment.export import description, tables, urdf
@@ -60,6 +61,7 @@ def contents(
             if each not in CARRY_ALL
         ]
         refuse(problems, "Nothing was written")
+    fits = misfit(found, robot, model)
     std = _deviations(found[f"{model}_model"], arm.model.joints)
     made = {}
     for each in dict.fromkeys(formats):
@@ -69,9 +71,9 @@ def contents(
             known = store.read_metadata(Path(folder) / f"{model}_model.parquet")
             marks = {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
             own = None if arm.model.table is not None else found[f"{model}_model"]
-            text = description.robot_json(arm, std, robot.dh, marks, own)
+            text = description.robot_json(arm, std, robot.dh, marks, fits, own)
         elif each == "csv":
-            text = description.robot_csv(arm, std, robot.dh)
+            text = description.robot_csv(arm, std, robot.dh, fits)
         elif each == "urdf" and urdf_file is not None:
             text = urdf.corrected(arm, urdf_file, *links)
         elif each == "urdf":
@@ -140,7 +142,14 @@ def _tables(found: Mapping, robot: Robot, dataset: str, unseen: Sequence[str], f
     fixed = {str(parameter) for parameter, status in pairs if status == FIXED}
     selected = results.recorded_model(found)
     made = tables.paper_tables(
-        found["residuals"], found["dh_model"], nominal, dataset, unseen, fixed, selected
+        found["residuals"],
+        found["dh_model"],
+        nominal,
+        dataset,
+        unseen,
+        fixed,
+        selected,
+        misfit(found, robot, PLAINEST),
     )
     return (tables.markdown if form == "markdown" else tables.latex)(made)
 

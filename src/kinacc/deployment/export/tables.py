@@ -9,6 +9,7 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import ERROR_MODELS, MEASURED, Comparison, model_name
+from kinacc.calibration.misfit import GIVEN, Misfit, in_words
 from kinacc.config.names import in_markdown
 from kinacc.deployment.record import POSES
 from kinacc.kinematics.dh import PARAMETERS
@@ -38,11 +39,13 @@ def paper_tables(
     unseen: Sequence[str] = (),
     fixed: Collection[str] = (),
     selected: str = "",
+    fits: Misfit | None = None,
 ) -> list[PrintedTable]:
     """Tables of a data set from its ``residuals`` and ``dh_model``; ``nominal`` as ``dh_model``.
 
     ``unseen``: what the poses leave open, in sentences, as a note to the DH parameters; ``fixed``:
     those that were not fitted, as ``dh_identified`` names them. The model ``selected`` comes first.
+    ``fits``: what standard deviations of the DH parameters are worth.
     """
 
     def measured(model: str) -> PrintedTable:
@@ -52,7 +55,7 @@ def paper_tables(
 
     made = [
         measured("vec"),
-        _dh_table(fitted, nominal, name, unseen, fixed),
+        _dh_table(fitted, nominal, name, unseen, fixed, fits),
         _residual_table(residuals, "dh_vs_vec", "dh_vec", f"DH model against VEC model, {name}"),
         measured("dh"),
     ]
@@ -131,6 +134,7 @@ def _dh_table(
     name: str,
     unseen: Sequence[str],
     unfitted: Collection[str],
+    fits: Misfit | None,
 ) -> PrintedTable:
     order = np.argsort(fitted["joint"], kind="stable")
     shown = [each for each in PARAMETERS if each != "beta_rad" or np.any(fitted[each] != 0.0)]
@@ -158,7 +162,8 @@ def _dh_table(
             blind |= not np.isfinite(std)
             cells.append(with_deviation(value, std))
         rows.append(cells)
-    notes = ["One standard deviation behind ±."]
+    worth = GIVEN if fits is None else in_words([fits])
+    notes = [f"One standard deviation behind ±, {worth}."]
     if blind:
         notes.append(
             "† the poses show it only together with others: this value is one of many that fit as "

@@ -1,0 +1,87 @@
+"""How well a model fits beside the noise: what the standard deviations of its parameters are worth.
+
+A standard deviation by the covariance of a fit is valid given the model. Errors that the model
+cannot follow, as those of eccentric gears, are shared by neighbouring poses, and the fit counts
+them as independent noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import model_name
+from kinacc.calibration.noise import UNKNOWN, Noise, of_measurements
+from kinacc.kinematics.robot import Robot
+
+GIVEN = "valid given the model"
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Error of ``model`` at held-out poses beside the noise of one reading.
+
+    ``held_out_mm``: rms of the position error per axis, NaN where nothing was held out.
+    """
+
+    model: str
+    held_out_mm: float
+    noise: Noise
+
+    @property
+    def ratio(self) -> float:
+        """Held-out error over noise; NaN where one of the two is unknown."""
+        noise_mm = self.noise.per_axis_mm
+        return self.held_out_mm / noise_mm if noise_mm > 0.0 else math.nan
+
+    def as_facts(self) -> dict[str, object]:
+        """For JSON, unknown numbers null."""
+        numbers = {
+            "held_out_rms_per_axis_mm": self.held_out_mm,
+            "noise_per_axis_mm": self.noise.per_axis_mm,
+            "held_out_over_noise": self.ratio,
+        }
+        known = {name: each if math.isfinite(each) else None for name, each in numbers.items()}
+        return {"valid": "given the model", **known, "noise_freedom": self.noise.freedom}
+
+
+def misfit(tables: Mapping[str, Columns], robot: Robot, model: str) -> Misfit:
+    """Misfit of ``model`` by the tables ``model_selection`` and ``measurements``."""
+    return Misfit(model, _held_out_mm(tables, model), _noise_of(tables, robot))
+
+
+def misfits(tables: Mapping[str, Columns], robot: Robot) -> list[Misfit]:
+    """Misfit of every model of the table ``model_selection``."""
+    noise = _noise_of(tables, robot)
+    models = [str(each) for each in tables["model_selection"]["model"]]
+    return [Misfit(each, _held_out_mm(tables, each), noise) for each in models]
+
+
+def in_words(found: Sequence[Misfit]) -> str:
+    """What standard deviations of one or more models of one calibration are worth."""
+    return f"{GIVEN}; {over_noise(found)}"
+
+
+def over_noise(found: Sequence[Misfit]) -> str:
+    """Held-out errors of models over the noise of their readings, in words."""
+    noise = found[0].noise
+    if not noise.per_axis_mm > 0.0:
+        return "noise unknown (no configuration was read twice)"
+    ratios = (f"{each.ratio:.3g}" if math.isfinite(each.ratio) else "unknown" for each in found)
+    pairs = zip((model_name(each.model) for each in found), ratios, strict=True)
+    listed = ", ".join(map(" ".join, pairs))
+    return f"held-out error over noise ({noise.per_axis_mm:.3g} mm): {listed}"
+
+
+def _held_out_mm(tables: Mapping[str, Columns], model: str) -> float:
+    table = tables.get("model_selection", {"model": [], "held_out_rms_mm": []})
+    rms = dict(zip(map(str, table["model"]), table["held_out_rms_mm"], strict=True))
+    return float(rms.get(model, np.nan)) / math.sqrt(3.0)
+
+
+def _noise_of(tables: Mapping[str, Columns], robot: Robot) -> Noise:
+    return of_measurements(tables["measurements"], robot) if "measurements" in tables else UNKNOWN

@@ -1,0 +1,9 @@
+"""Commands that are gone, and where to find what they did: one line each, for one release."""
+
+from __future__ import annotations
+
+_RESEARCH = "now in research/ of the repository: snakemake -c2 -s research/Snakefile"
+REMOVED_COMMANDS = {
+    "tournament": f"{_RESEARCH} tournament",
+    "draw-robots": f"{_RESEARCH} arms",
+}

@@ -1,1 +1,0 @@
-"""The claims over every choice that the paper leaves open: what is varied, and what decides."""

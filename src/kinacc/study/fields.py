@@ -1,0 +1,243 @@
+"""Error fields: true errors of many poses, synthetic and measured.
+
+A field holds configurations with the deterministic error of the model at each. Simulated campaigns
+draw their candidates from it at random.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison, model_name
+from kinacc.assess.error_effects import joint_errors
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics import dh
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import Robot
+from kinacc.study.operating_points import readings_of
+from kinacc.synthetic import plan
+from kinacc.synthetic.accepted import accepted_draw
+from kinacc.synthetic.draw import physical_robot
+from kinacc.synthetic.physical import PhysicalRobot, Visits, pose
+
+CALIBRATION_POSES = 400
+POINTS = 1000
+_TRUNCATION = 1e-6  # DH directions that the calibration poses do not see are left alone
+_DEFECT_SHARE = 0.02
+_DEFECT_RAD = 6e-4  # jump of joint 2 where its teeth are worn: about 1 mm at the flange
+_RARE_SHARE, _RARE_MM = 0.01, (1.2, 1.9)
+
+
+@dataclass(frozen=True)
+class ErrorField:
+    """True errors ``error_mm`` (n, 3) of a model, robot base frame.
+
+    Where the joints are known: ``q_rad`` (n, k) as reported; where the robot is: ``effects``
+    (n, 3, 6 k) of errors of each joint at the tool, see :func:`joint_errors`. ``kind`` is
+    ``paper``, ``synthetic``, ``made_up`` or ``measured``, empty for errors of a file. The first
+    ``kept`` configurations are among any candidates drawn.
+    """
+
+    name: str
+    error_mm: np.ndarray
+    q_rad: np.ndarray | None = None
+    effects: np.ndarray | None = None
+    kind: str = ""
+    meaning: str = ""
+    kept: int = 0
+
+    def __post_init__(self) -> None:
+        count = len(self.error_mm)
+        joints = self.q_rad is None or (self.q_rad.ndim == 2 and len(self.q_rad) == count)
+        if self.error_mm.shape != (count, 3) or not count or not joints:
+            shapes = f"errors {self.error_mm.shape}, joints {np.shape(self.q_rad)}"
+            raise InputError(
+                Problem(f"field {self.name}", shapes, "(n, 3) and (n, k), n at least 1")
+            )
+        if not np.all(np.isfinite(self.error_mm)):
+            what = "holds errors that are not finite"
+            raise InputError(Problem(f"field {self.name}", what, "numbers in mm"))
+
+    @property
+    def points(self) -> int:
+        """Number of configurations."""
+        return len(self.error_mm)
+
+    @cached_property
+    def size_mm(self) -> np.ndarray:
+        """Sizes of the errors (n,)."""
+        return np.linalg.norm(self.error_mm, axis=1)
+
+    def known(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """What an assessor may know of candidates beside the noise: joints and effects."""
+        known = {"q_rad": self.q_rad, "effects": self.effects}
+        return {name: values[rows] for name, values in known.items() if values is not None}
+
+    def candidates(self, count: int, entropy: tuple[int, ...]) -> np.ndarray:
+        """Rows of ``count`` configurations drawn without replacement, in random order."""
+        rng = np.random.default_rng([*entropy, 0])
+        if not self.kept:
+            return rng.permutation(self.points)[:count]
+        others = self.kept + rng.permutation(self.points - self.kept)
+        return rng.permutation(np.append(np.arange(self.kept), others)[:count])
+
+
+def of_points(name: str, robot: Robot | None, points: Mapping) -> ErrorField:
+    """The paper's field: ``assessment_points`` of a modelled space."""
+    meaning = "errors of the DH model at the operating points of the study"
+    q_rad = _stacked(points, "q")
+    return ErrorField(name, _vectors(points), q_rad, _effects(robot, q_rad), "paper", meaning)
+
+
+def of_measurements(
+    name: str,
+    robot: Robot | None,
+    errors: Mapping,
+    measurements: Mapping,
+    model: str = PLAINEST,
+    target: str | None = None,
+) -> ErrorField:
+    """Held-out errors of a ``model`` at measured configurations, readings averaged.
+
+    Of one ``target``, or of all of them where none is named. errors: ``pose_errors``;
+    measurements: ``measurements``. The errors hold the noise of the instrument, which counts as
+    truth here.
+    """
+    wanted = (np.asarray(errors["comparison"]) == Comparison(MEASURED, model).name) & (
+        np.asarray(errors["estimate"]) == "cross_validated"
+    )
+    if target is not None:
+        wanted &= np.asarray(errors["target"]).astype(str) == target
+    if not wanted.any():
+        what = f"pose_errors holds no held-out errors of the {model_name(model)} model"
+        raise InputError(Problem(f"field {name}", what, fix="set measurements.folds"))
+    rows = np.flatnonzero(wanted)
+    groups = readings_of(np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows])
+    vectors, q_rad = _vectors(errors), _stacked(measurements, "q")
+    pose_of = {int(each): row for row, each in reversed([*enumerate(measurements["pose"])])}
+    first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
+    means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
+    meaning = f"held-out errors of the {model_name(model)} model at measured configurations"
+    meaning += f", target {target}" if target else ""
+    q_rad = q_rad[first]
+    return ErrorField(name, means, q_rad, _effects(robot, q_rad), "measured", meaning)
+
+
+def synthetic(name: str, draw: int) -> ErrorField:
+    """Physical arm of an accepted draw less the DH model calibrated to it, at other poses.
+
+    ``name`` is one of :data:`FAMILIES`. The calibration sees no noise, so all that is left is
+    deterministic; DH parameters and base are fitted to positions by least squares.
+    """
+    made = accepted_draw(draw)
+    arm = physical_robot(made.seed, made.scales, made.geometry)
+    change = FAMILIES[name]
+    nominal = robots.load("mh180")
+    q_rad = plan.configurations(nominal, CALIBRATION_POSES + POINTS)
+    arm = change.arm(arm)
+    true_mm = pose(arm, _quiet_visits(q_rad)).position_mm
+    error_mm = true_mm - dh.forward(arm.dh, q_rad).position_mm
+    rng = np.random.default_rng([made.seed, 4])
+    error_mm = change.after(error_mm, q_rad, arm, rng)
+    fitted = slice(None, CALIBRATION_POSES)
+    left_mm = _beyond_dh(arm, q_rad, error_mm, fitted)
+    q_rad, left_mm = q_rad[CALIBRATION_POSES:], left_mm[CALIBRATION_POSES:]
+    effects = joint_errors(nominal, q_rad)
+    return ErrorField(f"{name}_{draw}", left_mm, q_rad, effects, "synthetic", change.meaning)
+
+
+@dataclass(frozen=True)
+class Family:
+    """How a synthetic field differs from the accepted draw; ``meaning`` in words."""
+
+    meaning: str
+    arm: Callable[[PhysicalRobot], PhysicalRobot]
+    after: Callable[..., np.ndarray] = lambda error_mm, *_: error_mm
+
+
+def _only(**factors: float) -> Callable[[PhysicalRobot], PhysicalRobot]:
+    """The arm with the effects named times their factors, the other effects beyond a VEC none."""
+
+    def change(arm: PhysicalRobot) -> PhysicalRobot:
+        parts = ("compliance", "ripple_rad", "backlash_rad", "drift", "repeatability_rad")
+        own = {part: getattr(arm.beyond, part) * factors.get(part, 0.0) for part in parts}
+        return replace(arm, beyond=replace(arm.beyond, **own))
+
+    return change
+
+
+def _small(arm: PhysicalRobot) -> PhysicalRobot:
+    return replace(_only()(arm), smooth=replace(arm.smooth, amplitude=0.35 * arm.smooth.amplitude))
+
+
+def _with_defect(error_mm, q_rad, arm, rng) -> np.ndarray:
+    """A worn spot of joint 2: it jumps over a few degrees that hold 2 % of the poses."""
+    angle = q_rad[:, 1]
+    start = rng.uniform(0.3, 0.7)
+    low, high = np.quantile(angle, [start, start + _DEFECT_SHARE])
+    worn = (angle >= low) & (angle < high)
+    lever = dh.joint_jacobian(arm.dh, q_rad)[:, :3, 1]
+    return error_mm + np.where(worn[:, None], lever * _DEFECT_RAD, 0.0)
+
+
+def _with_rare(error_mm, q_rad, arm, rng) -> np.ndarray:
+    """Single poses far off, for no reason a model could know."""
+    size = np.where(rng.random(len(q_rad)) < _RARE_SHARE, rng.uniform(*_RARE_MM, len(q_rad)), 0.0)
+    turn = rng.normal(size=(len(q_rad), 3))
+    return error_mm + size[:, None] * turn / np.linalg.norm(turn, axis=1)[:, None]
+
+
+FAMILIES: dict[str, Family] = {
+    "smooth": Family("errors that depend smoothly on single joints", _only()),
+    "gravity": Family("compliance under gravity, four times as large", _only(compliance=4.0)),
+    "ripple": Family("ripple of the gears alone, on smooth errors", _only(ripple_rad=1.0)),
+    "thermal": Family("warming up, three times as large", _only(drift=3.0)),
+    "workshop": Family(
+        "all effects of the physical arm",
+        _only(compliance=1.0, ripple_rad=1.0, backlash_rad=1.0, drift=1.0),
+    ),
+    "defect": Family(
+        "a worn spot of joint 2 that moves 2 % of the poses",
+        _only(compliance=1.0, ripple_rad=0.3),
+        _with_defect,
+    ),
+    "rare": Family("small smooth errors and 1 % of single poses far off", _small, _with_rare),
+}
+
+
+def _quiet_visits(q_rad: np.ndarray) -> Visits:
+    """Visits without chance: in the plan's order and time."""
+    count = len(q_rad)
+    return Visits(q_rad, plan.directions(q_rad), plan.time_h(count), np.zeros(q_rad.shape))
+
+
+def _beyond_dh(arm: PhysicalRobot, q_rad, error_mm, fitted: slice) -> np.ndarray:
+    """What DH parameters and base, fitted by linear least squares, leave of small errors."""
+    count = len(q_rad)
+    parameters = dh.parameter_jacobian(arm.dh, q_rad)[:, :3, :, :4].reshape(count, 3, -1)
+    tip_mm = dh.forward(arm.dh, q_rad).position_mm
+    turns = np.stack([np.cross(axis, tip_mm) for axis in np.eye(3)], axis=2)
+    shifts = np.broadcast_to(np.eye(3), (count, 3, 3))
+    matrix = np.concatenate([parameters, turns, shifts], axis=2)
+    size = np.linalg.norm(matrix.reshape(3 * count, -1), axis=0)
+    matrix = matrix / np.where(size > 1e-9 * size.max(), size, 1.0)  # some move no position
+    known = matrix[fitted].reshape(-1, matrix.shape[2])
+    solved, *_ = np.linalg.lstsq(known, error_mm[fitted].ravel(), rcond=_TRUNCATION)
+    return error_mm - matrix @ solved
+
+
+def _effects(robot: Robot | None, q_rad: np.ndarray) -> np.ndarray | None:
+    return None if robot is None else joint_errors(robot, q_rad)
+
+
+def _stacked(columns: Mapping, letter: str) -> np.ndarray:
+    names = [name for name in columns if name[:1] == letter and name[1:].isdigit()]
+    return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
+
+
+def _vectors(columns: Mapping) -> np.ndarray:
+    return np.stack([np.asarray(columns[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)

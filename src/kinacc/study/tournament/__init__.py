@@ -1,1 +1,0 @@
-"""Every assessor on every error field: who keeps what it says, and how close it comes."""

@@ -1,0 +1,192 @@
+"""One figure of the noise for one file, and what standard deviations beside it are worth."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import numpy as np
+import pytest
+from command_line import call
+
+from kinacc.artifacts import store
+from kinacc.calibration.misfit import misfit
+from kinacc.geometry import exp_so3
+from kinacc.kinematics import dh, robot
+
+NOISE_MM = np.array([0.02, 0.03, 0.04])  # along the instrument's axes
+POSES, TIMES, AGAIN = 150, 3, 40
+GEARS_RAD = 1e-3
+
+
+def written(folder, gears_rad):
+    """A file of positions and its configuration: 40 poses were gone to three times.
+
+    The arm stops within some thousandths of a degree. Its gears are eccentric by ``gears_rad``.
+    """
+    rng, arm = np.random.default_rng(5), robot.load("irb120")
+    q = np.deg2rad(rng.uniform(-70, 70, (POSES, 6)))
+    q = np.concatenate([q, *[q[:AGAIN]] * (TIMES - 1)])
+    q = q + np.deg2rad(0.01) * rng.uniform(-0.5, 0.5, q.shape)
+    parameters = dh.to_vector(arm.dh).reshape(-1, 5) + rng.normal(size=(6, 5)) * [
+        5e-4, 0.3, 0.3, 5e-4, 0.0,
+    ]  # fmt: skip
+    turned = q + gears_rad * np.sin(q + rng.uniform(0, 6, 6))
+    flange = dh.forward(dh.with_vector(arm.dh, parameters.ravel()), turned)
+    point = flange.position_mm + flange.rotation @ [30.0, -20.0, 60.0]
+    point = point @ exp_so3(np.array([0.3, -0.2, 1.1])).T + [1500.0, 200.0, -400.0]
+    point = point + rng.normal(size=point.shape) * NOISE_MM
+    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
+    np.savetxt(
+        folder / "arm.csv",
+        np.column_stack([np.rad2deg(q), point]),
+        fmt="%.6f",
+        delimiter=",",
+        header=",".join(names),
+        comments="",
+    )
+    config = folder / "arm.yaml"
+    config.write_text(
+        f"datasets: {{arm: {{robot: irb120, measurements: {{source: file, file: {{path: "
+        f"{folder / 'arm.csv'}, orientation: {{kind: none}}}}}}, calibration: {{base_and_tool: "
+        "estimated, vec: {order: 2}, dh: {fit_to: measurements}}, evaluation: {space: measured}}}\n"
+    )
+    return config
+
+
+def calibrated(folder, gears_rad):
+    """The configuration and the results folder of such an arm."""
+    config = written(folder, gears_rad)
+    for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
+        done = call("run", stage, "--config", config, "--results", folder / "results")
+        assert done.exit_code == 0, done.output
+    return config, folder / "results" / "arm"
+
+
+@pytest.fixture(scope="module")
+def eccentric(tmp_path_factory):
+    return calibrated(tmp_path_factory.mktemp("eccentric"), GEARS_RAD)
+
+
+def printed(*words):
+    done = call(*words)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+def told(*words):
+    return json.loads(call(*words, "--json").stdout)
+
+
+def checked(config):
+    return told("check-data", config)["datasets"][0]["facts"]["noise"]
+
+
+def worth(folder):
+    return told("fitted", folder)["standard_deviations"]["dh"]
+
+
+def test_check_calibration_page_and_campaign_print_one_noise_of_a_file(eccentric, tmp_path):
+    config, results = eccentric
+    found = checked(config)
+    freedom = AGAIN * (TIMES - 1)
+    assert found["degrees_of_freedom"] == freedom
+    assert found["configurations"] == AGAIN
+    off = np.array(found["std_mm"]) / NOISE_MM - 1.0
+    assert np.all(np.abs(off) < 4.0 / np.sqrt(2.0 * freedom))
+    assert worth(results)["noise_per_axis_mm"] == pytest.approx(found["per_axis_mm"], rel=1e-9)
+    shown = [f"{each:.2g}" for each in found["std_mm"]]
+    page = tmp_path / "page.html"
+    printed("report", results, "--out", page)
+    begun = call("campaign", "start", tmp_path / "c", "--calibration", results, "--budget", 300)
+    texts = {
+        "fitted": (printed("fitted", results), r"scatter by ([\d.,]+) mm"),
+        "campaign": (begun.output, r"scatter by ([\d.,]+) mm"),
+        "report": (page.read_text("utf-8"), r"deviation x ([\d.]+), y ([\d.]+), z ([\d.]+) mm"),
+    }
+    for name, (text, pattern) in texts.items():
+        numbers = ",".join(re.search(pattern, " ".join(text.split())).groups())
+        assert numbers.split(",") == shown, name
+
+
+def test_a_repeatability_test_and_a_check_of_the_same_readings_agree(tmp_path):
+    rng, arm = np.random.default_rng(2), robot.load("irb120")
+    q = np.repeat(np.deg2rad(rng.uniform(-60, 60, (20, 6))), 4, axis=0)
+    point = robot.forward(arm, q).position_mm + 0.03 * rng.normal(size=(80, 3))
+    order = np.arange(80).reshape(20, 4).T.ravel()  # every pose is left before it is read again
+    rows = np.column_stack([np.rad2deg(q), point, np.repeat(np.arange(20), 4)])[order]
+    names = ",".join([*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm", "pose"])
+    config = tmp_path / "arm.yaml"
+    np.savetxt(tmp_path / "a.csv", rows, fmt="%.7f", delimiter=",", header=names, comments="")
+    config.write_text(
+        f"datasets: {{cell: {{robot: irb120, measurements: {{source: file, file: {{path: "
+        f"{tmp_path / 'a.csv'}, orientation: {{kind: none}}}}}}, calibration: {{base_and_tool: "
+        "estimated}, evaluation: {space: measured}}}\n"
+    )
+    of_poses = told("repeatability", tmp_path / "a.csv", "--rows", "visits")["noise"]["std_mm"]
+    found = checked(config)
+    assert found["degrees_of_freedom"] == 60
+    assert found["per_axis_mm"] == pytest.approx(np.sqrt(np.mean(np.square(of_poses))), rel=1e-6)
+
+
+def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric, tmp_path):
+    _, results = eccentric
+    found, errors = worth(results), store.read(results / "pose_errors.parquet")
+    rows = (errors["comparison"] == "dh_vs_measured") & (errors["estimate"] == "cross_validated")
+    error_mm = np.sqrt(np.mean([errors[f"e{axis}_mm"][rows] ** 2 for axis in "xyz"]))
+    assert found["valid"] == "given the model"
+    assert found["held_out_rms_per_axis_mm"] == pytest.approx(error_mm, rel=1e-6)
+    ratio = found["held_out_over_noise"]
+    assert ratio == pytest.approx(error_mm / found["noise_per_axis_mm"], rel=1e-9)
+    assert ratio > 3.0
+    printed("export", results, "--out", tmp_path, "--format", "json", "--format", "csv",
+            "--format", "markdown", "--format", "latex")  # fmt: skip
+    page, compared = tmp_path / "page.html", tmp_path / "compared.html"
+    printed("report", results, "--out", page)
+    marked = [
+        printed("fitted", results),
+        *(printed("show", results, table) for table in ("dh_model", "dh_identified")),
+        *(next(tmp_path.glob(each)).read_text("utf-8") for each in ("*.csv", "*.md", "*.tex")),
+        page.read_text("utf-8"),
+        printed("compare", results, results, "--page", compared),
+        compared.read_text("utf-8"),
+    ]
+    for text in marked:
+        text = " ".join(text.split())
+        assert "valid given the model" in text
+        assert re.search(rf"\(\S+ mm\): DH {re.escape(f'{ratio:.3g}')}\b", text)
+    for each in (
+        told("show", results, "dh_model")["standard_deviations"],
+        json.loads(next(tmp_path.glob("*.json")).read_text())["standard_deviations"],
+        *told("compare", results, results)["standard_deviations"],
+    ):
+        assert each == found
+
+
+def test_an_arm_that_the_model_fits_has_errors_of_the_size_of_the_noise(tmp_path):
+    _, results = calibrated(tmp_path, 0.0)
+    assert worth(results)["held_out_over_noise"] == pytest.approx(1.0, abs=0.25)
+
+
+def test_deviations_without_repeated_readings_say_that_the_noise_is_unknown(eccentric, tmp_path):
+    _, results = eccentric
+    tables = {name: store.read(results / f"{name}.parquet")
+              for name in ("measurements", "model_selection")}  # fmt: skip
+    tables["measurements"] = {key: each[:POSES] for key, each in tables["measurements"].items()}
+    found = misfit(tables, robot.load("irb120"), "dh").as_facts()
+    assert found["held_out_over_noise"] is None
+    assert found["noise_per_axis_mm"] is None
+    assert found["noise_freedom"] == 0
+    assert found["held_out_rms_per_axis_mm"] > 0.0
+
+
+def test_a_table_of_an_export_has_its_deviations_in_the_columns_of_before(eccentric, tmp_path):
+    _, results = eccentric
+    printed("export", results, "--out", tmp_path, "--format", "csv")
+    with next(tmp_path.glob("*.csv")).open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    table = store.read(results / "dh_model.parquet")
+    assert [float(row["std_a_mm"] or np.nan) for row in rows] == pytest.approx(
+        table["std_a_mm"], rel=1e-9, nan_ok=True
+    )

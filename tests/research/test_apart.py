@@ -1,0 +1,42 @@
+"""Research stands apart: kinacc works without it, and its rules run from the repository."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+TOP = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("folder", ["src", "workflow", "tools", "benchmarks"])
+def test_nothing_imports_research(folder):
+    for path in (TOP / folder).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            assert "research" not in {name.partition(".")[0] for name in names}, path
+
+
+def snakemake(*arguments: str) -> None:
+    command = [sys.executable, "-m", "snakemake", "-c1", "-s", "research/Snakefile", "--nolock"]
+    done = subprocess.run([*command, *arguments], cwd=TOP, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_rules_are_planned_and_a_small_tournament_is_played(tmp_path):
+    few = tmp_path / "few.yaml"
+    few.write_text(
+        f"results: '{tmp_path}'\n"
+        "tournament: {size: smoke, parts: 2, assessors: [single_shot, sequential]}\n"
+    )
+    snakemake("--configfile", str(few), "-n", "--", "all", f"{tmp_path}/accepted_draws.csv")
+    table = tmp_path / "tournament_verdicts.parquet"
+    snakemake("--configfile", str(few), "--", str(table), f"{tmp_path}/tournament_coverage.png")
+    found = pd.read_parquet(table).query("target == 'measured'").set_index("assessor")
+    assert found["statements"].to_dict() == {"single_shot": 40, "sequential": 40}
+    assert found["mean_holds"].min() >= 0.9

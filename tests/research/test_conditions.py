@@ -1,0 +1,73 @@
+"""Readings that come about otherwise than stated: each world is what its name says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import kurtosis
+
+from kinacc.assess.random_numbers import key_of
+from kinacc.assess.world import drawn_world
+from research.conditions import CONDITIONS, Course
+
+SIGMA = 0.2
+
+
+def readings(condition, poses=40, visits=50, key=1):
+    """Deviations (visits, poses, 3) in units of the noise stated, read pose after pose in turn."""
+    world = drawn_world(np.ones((poses, 3)), SIGMA, key_of(key), visits)
+    course = Course(CONDITIONS[condition], world, poses * visits)
+    read = [[course.reading_mm(row, visit) for row in range(poses)] for visit in range(visits)]
+    return (np.array(read) - 1.0) / course.stated_mm()[:, None]
+
+
+@pytest.mark.parametrize(
+    ("condition", "scale"), [("noise_1.2", 1.2), ("repeatability", 1.0), ("stated", 1.0)]
+)
+def test_the_noise_is_as_large_as_the_name_of_the_world_says(condition, scale):
+    found = readings(condition)
+    assert found.std() == pytest.approx(scale, rel=0.03)
+    own = found.std(axis=(0, 2))
+    assert own.max() / own.min() > (1.4 if condition == "repeatability" else 1.0)
+
+
+@pytest.mark.parametrize("condition", ["student_t4", "student_t4_whole"])
+def test_heavy_tails_leave_the_variance_as_stated(condition):
+    found = readings(condition, visits=400)
+    assert found.std() == pytest.approx(1.0, rel=0.04)
+    assert kurtosis(found, axis=None) > 2.0
+    together = np.corrcoef(*(found[..., axis].ravel() ** 2 for axis in (0, 1)))[0, 1]
+    assert (together > 0.1) == (condition == "student_t4_whole")
+
+
+def test_one_reading_in_a_hundred_is_ten_sigma_off():
+    off = np.linalg.norm(readings("wrong_1pct", visits=100), axis=2) > 5.5
+    assert off.mean() == pytest.approx(0.01, abs=0.004)
+
+
+@pytest.mark.parametrize("condition", ["drift_3", "step_3"])
+def test_the_frame_moves_by_three_sigma_over_the_campaign(condition):
+    found = readings(condition).mean(axis=1)  # of 40 readings each
+    moved = np.linalg.norm(found[-5:].mean(axis=0) - found[:5].mean(axis=0))
+    assert moved == pytest.approx(2.7 if condition == "drift_3" else 3.0, abs=0.35)
+    half = np.linalg.norm(found[26:30].mean(axis=0) - found[20:24].mean(axis=0))
+    assert (half > 2.0) == (condition == "step_3")
+
+
+def test_a_noise_tested_before_is_stated_as_large_as_chance_has_it():
+    factors = [1.0 / readings("tested_60", 2, 1, key).std() for key in range(3)]
+    assert len(set(factors)) == 3
+    worlds = [drawn_world(np.ones((1, 3)), SIGMA, key_of(key), 1) for key in range(400)]
+    stated = [Course(CONDITIONS["tested_60"], world, 1).stated_mm()[0] for world in worlds]
+    assert np.std(stated) / SIGMA == pytest.approx(1 / np.sqrt(120), rel=0.15)
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_reading_is_the_same_whatever_was_read_before_it_elsewhere(condition):
+    world = drawn_world(np.ones((3, 3)), SIGMA, key_of(4), 9)
+    first, second = (Course(CONDITIONS[condition], world, 20) for _ in range(2))
+    for row in (0, 1, 1):
+        first.reading_mm(row, 0)
+    for row in (2, 2, 0):
+        second.reading_mm(row, 1)
+    assert np.array_equal(first.reading_mm(2, 5), second.reading_mm(2, 5))
