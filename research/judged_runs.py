@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 
 from kinacc.artifacts.error_models import ALWAYS
-from kinacc.artifacts.provenance import config_hash
 from kinacc.errors import InputError
 from kinacc.study.claims.evaluate import evaluate
-from kinacc.workflow import in_memory
+from kinacc.workflow.code import config_hash
 from research.design import Run
+from research.memory import Memory, settings_of
 from research.open_choices import FIG_5
 
 _POINTS = ("measurements", *ALWAYS, "assessment_points")
@@ -49,7 +49,7 @@ def alike(runs: Iterable[Run], config: Mapping) -> list[Run]:
 
     def shared(run: Run) -> list[str]:
         own = run.configured(config)
-        return [config_hash(in_memory.settings_of(name, own)) for name in _STAGES]
+        return [config_hash(settings_of(name, own)) for name in _STAGES]
 
     return sorted(runs, key=shared)
 
@@ -59,7 +59,7 @@ def judged(runs: Iterable[Run], config: Mapping) -> tuple[pd.DataFrame, pd.DataF
 
     Runs that share settings should stand side by side, so that what these make is made once.
     """
-    memory, rows, factors = in_memory.Memory(), [], []
+    memory, rows, factors = Memory(), [], []
     for run in runs:
         tables, why = {}, None
         followed_only = run.varied == FIG_5

@@ -15,7 +15,7 @@ from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import Output, answers
 from kinacc.cli.show import Answer, at_odds
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.workflow.plan import RESULTS
+from kinacc.workflow.data_sets import RESULTS
 
 if TYPE_CHECKING:
     from kinacc.cli.sheet import Sheet

@@ -34,7 +34,7 @@ def with_added(text: str, path: Path, value: Any, name: str) -> str:
     """
     try:
         data = yaml.safe_load(text)
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node: Any = yaml.compose(text, Loader=yaml.SafeLoader)
         wanted = _joined(data, path, value)
         changed = _changed(text, node, path, value, wanted)
         if yaml.safe_load(changed) == wanted:
@@ -59,7 +59,7 @@ def _joined(data: Any, path: Path, value: Any) -> Any:
     return whole
 
 
-def _changed(text: str, node: yaml.Node, path: Path, value: Any, wanted: Any) -> str:
+def _changed(text: str, node: Any, path: Path, value: Any, wanted: Any) -> str:
     """The text with the value put behind the last entry of the deepest part that is there."""
     depth = 0
     while depth < len(path):

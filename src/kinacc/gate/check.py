@@ -49,9 +49,9 @@ def check_results(
     broken = {each.dataset for each in outcomes if each.verdict == FAILED}
     chosen = {name: own for name, own in configurations.items() if name in names}
     outcomes += judged(results, chosen, against, broken)
-    for name in names if against is not None else ():
-        if name not in broken:
-            outcomes += compared(results / name, against / name)
+    if against is not None:
+        for name in names:
+            outcomes += [] if name in broken else compared(results / name, against / name)
     return CheckReport(str(results), str(against or ""), tuple(outcomes))
 
 

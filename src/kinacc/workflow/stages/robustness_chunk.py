@@ -50,7 +50,8 @@ def claims_on(draw: int, config: Mapping) -> Columns:
     synthetic = {**measurements["synthetic"], "draw": draw}
     own = {**config, "measurements": {**measurements, "synthetic": synthetic}}
     tables: dict = {}
-    in_memory.Memory().fill(tables, ("measurements", *STAGES), own)
+    for name in ("measurements", *STAGES):
+        tables |= in_memory.lean(name, own, tables)
     claims = evaluate(tables, paper_arm=True)
     rows = {name: claims[name] for name in ("claim", "reproduced", "verdict")}
     return {"draw": np.full(len(claims["claim"]), draw), **rows}
