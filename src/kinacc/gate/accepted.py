@@ -120,8 +120,14 @@ def _errors_beside(now: Path, before: Path) -> Outcome:
         f"{word}: mean held-out position error {means[0]:.3f} mm, accepted run {means[1]:.3f} mm "
         f"({new.count} and {old.count} poses, {CONFIDENCE:.0%} confidence)"
     )
-    figures: dict[str, float | int | str | None] = {"mean_mm": means[0], "accepted_mean_mm": means[1], "difference_mm": worse.difference,
-               "at_least_mm": worse.least, "confidence": CONFIDENCE, "result": word}  # fmt: skip
+    figures: dict[str, float | int | str | None] = {
+        "mean_mm": means[0],
+        "accepted_mean_mm": means[1],
+        "difference_mm": worse.difference,
+        "at_least_mm": worse.least,
+        "confidence": CONFIDENCE,
+        "result": word,
+    }
     fix = f"kinacc compare {before} {now}" if verdict == FAILED else worse.open
     return Outcome(now.name, "held-out errors", "accepted", verdict, says, fix, figures)
 
