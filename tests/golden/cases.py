@@ -1,0 +1,202 @@
+"""What the golden results are made of: data sets, faults, foreign files, exports, a campaign.
+
+Shared by the tests beside it and by ``tools/renew_golden.py``, which makes the files.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from click.testing import CliRunner
+
+TESTS = Path(__file__).parents[1]
+sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "campaign"))]
+
+import plants  # noqa: E402
+import yaml  # noqa: E402
+from good_files import File, simulated  # noqa: E402
+from measurements.files_as_they_come import FILES  # noqa: E402
+
+from kinacc.artifacts import store  # noqa: E402
+from kinacc.cli.group import main  # noqa: E402
+from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
+from kinacc.workflow.stages import (  # noqa: E402
+    accuracy_map,
+    assessment_points,
+    claims,
+    error_model,
+    histories,
+    measurements,
+    residuals,
+    study,
+    study_chunk,
+    summary,
+)
+
+GOLDEN = Path(__file__).parent
+ROOT = GOLDEN.parents[1]
+RESULTS = GOLDEN / "results"
+MARKS = {"kinacc_version": "golden", "config_hash": "golden", "seed": "0"}
+MODELS = ("vec_model", "dh_model", "frames")
+
+# Stages by name: the function, and the golden tables it reads.
+STAGES: dict[str, tuple[Callable, tuple[str, ...]]] = {
+    "measurements": (measurements.run, ()),
+    "fit_vec": (partial(error_model.run, kind="vec"), ("measurements",)),
+    "fit_dh": (
+        partial(error_model.run, kind="dh"),
+        ("measurements", "vec_model", "vec_frames"),
+    ),
+    "residuals": (residuals.run, ("measurements", *MODELS, "vec_orders")),
+    "summary": (
+        summary.run,
+        ("measurements", "robot", *MODELS, "dh_identified", "pose_errors", "model_selection",
+         "vec_fit", "vec_covariance", "dh_fit", "dh_covariance", "vec_orders"),
+    ),
+    "accuracy_map": (accuracy_map.run, MODELS),
+    "operating_points": (
+        assessment_points.run,
+        ("measurements", *MODELS, "pose_errors"),
+    ),
+    "study": (study.run, ("study_chunk", "assessment_points")),
+    "histories": (histories.run, ("assessment_points",)),
+    "claims": (
+        claims.run,
+        ("residuals", "dh_model", "assessment_points", "study", "study_summary", "readings",
+         "histories", "accuracy_map"),
+    ),
+}  # fmt: skip
+CALIBRATION = ("measurements", "fit_vec", "fit_dh", "residuals", "summary")
+PAPER = (*CALIBRATION, "accuracy_map", "operating_points", "study", "histories", "claims")
+DATA_SETS = {
+    "mh180": PAPER,
+    "ur10_d": CALIBRATION,
+    "ur5_grid": CALIBRATION,
+    "spherical_wrist": CALIBRATION,
+    "ur_type": CALIBRATION,
+    "seven_axes": CALIBRATION,
+}
+_SIMULATED = {"spherical_wrist": "irb120", "ur_type": "ur10", "seven_axes": "iiwa14"}
+
+
+def data_sets() -> DataSets:
+    """Settings of all golden data sets; paths in them are relative to the repository."""
+    return read_data_sets([GOLDEN / "config.yaml"])
+
+
+def write_simulated_files() -> None:
+    """Measured files of simulated arms, half a millimetre and a milliradian off, and the truth."""
+    (GOLDEN / "data").mkdir(exist_ok=True)
+    for name, robot in _SIMULATED.items():
+        file = simulated(robot, poses=100, noise_mm=0.02, turned=True, seed=4)
+        file.write(GOLDEN / "data", name).unlink()
+
+
+def run_stage(data: DataSets, dataset: str, stage: str, folder: Path) -> dict[str, Mapping]:
+    """Tables that one stage makes of the tables in a folder."""
+    function, reads = STAGES[stage]
+    tables = {
+        name: store.read(folder / f"{name}.parquet")
+        for name in reads
+        if (folder / f"{name}.parquet").is_file()
+    }
+    settings = dict(data.settings[dataset])
+    if stage == "study":
+        tables |= study_chunk.run(tables, settings)
+    return function(tables, settings)
+
+
+def write_tables(tables: Mapping[str, Mapping], folder: Path) -> None:
+    """Tables of a stage as files, without what differs from version to version."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, columns in tables.items():
+        store.write(folder / f"{name}.parquet", name, columns, MARKS)
+
+
+def faults() -> Iterator[tuple[str, File]]:
+    """Files of a simulated arm with one fault each."""
+    good = simulated("irb120", poses=60, turned=True, seed=2)
+    every, some, late = plants.every(good), plants.some(good), plants.late(good)
+    joints, points = plants.joints(good), plants.points(good)
+    yield "none", good
+    yield "joints_in_radians", plants.in_radians(good, joints, every)
+    yield "some_joints_in_radians", plants.in_radians(good, joints, some)
+    yield "metres", plants.scaled(good, points, 1e-3, every)
+    yield "left_handed", plants.mirrored(good, "y", every)
+    yield "transposed", plants.transposed(good, every)
+    yield "angles_in_radians", plants.in_radians(good, plants.ANGLES, every)
+    for joint in (2, 4, 6):
+        yield f"sign_of_joint_{joint}", plants.scaled(good, [f"q{joint}_deg"], -1.0, every)
+    yield "coupled_joints", plants.coupled(good, every)
+    columns = {"q4_deg": good.columns["q5_deg"], "q5_deg": good.columns["q4_deg"]}
+    yield "joints_exchanged", good.but(**columns)
+    yield "rows_twice", plants.copied(good, some)[0]
+    yield "outliers", plants.shifted(good, points[:3], np.array([15.0, -9.0, 12.0]), some)
+    yield "base_jump", plants.jumped(good, (1.0, -0.5, 0.7), 1.0, late)
+    yield "tool_moved", plants.on_the_flange(good, plants.rotations(good), (0.5, -0.5, 0.4), late)
+    yield "commanded_joints", plants.rounded(good, every, 0)
+
+
+def findings(folder: Path, name: str) -> list[dict]:
+    """Codes, levels, lines and numbers that ``check-data`` finds in a configured file."""
+    told = json.loads(call("check-data", folder / f"{name}.yaml", "--json").stdout)
+    kept = ("kind", "level", "lines")
+    found = []
+    for each in told["datasets"][0].get("suspicions", []):
+        numbers = {key: value for key, value in each.items() if _is_number(value)}
+        found.append({**{key: each[key] for key in kept}, **numbers})
+    return found
+
+
+def _is_number(value: object) -> bool:
+    values = value if isinstance(value, list) else [value]
+    return bool(values) and all(isinstance(each, float) for each in values)
+
+
+FOREIGN = (
+    "german_decimal_commas", "german_latin1", "thousands_swiss", "inches", "units_row", "french",
+    "japanese", "yaskawa_axes", "one_row_per_reflector", "no_readings_as_written",
+    "aligned_with_blanks", "kuka_log_abc", "fanuc_log_wpr", "abb_log_rax",
+    "rtde_recording_and_tracker",
+)  # fmt: skip
+
+
+def write_foreign_files() -> None:
+    """Foreign files as their makers write them, and the robot of each."""
+    robots = {}
+    for name in FOREIGN:
+        folder = GOLDEN / "foreign" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        measured = FILES[name](folder)
+        robots[name] = [measured.robot, *(path.name for path in measured.files)]
+    (GOLDEN / "foreign" / "files.json").write_text(json.dumps(robots, indent=1) + "\n")
+
+
+def understanding(name: str, folder: Path) -> dict:
+    """What ``init`` makes of a foreign file: the data set it describes, or why it does not."""
+    robot, *files = json.loads((GOLDEN / "foreign" / "files.json").read_text())[name]
+    for file in files:
+        shutil.copyfile(GOLDEN / "foreign" / name / file, folder / file)
+    words = ["init", *(folder / file for file in files), "--robot", robot, "--yes", "--json"]
+    done = call(*words, "--out", folder, "--name", "n")
+    if done.exit_code:
+        return {"exit_code": done.exit_code}
+    described = yaml.safe_load((folder / "n.yaml").read_text())["datasets"]["n"]
+    read = read_data_sets([folder / "n.yaml"])
+    columns = measurements.run({}, read.settings["n"])["measurements"]
+    kept = [key for key in columns if key[0] in "qxyz" and columns[key].dtype.kind == "f"]
+    rows = {key: [round(float(each), 9) for each in columns[key][:3]] for key in kept}
+    rows = {key: values for key, values in rows.items() if not np.isnan(values).any()}
+    file = {k: v for k, v in described["measurements"]["file"].items() if "path" not in k}
+    return {"exit_code": 0, "rows": len(columns["pose"]), "first": rows, "file": file}
+
+
+def call(*words: object):
+    """A command of kinacc."""
+    return CliRunner().invoke(main, [str(each) for each in words])

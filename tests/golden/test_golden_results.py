@@ -1,0 +1,82 @@
+"""Results are those of the golden files, stage by stage: each on its own golden inputs."""
+
+import json
+
+import cases
+import numpy as np
+import pytest
+
+from kinacc.artifacts.comparison import compare_tables
+from kinacc.deployment.export.files import contents
+from kinacc.deployment.folder import recorded_robot
+
+STAGES = [(name, stage) for name, stages in cases.DATA_SETS.items() for stage in stages]
+
+
+@pytest.fixture(scope="module")
+def data():
+    return cases.data_sets()
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize(("name", "stage"), STAGES)
+def test_a_stage_makes_its_golden_tables(name, stage, data, tmp_path):
+    made = cases.run_stage(data, name, stage, cases.RESULTS / name)
+    cases.write_tables(made, tmp_path)
+    differences = []
+    for table in made:
+        golden = cases.RESULTS / name / f"{table}.parquet"
+        differences += compare_tables(golden, tmp_path / f"{table}.parquet")
+    assert not differences, "\n".join(map(str, differences))
+
+
+def same(found, golden):
+    """Whether two values agree: numbers to 1e-6, all else exactly."""
+    if isinstance(golden, dict):
+        return found.keys() == golden.keys() and all(same(found[k], golden[k]) for k in golden)
+    if isinstance(golden, list):
+        return len(found) == len(golden) and all(map(same, found, golden))
+    if isinstance(golden, float):
+        return np.isclose(found, golden, rtol=1e-6, atol=1e-6)
+    return found == golden
+
+
+FINDINGS = json.loads((cases.GOLDEN / "faults" / "findings.json").read_text())
+
+
+@pytest.mark.parametrize("name", FINDINGS)
+def test_a_planted_fault_is_found_with_its_rows_and_size(name):
+    found = json.loads(json.dumps(cases.findings(cases.GOLDEN / "faults", name)))
+    assert same(found, FINDINGS[name])
+
+
+def test_every_planted_fault_but_none_has_a_finding():
+    assert [name for name, found in FINDINGS.items() if not found] == ["none"]
+
+
+UNDERSTOOD = json.loads((cases.GOLDEN / "foreign" / "understanding.json").read_text())
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("name", UNDERSTOOD)
+def test_a_foreign_file_is_understood_as_before(name, tmp_path):
+    assert same(json.loads(json.dumps(cases.understanding(name, tmp_path))), UNDERSTOOD[name])
+
+
+@pytest.mark.parametrize(("model", "formats"), [("dh", ("json", "yaml", "csv", "urdf")),
+                                                ("vec", ("json",))])  # fmt: skip
+def test_exports_are_as_before(model, formats):
+    folder = cases.RESULTS / "ur10_d"
+    made = contents(folder, recorded_robot(folder), formats, model=model)
+    for name, text in made.items():
+        golden = (cases.GOLDEN / "exports" / name).read_text()
+        if name.endswith(".json"):
+            assert same(json.loads(text), json.loads(golden))
+        else:
+            assert text == golden
+
+
+def test_golden_files_are_small():
+    sizes = {path: path.stat().st_size for path in cases.GOLDEN.rglob("*") if path.is_file()}
+    assert max(sizes.values()) < 2**20
+    assert sum(size for path, size in sizes.items() if "__pycache__" not in path.parts) < 8 * 2**20
