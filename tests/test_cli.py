@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from kinacc.workflow.catalogue import STAGES
 
 from kinacc import __version__
 from kinacc.cli.group import main
-from kinacc.workflow.catalogue import STAGES
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIG = str(ROOT / "config.yaml")

@@ -7,12 +7,12 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-
-from kinacc.artifacts import allowed, records, store
-from kinacc.artifacts.contract import PROVENANCE_KEYS
 from kinacc.workflow.catalogue import HISTORY, STAGES
 from kinacc.workflow.plan import Plan
 from kinacc.workflow.runner import Job, stage_provenance
+
+from kinacc.artifacts import allowed, records, store
+from kinacc.artifacts.contract import PROVENANCE_KEYS
 
 SEED = 7
 NOISE_MM = (0.05, 0.3)

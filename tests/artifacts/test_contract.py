@@ -6,11 +6,11 @@ from pathlib import Path
 
 import document_artifacts as document
 import pytest
+from kinacc.workflow.catalogue import STAGES
 
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Column, joint_count
 from kinacc.artifacts.contract import ARTEFACTS
-from kinacc.workflow.catalogue import STAGES
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import paper_settings as paper
 import pytest
+from kinacc.artifacts.provenance import imported_names
 from kinacc.assess.sequential import Sequential
 from kinacc.assess.two_stage import TwoStage
 
-from kinacc.artifacts.provenance import imported_names
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.coverage import companions, excepted, hardly_missed
 from kinacc.assess.error_effects import joint_errors

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kinacc.workflow.plan import planned
 from simulated import POINT, POSE, THREE, disturbed, measure
 
 from kinacc.calibration import constraints, identified, uncertainty
 from kinacc.calibration.models import estimators
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot
-from kinacc.workflow.plan import planned
 
 ROOT = Path(__file__).resolve().parents[2]
 STATED_MM = 140.0

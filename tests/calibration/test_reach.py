@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shared_data
+from kinacc.workflow.plan import planned
 
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.observations import from_columns
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh, robot
-from kinacc.workflow.plan import planned
 from kinacc.workflow.stages import measurements
 
 ROOT = Path(__file__).resolve().parents[2]

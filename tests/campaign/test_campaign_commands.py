@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
 from command_line import call
+from kinacc.workflow.verification.conformity import check_file
 
 from kinacc.artifacts import store
 from kinacc.artifacts.contract import ARTEFACTS
@@ -20,7 +21,6 @@ from kinacc.campaign.words import reason
 from kinacc.cli import campaigns_answers
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics.model import JointState
-from kinacc.workflow.verification.conformity import check_file
 
 
 def test_a_budget_below_the_candidates_is_told_what_more_would_bring(calibration, tmp_path):

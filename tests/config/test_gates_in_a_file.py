@@ -1,14 +1,14 @@
 """Gates as people write them into a configuration, right and wrong."""
 
 import pytest
-
 from kinacc.artifacts.provenance import config_hash
+from kinacc.workflow.plan import planned
+
 from kinacc.config.load import load
 from kinacc.config.schema import key
 from kinacc.errors import InputError
 from kinacc.gate import values
 from kinacc.gate.run_tables import RunTables
-from kinacc.workflow.plan import planned
 
 END = "datasets: {mh180: {robot: mh180}, other: {robot: mh180}}\n"
 

@@ -6,10 +6,10 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from kinacc.workflow.plan import planned
 
 from kinacc.errors import InputError
 from kinacc.workflow.contradictions import load
-from kinacc.workflow.plan import planned
 
 MARCH, MAY, JUNE = (f"tracker-2026-0{month}" for month in ("3-01", "5-04", "6-02"))
 SERIES = """\

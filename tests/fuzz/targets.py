@@ -247,9 +247,9 @@ def _sealed(case: Case, rng: Random) -> Case:
     import io
 
     import pyarrow.parquet as pq
+    from kinacc.artifacts.digests import columns_digest
 
     from kinacc.artifacts.contract import COLUMNS_DIGEST
-    from kinacc.artifacts.digests import columns_digest
 
     changed = [name for name in case.files if name.endswith(".parquet")]
     if len(changed) > 1:

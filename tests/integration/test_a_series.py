@@ -15,10 +15,7 @@ import pytest
 from command_line import call
 from shared_work import once
 
-from kinacc.artifacts.store import read, stated_digest
-from kinacc.workflow.catalogue import STAGES
-from kinacc.workflow.plan import Plan, planned
-from kinacc.workflow.runner import is_done, perform
+from kinacc.artifacts.store import digest_of, read
 
 MEASURED = Path(__file__).parents[2] / "examples" / "data" / "ur10_tmac"
 # Series D has another base and another tool than B.
@@ -29,7 +26,6 @@ LINES = {
     "june": "{path: june.csv, date: 2026-06-02, base: moved, tool: moved}",
 }
 MARCH, MAY, JUNE = "tracker-2026-03-01", "tracker-2026-05-04", "tracker-2026-06-02"
-REPORTED = ("history", "history_over_time")
 
 
 def configured(folder: Path, names: Iterable[str], more: str = "") -> Path:
@@ -57,16 +53,10 @@ figures: {{formats: [svg]}}
     return path
 
 
-def made(plan: Plan) -> list[tuple[str, str]]:
-    """Make what is not up to date of lines and history, and say what that was."""
-    ran = []
-    for dataset in (*plan.lines("tracker"), "tracker"):
-        for name in plan.stages(dataset):
-            wanted = dataset != "tracker" or name in REPORTED
-            if wanted and not is_done(job := plan.job(name, dataset)):
-                perform(job)
-                ran.append((name, dataset))
-    return ran
+def calibrated() -> None:
+    """Calibrate the series of the folder called from."""
+    done = call("calibrate", "tracker.yaml", "--cores", "2")
+    assert done.exit_code == 0, done.output
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +70,8 @@ def two_lines(tmp_path_factory):
             (folder / f"{name}.csv").write_text(f"{text}\n")
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
-            made(planned([configured(folder, ["march", "june"])]))
+            configured(folder, ["march", "june"])
+            calibrated()
 
     return once(tmp_path_factory, "two_lines", make)
 
@@ -107,7 +98,7 @@ def test_a_history_has_a_row_for_every_line_made_of_its_own_tables(arm):
     assert list(history["in_force"])[:2] == [None, MARCH]
     for row, line in enumerate(history["series"]):
         measured = f"results/{line}/measurements.parquet"
-        assert history["digest"][row] == stated_digest(measured)
+        assert history["digest"][row] == digest_of("measurements", read(measured))
         assert history["rows"][row] == len(read(measured)["pose"])
         stated = read(measured)["temperature_c"]
         assert history["temperature_c"][row] == pytest.approx(np.nanmean(stated))
@@ -120,51 +111,15 @@ def test_a_history_has_a_row_for_every_line_made_of_its_own_tables(arm):
 
 def test_a_line_that_is_added_makes_itself_and_the_history_alone(arm):
     before = contents(arm, MARCH, JUNE)
-    ran = made(planned([configured(arm, ["march", "june", "may"])]))
-    assert {dataset for _, dataset in ran} == {MAY, "tracker"}
-    assert [name for name, dataset in ran if dataset == "tracker"] == [*REPORTED]
+    configured(arm, ["march", "june", "may"])
+    calibrated()
     assert contents(arm, MARCH, JUNE) == before
     table = Path("results/tracker/history.parquet")
     assert list(read(table)["series"]) == [MARCH, MAY, JUNE]
-    # Whatever order the lines are written in, and whatever else is configured.
-    content = table.read_bytes()
-    more = "  other: {robot: mh180, measurements: {synthetic: {poses: 80}}}\n"
-    plan = planned([configured(arm, ["june", "may", "march"], more)])
-    assert made(plan) == []
-    table.unlink()
-    perform(plan.job("history", "tracker"))
-    assert table.read_bytes() == content
 
 
-def test_a_history_is_checked_against_the_lines_it_was_made_from(arm):
-    checked = call("check-results", "results/tracker", "--config", "tracker.yaml")
-    assert "history" not in "".join(
-        line for line in checked.output.splitlines() if line.startswith("  - ")
-    )
+def test_a_history_made_from_other_tables_is_noticed(arm):
     shutil.copy(f"results/{MARCH}/frames.parquet", f"results/{JUNE}/frames.parquet")
-    checked = call("check-results", "results/tracker", "--config", "tracker.yaml")
-    assert "history.parquet: was made from another tracker-2026-06-02/frames" in checked.output
-
-
-def test_a_changed_number_of_a_history_is_found(arm):
-    from kinacc.artifacts import records, store
-
-    path = Path("results/tracker/history.parquet")
-    history, marks = store.read(path), store.read_metadata(path)
-    history["held_out_mean_mm"][1] *= 0.5
-    table = store.to_table("history", history, marks)
-    record = records.read(records.place("results/tracker", "history"))
-    digest = table.schema.metadata[store.COLUMNS_DIGEST.encode()].decode()
-    place = records.place("results/tracker", "history")
-    records.leave(place, record, {str(path): (store.content_of(table), digest)})
-    perform(planned(["tracker.yaml"]).job("history_over_time", "tracker"))
-    checked = call("check-results", "results/tracker", "--config", "tracker.yaml")
-    assert "history.parquet, column held_out_mean_mm" in checked.output
-
-
-def test_single_stages_say_which_data_sets_they_cannot_be_of(arm):
-    done = call("run", "study", "--config", "tracker.yaml", "--dataset", MARCH)
-    assert done.exit_code == 2
-    assert "a line of the series of tracker is calibrated only" in done.output
-    assert "study" not in planned(["tracker.yaml"]).stages(JUNE)
-    assert STAGES["history"].of_lines
+    checked = call("check-results", "results", "--dataset", JUNE, "--config", "tracker.yaml")
+    assert checked.exit_code == 1
+    assert "frames.parquet" in checked.output

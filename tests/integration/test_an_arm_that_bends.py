@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 import yaml
 from command_line import call
+from kinacc.workflow.catalogue import maker_of
+from kinacc.workflow.plan import planned
+from kinacc.workflow.runner import perform
 from oracles import compliant_arm
 from oracles.compliant_arm import Arm, Body, Described
 from scipy.stats import chi2
 
 from kinacc.artifacts.store import read
-from kinacc.workflow.catalogue import maker_of
-from kinacc.workflow.plan import planned
-from kinacc.workflow.runner import perform
 
 POSES = 60
 NOISE_MM = 0.03

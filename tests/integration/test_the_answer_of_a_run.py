@@ -1,7 +1,5 @@
 """A run ends with half a page on each data set; the paper's claims are of its own arm alone."""
 
-import shutil
-
 
 def test_a_run_ends_with_what_the_calibrations_are_worth(project):
     (project.folder / "results/own/summary.parquet").unlink()
@@ -26,20 +24,3 @@ def test_a_run_up_to_one_table_says_nothing_of_tables_it_did_not_ask_for(project
     (project.folder / "results/own/vec_model.parquet").unlink()
     text = project.snakemake("results/own/vec_model.parquet")
     assert "what its calibration is worth" not in text
-
-
-def test_claims_that_an_earlier_version_left_are_no_fault_of_a_measured_arm(project):
-    shutil.copy(project.folder / "results/mh180/claims.parquet", project.folder / "results/own")
-    text = project.kinacc("check-results", "results")
-    assert "all is well" in text
-    assert "own/claims.parquet: left from before" in text
-    text = project.kinacc("check-results", "results/own", configs=())
-    assert "note: results/own/claims.parquet: left from before" in text
-    assert "claims.parquet: missing" not in text
-    assert "hash" not in text
-    assert project.to_do() == {}
-    page = project.kinacc("fitted", "results/own", configs=())
-    assert "claims" not in page
-    (project.folder / "results/own/claims.parquet").unlink()
-    text = project.kinacc("check-results", "results/own", configs=())
-    assert "claims.parquet" not in text

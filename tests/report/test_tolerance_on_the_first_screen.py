@@ -7,10 +7,10 @@ import re
 
 import pytest
 from command_line import call, small_study
+from kinacc.gate.first_screens import first_screens
 from test_report_campaign import measured
 
 from kinacc.calibration.summary import Tolerance
-from kinacc.gate.first_screens import first_screens
 from kinacc.report.campaign_answers import answers
 
 

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from command_line import call
+from kinacc.workflow.plan import planned
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
@@ -14,7 +15,6 @@ from kinacc.geometry import log_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.model import JointState
-from kinacc.workflow.plan import planned
 
 COUNT, LOAD = 90, np.array([60.0, 20.0, -10.0, 150.0])
 ARM = robot.load("mh180")

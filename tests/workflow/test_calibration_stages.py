@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kinacc.workflow.plan import planned
 
 from kinacc.artifacts import store
 from kinacc.errors import InputError
@@ -16,7 +17,6 @@ from kinacc.kinematics import robot
 from kinacc.kinematics import vec as vec_kinematics
 from kinacc.kinematics.tables import frame, models
 from kinacc.workflow.in_memory import RUNS
-from kinacc.workflow.plan import planned
 from kinacc.workflow.stages import assessment_points, measurements
 
 ROOT = Path(__file__).resolve().parents[2]

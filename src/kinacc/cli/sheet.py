@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -108,9 +106,7 @@ class Sheet:
         return text.encode()
 
     def _excel(self) -> bytes:
-        """Names, units and rows on one sheet; the same rows, the same bytes."""
-        import zipfile
-
+        """Names, units and rows on one sheet."""
         from openpyxl import Workbook
         from openpyxl.styles import Font
 
@@ -124,18 +120,9 @@ class Sheet:
         for cell in page[1]:
             cell.font = Font(bold=True)
         page.freeze_panes = "A3"
-        book.properties.created = book.properties.modified = datetime(2000, 1, 1)
-        written, kept = io.BytesIO(), io.BytesIO()
+        written = io.BytesIO()
         book.save(written)
-        # A zip file holds the time each part was written at, and the book that of its saving.
-        with zipfile.ZipFile(written) as old, zipfile.ZipFile(kept, "w") as new:
-            for part in old.infolist():
-                content = old.read(part)
-                if part.filename == "docProps/core.xml":
-                    content = re.sub(rb"\d{4}-\d\d-\d\dT[\d:]+Z", b"2000-01-01T00:00:00Z", content)
-                plain_part = zipfile.ZipInfo(part.filename)
-                new.writestr(plain_part, content, zipfile.ZIP_DEFLATED)
-        return kept.getvalue()
+        return written.getvalue()
 
     def _parquet(self) -> bytes:
         import pyarrow as pa

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from kinacc.workflow.plan import planned
 from test_urdf import SCARA, UR10, text_of
 
 from kinacc.errors import InputError
 from kinacc.workflow.contradictions import load
-from kinacc.workflow.plan import planned
 
 PAPER = Path(__file__).parents[3] / "config.yaml"
 
