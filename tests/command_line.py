@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from click.testing import CliRunner, Result
+from stages_by_hand import run_stage
 
 from kinacc.cli.group import main
 
@@ -22,6 +23,6 @@ def small_study(base: Path) -> Path:
         "calibration: {vec: {order: 1}}\n"
     )
     for stage in ("measurements", "vec", "dh", "residuals"):
-        done = call("run", stage, "--config", config, "--results", base / "results")
+        done = run_stage(stage, "--config", config, "--results", base / "results")
         assert done.exit_code == 0, done.output
     return base / "results" / "mh180"

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from kinacc.workflow.catalogue import STAGES
 
 from kinacc import __version__
 from kinacc.cli.group import main
@@ -22,19 +21,6 @@ def call(*words: str):
 
 def test_version():
     assert call("--version").output.strip().endswith(__version__)
-
-
-@pytest.mark.parametrize(
-    "stage",
-    [stage for stage in STAGES.values() if not stage.joint],  # the tournament has its own command
-    ids=lambda stage: stage.name,
-)
-def test_help_of_a_stage_says_what_it_reads_and_leaves(stage):
-    shown = call("run", stage.name, "--help")
-    assert shown.exit_code == 0
-    text = " ".join(shown.output.split())
-    for name in (*stage.inputs, *stage.outputs, *stage.settings):
-        assert name in text
 
 
 def commands_of(group, words=()):
@@ -64,15 +50,6 @@ def test_every_command_is_listed_once_with_all_its_words():
         assert not line.endswith("...")
 
 
-def test_a_stage_says_what_it_wrote(tmp_path):
-    done = call("run", "fig1", "--config", CONFIG, "--results", tmp_path)
-    paths = [line.removeprefix("written: ") for line in done.stdout.splitlines()]
-    assert len(paths) == 3
-    assert all(Path(path).is_file() for path in paths)
-    again = call("run", "fig1", "--config", CONFIG, "--results", tmp_path, "--json")
-    assert json.loads(again.stdout) == {"stage": "fig1", "written": paths}
-
-
 def test_help_loads_no_numerical_library():
     code = (
         "import sys; from kinacc.cli.group import main\n"
@@ -95,57 +72,6 @@ def test_a_command_loads_no_tools_of_numpy_and_no_compiler(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
-
-
-def test_a_figure_that_needs_no_table_is_drawn(tmp_path):
-    done = call("run", "fig1", "--config", CONFIG, "--results", tmp_path)
-    assert done.exit_code == 0, done.output
-    assert (tmp_path / "mh180" / "figures" / "fig1.svg").stat().st_size > 1000
-
-
-def test_missing_inputs_are_all_named_with_the_command_that_makes_them(tmp_path):
-    done = call("run", "fig4", "--config", CONFIG, "--results", tmp_path)
-    assert done.exit_code == 2
-    assert "study_summary.parquet: no such file" in done.output
-    assert "assessment_points.parquet: no such file" in done.output
-    assert "kinacc run assessment_points" in done.output
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_unknown_data_set_is_named_beside_the_known_ones(tmp_path):
-    done = call("run", "fig1", "--config", CONFIG, "--results", tmp_path, "--dataset", "mh18")
-    assert done.exit_code == 2
-    assert "'mh18'" in done.output
-    assert "mh180" in done.output
-
-
-def test_a_data_set_must_be_named_where_there_are_two(tmp_path):
-    second = tmp_path / "second.yaml"
-    second.write_text("datasets: {other: {robot: mh180}}\n")
-    done = call("run", "fig1", "--config", CONFIG, "--config", second)
-    assert done.exit_code == 2
-    assert "mh180, other" in done.output
-
-
-def test_a_part_that_does_not_exist_is_refused(tmp_path):
-    done = call("run", "study_chunk", "--config", CONFIG, "--results", tmp_path, "--part", "3-of-2")
-    assert done.exit_code == 2
-    assert "1-of-2, 2-of-2" in done.output
-
-
-def test_a_stage_the_data_set_cannot_go_through_says_why(tmp_path):
-    own = tmp_path / "own.yaml"
-    own.write_text("evaluation: {space: joint_box}\n")
-    done = call("run", "accuracy_map", "--config", CONFIG, "--config", own, "--results", tmp_path)
-    assert done.exit_code == 2
-    assert "joint_box" in done.output
-
-
-def test_a_configuration_that_is_not_there(tmp_path):
-    done = call("run", "fig1", "--config", tmp_path / "nowhere.yaml")
-    assert done.exit_code == 2
-    assert "nowhere.yaml: no such file" in done.output
-    assert "Traceback" not in done.output
 
 
 def test_checking_a_folder_that_is_not_there_fails(tmp_path):

@@ -290,22 +290,6 @@ def test_an_option_beyond_any_machine_is_refused_with_what_is_allowed(tmp_path, 
     assert "range" in said or "at most" in said
 
 
-def test_settings_that_multiply_beyond_any_machine_are_named_together(tmp_path):
-    (tmp_path / "own.yaml").write_text(
-        "datasets: {own: {robot: mh180}}\n"
-        "study: {repetitions: 100000, measurements: 100000, noise_mm: [0.1, 0.2]}\n"
-        "evaluation: {points: 100000}\n"
-        "map: {grid_mm: 1, slices_deg: [0, 10, 20, 30, 40]}\n"
-        "measurements: {synthetic: {poses: 100000}}\ncalibration: {vec: {order: 40}}\n"
-    )
-    said = refused(tmp_path, "run", "study", "--dataset", "own", "--config", "own.yaml")
-    assert "own.yaml:2, study.repetitions (data set own): 100000 repetitions at 2 noises" in said
-    assert "own.yaml:2, study.measurements (data set own): 100000 measurements, of which" in said
-    assert "own.yaml:4, map.grid_mm" in said
-    assert "own.yaml:5, measurements.synthetic.poses" in said
-    assert said.count("at most") == 4
-
-
 def test_more_candidates_than_can_be_compared_are_refused(tmp_path):
     zeros = pa.array(np.zeros(150_000, np.int8))
     pq.write_table(pa.table(dict.fromkeys(COLUMNS, zeros)), tmp_path / "many.parquet")

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kinacc.workflow.plan import planned
 from simulated import POINT, POSE, THREE, disturbed, measure
 
 from kinacc.calibration import constraints, identified, uncertainty
 from kinacc.calibration.models import estimators
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot
+from kinacc.workflow.data_sets import read_data_sets
 
 ROOT = Path(__file__).resolve().parents[2]
 STATED_MM = 140.0
@@ -23,7 +23,8 @@ STATED_MM = 140.0
 
 @cache
 def settings():
-    return planned([str(ROOT / "config.yaml"), str(ROOT / "examples/ur10.yaml")]).datasets["ur10_d"]
+    paths = [str(ROOT / "config.yaml"), str(ROOT / "examples/ur10.yaml")]
+    return read_data_sets(paths).settings["ur10_d"]
 
 
 def stated_arm():

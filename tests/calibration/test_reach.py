@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shared_data
-from kinacc.workflow.plan import planned
 
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.observations import from_columns
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh, robot
+from kinacc.workflow.data_sets import read_data_sets
 from kinacc.workflow.stages import measurements
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,9 +23,8 @@ pytestmark = shared_data.needed("")
 def held_out_errors(dataset, monkeypatch):
     """Observations and position errors (n, 3) of rows by DH fits that have not seen them."""
     monkeypatch.chdir(ROOT)
-    plan = planned(["benchmarks/reach.yaml"])
-    table = measurements.run({}, plan.settings("measurements", dataset))
-    config = plan.datasets[dataset]
+    config = read_data_sets(["benchmarks/reach.yaml"]).settings[dataset]
+    table = measurements.run({}, config)
     arm = robot.load(config["robot"])
     every = from_columns(table["measurements"], arm)
     estimator = DHEstimator.of(config["calibration"], arm, every)

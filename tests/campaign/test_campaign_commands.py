@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
 from command_line import call
-from kinacc.workflow.verification.conformity import check_file
 
 from kinacc.artifacts import store
 from kinacc.artifacts.contract import ARTEFACTS
@@ -19,6 +18,7 @@ from kinacc.campaign import folder as campaigns
 from kinacc.campaign import prediction_check
 from kinacc.campaign.words import reason
 from kinacc.cli import campaigns_answers
+from kinacc.gate.conformity import check_file
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics.model import JointState
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shared_data
 from command_line import call
+from stages_by_hand import run_stage
 
 from kinacc.artifacts import store
 from kinacc.assess.random_numbers import key_of
@@ -39,7 +40,7 @@ def ur10_d(tmp_path_factory):
         " dh: {fit_to: measurements, hayati_joints: [2, 3]}}\nevaluation: {space: measured}\n"
     )
     for stage in ("measurements", "data_check", "vec", "dh", "residuals"):
-        done = call("run", stage, "--config", config, "--results", base / "results")
+        done = run_stage(stage, "--config", config, "--results", base / "results")
         assert done.exit_code == 0, done.output
     results = base / "results" / "ur10_d"
     seen = store.read(results / "measurements.parquet")

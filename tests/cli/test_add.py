@@ -8,11 +8,8 @@ from pathlib import Path
 
 import pytest
 from command_line import call
-from kinacc.workflow.plan import planned
 
 from kinacc.config.series_text import with_line
-from kinacc.errors import InputError
-from kinacc.workflow import measured_files
 from kinacc.workflow.contradictions import load
 
 ROOT = Path(__file__).parents[2]
@@ -150,14 +147,6 @@ def test_old_readings_among_new_ones_are_no_new_line(cell):
     assert done.exit_code == 2
     assert "20 of its 60 readings are those of data/march.csv" in done.output
     assert Path("tracker.yaml").read_text() == HERE
-
-
-def test_lines_written_by_hand_with_the_same_readings_are_refused_before_anything_runs(cell):
-    assert added("june.csv", *JUNE, "--first-date", "2026-03-01").exit_code == 0
-    exported_again()
-    with pytest.raises(InputError) as refused:
-        measured_files.check(planned(["tracker.yaml"]))
-    assert "20 of its 60 readings are those of" in str(refused.value)
 
 
 def test_a_file_that_cannot_be_read_so_is_refused_with_all_other_problems(cell):

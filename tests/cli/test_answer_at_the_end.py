@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_line import call, small_study
+from stages_by_hand import run_stage
 
 from kinacc.artifacts import store
 from kinacc.calibration.summary_words import half_page
@@ -24,7 +25,7 @@ def study(tmp_path_factory):
     base = tmp_path_factory.mktemp("study")
     folder = small_study(base)
     config, results = base / "small.yaml", folder.parent
-    done = call("run", "summary", "--config", config, "--results", results)
+    done = run_stage("summary", "--config", config, "--results", results)
     assert done.exit_code == 0, done.output
     return folder
 
@@ -48,7 +49,7 @@ def calibrated(base, accept=""):
     )
     for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
         words = ("--config", base / "own.yaml", "--results", base / "results")
-        done = call("run", stage, *words)
+        done = run_stage(stage, *words)
         assert done.exit_code == 0, done.output
     return base / "results" / "own"
 
@@ -125,7 +126,7 @@ def test_every_pose_of_an_own_file_fits_the_delivered_models(tmp_path, monkeypat
     Path("own.csv").write_text("\n".join(lines) + "\n")
     assert call("init", "own.csv", "--robot", "irb120", "--yes").exit_code == 0
     for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
-        done = call("run", stage, "--config", "own.yaml", "--results", "results")
+        done = run_stage(stage, "--config", "own.yaml", "--results", "results")
         assert done.exit_code == 0, done.output
     page = shown("results/own")
     assert "kept out" not in page

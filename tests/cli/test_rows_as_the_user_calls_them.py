@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from stages_by_hand import run_stage
 from tracked_arm import call, table, tracked, written
 
 from kinacc.artifacts import store
@@ -45,7 +46,7 @@ def two_files(tmp_path_factory):
 def results(two_files):
     folder, configs, _ = two_files
     for stage in _STAGES:
-        done = call("run", stage, *_options(configs), "--results", folder / "results")
+        done = run_stage(stage, *_options(configs), "--results", folder / "results")
         assert done.exit_code == 0, done.output
     return folder / "results" / "m"
 
@@ -122,7 +123,7 @@ def test_the_rows_of_a_workbook_are_called_rows_in_every_answer(tmp_path):
         "measurements: {file: {exclude: [{lines: [35], reason: bumped}]}}}}\n"
     )
     for stage in _STAGES:
-        done = call("run", stage, *_options((tmp_path / "m.yaml", quick)), "--results", tmp_path)
+        done = run_stage(stage, *_options((tmp_path / "m.yaml", quick)), "--results", tmp_path)
         assert done.exit_code == 0, done.output
     whole = call("fitted", tmp_path / "m", "--all").output
     before, worst = whole.split("worst rows")

@@ -7,15 +7,12 @@ import math
 import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
 from command_line import call, small_study
-from kinacc.workflow.last_words import last_words
-from kinacc.workflow.plan import SNAKEFILE, planned
+from stages_by_hand import run_stage
 
 from kinacc.artifacts import store
 from kinacc.campaign import of_calibration
@@ -30,7 +27,7 @@ def study(tmp_path_factory):
     """Results of a small synthetic study, up to its summary."""
     base = tmp_path_factory.mktemp("study")
     folder = small_study(base)
-    done = call("run", "summary", "--config", base / "small.yaml", "--results", folder.parent)
+    done = run_stage("summary", "--config", base / "small.yaml", "--results", folder.parent)
     assert done.exit_code == 0, done.output
     return folder
 
@@ -221,29 +218,6 @@ def many(folder, count):
         told = {"datasets": {f"cell_{number}": {"robot": "mh180"}}}
         (folder / f"cell_{number}.yaml").write_text(yaml.safe_dump(told))
     return sorted(map(str, folder.iterdir()))
-
-
-def test_at_the_end_of_a_run_of_many_robots_the_command_for_all_is_named(tmp_path):
-    plan = planned(many(tmp_path / "robots", 5))
-    made = {plan.outputs("summary", name)["summary"] for name in plan.datasets}
-    assert last_words(plan, made) == [
-        "",
-        "5 data sets: kinacc summary results says what each is worth",
-    ]
-
-
-def test_one_stage_of_one_of_many_robots_goes_by_its_short_name(tmp_path):
-    configs = many(tmp_path / "robots", 22)
-    words = ["-n", "-c1", "--workflow-profile", "none", "--snakefile", SNAKEFILE]
-    words += ["--scheduler", "greedy", "--configfile", *configs, "--", "cell_21_vec"]
-    done = subprocess.run(
-        [sys.executable, "-m", "snakemake", *words],
-        cwd=tmp_path, capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    told = done.stdout + done.stderr
-    assert "cell_21: vec is up to date" in told
-    assert "cell_20: " not in told
 
 
 def test_a_robot_described_in_two_files_is_named_with_both(tmp_path):

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from stages_by_hand import run_stage
 from tracked_arm import call, table, tracked
 
 Q = [f"q{i}_deg" for i in range(1, 7)]
@@ -38,7 +39,7 @@ def results(tmp_path_factory):
     (base / "sets.yaml").write_text("\n".join(lines) + "\n")
     for name in sets:
         for stage in STAGES:
-            done = call("run", stage, "--config", base / "sets.yaml", "--dataset", name,
+            done = run_stage(stage, "--config", base / "sets.yaml", "--dataset", name,
                         "--results", base / "results")  # fmt: skip
             assert done.exit_code == 0, done.output
     return base / "results"

@@ -1,8 +1,6 @@
 """Gates as people write them into a configuration, right and wrong."""
 
 import pytest
-from kinacc.artifacts.provenance import config_hash
-from kinacc.workflow.plan import planned
 
 from kinacc.config.load import load
 from kinacc.config.schema import key
@@ -124,22 +122,6 @@ def test_campaigns_are_sought_from_the_folder_of_the_configuration(tmp_path):
     path = tmp_path / "cell" / "cell.yaml"
     path.write_text("gates: [{name: a, campaign: check, tolerance_mm: 1}]\n" + END)
     assert load([path], folder=tmp_path)["mh180"]["gates"][0]["campaign"] == "cell/check"
-
-
-def test_gates_make_nothing_anew_and_a_tolerance_only_what_hands_it_on(tmp_path):
-    plans = []
-    for text in ("", "gates: [{name: a, claims: agree}]\n", "tolerance: {mm: 1}\n"):
-        path = tmp_path / f"{len(plans)}.yaml"
-        path.write_text(text + END)
-        plans.append(planned([path]))
-    hashes = [
-        {name: config_hash(plan.settings(name, "mh180")) for name in plan.stages("mh180")}
-        for plan in plans
-    ]
-    assert hashes[0] == hashes[1]
-    other = {name for name in hashes[0] if hashes[0][name] != hashes[2][name]}
-    assert "summary" in other
-    assert other <= {"summary", "report", "history"}
 
 
 def test_every_figure_of_the_schema_can_be_asked_for(tmp_path):

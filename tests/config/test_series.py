@@ -6,7 +6,6 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from kinacc.workflow.plan import planned
 
 from kinacc.errors import InputError
 from kinacc.workflow.contradictions import load
@@ -62,28 +61,6 @@ def test_every_line_is_a_data_set_and_the_arm_is_its_newest(written):
     }
     flags = [(line["name"], line["base"], line["tool"]) for line in loaded["tracker"]["series"]]
     assert flags == [(MARCH, None, None), (MAY, "same", "same"), (JUNE, "moved", "same")]
-
-
-def test_lines_are_calibrated_only_and_the_arm_has_a_history(written):
-    plan = planned([written(SERIES)])
-    assert plan.told == ["tracker"]
-    for line in plan.lines("tracker"):
-        assert {"vec", "dh", "residuals", "summary"} <= set(plan.stages(line))
-        assert not {"history", "study", "report", "fig2", "claims"} & set(plan.stages(line))
-    assert {"history", "history_over_time", "study", "report"} <= set(plan.stages("tracker"))
-    read = plan.inputs("history", "tracker")
-    assert read[f"{MAY}/frames"] == f"results/{MAY}/frames.parquet"
-    assert not any(role.startswith("tracker/") for role in read)
-
-
-def test_the_settings_of_a_line_do_not_depend_on_the_other_lines(written):
-    every = planned([written(SERIES)])
-    without_june = SERIES.split("\n", 1)[1]
-    before = planned([written(without_june)])
-    for line in (MARCH, MAY):
-        for stage in before.stages(line):
-            assert before.job(stage, line) == every.job(stage, line)
-            assert before.job_text(stage, line) == every.job_text(stage, line)
 
 
 def test_files_are_sought_beside_the_configuration(written, tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 from command_line import call
+from stages_by_hand import run_stage
 
 from kinacc.artifacts import store
 from kinacc.calibration.misfit import misfit
@@ -59,7 +60,7 @@ def calibrated(folder, gears_rad):
     """The configuration and the results folder of such an arm."""
     config = written(folder, gears_rad)
     for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
-        done = call("run", stage, "--config", config, "--results", folder / "results")
+        done = run_stage(stage, "--config", config, "--results", folder / "results")
         assert done.exit_code == 0, done.output
     return config, folder / "results" / "arm"
 

@@ -73,7 +73,6 @@ def test_a_row_that_cannot_be_right(project, row, column, value, said):
 
 
 def test_a_mapping_that_no_longer_fits_the_file(project):
-    before = project.digests()
     wrong = project.folder / "wrong.yaml"
     wrong.write_text("datasets: {own: {measurements: {file: {columns: {q1: shoulder}}}}}\n")
     text = project.snakemake(ok=False, configs=("config.yaml", "small.yaml", "wrong.yaml"))
@@ -82,7 +81,6 @@ def test_a_mapping_that_no_longer_fits_the_file(project):
 
 
 def test_fewer_readings_than_the_fits_have_parameters(project):
-    before = project.digests()
     path = project.folder / CSV
     good = path.read_text()
     path.write_text("\n".join(good.splitlines()[:12]) + "\n")

@@ -7,14 +7,14 @@ import json
 import numpy as np
 import pytest
 from command_line import call
-from kinacc.workflow.plan import planned
+from stages_by_hand import run_stage
 
-from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.geometry import log_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.model import JointState
+from kinacc.workflow.data_sets import read_data_sets
 
 COUNT, LOAD = 90, np.array([60.0, 20.0, -10.0, 150.0])
 ARM = robot.load("mh180")
@@ -57,7 +57,7 @@ datasets:
       compliance: {{joints: [2, 3]}}
 """)
     for stage in ("measurements", "data_check", "vec", "compliance", "dh", "residuals"):
-        done = call("run", stage, "--config", base / "set.yaml", "--results", base / "results")
+        done = run_stage(stage, "--config", base / "set.yaml", "--results", base / "results")
         assert done.exit_code == 0, done.output
     return base / "results" / "bent"
 
@@ -122,38 +122,9 @@ def test_a_format_that_cannot_carry_the_model_says_so(folder, tmp_path):
     assert model.compliance_rad_per_nm[1] == answer["bending"][0]["compliance_rad_per_nm"]
 
 
-def test_a_folder_with_all_models_is_as_the_contract_says(folder):
-    config = folder.parents[1] / "set.yaml"
-    said = call("check-results", folder, "--config", config).output
-    problems = [line for line in said.splitlines() if line.startswith("  - ")]
-    not_run = (": missing; made by", "/figures/", "/report.html")
-    assert not [line for line in problems if not any(each in line for each in not_run)], said
-
-
 def plan_of(tmp_path, text):
     (tmp_path / "a.yaml").write_text(f"datasets: {{arm: {{robot: mh180}}}}\n{text}")
-    return planned([tmp_path / "a.yaml"])
-
-
-def test_nobody_asks_and_nothing_is_planned_read_or_hashed(tmp_path):
-    plan = plan_of(tmp_path, "")
-    assert "compliance" not in plan.stages("arm")
-    assert not any("compliance" in path for path in plan.targets("arm"))
-    for name in plan.stages("arm"):
-        job = plan.job(name, "arm", plan.part_names(name, "arm")[0])
-        assert not any("compliance" in each for each in (*job.inputs, *job.uses))
-    kept = {*defaults()["calibration"]} - {"compliance"}
-    assert set(plan.settings("residuals", "arm")["calibration"]) == kept
-
-
-def test_who_asks_gets_the_stage_and_depends_on_the_model(tmp_path):
-    plan = plan_of(tmp_path, "calibration: {compliance: {joints: [2]}}")
-    assert "compliance_model" in plan.inputs("residuals", "arm")
-    assert "compliance_frames" in plan.inputs("dh", "arm")
-    used = plan.job("residuals", "arm").uses
-    assert "kinacc.artifacts.error_models:MODELS[compliance]" in used
-    assert "kinacc.artifacts.error_models:ESTIMATORS[compliance]" in used
-    assert not any("compliance" in each for each in plan.job("vec", "arm").uses)
+    return read_data_sets([tmp_path / "a.yaml"])
 
 
 def test_everything_wrong_with_the_settings_is_said_at_once(tmp_path):

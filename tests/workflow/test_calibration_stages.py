@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kinacc.workflow.plan import planned
 
 from kinacc.artifacts import store
 from kinacc.errors import InputError
@@ -16,6 +15,7 @@ from kinacc.kinematics import dh as dh_kinematics
 from kinacc.kinematics import robot
 from kinacc.kinematics import vec as vec_kinematics
 from kinacc.kinematics.tables import frame, models
+from kinacc.workflow.data_sets import read_data_sets
 from kinacc.workflow.in_memory import RUNS
 from kinacc.workflow.stages import assessment_points, measurements
 
@@ -24,14 +24,12 @@ POSES = 150
 MARKS = {
     "kinacc_version": "0",
     "config_hash": "0" * 16,
-    "code_hash": "0" * 16,
-    "inputs_hash": "0" * 16,
     "seed": 1,
 }
 
 
 def settings_of(plan, name, dataset="mh180", **changes):
-    found = copy.deepcopy(plan.settings(name, dataset))
+    found = copy.deepcopy(plan.settings[dataset])
     for path, value in changes.items():
         section, *keys = path.split("__")
         at = found[section]
@@ -43,7 +41,7 @@ def settings_of(plan, name, dataset="mh180", **changes):
 
 @pytest.fixture(scope="module")
 def plan():
-    return planned([ROOT / "config.yaml"])
+    return read_data_sets([ROOT / "config.yaml"])
 
 
 def columns(base=None, tool=None):
@@ -75,7 +73,7 @@ def chain(plan, split, **changes):
     tables = {"measurements": split}
     given = {"calibration__vec__order": 2} | changes
     for name in ("vec", "dh", "residuals"):
-        sections = plan.settings(name, "mh180")["calibration"]
+        sections = plan.settings["mh180"]["calibration"]
         own = {path: value for path, value in given.items() if path.split("__")[1] in sections}
         tables |= RUNS[name](tables, settings_of(plan, name, **own))
     return tables
@@ -83,7 +81,7 @@ def chain(plan, split, **changes):
 
 @pytest.fixture(scope="module")
 def tables(plan):
-    return chain(plan, measurements.split(columns(), plan.settings("measurements", "mh180")))
+    return chain(plan, measurements.split(columns(), plan.settings["mh180"]))
 
 
 def row(table, **wanted):
@@ -182,7 +180,7 @@ def test_rank_of_the_vec_is_in_its_table(tables):
 def test_base_and_tool_estimated_and_fitted_to_measurements(plan):
     base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
     tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-    split = measurements.split(columns(base, tool), plan.settings("measurements", "mh180"))
+    split = measurements.split(columns(base, tool), plan.settings["mh180"])
     found = chain(
         plan,
         split,
@@ -206,7 +204,7 @@ def test_base_and_tool_estimated_and_fitted_to_measurements(plan):
 def test_masks_priors_loss_and_hayati_angles_come_from_the_configuration(plan):
     base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
     tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-    split = measurements.split(columns(base, tool), plan.settings("measurements", "mh180"))
+    split = measurements.split(columns(base, tool), plan.settings["mh180"])
     found = chain(
         plan,
         split,
@@ -241,7 +239,7 @@ def test_masks_priors_loss_and_hayati_angles_come_from_the_configuration(plan):
 def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(plan):
     base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
     tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-    split = measurements.split(columns(base, tool), plan.settings("measurements", "mh180"))
+    split = measurements.split(columns(base, tool), plan.settings["mh180"])
     found = chain(
         plan,
         split,
@@ -279,9 +277,7 @@ def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(plan):
 
 def test_a_base_all_of_which_is_fixed_is_held_in_every_model(plan):
     base = Pose(exp_so3(np.array([0.0, 0.0, 0.3])), np.array([1500.0, -700.0, 300.0]))
-    split = measurements.split(
-        columns(base, Pose(np.eye(3), np.zeros(3))), plan.settings("measurements", "mh180")
-    )
+    split = measurements.split(columns(base, Pose(np.eye(3), np.zeros(3))), plan.settings["mh180"])
     stated = {f"base {axis}": {"value_mm": base.position_mm[i]} for i, axis in enumerate("xyz")}
     stated |= {"base rx": "fixed", "base ry": "fixed", "base rz": {"value_rad": 0.3}}
     found = chain(
@@ -345,7 +341,7 @@ def test_a_target_seen_in_one_configuration_always_trains(plan):
     measured = {name: np.concatenate([values, values[:1]]) for name, values in columns().items()}
     measured["target"] = np.array(["tool"] * POSES + ["rare"], dtype=object)
     with pytest.warns(UserWarning, match="target rare has fewer than 3 rows"):
-        split = measurements.split(measured, plan.settings("measurements", "mh180"))
+        split = measurements.split(measured, plan.settings["mh180"])
     again = POSES - POSES // 10  # the first configuration is visited again here
     assert np.isnan(split["fold"][[0, again, POSES]]).all()
     assert np.isnan(split["fold"]).sum() == 3
@@ -354,7 +350,7 @@ def test_a_target_seen_in_one_configuration_always_trains(plan):
 def test_order_and_prior_cannot_be_chosen_without_folds_that_hold_rows(plan):
     one = {name: values[:30] for name, values in columns().items()}
     one["pose"] = np.zeros(30, dtype=int)  # one configuration, in one fold
-    split = measurements.split(one, plan.settings("measurements", "mh180"))
+    split = measurements.split(one, plan.settings["mh180"])
     given = settings_of(plan, "vec", calibration__vec__order="auto")
     with pytest.raises(InputError, match="no order or prior can be tried"):
         RUNS["vec"]({"measurements": split}, given)
@@ -362,18 +358,18 @@ def test_order_and_prior_cannot_be_chosen_without_folds_that_hold_rows(plan):
 
 def test_too_few_poses_for_the_order_is_bad_input(plan):
     few = {name: values[:20] for name, values in columns().items()}
-    split = measurements.split(few, plan.settings("measurements", "mh180"))
+    split = measurements.split(few, plan.settings["mh180"])
     with pytest.raises(InputError, match=r"96 residual components .* 216 free parameters"):
-        RUNS["vec"]({"measurements": split}, plan.settings("vec", "mh180"))
+        RUNS["vec"]({"measurements": split}, plan.settings["mh180"])
 
 
 @pytest.mark.parametrize(("dataset", "reach_mm"), [("ur10_b", 0.475), ("ur10_d", 0.43)])
 def test_reach_on_the_measured_ur10(dataset, reach_mm, monkeypatch):
     monkeypatch.chdir(ROOT)
-    measured = planned([ROOT / "config.yaml", ROOT / "examples" / "ur10.yaml"])
+    measured = read_data_sets([ROOT / "config.yaml", ROOT / "examples" / "ur10.yaml"])
     found: dict = {}
     for name in ("measurements", "vec", "dh", "residuals"):
-        found |= RUNS[name](found, measured.settings(name, dataset))
+        found |= RUNS[name](found, measured.settings[dataset])
     rms = {
         comparison: row(
             found["residuals"],

@@ -54,10 +54,10 @@ class Answers:
     campaign: Sequence[str]
     following: Sequence[str]
     outdated: Sequence[str]
-    reason: str
     more: str
     tolerance: str = ""
     history: str = ""
+    reason: str = ""
 
 
 def screen(

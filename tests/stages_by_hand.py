@@ -1,0 +1,80 @@
+"""One stage of the workflow on the tables of a results folder, as its rule would run it."""
+
+from __future__ import annotations
+
+import warnings
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
+from kinacc.artifacts import store, sums
+from kinacc.artifacts.atomic import write_together
+from kinacc.errors import KinaccError
+from kinacc.workflow.code import config_hash
+from kinacc.workflow.data_sets import read_data_sets
+from kinacc.workflow.outdated import CALIBRATION
+from kinacc.workflow.stages import (
+    accuracy_map,
+    assessment_points,
+    claims,
+    data_check,
+    error_model,
+    excluded_rows,
+    histories,
+    measurements,
+    residuals,
+    study,
+    study_chunk,
+    summary,
+)
+
+STAGES = {
+    "measurements": measurements.run,
+    "data_check": data_check.run,
+    **{kind: partial(error_model.run, kind=kind) for kind in ("vec", "compliance", "dh")},
+    "residuals": residuals.run,
+    "excluded_rows": excluded_rows.run,
+    "summary": summary.run,
+    "accuracy_map": accuracy_map.run,
+    "assessment_points": assessment_points.run,
+    "study": study.run,
+    "histories": histories.run,
+    "claims": claims.run,
+}
+CALIBRATED = ("measurements", "vec", "dh", "residuals")
+
+
+def run_stage(name: str, *words: object) -> SimpleNamespace:
+    """Exit code and output of a stage, by ``--config``, ``--results`` and ``--dataset``."""
+    given = [str(word) for word in words]
+    pairs = list(zip(given[::2], given[1::2], strict=True))
+    configs = [value for option, value in pairs if option == "--config"]
+    options = dict(pairs)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            perform(name, configs, Path(options.get("--results", "results")),
+                    options.get("--dataset"))  # fmt: skip
+        except KinaccError as error:
+            return SimpleNamespace(exit_code=1, output=str(error))
+    return SimpleNamespace(exit_code=0, output="\n".join(str(each.message) for each in told))
+
+
+def perform(name: str, configs: list[str], results: Path, dataset: str | None = None) -> Path:
+    """Run a stage and write its tables and their digests; the folder of the data set."""
+    data = read_data_sets(configs, results=str(results))
+    dataset = dataset or next(iter(data.settings))
+    settings, folder = data.settings[dataset], results / dataset
+    folder.mkdir(parents=True, exist_ok=True)
+    tables = {path.stem: store.read(path) for path in folder.glob("*.parquet")}
+    if name == "study":
+        tables |= study_chunk.run(tables, settings)
+    own = data.chosen(dataset, *CALIBRATION) if name == "summary" else settings
+    marks = {"kinacc_version": "0", "config_hash": config_hash(own), "seed": settings["seed"]}
+    contents = {
+        f"{table}.parquet": store.content_of(store.to_table(table, columns, marks))
+        for table, columns in STAGES[name](tables, settings).items()
+    }
+    left = {folder / file: content for file, content in contents.items()}
+    write_together({**left, folder / "sums" / f"{name}.sha256": sums.text_of(contents, {})})
+    return folder
