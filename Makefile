@@ -85,7 +85,7 @@ fuzz: $(KINACC) $(TOOLS)
 	$(PY) tests/fuzz/run.py $(FUZZ)
 
 kills: $(KINACC) $(TOOLS) $(CLUSTER)
-	$(PY) tests/kills/kill_runs.py --work study cached calibrate tournament slurm
+	$(PY) tests/kills/kill_runs.py --work study cached calibrate slurm
 
 corrupt: $(KINACC) $(TOOLS)
 	$(PY) tools/corrupt --cases 1000 --seed 1

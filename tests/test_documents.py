@@ -106,7 +106,6 @@ REFERENCE = (
     "configuration",
     "mutants",
     "reading-the-paper",
-    "tournament",
 )
 
 

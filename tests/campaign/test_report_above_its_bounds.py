@@ -68,7 +68,7 @@ def test_readings_quieter_than_the_noise_stated_lie_above_their_limits(reported)
 
 
 def test_readings_noisier_than_stated_make_limits_that_contradict(reported):
-    text, _ = reported(0.02, 0.2, 0.4, "--assessor", "sequential", points=20, budget=60)
+    text, _ = reported(0.02, 0.2, 0.4, "--set", "noise_margin=1.0", points=20, budget=60)
     rows = largest(text)
     crossed = [row[0] for row in rows if float(row[3]) > float(row[4])]
     assert crossed

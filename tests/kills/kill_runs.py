@@ -32,7 +32,6 @@ _CONFIGS = ("--configfile", "config.yaml", "small.yaml")
 _EACH_CONFIG = ("--config", "config.yaml", "--config", "small.yaml")
 SNAKEMAKE = (sys.executable, "-m", "snakemake", "--nocolor", "--quiet", "all")
 KINACC = (sys.executable, "-m", "kinacc")
-_TINY_TOURNAMENT = '\nSIZES["default"] = Size((0.1,), {20: (10,)}, 2, 1, (0,))\n'
 
 
 @dataclass(frozen=True)
@@ -44,22 +43,10 @@ class Work:
     cluster: bool = False
 
 
-def _tables_of_data_sets(project: Path) -> None:
-    with (project / "src/kinacc/study/tournament/contest.py").open("a") as file:
-        file.write(_TINY_TOURNAMENT)
-    targets = [f"results/{name}/assessment_points.parquet" for name in ("mh180", "own")]
-    done = [*SNAKEMAKE, "-c2", *_CONFIGS, "--", *targets]
-    subprocess.run(done, cwd=project, env=Place(project).environment(), check=True)
-
-
 WORKS: Mapping[str, Work] = {
     "study": Work((*SNAKEMAKE, "-c2", *_CONFIGS)),
     "cached": Work((*SNAKEMAKE, "-c2", "--cache", *_CONFIGS, "--", "own_dh")),
     "calibrate": Work((*KINACC, "calibrate", "-c", "2", *_CONFIGS[1:])),
-    "tournament": Work(
-        (*KINACC, "tournament", *_EACH_CONFIG, "--parts", "3", "--cores", "2", "--json"),
-        _tables_of_data_sets,
-    ),
     "slurm": Work((), cluster=True),
 }
 
@@ -247,7 +234,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--kills", type=int, default=30, help="of each work")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--work", nargs="+", choices=WORKS, default=["study", "tournament"])
+    parser.add_argument("--work", nargs="+", choices=WORKS, default=["study"])
     parser.add_argument("--folder", type=Path)
     given = parser.parse_args()
     folder = given.folder or Path(tempfile.mkdtemp(prefix="kills-"))

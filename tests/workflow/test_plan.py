@@ -5,11 +5,11 @@ import pytest
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
-from kinacc.workflow.catalogue import STAGES, TOURNAMENT, maker_of
+from kinacc.workflow.catalogue import STAGES, maker_of
 from kinacc.workflow.plan import Plan, planned
 from kinacc.workflow.stages import histories, study, study_chunk
 
-OVER_ALL = {"robustness_chunk", "choices_chunk"}  # stages that go through the whole study
+OVER_ALL = {"robustness_chunk"}  # goes through the whole study
 CONFIG = "datasets: {arm: {robot: mh180}}\n"
 
 
@@ -47,8 +47,6 @@ seed: 11
 def test_every_setting_a_stage_names_is_in_the_configuration():
     known = defaults() | {"dataset": "", "robot": "", "series": []}
     for stage in STAGES.values():
-        if stage.joint:
-            continue
         for path in (*stage.settings, *stage.files):
             section = known
             for key in path.split("."):
@@ -84,28 +82,22 @@ def assert_same(some, others):
             np.testing.assert_array_equal(values, others[name][column], f"{name}.{column}")
 
 
-AGAIN = (*OVER_ALL, "map_readings_chunk")  # go through fits and maps with other arms
-
-
 @pytest.mark.parametrize(
     ("change", "stages"),
     [
         ("study: {search: bisection}", {"study", *OVER_ALL}),
         ("study: {repetitions: 7}", {"study_chunk", *OVER_ALL}),
-        ("evaluation: {points: 7}", {"assessment_points", *AGAIN}),
+        ("evaluation: {points: 7}", {"assessment_points", *OVER_ALL}),
         (
             "evaluation: {reference_frame: base}",
-            {"measurements", "accuracy_map", "assessment_points", *AGAIN},
+            {"measurements", "accuracy_map", "assessment_points", *OVER_ALL},
         ),
-        ("map: {grid_mm: 50}", {"accuracy_map", *AGAIN}),
+        ("map: {grid_mm: 50}", {"accuracy_map", *OVER_ALL}),
         ("robustness: {draws: 3}", OVER_ALL),
-        ("map_readings: {arms: 3}", {"map_readings_chunk"}),
-        ("choices: {runs: 7}", {"choices_chunk"}),
         ("measurements: {file: {decimal: ','}}", set()),
-        ("measurements: {synthetic: {poses: 700}}", {"measurements", *AGAIN}),
+        ("measurements: {synthetic: {poses: 700}}", {"measurements", *OVER_ALL}),
         ("figures: {formats: [svg]}", set()),
         ("study: {chunks: 5}", set()),
-        ("choices: {chunks: 5}", set()),
     ],
 )
 def test_a_value_is_told_to_the_stages_that_depend_on_it(plan_of, change, stages):
@@ -144,46 +136,6 @@ datasets:
     alone = plan_of(text.format(folder=tmp_path, joints=""))
     file = alone.settings("measurements", "two")["measurements"]["file"]
     assert not {"joints", "pulses_per_deg", "repeats_in_names"} & set(file)
-
-
-def test_the_tournament_reads_tables_of_every_data_set_by_where_its_errors_come_from(
-    plan_of, tmp_path
-):
-    (tmp_path / "two.csv").touch()
-    plan = plan_of(f"""
-tournament: {{chunks: 2}}
-datasets:
-  two:
-    robot: mh180
-    evaluation: {{space: measured}}
-    measurements:
-      source: file
-      file: {{path: "{tmp_path}/two.csv", source: a test, orientation: {{kind: none}}}}
-""").contest(noise_mm=(0.1,))
-    inputs = plan.inputs("tournament_tables", TOURNAMENT)
-    assert inputs["tournament_chunk"] == [
-        f"results/tournament/tournament_chunk/{part}-of-2.parquet" for part in (1, 2)
-    ]
-    assert set(inputs) == {
-        "arm/assessment_points",
-        "two/pose_errors",
-        "two/measurements",
-        "tournament_chunk",
-    }
-    assert plan.settings("tournament_chunk", TOURNAMENT) == {
-        "seed": plan.seed("arm"),
-        "size": "default",
-        "assessors": [],
-        "noise_mm": [0.1],
-        "robots": {"arm": "mh180", "two": "mh180"},
-        "study": {
-            "alpha": 0.6,
-            "outlier_rule": "normal",
-            "distance": "squared",
-            "covariance": "r",
-            "search": "from_above",
-        },
-    }
 
 
 def test_other_picture_formats_for_one_data_set_are_refused(plan_of):

@@ -13,7 +13,6 @@ from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import format as in_shell
 
 from kinacc.artifacts.provenance import PACKAGE
-from kinacc.workflow.catalogue import STAGES, TOURNAMENT
 from kinacc.workflow.plan import planned
 from kinacc.workflow.runner import stage_provenance
 from kinacc.workflow.stage import COMMAND, from_words, python_of_stages
@@ -78,11 +77,10 @@ def command(plan, name, dataset, part, gates=()) -> list[str]:
 def test_every_stage_gets_by_its_command_what_was_planned(plan, monkeypatch):
     monkeypatch.setenv("KINACC_PYTHON", sys.executable)
     (dataset,) = plan.datasets
-    for name in {**plan.stages(dataset), **plan.stages(TOURNAMENT)}:
-        whose = TOURNAMENT if STAGES[name].joint else dataset
-        part = plan.part_names(name, whose)[-1]
-        wanted = plan.job(name, whose, part)
-        assert from_words(command(plan, name, whose, part, ["a gate"])) == wanted, name
+    for name in plan.stages(dataset):
+        part = plan.part_names(name, dataset)[-1]
+        wanted = plan.job(name, dataset, part)
+        assert from_words(command(plan, name, dataset, part, ["a gate"])) == wanted, name
 
 
 def test_whoever_carries_a_job_out_says_itself_what_it_runs(plan):

@@ -36,10 +36,8 @@ LEFT_OUT = (
     "campaign/test_marks.py",
     "campaign/test_documentation.py",
     "campaign/test_campaign_commands.py",
-    "study/tournament/test_pages.py",
     "workflow/test_stopping.py",
     "workflow/test_stages_on_a_cluster.py",
-    "workflow/test_tournament_command.py",
 )
 Line = tuple[str, int]
 
