@@ -7,7 +7,6 @@
 # make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make fuzz        what reads files, given files that nobody would write; FUZZ="--minutes 600" for longer
-# make recipes     the recipes for build servers in full, with an environment of their own (needs the network)
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
 # make lock        renew requirements/*.txt (needs uv)
@@ -16,7 +15,7 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test size bench recipes docs docs-links \
+.PHONY: reproduce robustness public-robots lint check test size bench docs docs-links \
   audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
@@ -78,9 +77,6 @@ FUZZ = --inputs 100000
 fuzz: $(KINACC) $(TOOLS)
 	$(PY) tests/fuzz/run.py $(FUZZ)
 
-recipes: $(KINACC) $(TOOLS)
-	KINACC_RECIPES_IN_FULL=1 $(PY) -m pytest tests/integration/test_recipes_in_full.py
-
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
 docs: $(KINACC) $(TOOLS)
 	@$(SITE) . docs/_build
@@ -118,7 +114,6 @@ $(KINACC): $(PACKAGES)
 	  echo "kinacc: programs in .venv do not start in $$(pwd): give the folder a plain name" >&2; exit 1; \
 	}
 	@$(PY) -m compileall -q src
-	@$(PY) -m kinacc.workflow.warm_up
 	@touch $@
 
 $(TOOLS): $(PACKAGES)
@@ -135,7 +130,6 @@ $(PEERS):
 	  echo "kinacc: the other libraries cannot be installed here, and are left out"
 	@$(PEERS_PIP) --no-build-isolation --no-deps --editable .
 	@.venv-bench/bin/python -m compileall -q src
-	@.venv-bench/bin/python -m kinacc.workflow.warm_up
 	@touch $@
 
 $(AUDIT):

@@ -1,7 +1,7 @@
 """The site of the pages, as Sphinx builds it: ``make docs``, from the folder of the repository.
 
 The pages stay plain Markdown. Two things are made of what they hold anyway: the contents of the
-site from the lists of links in index.md and assessors.md, and the entries of the reference of
+site from the lists of links in index.md, and the entries of the reference of
 the API from the names in api.md.
 """
 
@@ -15,7 +15,14 @@ project = "kinacc"
 copyright = "the kinacc developers"
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 root_doc = "docs/index"
-include_patterns = ["*.md", "docs/**.md", "benchmarks/*.md", "config/*.md", "examples/data/*.md"]
+include_patterns = [
+    "*.md",
+    "docs/**.md",
+    "benchmarks/*.md",
+    "research/*.md",
+    "config/*.md",
+    "examples/data/*.md",
+]
 exclude_patterns = ["docs/_build"]
 myst_heading_anchors = 4  # by the same names as on a code host
 nitpicky = True
@@ -29,13 +36,12 @@ html_static_path = ["site/wide.css"]
 html_css_files = ["wide.css"]
 html_theme_options = {"light_css_variables": {"code-font-size": "75%"}}
 
-_CONTENTS = ("docs/index", "docs/assessors")
 _LISTED = re.compile(r"^- \[([^]]*)\]\(([\w./-]+)\.md\)", re.MULTILINE)
 _NAME = re.compile(r"^- `(kinacc\.[\w.]+)`.*\n", re.MULTILINE)
 
 
 def _made_of_the_page(app: object, page: str, source: list[str]) -> None:
-    if page in _CONTENTS:
+    if page == "docs/index":
         source[0] = "".join(map(_with_contents, re.split(r"^(?=## )", source[0], flags=re.M)))
     if page == "docs/api":
         source[0] = _NAME.sub(_entry, source[0])

@@ -105,7 +105,6 @@ REFERENCE = (
     "claims",
     "configuration",
     "reading-the-paper",
-    "tournament",
 )
 
 

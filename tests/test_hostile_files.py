@@ -280,7 +280,6 @@ def test_a_parquet_file_with_a_column_twice_is_refused(tmp_path):
         (("plan-campaign", "--noise-mm", "0.05", "--poses", 50_000), "--poses, --budget"),
         (("plan-campaign", "--noise-mm", "0.05", "--repetitions", 10**9), "--repetitions"),
         (("campaign", "start", "x", "--drawn", 10**9), "--drawn"),
-        (("tournament", "--parts", 10**9), "--parts"),
     ],
     ids=lambda given: " ".join(map(str, given)) if isinstance(given, tuple) else "",
 )

@@ -39,9 +39,6 @@ checksums.
 `q*` stands for `q1`, `q2`, ... for every joint of the arm, `s*` likewise. Rows are unique in the
 columns named as key. `figures/fig*` are pictures (.svg, .png, .pdf).
 
-`results/tournament/` holds the tables named `tournament_*`, about all data sets together; they are
-made on request by `kinacc tournament` or `snakemake tournament`.
-
 `kinacc campaign report` leaves the tables named `campaign_*` in the campaign's own folder.
 
 `kinacc check-results results/` holds a folder to all of this; `kinacc show` prints any of it

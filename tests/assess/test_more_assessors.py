@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kinacc.assess.kinematic import Kinematic
-from kinacc.assess.kinematic_model import Basis, fitted_scales
 from scipy.stats import binom, gamma
 
 from kinacc.assess.adaptive import Candidates
@@ -43,10 +41,6 @@ def smooth_errors(q_rad: np.ndarray, seed: int = 3) -> np.ndarray:
     causes = rng.normal(size=36) * np.sin(1.5 * angle) + rng.normal(size=36) * np.cos(2.5 * angle)
     errors = np.einsum("nic,nc->ni", effects, causes)
     return 0.5 * errors / np.sqrt(np.mean(np.sum(errors**2, axis=1)))
-
-
-def known(q_rad: np.ndarray) -> dict[str, np.ndarray]:
-    return {"q_rad": q_rad, "effects": joint_errors(ARM, q_rad)}
 
 
 def test_effects_are_the_derivatives_of_the_arm():
@@ -188,54 +182,6 @@ def test_a_reading_with_a_covariance_of_its_own_widens_the_calibrated_bound():
             campaign.record(point, np.array([0.5, 0.0, 0.0]), given)
         bounds.append(campaign.statements()[0].upper_mm)
     assert bounds[0] < bounds[1]
-
-
-def test_smooth_errors_of_joints_are_told_from_local_ones():
-    q_rad = joints(150)
-    errors = smooth_errors(q_rad)
-    local = 0.15 * np.random.default_rng(9).normal(size=errors.shape)
-    basis = Basis.of(**known(q_rad))
-    noise = np.full(150, 0.01)
-    assert fitted_scales(basis, np.arange(150), errors, noise).local_mm2 < 0.03**2
-    found = fitted_scales(basis, np.arange(150), errors + local, noise).local_mm2
-    assert 0.1**2 < found < 0.2**2
-
-
-def test_the_kinematic_process_finds_and_bounds_the_largest_of_smooth_errors():
-    q_rad = joints(160)
-    errors = smooth_errors(q_rad)
-    readings = drawn_world(errors, 0.1, key_of(10), 150)
-    campaign = conduct(Kinematic(150), readings, **known(q_rad))
-    everywhere, measured = campaign.statements()
-    truth = np.linalg.norm(errors, axis=1).max()
-    assert (everywhere.target, measured.target) == (CANDIDATES, MEASURED)
-    assert everywhere.lower_mm <= truth <= everywhere.upper_mm
-    assert everywhere.upper_mm - truth < 0.15
-    assert len(campaign.ledger.visited) < 150
-    assert measured.assumption == Reason("smooth")
-    assert everywhere.assumption.numbers["crowd"] > 0
-
-
-def test_the_kinematic_process_withholds_what_joints_do_not_explain():
-    q_rad = joints(150)
-    defect = smooth_errors(q_rad)
-    defect[:3] += [1.5, 0.0, 0.0]
-    said = conduct(Kinematic(150), drawn_world(defect, 0.05, key_of(11), 150), **known(q_rad))
-    assert said.statements()[0].withheld.code == "unexplained_reading"
-    chance = 0.4 * np.random.default_rng(12).normal(size=(150, 3))
-    said = conduct(Kinematic(150), drawn_world(chance, 0.05, key_of(11), 150), **known(q_rad))
-    assert said.statements()[0].withheld
-    few = conduct(Kinematic(60), drawn_world(chance, 0.05, key_of(11), 60), **known(q_rad))
-    assert few.statements()[0].withheld == Reason("few_for_model", {"first": 36, "needed": 84})
-
-
-def test_the_kinematic_process_asks_for_what_it_needs():
-    with pytest.raises(InputError) as caught:
-        Kinematic(20).begin(Candidates.with_equal_noise(np.full(5, 0.1)))
-    assert [each.where for each in caught.value.problems] == [
-        "candidates, q_rad",
-        "candidates, effects",
-    ]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from kinacc.assess.sequential import Sequential
 from scipy.stats import binom, chi2, f, kstest, ncx2, norm, t
 
 from kinacc.assess.adaptive import Candidates, Ledger
@@ -300,17 +299,3 @@ def test_a_future_visit_of_unequal_noise_stays_within_that_of_the_largest_in_all
         visits = size * towards / np.linalg.norm(towards) + spread * rng.normal(size=(4000, 3))
         reach = np.quantile(np.linalg.norm(visits, axis=1), 0.94)
         assert reach <= visit_mm(size, spread.max())
-
-
-def test_one_first_reading_far_off_does_not_carry_the_lower_bound_where_its_point_is_read_again():
-    rng = np.random.default_rng(16)
-    errors = np.full((30, 3), 0.3 / math.sqrt(3.0))
-    campaign = Sequential(60).begin(equal(30))
-    far = 1.5 / 0.3 * errors[7]
-    carry_on(
-        campaign,
-        lambda row, visit: (
-            far if (row, visit) == (7, 0) else errors[row] + 0.1 * rng.normal(size=3)
-        ),
-    )
-    assert 0.2 < campaign.statements()[0].lower_mm < 0.3

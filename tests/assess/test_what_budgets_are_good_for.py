@@ -13,13 +13,11 @@ from scipy.stats import binom, hypergeom
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.binomial import binomial_interval
 from kinacc.assess.coverage import at_most, companions, hardly_missed
-from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import assessed, is_broken, noisy, truth_mm
+from kinacc.assess.simulate import is_broken, noisy, truth_mm
 from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
-from kinacc.assess.world import drawn_world
 
 
 @pytest.mark.parametrize(("hits", "trials"), [(0, 20), (1, 20), (7, 20), (19, 20), (20, 20)])
@@ -96,21 +94,6 @@ def test_a_budget_that_asks_for_company_is_told_how_many_readings_it_takes():
     assert few == {needed}
 
 
-def test_the_kinematic_process_needs_a_component_for_every_coefficient():
-    """Two causes a joint, each a polynomial of order 2: the first visit must hold their number."""
-    enough = paper.assessor("kinematic", measurements=600)
-    assert enough.shortfall(400, 6) is None
-    few = paper.assessor("kinematic", measurements=6).shortfall(400, 6)
-    assert few.code == "no_bound_ahead"
-    needed = few.numbers["needed"]
-    assert paper.assessor("kinematic", measurements=6).shortfall(400, 12).numbers["needed"] == (
-        pytest.approx(2 * needed, abs=1)
-    )
-    # All of so many points are visited at first where the budget is half as large again.
-    assert enough.shortfall(needed, 6) is None
-    assert enough.shortfall(needed - 1, 6) == few
-
-
 def test_statements_are_held_to_what_they_speak_of():
     size = np.array([0.2, 0.9, 0.4])
     assert truth_mm(Statement(CANDIDATES, 1.0), size, [0, 2]) == 0.9
@@ -137,18 +120,6 @@ def test_noisy_readings_are_the_errors_and_noise_of_the_covariance_asked_for():
     np.testing.assert_array_equal(again(1, 7), read(1, 7))
     assert not np.array_equal(read(1, 7), read(1, 8))
     assert not np.array_equal(noisy(errors, root, 4000, 3, 2)(1, 7), read(1, 7))
-
-
-@pytest.mark.parametrize("name", ["maximum", "single_shot"])
-def test_either_interface_tells_what_it_took(name):
-    errors = np.random.default_rng(5).normal(size=(12, 3))
-    world = drawn_world(errors, 1e-6, key_of(4), 20)
-    found = assessed(name, paper.study(measurements=12), world)
-    assert found.measurements == found.points_visited == 12
-    assert (found.visited is None) == (name == "maximum")
-    assert found.visited is None or sorted(found.visited) == list(range(12))
-    size = np.linalg.norm(errors, axis=1)
-    assert found.statements[0].value_mm == pytest.approx(size.max(), abs=1e-4)
 
 
 def test_a_bound_on_readings_of_unequal_noise_takes_each_ones_own_covariance():

@@ -14,12 +14,11 @@ from kinacc.errors import InputError
 from kinacc.kinematics import robot
 
 TAKEN, REFUSED = "taken", "refused"
-WITH_CONFIDENCE = ("region_share", "single_shot", "two_stage", "sequential", "kinematic",
-                   "invalidation_calibrated", "search_and_confirm")  # fmt: skip
-WITH_VISITED = ("sequential", "model_invalidation_full", "invalidation_calibrated", "kinematic")
+WITH_CONFIDENCE = ("region_share", "single_shot", "invalidation_calibrated", "search_and_confirm")
+WITH_VISITED = ("model_invalidation_full", "invalidation_calibrated")
 LIMITS = [
     *((name, "measurements", 0, REFUSED) for name in ADAPTIVE),
-    *((name, "measurements", 1, TAKEN) for name in ADAPTIVE if name != "two_stage"),
+    *((name, "measurements", 1, TAKEN) for name in ADAPTIVE),
     *((name, "measurements", 2.5, REFUSED) for name in ADAPTIVE),
     *((name, "confidence", 0.5, TAKEN) for name in WITH_CONFIDENCE),
     *((name, "confidence", 0.49, REFUSED) for name in WITH_CONFIDENCE),
@@ -34,20 +33,11 @@ LIMITS = [
     ("region_share", "deviations", -0.1, REFUSED),
     ("model_invalidation_full", "bound_mm", 0.0, REFUSED),
     ("model_invalidation_full", "bound_mm", 0.001, TAKEN),
-    ("sequential", "width_mm", 0.0, REFUSED),
-    ("sequential", "width_mm", 0.001, TAKEN),
     ("search_and_confirm", "isolation", 1.0, REFUSED),
     ("search_and_confirm", "isolation", 1.001, TAKEN),
     ("search_and_confirm", "crowd", 0.0, REFUSED),
     ("search_and_confirm", "crowd", 0.999, TAKEN),
     ("search_and_confirm", "crowd", 1.0, REFUSED),
-    ("two_stage", "screened", 0.0, REFUSED),
-    ("two_stage", "screened", 0.001, TAKEN),
-    ("two_stage", "screened", 1.0, REFUSED),
-    ("two_stage", "repeats", 0, REFUSED),
-    ("two_stage", "repeats", 1, TAKEN),
-    ("two_stage", "measurements", 4, REFUSED),
-    ("two_stage", "measurements", 5, TAKEN),
 ]
 
 
@@ -72,9 +62,7 @@ def candidates_of_an_arm(count):
     return Candidates(np.tile(0.01 * np.eye(3), (count, 1, 1)), **known)
 
 
-@pytest.mark.parametrize(
-    "name", ["search_and_confirm", "invalidation_calibrated", "kinematic", "sequential"]
-)
+@pytest.mark.parametrize("name", ["search_and_confirm", "invalidation_calibrated"])
 def test_before_the_first_visit_ends_it_is_said_how_many_points_are_left(name):
     campaign = paper.assessor(name, measurements=30).begin(candidates_of_an_arm(50))
     rng, left = np.random.default_rng(4), []

@@ -31,7 +31,6 @@ def test_a_budget_below_the_candidates_is_told_what_more_would_bring(calibration
 
     assert "with 59 readings it would be on all" in " ".join(start(58).split())
     assert "it would be on all" not in start(59)
-    assert "no bound will be stated: that takes 84 points" in start(57, "--assessor", "kinematic")
 
 
 def test_a_whole_campaign_ends_as_in_memory(begun):
@@ -284,7 +283,6 @@ def test_readings_of_a_file_that_has_grown_are_taken_once(begun, tmp_path):
             ("--noise-mm", "0.1", "--budget", "0"),
             "--budget: 0; allowed: a whole number, at least 1",
         ),
-        (("--noise-mm", "0.1", "--assessor", "two_stage", "--budget", "4"), "do not cover"),
         (("--noise-mm", "0.1", "--assessor", "guess"), "search_and_confirm"),
         (("--noise-mm", "0.1", "--set", "repeats=3"), "setting repeats"),
         (("--noise-mm", "0.1", "--confidence", "2"), "at least 0.5 and below 1"),

@@ -69,12 +69,6 @@ def test_there_is_no_forecast_from_nearly_nothing(make_plan):
     assert reason(why_none(state)) == "0 points were read, 8 are needed"
 
 
-def test_there_is_no_forecast_for_an_assessor_that_errors_drawn_one_by_one_would_mislead(make_plan):
-    state = restore(make_plan("kinematic"), [])
-    assert forecast(state, 5) is None
-    assert "plan-campaign" in reason(why_none(state))
-
-
 def test_simulated_readings_do_not_depend_on_what_else_is_read(make_plan):
     plan = make_plan("single_shot")
     rows = plan.visiting(frozenset())

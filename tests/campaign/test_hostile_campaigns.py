@@ -140,7 +140,7 @@ def test_digits_of_other_alphabets_are_no_numbers_of_options(digits):
         (("--set", "confidence=[1]"), "setting confidence"),
         (("--set", "measurements=true"), "setting measurements"),
         (("--set", "isolation=" + "[" * 5000), "setting isolation"),
-        (("--assessor", "sequential", "--set", "width_mm=wide"), "setting width_mm"),
+        (("--set", "isolation=wide"), "setting isolation"),
         (("--assessor", "invalidation_calibrated", "--set", "alpha=1"), "setting alpha"),
         (("--assessor", "invalidation_calibrated", "--set", "alpha=null"), "setting alpha"),
         (("--noise-mm", "1e-320"), "at least 1e-09 mm"),

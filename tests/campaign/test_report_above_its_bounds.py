@@ -67,16 +67,6 @@ def test_readings_quieter_than_the_noise_stated_lie_above_their_limits(reported)
     assert "the noise may be stated too large" in text
 
 
-def test_readings_noisier_than_stated_make_limits_that_contradict(reported):
-    text, _ = reported(0.02, 0.2, 0.4, "--assessor", "sequential", points=20, budget=60)
-    rows = largest(text)
-    crossed = [row[0] for row in rows if float(row[3]) > float(row[4])]
-    assert crossed
-    said = text.split("Limits that contradict each other: ")[1].split(".")[0]
-    assert all(point in said for point in crossed)
-    assert "the noise is stated too small" in text
-
-
 def test_points_beyond_a_share_of_the_region_are_said_to_be_beyond_it(reported):
     text, _ = reported(0.02, 0.2, 0.02, "--assessor", "region_share", "--set", "share=0.5",
                        points=60, budget=60)  # fmt: skip

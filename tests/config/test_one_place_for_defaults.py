@@ -35,7 +35,6 @@ OTHERS = {
     ("checks/hand_eye.py", "draws"): "random draws of poses, not of the synthetic arm",
     ("cli/choice.py", "seed"): "of a campaign, which no configuration speaks of",
     ("cli/compare.py", "poses"): "poses compared, not poses of the synthetic arm",
-    ("cli/draw_robots.py", "draws"): "arms searched for the package, not arms that a run uses",
     ("cli/plan_campaign.py", "poses"): "poses of simulated campaigns, not of the synthetic arm",
     ("cli/plan_campaign.py", "repetitions"): "of simulated campaigns, not of the study",
     ("cli/plan_poses.py", "poses"): "poses chosen, not poses of the synthetic arm",

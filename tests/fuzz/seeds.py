@@ -304,7 +304,7 @@ def campaign() -> tuple[Case, ...]:
     about = {"robot": "mh180", "calibration": "none", "model": "nominal", "point": "tool",
              "candidates": "drawn"}  # fmt: skip
     cases = []
-    for name, count in (("search_and_confirm", 0), ("search_and_confirm", 9), ("kinematic", 6)):
+    for name, count in (("search_and_confirm", 0), ("search_and_confirm", 9), ("single_shot", 6)):
         plan = begin.plan_of(
             arm, points, assessor_of(name, {"measurements": 12}),
             instruments(("tracker=0.05",), "base"),

@@ -12,6 +12,8 @@ from scipy.stats import binomtest
 
 from kinacc.assess.attainable import width_limits
 from kinacc.assess.error_effects import joint_errors
+from kinacc.assess.random_numbers import key_of
+from kinacc.assess.world import drawn_world
 from kinacc.kinematics import robot
 from kinacc.study.fields import ErrorField
 from research import contest, verdicts
@@ -240,3 +242,15 @@ def test_every_world_with_every_setup_is_a_row_of_its_own(field):
 def test_few_campaigns_do_not_tell_three_points_from_chance():
     few = graded(upper_mm=[1.2, 1.2, 1.2, 1.2, 0.9])
     assert verdict_of(few, 1)["below"] == 0
+
+
+@pytest.mark.parametrize("name", ["maximum", "single_shot"])
+def test_either_interface_tells_what_it_took(name):
+    errors = np.random.default_rng(5).normal(size=(12, 3))
+    world = drawn_world(errors, 1e-6, key_of(4), 20)
+    found = contest.assessed(name, paper.study(measurements=12), world)
+    assert found.measurements == found.points_visited == 12
+    assert (found.visited is None) == (name == "maximum")
+    assert found.visited is None or sorted(found.visited) == list(range(12))
+    size = np.linalg.norm(errors, axis=1)
+    assert found.statements[0].value_mm == pytest.approx(size.max(), abs=1e-4)
