@@ -16,9 +16,9 @@ import time
 
 import numpy as np
 import yaml
+from kinacc.workflow.plan import planned
 
 from kinacc.workflow.in_memory import RUNS
-from kinacc.workflow.plan import planned
 
 STAGES = ("measurements", "vec", "dh", "residuals")
 

@@ -159,7 +159,6 @@ def _study(repetitions: float) -> tuple[float, Callable[[], object]]:
 
 def _data_sets(count: float) -> tuple[float, Callable[[], object]]:
     import project
-
     from kinacc.workflow.plan import planned
 
     path = project.folder() / "many.yaml"
