@@ -69,6 +69,10 @@ def arrangements(plan: Plan) -> list[str]:
     if of.references:
         what = "taken from all readings" if of.correct_drift else "said, and no bound is stated"
         lines.append(f"{of.references} readings return to reference poses: a drift found is {what}")
+        lines.append(
+            "a drift of one standard deviation over the campaign is found in under 10 % of "
+            "campaigns, and bounds then hold less often (docs/drift-and-steps.md)"
+        )
     if of.error_of != MEAN:
         lines.append(f"the error meant is what {FUTURE:.0%} of visits to the worst pose keep")
     if of.allowance_mm:
