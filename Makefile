@@ -39,8 +39,7 @@ AUDIT := .venv-audit/.audit-$(call key,requirements/audit.txt)
 PEERS := .venv-bench/.peers-$(call key,requirements/run.txt requirements/bench.txt pyproject.toml)
 
 reproduce: $(KINACC)
-	@$(PY) -m snakemake --cores $(CORES) --no-hooks
-	@$(PY) -m kinacc fitted results/mh180
+	@$(PY) -m snakemake --cores $(CORES)
 
 robustness: $(KINACC)
 	@$(PY) -m snakemake --cores $(CORES) robustness

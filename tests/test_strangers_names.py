@@ -125,39 +125,6 @@ def test_nothing_in_the_package_runs_what_a_file_says(path):
         assert name not in ("np.load", "numpy.load", "pd.read_pickle"), name
 
 
-def planned_with(folder: Path, link: str, target: Path):
-    """The plan of a data set one of whose files or folders is a link."""
-    from kinacc.workflow.plan import planned
-
-    (folder / "own.yaml").write_text("datasets: {own: {robot: mh180}}\n")
-    place = folder / "results" / link
-    place.parent.mkdir(parents=True, exist_ok=True)
-    place.symlink_to(target)
-    return planned([folder / "own.yaml"], results=str(folder / "results"))
-
-
-@pytest.mark.parametrize("link", ["own", "own/logs", "own/logs/vec.log", "own/vec_model.parquet"])
-def test_nothing_is_written_through_a_link_out_of_the_results(tmp_path, link):
-    with pytest.raises(InputError, match="outside of the results") as caught:
-        planned_with(tmp_path, link, tmp_path / "elsewhere")
-    assert [each.where for each in caught.value.problems] == [str(tmp_path / "results" / link)]
-
-
-def test_artefacts_are_links_into_the_shared_cache_alone(tmp_path, monkeypatch):
-    monkeypatch.setenv("SNAKEMAKE_OUTPUT_CACHE", str(tmp_path / "cache"))
-    link = "own/vec_model.parquet"
-    assert planned_with(tmp_path, link, tmp_path / "cache" / "abc.parquet")
-    monkeypatch.delenv("SNAKEMAKE_OUTPUT_CACHE")
-    with pytest.raises(InputError, match="SNAKEMAKE_OUTPUT_CACHE"):
-        planned_with(tmp_path, "own/dh_model.parquet", tmp_path / "cache" / "abc.parquet")
-
-
-def test_the_results_folder_itself_may_be_on_another_disk(tmp_path):
-    (tmp_path / "disk" / "own").mkdir(parents=True)
-    (tmp_path / "results").symlink_to(tmp_path / "disk")
-    assert planned_with(tmp_path, "own/inside.parquet", tmp_path / "disk" / "own" / "a.parquet")
-
-
 @pytest.mark.parametrize("name", ["$(touch owned)", "a; touch owned", "`touch owned` 'x\"", "a b&"])
 def test_a_command_that_is_printed_is_safe_to_paste(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)

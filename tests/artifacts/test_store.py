@@ -22,7 +22,6 @@ from kinacc.errors import InputError
 PROVENANCE = {
     "kinacc_version": "0.1.0",
     "config_hash": "c",
-    "code_hash": "k",
     "seed": 7,
 }
 
@@ -127,7 +126,7 @@ def test_every_problem_is_listed_at_once(tmp_path):
     with pytest.raises(InputError) as caught:
         store.write(tmp_path / "r.parquet", "residuals", table, {"seed": 1, "time": "now"})
     text = str(caught.value)
-    for word in ("column rms", "column n", "column mean", "'time'", "code_hash"):
+    for word in ("column rms", "column n", "column mean", "'time'", "config_hash"):
         assert word in text
 
 

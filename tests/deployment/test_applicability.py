@@ -9,6 +9,7 @@ import pytest
 import shared_data
 from command_line import call
 from small_arms import calibrated, joints, measured, measured_at, results_of
+from stages_by_hand import run_stage
 
 from kinacc.artifacts import store
 from kinacc.deployment import folder
@@ -39,8 +40,9 @@ def part_of_the_series(tmp_path_factory):
         " dh: {fit_to: measurements, hayati_joints: [2, 3]}}\nevaluation: {space: measured}\n"
     )
     for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
-        words = ("run", stage, "--config", base / "part.yaml", "--results", base / "results")
-        done = call(*words)
+        done = run_stage(
+            stage, "--config", base / "part.yaml", "--results", base / "results"
+        )
         assert done.exit_code == 0, done.output
     seen = np.stack([table[f"{axis}_mm"] for axis in "xyz"], axis=1)
     return base / "results" / "part", np.deg2rad(q_deg[~kept]), seen[~kept]

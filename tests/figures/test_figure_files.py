@@ -43,7 +43,6 @@ def test_two_drawings_have_the_same_bytes(rendered):
 def test_another_process_gives_the_same_bytes(rendered):
     program = (
         "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
-        "import kinacc.workflow.runner\n"  # as a stage does
         "from figure_words import figures\n"
         "from kinacc.figures import save\n"
         "for name, figure in figures('mh180').items():\n"

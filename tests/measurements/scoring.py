@@ -20,6 +20,7 @@ from command_line import call
 from measurements.measured_file import Measured
 from measurements.simulated_arms import flange
 from scipy.spatial.transform import Rotation
+from stages_by_hand import run_stage
 
 RIGHT, PARTIAL, ASKED = "right", "partial", "asked"
 REFUSED, WRONG, CRASHED = "refused", "wrong", "crashed"
@@ -63,7 +64,7 @@ def score(measured: Measured, folder: Path) -> Score:
     described = call("init", *measured.files, *words)
     if described.exit_code != 0:
         return _not_read(measured, described, "init")
-    read = call("run", "measurements", "--config", folder / "n.yaml", "--results", folder / "r")
+    read = run_stage("measurements", "--config", folder / "n.yaml", "--results", folder / "r")
     if read.exit_code != 0:
         return _not_read(measured, read, "run", asked=False)
     wrong = difference(measured, folder / "r" / "n")

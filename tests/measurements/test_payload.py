@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from command_line import call
+from stages_by_hand import run_stage
 
 from kinacc.artifacts import store
 from kinacc.config.schema import defaults
@@ -100,7 +100,7 @@ def test_the_table_has_the_columns_where_the_file_has_them(tmp_path, names):
         f'{{path: "{path}", orientation: {{kind: none}}}}}}}}}}\n'
     )
     out = tmp_path / "results"
-    done = call("run", "measurements", "--config", tmp_path / "set.yaml", "--results", out)
+    done = run_stage("measurements", "--config", tmp_path / "set.yaml", "--results", out)
     assert done.exit_code == 0, done.output
     table = store.read(out / "own" / "measurements.parquet")
     assert ("payload_kg" in table) == bool(names)

@@ -56,6 +56,13 @@ def changed_since(folder: Path | str) -> list[str]:
     return sorted(os.path.relpath(folder / name) for name in names)
 
 
+def read_by(folder: Path | str, stage: str) -> set[str]:
+    """Digests of the files that a stage of a data set read."""
+    path = Path(folder) / FOLDER / f"{stage}.sha256"
+    lines = _parsed(path) if path.is_file() else ()
+    return {value for _, value in lines if value.startswith(_READ)}
+
+
 def _changed_reads(folder: Path) -> Iterator[tuple[str, list[str]]]:
     """Each file that changed since a stage read it, with what that stage left."""
     now = stated(folder)

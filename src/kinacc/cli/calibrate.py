@@ -6,6 +6,7 @@ import json
 import os
 import shlex
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,7 +93,8 @@ def carried_out(
     Snakemake's exit code where that is not 0. Raises InputError for bad configuration.
     """
     from kinacc.errors import InputError, Problem
-    from kinacc.workflow.data_sets import read_data_sets
+    from kinacc.workflow.data_sets import RESULTS, read_data_sets
+    from kinacc.workflow.running import held
     from kinacc.workflow.start import run_workflow
 
     first = next((i for i, word in enumerate(words) if word.startswith("-")), len(words))
@@ -107,9 +109,11 @@ def carried_out(
         raise InputError(Problem("FILE.yaml", what, fix=fix))
     configs = tuple(each for word in configs for each in _files(word))
     data = read_data_sets(configs)
-    if code := run_workflow(target, configs, cores or os.cpu_count() or 1, more):
-        raise SystemExit(code)
     ran = not {"-n", "--dry-run", "--dryrun", "--lint"} & set(more)
+    with held(RESULTS) if ran else nullcontext():  # --no-hooks leaves out what holds them
+        code = run_workflow(target, configs, cores or os.cpu_count() or 1, more)
+    if code:
+        raise SystemExit(code)
     return configs, data if ran else None
 
 

@@ -173,7 +173,7 @@ def _as_options(text: str) -> str:
 
 
 # Found in 98 % of campaigns with a drift of three standard deviations, for a tenth of the width.
-_REFERENCES, _LEAST_BUDGET = 20, 1.4
+_REFERENCES, _LEAST_BUDGET, _LEAST_READINGS = 20, 1.4, 100
 
 
 def with_references(
@@ -183,7 +183,7 @@ def with_references(
 
     ``references``: as given, None where the option is not; ``points``: number of candidates.
     """
-    enough = assessor.measurements >= _LEAST_BUDGET * points
+    enough = assessor.measurements >= max(_LEAST_BUDGET * points, _LEAST_READINGS)
     if references is not None or not enough or not hasattr(assessor, "references"):
         return assessor
     return replace(assessor, references=_REFERENCES)

@@ -61,10 +61,11 @@ def shared(places: Sequence[str]) -> SharedReadings:
     tables = [_measured(place) for place in places]
     if tables[0] is None or tables[1] is None:
         return NONE_SHARED
-    from kinacc.artifacts import store
+    from kinacc.artifacts import sums
 
-    origins = {store.read_metadata(_file(place)).get("inputs_hash") for place in places}
-    return shared_readings.shared(tables[0], tables[1], len(origins) == 1)
+    origins = [sums.read_by(_file(place).parent, "measurements") for place in places]
+    same_file = bool(origins[0]) and origins[0] == origins[1]
+    return shared_readings.shared(tables[0], tables[1], same_file)
 
 
 def _file(place: str) -> Path:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from kinacc.artifacts import sums
+from kinacc.artifacts import campaign_tables, store, sums
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.errors import InputError, Problem, and_more
 from kinacc.gate.accepted import compared
@@ -42,6 +42,8 @@ def check_results(
     InputError
         Where there is no such folder or data set.
     """
+    if (results / f"{campaign_tables.ALL[0].name}.parquet").is_file():
+        return CheckReport(str(results), "", (check_campaign(results),))
     names = list(datasets) or sorted({*configurations, *data_sets_in(results)})
     if not names:
         raise InputError(Problem(str(results), "holds no data set", "a folder of results"))
@@ -60,6 +62,29 @@ def data_sets_in(results: Path) -> list[str]:
     if not results.is_dir():
         raise InputError(Problem(str(results), "no such folder", fix="name a results folder"))
     return sorted(each.parent.name for each in results.glob(f"*/{sums.FOLDER}"))
+
+
+def check_campaign(folder: Path) -> Outcome:
+    """Whether the tables of a campaign's report are there, made together and fit their schemas."""
+    problems, tables, marks = [], {}, []
+    for artefact in campaign_tables.ALL:
+        path = folder / f"{artefact.name}.parquet"
+        if not path.is_file():
+            problems.append(Problem(str(path), "missing"))
+            continue
+        tables[artefact.name], found = check_file(path, artefact)
+        problems += found
+        if not found:
+            marks.append(store.read_metadata(path))
+    if any(each != marks[0] for each in marks):
+        problems.append(Problem(str(folder), "tables of different states of a campaign"))
+    problems = problems or campaign_tables.contradictions(tables)
+    if problems:
+        says = "; ".join(map(str, problems[:_SHOWN])) + and_more(len(problems) - _SHOWN)
+        fix = "run `kinacc campaign report` again"
+        return Outcome(folder.name, "files", "files", FAILED, says, fix)
+    says = "tables fit their schemas and each other"
+    return Outcome(folder.name, "files", "files", PASSED, says, figures={"files": len(tables)})
 
 
 def check_files(folder: Path) -> Outcome:

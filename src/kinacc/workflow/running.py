@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 import fcntl
+import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
 from kinacc.errors import InputError
 
-_held: list[TextIO] = []  # until the process ends, however it ends
+_held: list[tuple[TextIO, float]] = []  # until the process ends, however it ends; since when
 
 
 def hold(results: str) -> None:
     """Hold the results for this process; leave with a line where another run holds them."""
+    _held.append((_locked(results), time.time()))
+
+
+@contextmanager
+def held(results: str) -> Iterator[None]:
+    """Hold the results as long as the context lasts."""
+    with _locked(results):
+        yield
+
+
+def _locked(results: str) -> TextIO:
     Path(results).mkdir(parents=True, exist_ok=True)
     file = open(Path(results) / ".lock", "w")  # noqa: SIM115 held until the process ends
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise SystemExit(f"another run holds {results}: wait until it has ended") from None
-    _held.append(file)
+    return file
 
 
 def answers(results: str, datasets: Sequence[str]) -> Iterator[str]:
@@ -29,7 +42,9 @@ def answers(results: str, datasets: Sequence[str]) -> Iterator[str]:
     from kinacc.workflow.fleet import FEW
 
     folders = [Path(results, name) for name in datasets]
-    made = [folder for folder in folders if (folder / "summary.parquet").is_file()]
+    began = _held[0][1]
+    tables = [folder / "summary.parquet" for folder in folders]
+    made = [each.parent for each in tables if each.is_file() and each.stat().st_mtime >= began]
     if len(made) > FEW:
         yield f"\n{len(made):,} data sets: kinacc summary {results} shows what each is worth"
         return
