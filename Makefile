@@ -6,7 +6,6 @@
 # make size        AST nodes and lines of every room, words of the docs, beside their budgets
 # make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
-# make fuzz        what reads files, given files that nobody would write; FUZZ="--minutes 600" for longer
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
 # make lock        renew requirements/*.txt (needs uv)
@@ -70,11 +69,6 @@ size:
 bench: $(PEERS)
 	@.venv-bench/bin/python benchmarks/run.py $(TOPICS)
 	@.venv-bench/bin/python tools/document_benchmarks.py
-
-# What docs/promises.md promises, at full size: an hour each and more.
-FUZZ = --inputs 100000
-fuzz: $(KINACC) $(TOOLS)
-	$(PY) tests/fuzz/run.py $(FUZZ)
 
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
 docs: $(KINACC) $(TOOLS)

@@ -81,9 +81,11 @@ include: "workflow/rules/pages.smk"
 
 
 onstart:
-    running.hold(RESULTS)
+    if workflow.is_main_process:  # not a job on a cluster
+        running.hold(RESULTS)
 
 
 onsuccess:
-    for line in running.answers(RESULTS, data.told):
-        logger.info(line)
+    if workflow.is_main_process:
+        for line in running.answers(RESULTS, data.told):
+            logger.info(line)

@@ -23,16 +23,9 @@ sys.path.append(str(TESTS.parent / "benchmarks"))
 # take longest: `make test` hands them out first, so that no worker is left alone with one.
 SLOW = (
     "integration/test_installed.py",
-    "slurm/test_on_slurm.py",
-    "integration/test_changed_artefacts.py",
-    "integration/test_shared_cache.py",
-    "integration/test_same_bytes.py",
     "integration/test_real_arm.py",
-    "integration/test_recipes.py",
     "integration",
     "integration_oracle",
-    "fuzz",
-    "slurm",
     "measurements/test_files_as_they_come.py",
     "checks/test_planted_faults.py",
     "assess/test_adaptive.py",
@@ -40,7 +33,6 @@ SLOW = (
     "assess/test_more_assessors.py",
     "assess/test_oracle_invalidation.py",
     "assess/test_size_limits.py",
-    "artifacts/test_check.py",
     "benchmarks",
     "calibration/test_chosen_order.py",
     "calibration/test_convergence.py",
@@ -59,10 +51,8 @@ SLOW = (
     "campaign/test_report_above_its_bounds.py",
     "campaign/test_state.py",
     "checks/test_advice_on_misread_files.py",
-    "gate/test_golden_runs.py",
     "cli/test_answer_at_the_end.py",
     "cli/test_check_data.py",
-    "cli/test_gate_command.py",
     "cli/test_init.py",
     "cli/test_init_readings.py",
     "cli/test_init_robots.py",
@@ -78,7 +68,6 @@ SLOW = (
     "deployment/test_poses_unlike_the_measured.py",
     "deployment/test_predict.py",
     "figures/test_figure_files.py",
-    "figures/test_figure_stages.py",
     "figures/test_figures.py",
     "kinematics/inverse/test_any_arm.py",
     "measurements/test_what_files_hold.py",
@@ -92,15 +81,12 @@ SLOW = (
     "test_inverse.py",
     "test_inverse_oracle.py",
     "test_models_oracle.py",
-    "test_provenance.py",
     "test_skipped.py",
     "test_strangers_names.py",
     "test_strangers_text.py",
     "test_study_oracle.py",
     "workflow/test_calibration_stages.py",
-    "workflow/test_cost.py",
     "workflow/test_robustness.py",
-    "workflow/test_stopping.py",
 )
 _SLOW = tuple(TESTS / name for name in SLOW)
 
@@ -131,17 +117,13 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Say how many tests were skipped because measured data, a browser or Slurm is absent."""
+    """Say how many tests were skipped because measured data or a browser is absent."""
     import shared_data
 
     reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())]
     absent = sum(shared_data.ABSENT in reason for reason in reasons)
     if absent:
         line = f"{absent} skipped: the measured data sets are expected in {shared_data.FOLDER}"
-        terminalreporter.write_line(line, yellow=True)
-    alone = sum("Slurm absent" in reason for reason in reasons)
-    if alone:
-        line = f"{alone} skipped: runs on a cluster need Debian's slurm-wlm, root and .venv/cluster"
         terminalreporter.write_line(line, yellow=True)
     unseen = sum("Chromium absent" in reason for reason in reasons)
     if unseen:

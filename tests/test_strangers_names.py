@@ -53,7 +53,7 @@ def test_a_table_of_a_calibrated_arm_holds_no_formula(monkeypatch):
     from kinacc.kinematics import robot
 
     arm = robot.load("mh180")
-    given = type("Calibrated", (), {"robot": arm, "left_open": ("=HYPERLINK(1)",)})
+    given = type("Calibrated", (), {"robot": arm, "left_open": ("=HYPERLINK(1)",), "targets": {}})
     given.model = type("Model", (), {"table": arm.dh})
     text = description.robot_csv(given, np.full((6, 5), np.nan), arm.dh, Misfit("dh", 0.1, UNKNOWN))
     assert [row["undetermined"] for row in csv.DictReader(io.StringIO(text))][

@@ -1,5 +1,6 @@
 """Write docs/artifacts.md from the contract: ``python tools/document_artifacts.py``."""
 
+# ruff: noqa: E501
 from __future__ import annotations
 
 from pathlib import Path

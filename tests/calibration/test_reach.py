@@ -1,4 +1,4 @@
-"""What DH fits reach on measured arms, held out; benchmarks/reach.py has VEC model and times."""
+"""What DH fits reach on measured arms, held out."""
 
 from __future__ import annotations
 

@@ -33,13 +33,8 @@ def test_the_table_names_commands_that_are_there():
 @pytest.mark.parametrize(
     ("words", "code"),
     [
-        ("gate results --config cell.yaml", AGAINST),
-        ("gate results --config wrong.yaml", UNUSABLE),
-        ("gate results --config cell.yaml --out gate.html", UNUSABLE),
-        ("gate --schema", DONE),
-        ("check-results results", AGAINST),
+        ("check-results results", UNUSABLE),
         ("check-results results --config wrong.yaml", UNUSABLE),
-        ("accept results --reason looked", UNUSABLE),
         ("add june.csv --to cell.yaml", UNUSABLE),
         ("summary results", AGAINST),
         ("check-data wrong.yaml", UNUSABLE),

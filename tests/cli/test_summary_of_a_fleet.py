@@ -159,16 +159,6 @@ def test_robots_without_a_summary_are_named_all_of_them(fleet):
     assert found["line_c"]["model"] is None
 
 
-def test_a_summary_of_other_tables_is_not_passed_off_as_that_of_these(fleet):
-    path = fleet / "line_a" / "pose_errors.parquet"
-    table = store.read(path)
-    table["ex_mm"] = table["ex_mm"] * 1.01
-    store.write(path, "pose_errors", table, store.read_metadata(path))
-    row = rows(code=1)["line_a"]
-    assert row["held_out_mean_mm"] is None
-    assert "made from other tables" in row["remarks"]
-
-
 def test_a_summary_that_was_emptied_is_a_problem_and_no_crash(fleet):
     path = fleet / "line_a" / "summary.parquet"
     table = {name: values[:0] for name, values in store.read(path).items()}

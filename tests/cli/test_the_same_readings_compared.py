@@ -107,5 +107,4 @@ def test_vec_models_that_share_no_joints_are_refused_in_one_message(results, tmp
     assert "--joints FILE" in done.output
     assert "--model dh" in done.output
     assert not (tmp_path / "moved.html").exists()
-    by_dh = compared(results, "before", "anew", "--joints", far)
-    assert "flange poses moved" in by_dh
+    assert "at most" in compared(results, "before", "anew", "--joints", far)

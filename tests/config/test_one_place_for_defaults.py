@@ -25,7 +25,7 @@ ALIASES = {"threshold": "truncation", "hayati": "hayati_joints", "parts": "chunk
 # (file, name): why it is no second default or range of a key.
 OTHERS = {
     ("artifacts/store.py", "joints"): "how many an arm has, not which of them bend",
-    ("workflow/verification/conformity.py", "joints"): "how many an arm has, not which bend",
+    ("gate/conformity.py", "joints"): "how many an arm has, not which bend",
     ("cli/planned.py", "joints"): "a joint of the arm at hand",
     ("assess/adaptive.py", "measurements"): "the budget of a campaign, which may be larger",
     (

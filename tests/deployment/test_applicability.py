@@ -40,9 +40,7 @@ def part_of_the_series(tmp_path_factory):
         " dh: {fit_to: measurements, hayati_joints: [2, 3]}}\nevaluation: {space: measured}\n"
     )
     for stage in ("measurements", "data_check", "vec", "dh", "residuals", "summary"):
-        done = run_stage(
-            stage, "--config", base / "part.yaml", "--results", base / "results"
-        )
+        done = run_stage(stage, "--config", base / "part.yaml", "--results", base / "results")
         assert done.exit_code == 0, done.output
     seen = np.stack([table[f"{axis}_mm"] for axis in "xyz"], axis=1)
     return base / "results" / "part", np.deg2rad(q_deg[~kept]), seen[~kept]

@@ -89,7 +89,7 @@ def test_a_run_that_is_stopped_keeps_its_finished_tables(fresh, by):
     run = started(folder, FIT)
     until((folder / FIRST).exists, run)
     os.killpg(run.pid, by) if by == signal.SIGINT else run.send_signal(by)
-    text, _ = run.communicate(timeout=60)
+    run.communicate(timeout=60)
     assert run.returncode != 0
     assert (folder / FIRST).read_bytes() == wanted["measurements"]
     assert not half_written(folder)

@@ -72,12 +72,12 @@ def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
     text = started(project, cell, ["kinacc", "init", "own data/poses.csv", *options])
     check, run = (line.strip() for line in text.partition("next:")[2].strip().splitlines()[:2])
     started(project, cell, ["sh", "-c", check])
-    assert "ours: checking" in started(project, cell, ["sh", "-c", f"{run} -- -n"])
+    assert "data_check" in started(project, cell, ["sh", "-c", f"{run} -- -n"])
 
 
 def test_calibrate_goes_by_the_profile_of_the_workflow(project, cell):
     text = started(project, cell, ["kinacc", "calibrate", "own.yaml", "--", "--dry-run"])
-    assert "own: fitting the DH model" in text
+    assert "fit_dh" in text
     assert "host:" not in text  # as the profile of the workflow says
 
 

@@ -47,4 +47,4 @@ def test_without_a_configuration_the_command_says_how_to_get_one(call):
 
 def test_the_papers_study_runs_from_the_installed_package(call):
     said = call("study", "--", "--dry-run")
-    assert "mh180" in said
+    assert "study_part" in said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from command_line import call
 from stages_by_hand import run_stage
 
 from kinacc.artifacts import store

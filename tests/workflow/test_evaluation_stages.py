@@ -22,7 +22,6 @@ ARM = robot.load("mh180")
 PROVENANCE = {
     "kinacc_version": "0",
     "config_hash": "0",
-    "inputs_hash": "0",
     "seed": 1,
 }
 EVALUATION = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -12,7 +13,8 @@ import click
 @click.option("--lines", required=True, metavar="12,15-18", help="Lines of the measured file.")
 @click.option("--reason", required=True, help="Reason, kept in the configuration.")
 @click.option("--dataset", metavar="NAME", help="Data set; needed where FILE.yaml has several.")
-def exclude(file: str, lines: str, reason: str, dataset: str | None) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print what was excluded as JSON.")
+def exclude(file: str, lines: str, reason: str, dataset: str | None, as_json: bool) -> None:
     """Exclude rows of a measured file from all fits and figures.
 
     \b
@@ -32,6 +34,9 @@ def exclude(file: str, lines: str, reason: str, dataset: str | None) -> None:
     path = ("datasets", name, "measurements", "file", "exclude")
     text = with_added(Path(file).read_text("utf-8"), path, [item], file)
     write_whole(file, text.encode())
+    if as_json:
+        click.echo(json.dumps({"file": file, "dataset": name, **item}))
+        return
     count = f"{len(numbers)} line{'s' if len(numbers) > 1 else ''}"
     click.echo(f"{file}: {count} of {section['path']} excluded\nnext:\n  kinacc check-data {file}")
 

@@ -22,16 +22,10 @@ EXIT_CODES: dict[int, tuple[str, str]] = {
 # Commands that judge, or that stand in a pipeline: what their 0, 1 and 2 mean. An empty
 # one comes only where the command could not finish.
 OF_COMMANDS: dict[str, tuple[str, str, str]] = {
-    "gate": (
-        "every gate passed, only warned, or cannot tell where that is no failure",
-        "at least one gate failed",
-        "a configuration, folder or option cannot be used; nothing was judged",
-    ),
-    "accept": ("the run is the accepted one", "", "refused; what was accepted before stays"),
     "add": ("the line stands in the configuration", "", "refused; the configuration is as it was"),
     "check-results": (
-        "all is well",
-        "a file is not there, or does not hold what it should",
+        "every check passed, only warned, or cannot tell where that is no failure",
+        "at least one check failed, or a file is missing or damaged",
         "the folder, a configuration or an option cannot be used",
     ),
     "check-data": (

@@ -66,7 +66,9 @@ def data_sets_in(results: Path) -> list[str]:
 
 def check_campaign(folder: Path) -> Outcome:
     """Whether the tables of a campaign's report are there, made together and fit their schemas."""
-    problems, tables, marks = [], {}, []
+    problems: list[Problem] = []
+    tables: dict[str, Any] = {}
+    marks = []
     for artefact in campaign_tables.ALL:
         path = folder / f"{artefact.name}.parquet"
         if not path.is_file():
