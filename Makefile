@@ -33,7 +33,6 @@ key = $(shell { cat $(1); pwd; } | cksum | tr -d ' ')
 PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
 KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
-CLUSTER := .venv/.cluster-$(call key,requirements/cluster.txt)
 AUDIT := .venv-audit/.audit-$(call key,requirements/audit.txt)
 PEERS := .venv-bench/.peers-$(call key,requirements/run.txt requirements/bench.txt pyproject.toml)
 
@@ -56,7 +55,7 @@ lint: $(KINACC) $(TOOLS)
 check: lint
 	$(PYTEST) -m "not slow"
 
-test: lint $(CLUSTER)
+test: lint
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PYTEST)
@@ -130,12 +129,6 @@ $(AUDIT):
 	@"$$(sh requirements/find-python $(PYTHON))" -m venv --clear .venv-audit
 	@.venv-audit/bin/python -m pip install -qq --disable-pip-version-check \
 	  --require-hashes -r requirements/audit.txt
-	@touch $@
-
-# Apart from the environment: Snakemake imports every plugin it finds, at every start.
-$(CLUSTER): $(PACKAGES)
-	@rm -rf .venv/cluster
-	@$(PIP) --require-hashes --no-deps --target .venv/cluster -r requirements/cluster.txt
 	@touch $@
 
 # One lock for every supported Python and platform: names, versions and hashes, nothing else.
