@@ -1,9 +1,8 @@
-"""What pages tell a reader to type, and what they say is then printed.
+"""What pages tell a reader to type.
 
 A comment above a block, which no reader sees, says what is special about it, and why:
 
     <!-- not run: REASON -->       typed nowhere
-    <!-- other output: REASON -->  what is printed is not held to it
     <!-- only in full: REASON -->  typed with KINACC_PAGES_IN_FULL=1
     <!-- dry run: REASON -->       its snakemake lines only plan
     <!-- exit code 1: REASON -->   the last command does not end with 0
@@ -14,15 +13,14 @@ A comment above a block, which no reader sees, says what is special about it, an
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
 TYPED = ("sh", "console", "python")
-_KINDS = r"not run|other output|only in full|dry run|exit code \d+|in a clone|file [\w.-]+"
+_KINDS = r"not run|only in full|dry run|exit code \d+|in a clone|file [\w.-]+"
 _NOTE = rf"<!-- ({_KINDS}): ((?:(?!-->).)+) -->\n"
 _BLOCK = re.compile(rf"^((?:{_NOTE})*)^```([\w-]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\d)")
 
 
 @dataclass(frozen=True)
@@ -63,42 +61,10 @@ def blocks(page: Path) -> list[Block]:
     return found
 
 
-def exchanges(block: Block) -> Iterator[tuple[str, str]]:
-    """Commands of a console block with what each is said to print, in order."""
-    for part in re.split(r"^\$ ", block.text, flags=re.MULTILINE)[1:]:
-        lines = part.splitlines()
-        typed = 1 + next(i for i, line in enumerate(lines) if not line.endswith("\\"))
-        yield "\n".join(lines[:typed]), "\n".join(lines[typed:])
-
-
-def not_printed(expected: str, printed: str) -> list[str]:
-    """Lines of a page that were not printed, in this order; ``..`` stands for any.
-
-    Blanks count once. Numbers may differ by one in the last digit and, where they have decimals, by
-    2 %, as they do between processors.
-    """
-    rest = iter(printed.splitlines())
-    missing = []
-    for line in expected.splitlines():
-        if line.strip() in ("", ".."):
-            continue
-        kept = list(rest)
-        at = next((i for i, other in enumerate(kept) if _alike(line, other)), None)
-        rest = iter(kept if at is None else kept[at + 1 :])
-        if at is None:
-            missing.append(line)
-    return missing
-
-
-def _alike(line: str, other: str) -> bool:
-    words, others = (" ".join(_NUMBER.sub("#", each).split()) for each in (line, other))
-    numbers, those = _NUMBER.findall(line), _NUMBER.findall(other)
-    return words == others and all(map(_close, numbers, those))
-
-
-def _close(number: str, other: str) -> bool:
-    base, _, exponent = number.partition("e")
-    decimals = len(base.partition(".")[2])
-    last = 10.0 ** (int(exponent or 0) - decimals)
-    share = 0.02 if decimals or exponent else 0.0
-    return abs(float(number) - float(other)) <= 1.01 * last + share * abs(float(number))
+def typed(block: Block) -> str:
+    """The text of a block that a shell is given; of a console, without what it printed."""
+    if block.language == "python":
+        return f"python -c {shlex.quote(block.text)}"
+    if block.language != "console":
+        return block.text
+    return "\n".join(re.findall(r"^\$ ((?:.*\\\n)*.*)", block.text, re.MULTILINE))

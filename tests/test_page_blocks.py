@@ -1,9 +1,8 @@
-"""What the tests of pages take from a page, and what they take for printed."""
+"""What the tests of pages take from a page."""
 
 from __future__ import annotations
 
-import pytest
-from page_blocks import blocks, exchanges, not_printed
+from page_blocks import blocks, typed
 
 PAGE = """\
 Type this:
@@ -31,23 +30,4 @@ def test_notes_above_a_block_are_read_with_their_reasons(tmp_path):
     assert first.notes["in a clone"] == "the data stand there"
     assert first.place == "page.md:5"
     assert (second.notes, second.exit_code) == ({}, 0)
-    typed = list(exchanges(second))
-    assert typed == [("kinacc plan --a \\\n      --b", "12 poses"), ("kinacc next", "")]
-
-
-PRINTED = "progress\nDH    0.370   1.008\nline 534 repeats 533\nend"
-
-
-@pytest.mark.parametrize(
-    ("expected", "missing"),
-    [
-        ("DH 0.370 1.008\n..\nend", []),
-        ("DH 0.371 1.008", []),  # another processor
-        ("DH 0.470 1.008", ["DH 0.470 1.008"]),
-        ("VEC 0.370 1.008", ["VEC 0.370 1.008"]),
-        ("line 544 repeats 533", ["line 544 repeats 533"]),
-        ("end\nDH 0.370 1.008", ["DH 0.370 1.008"]),  # in another order
-    ],
-)
-def test_a_line_that_was_not_printed_is_named(expected, missing):
-    assert not_printed(expected, PRINTED) == missing
+    assert typed(second) == "kinacc plan --a \\\n      --b\nkinacc next"

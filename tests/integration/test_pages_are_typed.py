@@ -2,25 +2,24 @@
 
 Pages are typed one after another from the top, each in a folder that holds what it assumes: the
 reader's own folder after the README has been followed, or a clone with results of the paper's arm
-and of two short measured series. What a page says is printed is held to what was printed, but
-where the series here are shorter than those of the page. ``KINACC_PAGES_IN_FULL=1`` takes them
-whole.
+and of two short measured series. They end with the exit code that the page says; what they print is
+held by tests/cli/test_snapshots.py. ``KINACC_PAGES_IN_FULL=1`` takes the series whole.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import shlex
 import shutil
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
+import page_blocks
 import pytest
 import shared_work
 import typed_commands
-from page_blocks import TYPED, Block, blocks, exchanges, not_printed
+from page_blocks import TYPED, blocks
 from typed_commands import ROOT, Shell
 
 from kinacc.artifacts import store
@@ -76,12 +75,6 @@ ASSUMED = {
         mv second/ur10_d.yaml after.yaml
     """,
 }
-# Pages that show what comes out of the whole series.
-SHORTENED = (
-    "docs/checking-data.md",
-    "docs/from-tracker-file-to-compensated-robot.md",
-    "docs/using-a-calibration.md",
-)
 IN_FULL = bool(os.environ.get("KINACC_PAGES_IN_FULL"))
 # Few poses of a series that a page calibrates only to show how, among them a repeated reading. With
 # 103 order 12 is the highest for all of them, and can still be fitted where a fold is left out.
@@ -111,8 +104,8 @@ def reader(shell, tmp_path_factory) -> Path:
 
     def follow(folder: Path) -> None:
         (folder / "a home").mkdir()
-        told = typed(shell, README, cloned(folder / "clone"), folder / "a home", None)
-        (folder / "told.json").write_text(json.dumps(told))
+        wrong = typed(shell, README, cloned(folder / "clone"), folder / "a home", None)
+        (folder / "wrong.json").write_text(json.dumps(wrong))
 
     return shared_work.once(tmp_path_factory, "reader", follow)
 
@@ -144,60 +137,27 @@ def cloned(clone: Path) -> Path:
     return clone
 
 
-def typed(
-    shell: Shell, page: Path, start: Path, home: Path, clone: Path | None
-) -> tuple[list[str], list[str]]:
-    """Type a page, from the top, in the folder it starts in.
-
-    What went otherwise than the page says, and what each block printed.
-    """
-    wrong, heard, folder, said = [], [], start, ""
+def typed(shell: Shell, page: Path, start: Path, home: Path, clone: Path | None) -> list[str]:
+    """Type a page, from the top, in the folder it starts in; what ended otherwise than it says."""
+    wrong, folder = [], start
     for block in blocks(page):
         if "not run" in block.notes or ("only in full" in block.notes and not IN_FULL):
-            said = ""
             continue
         if "in a clone" in block.notes:
             folder = clone
-        if block.language == "text" and said:
-            if "other output" not in block.notes and (IN_FULL or name_of(page) not in SHORTENED):
-                wrong += [f"{block.place} not printed: {x}" for x in not_printed(block.text, said)]
-        elif block.file:
+        if block.file:
             (folder / block.file).write_text(block.text)
         elif block.language in TYPED:
             dry = {"DRY_RUN": "1"} if "dry run" in block.notes else {}
-            said = ""
-            for text, expected in commands(block):
-                code, printed, folder = shell(text, folder, HOME=str(home), **dry)
-                said += printed
-                heard.append(printed)
-                if code != block.exit_code:
-                    wrong.append(f"{block.place} ended with {code}: {text}\n{printed[-3000:]}")
-                wrong += [
-                    f"{block.place} not printed by {text}: {line}"
-                    for line in not_printed(expected, printed)
-                ]
-    return wrong, heard
-
-
-def commands(block: Block) -> Iterator[tuple[str, str]]:
-    """What is typed of a block, and what the block itself says it prints."""
-    if block.language == "console":
-        yield from exchanges(block)
-    elif block.language == "python":
-        yield f"python -c {shlex.quote(block.text)}", ""
-    else:
-        yield block.text, ""
+            text = page_blocks.typed(block)
+            code, printed, folder = shell(text, folder, HOME=str(home), **dry)
+            if code != block.exit_code:
+                wrong.append(f"{block.place} ended with {code}: {text}\n{printed[-3000:]}")
+    return wrong
 
 
 def test_the_readme_leads_from_a_tracker_file_to_models_and_what_they_are_worth(reader):
-    wrong, heard = json.loads((reader / "told.json").read_text())
-    assert wrong == []
-    three, campaign = heard[1:]
-    for command in ("kinacc check-data tracker.yaml", "kinacc calibrate tracker.yaml"):
-        assert f"  {command}\n" in three
-    assert "kinacc study tracker.yaml" in three
-    assert "kinacc campaign next check" in campaign
-    assert "reading 1 of 300" in campaign
+    assert json.loads((reader / "wrong.json").read_text()) == []
     results = reader / "a home" / "cell" / "results" / "tracker"
     assert list(store.read(results / "dh_model.parquet")["joint"]) == [1, 2, 3, 4, 5, 6]
     assert not (results / "study.parquet").exists()
@@ -219,7 +179,7 @@ def test_a_page_does_what_it_says(page, shell, calibrated, request, tmp_path):
         shutil.copytree(request.getfixturevalue("finished").folder / "results", clone / "results")
     code, printed, _ = shell(assumed, start, HOME=str(home))
     assert code == 0, printed
-    assert typed(shell, page, start, home, clone)[0] == []
+    assert typed(shell, page, start, home, clone) == []
 
 
 def test_what_is_not_typed_says_why():

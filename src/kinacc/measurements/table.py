@@ -23,6 +23,7 @@ _NOTHING = frozenset(word for line in _NOTHING_TEXT.split("\n") for word in line
 _DASHES = frozenset("-–—*./")  # --, ---.---, ****
 _DIGITS = tuple("123456789")
 _LONGEST_NOTHING = max(map(len, _NOTHING))
+_LARGEST_CELL = 1e75  # its fourth power is still a float
 _SHOWN = 5  # rows named per problem; the rest is counted
 _LARGEST = 1e12  # beyond all lengths and angles
 _BLANKS = re.compile(r"[\u00a0\u2007\u2009\u202f]")  # blanks that keep a number on one line
@@ -119,7 +120,7 @@ def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool =
     """
     cells = table.columns[name]
     values = _converted(cells, table.decimal, table.thousands)
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(~(np.abs(values) < _LARGEST_CELL))
     if gaps:
         bad = np.array([row for row in bad if not _is_gap(cells[row])], dtype=int)
     if bad.size:
