@@ -366,7 +366,7 @@ def test_the_way_horizontal_angles_count_is_found_by_trying(tmp_path):
 
 
 def test_what_is_as_usual_leaves_the_settings_of_a_run_as_they_were(tmp_path):
-    from kinacc.workflow.plan import planned
+    from kinacc.workflow.data_sets import read_data_sets
 
     path = file(tmp_path, lines(cells()))
     head = "datasets: {cell: {robot: ur10, calibration: {base_and_tool: estimated}, evaluation: "
@@ -374,7 +374,7 @@ def test_what_is_as_usual_leaves_the_settings_of_a_run_as_they_were(tmp_path):
     for more, there in (("", False), (", sigma: 2, encoding: cp932", True)):
         config = tmp_path / "cell.yaml"
         config.write_text(f"{head}{{path: {path}, orientation: {{kind: none}}{more}}}}}}}}}\n")
-        settings = planned([config]).settings("measurements", "cell")["measurements"]["file"]
+        settings = read_data_sets([str(config)]).settings["cell"]["measurements"]["file"]
         for key in ("sigma", "encoding"):
             assert (key in settings) == there
         assert "layout" not in settings
