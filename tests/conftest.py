@@ -25,6 +25,8 @@ SLOW = (
     "integration/test_installed.py",
     "integration/test_real_arm.py",
     "integration",
+    "workflow/test_pipeline.py",
+    "gate/test_check_results.py",
     "integration_oracle",
     "measurements/test_files_as_they_come.py",
     "checks/test_planted_faults.py",
