@@ -39,8 +39,7 @@ def test_a_slip_of_80_mm_in_one_row(project):
     small = project.folder / "small.yaml"
     good = small.read_text()
     project.configure("datasets: {own: {data_check: {accept: {outliers: tried on purpose}}}}")
-    text = project.snakemake(MODEL)
-    assert "accepted: tried on purpose" in text
+    project.snakemake(MODEL)
     slipped = project.digests()["own/vec_model.parquet"]
 
     # The row is excluded: no fit sees it, and figures stand with and without it.
