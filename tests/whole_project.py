@@ -76,10 +76,10 @@ class Project:
 
     def to_do(self) -> set[str]:
         """The rules a run would go through now."""
-        text = self.snakemake(options=("--dry-run", "--quiet", "host", "reason"))
-        found = set(re.findall(r"^rule (\w+):", text, re.M)) - {"all"}
-        if not found:
-            assert "Nothing to be done" in text, text
+        text = self.snakemake(options=("--dry-run", "--quiet", "reason"))
+        table = text.partition("Job stats:")[2].partition("\ntotal ")[0]
+        found = set(re.findall(r"^(\w+) +\d+$", table, re.M)) - {"all"}
+        assert found or "Nothing to be done" in text, text
         return found
 
     def configure(self, text: str) -> None:

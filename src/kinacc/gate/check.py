@@ -108,14 +108,6 @@ def _problems(folder: Path) -> Iterator[Problem]:
     if not (folder / sums.FOLDER).is_dir():
         yield Problem(str(folder), f"has no {sums.FOLDER}", fix="run the workflow")
         return
-    whole = folder / "SHA256SUMS"
-    parts = b"".join(sorted(each.read_bytes() for each in (folder / sums.FOLDER).glob("*.sha256")))
-    if whole.is_file():
-        lines = set(parts.splitlines())
-        for line in whole.read_bytes().splitlines():
-            if line not in lines:
-                what = f"lists {line.decode(errors='replace')!r}, which no stage left"
-                yield Problem(str(whole), what, fix="run the workflow again")
     left = sums.stated(folder)
     yield from sums.changed(folder)
     for name in _NEEDED:
@@ -129,3 +121,21 @@ def _problems(folder: Path) -> Iterator[Problem]:
             yield Problem(str(path), "is none of the tables that the stages left", fix=fix)
             continue
         yield from check_file(path, artefact)[1]
+    yield from _gathered(folder)
+
+
+def _gathered(folder: Path) -> Iterator[Problem]:
+    """Where SHA256SUMS and the lists of digests that stages left do not agree."""
+    whole = folder / "SHA256SUMS"
+    if not whole.is_file():
+        return
+    lines = set(whole.read_bytes().splitlines())
+    paths = sorted((folder / sums.FOLDER).glob("*.sha256"))
+    listed = {path: set(path.read_bytes().splitlines()) for path in paths}
+    for line in sorted(lines.difference(*listed.values())):
+        what = f"lists {line.decode(errors='replace')!r}, which no stage left"
+        yield Problem(str(whole), what, fix="run the workflow again")
+    for path, own in listed.items():
+        if own & lines and own - lines:
+            fix = f"rm {path}, then run the workflow again"
+            yield Problem(str(path), f"changed since {whole.name} was gathered", fix=fix)

@@ -1,0 +1,117 @@
+"""The rules of the workflow as somebody meets them who changes one thing and runs again."""
+
+from __future__ import annotations
+
+import os
+import re
+
+import pytest
+from command_line import call
+from whole_project import finished, project
+
+__all__ = ["finished", "project"]
+
+TABLES = {
+    *("measurements", "data_check", "fit_vec", "fit_dh", "residuals", "summary", "accuracy_map"),
+    *("operating_points", "study_part", "study", "histories", "claims"),
+}
+SHOWN = {"figures", "map_figure", "report", "digests"}
+EVERY = TABLES | SHOWN
+ARM, CSV = "results/own", "own data/poses.csv"
+
+
+def test_after_a_run_there_is_nothing_to_do_and_touching_files_changes_nothing(project):
+    assert project.to_do() == set()
+    for path in (
+        *(project.folder / "src").rglob("*.py"),
+        *(project.folder / "workflow").rglob("*.*"),
+        *(project.folder / name for name in ("Snakefile", "config.yaml", "small.yaml", CSV)),
+    ):
+        os.utime(path)
+    assert project.to_do() == set()
+
+
+@pytest.mark.parametrize(
+    ("file", "made"),
+    [
+        ("src/kinacc/figures/fig4.py", SHOWN),
+        ("src/kinacc/report/residuals.py", SHOWN),
+        ("src/kinacc/kinematics/dh.py", TABLES | SHOWN),
+        ("src/kinacc/cli/group.py", set()),
+        ("workflow/scripts/claims.py", {"claims", "report", "digests"}),
+        ("workflow/scripts/map_figure.py", {"map_figure", "digests"}),
+    ],
+)
+def test_an_edited_line_makes_anew_what_depends_on_it(project, file, made):
+    project.append(file, "# changed")
+    assert project.to_do() == made
+
+
+AFTER_POINTS = {"study_part", "study", "histories", "claims", "figures", "report", "digests"}
+
+
+@pytest.mark.parametrize(
+    ("change", "made"),
+    [
+        ("gates: [{name: a, suspicions: none}]", set()),
+        ("map: {grid_mm: 200}", {"accuracy_map", "map_figure", "claims", "report", "digests"}),
+        ("histories: {noise_mm: 0.2}", {"histories", "claims", "figures", "report", "digests"}),
+        (
+            "datasets: {own: {evaluation: {points: 11}}}",
+            (AFTER_POINTS - {"claims"}) | {"operating_points"},
+        ),
+        (
+            "datasets: {mh180: {calibration: {vec: {order: 3}}}}",
+            EVERY - {"measurements", "data_check"},
+        ),
+    ],
+)
+def test_one_value_of_the_configuration_makes_anew_what_reads_it(project, change, made):
+    project.configure(change)
+    assert project.to_do() == made
+
+
+def test_a_changed_row_of_a_measured_file_makes_its_data_set_anew(project):
+    path = project.folder / CSV
+    lines = path.read_text().splitlines()
+    cells = lines[7].split(",")
+    cells[6] = f"{float(cells[6]) + 0.01:.9f}"
+    path.write_text("\n".join([*lines[:7], ",".join(cells), *lines[8:]]) + "\n")
+    assert project.to_do() == EVERY - {"accuracy_map", "map_figure", "claims"}
+
+
+def test_a_table_that_was_deleted_is_made_anew(project):
+    before = project.digests()
+    (project.folder / ARM / "histories.parquet").unlink()
+    project.snakemake()
+    assert project.digests() == before
+    assert project.to_do() == set()
+
+
+def test_an_edited_table_is_refused_by_the_next_stage_and_by_the_check(project):
+    import pyarrow.parquet as pq
+
+    before = project.digests()
+    path = project.folder / ARM / "dh_model.parquet"
+    table = pq.read_table(path)
+    place = table.schema.get_field_index("d_mm")
+    edited = table.column("d_mm").to_numpy() + 1.0
+    pq.write_table(table.set_column(place, table.schema.field("d_mm"), [edited]), path)
+
+    text = project.snakemake(f"{ARM}/residuals.parquet", ok=False)
+    wanted = f"{ARM}/dh_model.parquet"
+    assert re.search(rf"own residuals: .*{wanted}: changed since .*rm {wanted}", text, re.S), text
+    assert "Traceback" not in text
+    assert "Traceback" in (project.folder / ARM / "logs" / "residuals.log").read_text()
+    done = call("check-results", project.folder / ARM)
+    assert done.exit_code == 1
+    assert "dh_model.parquet" in done.output
+
+    path.unlink()
+    project.snakemake()
+    assert project.digests() == before
+
+
+def test_lint_finds_nothing(project):
+    text = project.snakemake(options=("--lint",))
+    assert "Congratulations" in text, text
