@@ -174,7 +174,8 @@ def write_foreign_files() -> None:
         folder = GOLDEN / "foreign" / name
         folder.mkdir(parents=True, exist_ok=True)
         measured = FILES[name](folder)
-        robots[name] = [measured.robot, *(path.name for path in measured.files)]
+        robot = Path(measured.robot).name  # a shipped robot's name, or a file beside the readings
+        robots[name] = [robot, *(path.name for path in measured.files)]
     (GOLDEN / "foreign" / "files.json").write_text(json.dumps(robots, indent=1) + "\n")
 
 
@@ -183,6 +184,8 @@ def understanding(name: str, folder: Path) -> dict:
     robot, *files = json.loads((GOLDEN / "foreign" / "files.json").read_text())[name]
     for file in files:
         shutil.copyfile(GOLDEN / "foreign" / name / file, folder / file)
+    beside = GOLDEN / "foreign" / name / robot
+    robot = beside if beside.is_file() else robot
     words = ["init", *(folder / file for file in files), "--robot", robot, "--yes", "--json"]
     done = call(*words, "--out", folder, "--name", "n")
     if done.exit_code:
