@@ -24,8 +24,6 @@ def test_every_reason_that_can_be_given_has_words_and_no_words_are_left_over():
     [
         ("few_points", {"read": 3, "share": 0.9, "needed": 35},
          "3 points read; 90% of the region needs 35"),
-        ("few_for_model", {"first": 36, "needed": 84},
-         "36 points in the first visit; the model needs 84"),
         ("much_noise", {"part": 0.317},
          "noise makes up 32% of the mean square of the readings"),
         ("stands_alone", {"isolation": 1.25},

@@ -2,7 +2,8 @@
 
 
 def test_a_run_ends_with_what_the_calibrations_are_worth(project):
-    (project.folder / "results/own/summary.parquet").unlink()
+    for name in ("mh180", "own"):
+        (project.folder / "results" / name / "summary.parquet").unlink()
     text = project.snakemake()
     paper = text[text.index("mh180: the paper reproduced") :]
     claims = paper.split("figures  ")[0]

@@ -9,28 +9,20 @@ REASONS = {
     "drawn_at_random": "the points were drawn at random from the region",
     "crowd": "at least {crowd} of the {points} candidates have an error above the largest divided "
     "by {isolation:g}",
-    "smooth": "smooth errors of single joints cause the errors, but for local ones",
-    "smooth_and_crowd": "smooth errors of single joints cause the errors, but for local ones; at "
-    "least {crowd} candidates have an error above the largest divided by {isolation:g}",
     # of statements withheld
     "nothing_measured": "nothing measured yet",
     "first_visit": "{left} more points of the first visit have to be read before anything is said",
     "first_visit_by_travel": "{left} points of the first visit, made in order of travel, are left",
     "predicted": "every reading ({read}) equals the predicted position to the last digit, which "
     "none of an instrument does: were predictions recorded?",
-    "suspects": "the suspects are not all measured again yet",
     "unmeasured": "{left} of {points} candidates are not measured",
-    "missed": "{seen} of {points} candidates measured: {crowd} could have been missed",
     "all_missed": "{seen} of {points} candidates measured: fewer than {crowd} large errors could "
     "all have been missed",
     "stands_alone": "one measured error is more than {isolation:g} times all others",
     "few_points": "{read} points read; {share:.0%} of the region needs {needed}",
     "few_sizes": "{read} points read; a distribution needs at least {needed}, of different size",
-    "few_for_model": "{first} points in the first visit; the model needs {needed}",
     "much_noise": "noise makes up {part:.0%} of the mean square of the readings",
     "not_gamma": "the largest reading does not belong to a gamma distribution",
-    "unexplained_reading": "a reading is farther from what joints explain than local errors are",
-    "unexplained_half": "smooth errors of single joints explain less than half of the errors",
     "drift": "the reference poses show a drift of {size:.3f} mm over the campaign "
     "({x:+.3f}, {y:+.3f}, {z:+.3f}; standard deviation {deviation:.3f} mm)",
     "step": "the reference poses show that something moved between readings {after} and {before}: "
@@ -58,7 +50,6 @@ REASONS = {
     "references_left": "{left} readings of reference poses are left, and the drift is corrected "
     "for by all of them",
     # of budgets that are small
-    "no_bound_ahead": "no bound will be stated: that takes {needed} points in the first visit",
     "no_bound_on_all": "no bound on all candidates would ever be stated: that takes {needed} "
     "readings at least",
     "assumption_ahead": "with {enough} readings, the bound on all candidates would need no "

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from kinacc.calibration.noise import Noise
 
 _NEAREST_M, _FARTHEST_M = 0.3, 80.0  # at which laser trackers measure
-_NEVER = ("no_bound_ahead", "no_bound_on_all")  # reasons of a budget that leads to nothing
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
 _LITTLE_NOISE = 0.8  # of the scatter that was measured
@@ -161,7 +160,7 @@ def of_distance(begun: Plan) -> list[Problem]:
 def of_budget(begun: Plan) -> list[Problem]:
     """A budget with which no bound on all candidates is ever stated."""
     short = begun.assessor.shortfall(*begun.points.joints.shape)
-    if short is None or short.code not in _NEVER:
+    if short is None or short.code != "no_bound_on_all":
         return []
     what = f"{begun.assessor.measurements} readings for {len(begun.points)} candidates"
     fix = "give a larger --budget or fewer candidates (--drawn); --sure begins it all the same"
