@@ -108,7 +108,7 @@ LEAST_REACHED = 0.55  # share of the combinations; the paper speaks of none that
 
 
 def choice(table: pd.DataFrame) -> pd.DataFrame:
-    """The readings of the table, one of them ``chosen``: the paper wrote its sentences about its maps.
+    """The readings of the table, one of them ``chosen``: the paper's sentences are about its maps.
 
     Of the readings that reach ``LEAST_REACHED`` of their combinations, the one under which most
     of the seven sentences hold on an arm, in the mean. Readings whose mean is less by no more
