@@ -209,7 +209,9 @@ def _campaign(
 
 def _claims(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome:
     table = tables["claims"]
-    verdict = dict(zip(map(str, table["claim"]), map(str, table["verdict"]), strict=True))
+    # Sentences that chose a reading of the paper are no evidence.
+    rows = zip(table["claim"], table["verdict"], table["used_to_choose"], strict=True)
+    verdict = {str(claim): str(said) for claim, said, chose in rows if not chose}
     excepted = gate["except"]
     unknown = [each for each in excepted if each not in verdict]
     if unknown:
