@@ -20,6 +20,7 @@ OPTIONS = {
         "--all": "numbers are not computed again; --against FOLDER compares with an accepted run",
         "--expect": "keep results/SHA256SUMS elsewhere and run sha256sum -c on it",
     },
+    "show": {"--plot": "pictures are in the folder figures and on the page: kinacc report RESULTS"},
     "plan-campaign": _CAMPAIGN,
     "campaign": _CAMPAIGN,
 }

@@ -34,7 +34,11 @@ datasets: {small: {robot: mh180}}
 seed: 4711
 measurements: {folds: 4, validation_fold: 1, synthetic: {poses: 24, tracker_noise_mm: 0.02}}
 calibration: {vec: {order: 1}}
-evaluation: {points: 8, reference_frame: slice, reference_orientation_deg: [180, 0, 0], rotations: signs_and_zero}
+evaluation:
+  points: 8
+  reference_frame: slice
+  reference_orientation_deg: [180, 0, 0]
+  rotations: signs_and_zero
 map: {slices_deg: [30], grid_mm: 450}
 study: {noise_mm: [0.1, 0.3], repetitions: 2, measurements: 12, chunks: 1}
 histories: {simulations_searched: 30}
