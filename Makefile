@@ -4,7 +4,7 @@
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
 # make size        AST nodes and lines of every room, words of the docs, beside their budgets
-# make bench       times beside other libraries and an earlier commit, and the page about them: ten minutes
+# make bench       times beside other libraries, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
 # make audit       known vulnerabilities of every locked package, asked of their database
 # make sbom        the packages of a run as a bill of materials, sbom.cdx.json (CycloneDX)
@@ -67,7 +67,6 @@ size:
 # The other libraries have an environment of their own: nothing else needs them.
 bench: $(PEERS)
 	@.venv-bench/bin/python benchmarks/run.py $(TOPICS)
-	@.venv-bench/bin/python tools/document_benchmarks.py
 
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
 docs: $(KINACC) $(TOOLS)

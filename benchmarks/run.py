@@ -1,118 +1,145 @@
-"""Measure, write benchmarks/results: ``make bench`` or ``python benchmarks/run.py [TOPIC ...]``.
+"""Measure and write docs/benchmarks.md: ``make bench`` or ``python benchmarks/run.py [TOPIC ..]``.
 
-``--today COMMIT`` names the kinacc to compare with, ``--smoke`` takes tiny sizes and writes
-nothing. Without topics all files of benchmarks/works are measured. Exits with 1 where outputs
-do not agree.
+A topic is a file of benchmarks/works: its docstring is the text of its section, ``works(smoke)``
+what is measured. Rows are kept in benchmarks/results/<topic>.csv; topics that are not named keep
+theirs. Exits with 1 where outputs do not agree.
 """
 
 from __future__ import annotations
 
-import argparse
-import importlib
+import ast
 import os
+import platform
+import subprocess
 import sys
-import tempfile
-import time
-from collections.abc import Sequence
+from datetime import date
+from importlib import import_module
 from pathlib import Path
 
-import harness
+import pandas as pd
+from harness import ROOT, measure
 
-TODAY = "f4528a6"
-WORKS = Path(__file__).resolve().parent / "works"
+HERE = Path(__file__).resolve().parent
+TOPICS = ("kinematics", "fits", "processes")
+PAGE = """\
+# Benchmarks
 
+Times of kinacc beside those of what one would have used otherwise. `make bench` measures them
+anew, with the other libraries in an environment of their own, and writes this page. What models
+reach on measured arms is [another page](../benchmarks/README.md).
 
-def topics() -> list[str]:
-    """All topics, by name."""
-    return sorted(path.stem for path in WORKS.glob("*.py") if path.stem != "__init__")
+{sections}
+## How it is measured
 
-
-def measure(topic: str, smoke: bool, today: tuple[str, Path | None]) -> tuple[list, list[str]]:
-    """Rows of a topic, and what went wrong in words.
-
-    A topic has ``works``, or ``measure(smoke)`` with rows of its own where times are not the
-    question.
-    """
-    module = importlib.import_module(f"works.{topic}")
-    if not hasattr(module, "works"):
-        return list(module.measure(smoke)), []
-    rows, wrong = [], []
-    works = module.works(smoke)
-    processes = _processes(works, today)
-    try:
-        for work in works:
-            try:
-                rows += harness.measure(work, processes, smoke)
-            except Exception as error:
-                wrong.append(f"{topic}, {work.name}: {type(error).__name__}: {error}")
-            else:
-                print("\n".join(map(told, rows_of(rows, work.name))), flush=True)
-    finally:
-        for process in processes:
-            process.close()
-    return rows, wrong
+Contenders take turns. A ratio is the median of the rounds' own ratios, with quartiles in
+brackets; times are medians of CPU time, of wall-clock time where threads or two cores are the
+question. Before anything is timed all outputs are compared, to a tolerance that stands in the
+topic's file. BLAS has one thread.
+"""
 
 
-def _processes(
-    works: Sequence[harness.Work], today: tuple[str, Path | None]
-) -> list[harness.Elsewhere]:
-    """kinacc's process and today's; none where no work asks for them or that commit is not here."""
-    commit, tree = today
-    asking = [work for work in works if work.today is not None]
-    if not asking or tree is None:
-        return []
-    kinacc = asking[0].contenders[0]
-    return [
-        harness.Elsewhere(kinacc.name, kinacc.version, harness.ROOT),
-        harness.Elsewhere(harness.TODAY, commit, tree),
-    ]
+def page(tables: dict[str, pd.DataFrame]) -> str:
+    """The page of these topics."""
+    sections = []
+    for topic, rows in tables.items():
+        told = ast.get_docstring(ast.parse((HERE / "works" / f"{topic}.py").read_text()))
+        title, _, text = (told or "").replace("``", "`").partition("\n\n")
+        own_ns = rows.groupby("work", sort=False)["ns"].first()
+        others = rows[rows.groupby("work").cumcount() > 0]
+        lines = [
+            "| work | beside | its time | kinacc's | kinacc is | wanted |",
+            "|---|---|---|---|---|---|",
+        ]
+        lines += [_line(row, own_ns[row.work]) for row in others.itertuples()]
+        sections.append("\n".join([f"## {title}", "", text, "", *lines, "", rows.attrs["on"], ""]))
+    return PAGE.format(sections="\n".join(sections))
 
 
-def rows_of(rows: Sequence[harness.Result], work: str) -> list[harness.Result]:
-    """The rows of one work."""
-    return [row for row in rows if row.work == work]
+def _line(row, own_ns: float) -> str:
+    who = f"{row.beside}: {row.version}" if row.beside == "limit" else f"{row.beside} {row.version}"
+    if pd.isna(row.ns):
+        return f"| {row.work} | {who} | | {duration(own_ns)} | | {_times(row.wanted)} |"
+    spread = ""
+    if row.beside != "limit":
+        low, high = sorted(map(_size, (row.ratio_low, row.ratio_high)))
+        spread = f" ({low:.3g} to {high:.3g})"
+    wanted = _times(row.wanted)
+    if wanted and row.ratio < row.wanted:
+        wanted = f"**{wanted}: not met**"
+    times = f"{duration(row.ns)} a {row.unit} | {duration(own_ns)}"
+    return f"| {row.work} | {who} | {times} | {_times(row.ratio)}{spread} | {wanted} |"
 
 
-def told(row: harness.Result) -> str:
-    """A row as a line on the screen."""
-    who = f"  {row.work}: {row.contender} {row.version}".rstrip()
-    if row.left_out:
-        return f"{who}: left out, {row.left_out}"
-    wanted = (
-        "" if row.wanted is None else f", wanted {row.wanted:.3g}{'' if row.met else ' (not met)'}"
+def _times(ratio: float) -> str:
+    return "" if pd.isna(ratio) else f"{_size(ratio):.3g} x {'faster' if ratio >= 1 else 'slower'}"
+
+
+def _size(ratio: float) -> float:
+    return max(ratio, 1.0 / ratio)
+
+
+def duration(ns: float) -> str:
+    """A time with three digits, in the unit that reads best."""
+    size, unit = next(
+        (each for each in ((1e9, "s"), (1e6, "ms"), (1e3, "µs")) if ns >= each[0]), (1.0, "ns")
     )
-    return f"{who}: {row.ns:,.4g} ns a {row.unit}, {row.ratio:.3g} x kinacc's time{wanted}"
+    return f"{ns / size:.3g} {unit}"
 
 
-def main() -> int:
-    """Measure the topics asked for."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("topics", nargs="*", metavar="TOPIC", help=", ".join(topics()))
-    parser.add_argument("--today", default=TODAY, metavar="COMMIT")
-    parser.add_argument("--smoke", action="store_true")
-    given = parser.parse_args()
-    unknown = sorted(set(given.topics) - set(topics()))
+def _facts() -> str:
+    """What the figures were measured on: one line."""
+    told = Path("/proc/cpuinfo")
+    names = told.read_text().splitlines() if told.exists() else []
+    cpu = next(
+        (line.partition(": ")[2] for line in names if "model name" in line), platform.machine()
+    )
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short=7", "HEAD"], cwd=ROOT, capture_output=True, text=True
+    ).stdout.strip()
+    return (
+        f"Measured on {cpu}, {os.cpu_count()} cores, Python {platform.python_version()}; "
+        f"kinacc at {commit or 'no commit'}, {date.today()}."
+    )
+
+
+def read() -> dict[str, pd.DataFrame]:
+    """Rows of every topic that has been measured; ``attrs["on"]`` says on what."""
+    tables = {}
+    for topic in TOPICS:
+        path = HERE / "results" / f"{topic}.csv"
+        if path.exists():
+            with path.open(encoding="utf-8") as file:
+                on = file.readline().removeprefix("# ").strip()
+                tables[topic] = pd.read_csv(file)
+            tables[topic].attrs["on"] = on
+    return tables
+
+
+def main(topics: list[str]) -> int:
+    """Measure the topics, then write the page of all."""
+    unknown = set(topics) - set(TOPICS)
     if unknown:
-        parser.error(f"no such topic: {', '.join(unknown)}; there are {', '.join(topics())}")
-
-    os.environ.update(harness.ONE_THREAD)  # before numpy is imported
-    import machine
-    import measured
-
-    wrong: list[str] = []
-    with tempfile.TemporaryDirectory(prefix="kinacc-bench-") as folder:
-        tree = None if given.smoke else machine.sources_of(given.today, Path(folder))
-        for topic in given.topics or topics():
-            begin = time.perf_counter()
-            print(topic, flush=True)
-            rows, problems = measure(topic, given.smoke, (given.today, tree))
-            wrong += problems
-            if rows and not given.smoke:
-                measured.write(measured.table(rows, machine.facts()), topic)
-            print(f"  {time.perf_counter() - begin:.0f} s", flush=True)
-    print("\n".join(wrong), file=sys.stderr)
-    return 1 if wrong else 0
+        print(f"no topic {', '.join(unknown)}; there are {', '.join(TOPICS)}", file=sys.stderr)
+        return 2
+    wrong = False
+    for topic in topics or TOPICS:
+        rows = []
+        for work in import_module(f"works.{topic}").works(smoke=False):
+            try:
+                found = measure(work)
+            except Exception as error:
+                print(f"{topic}, {work.name}: {error}", file=sys.stderr)
+                wrong = True
+                continue
+            rows += found
+            print(pd.DataFrame(found)[["work", "beside", "ns", "ratio"]].to_string(header=False))
+        (HERE / "results").mkdir(exist_ok=True)
+        with (HERE / "results" / f"{topic}.csv").open("w", encoding="utf-8") as file:
+            file.write(f"# {_facts()}\n")
+            pd.DataFrame(rows).to_csv(file, index=False, float_format="%.5g")
+    (ROOT / "docs" / "benchmarks.md").write_text(page(read()), encoding="utf-8")
+    return int(wrong)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -23,7 +23,7 @@ from kinacc.assess.adaptive import Campaign, Candidates
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of, points_bounded
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import RECOMMENDED
-from kinacc.assess.simulate import carry_on, is_broken, truth_mm
+from kinacc.assess.simulate import carry_on, truth_mm
 from kinacc.assess.statement import CANDIDATES, REGION, Reason, Statement
 from kinacc.assess.world import World, drawn_world
 from kinacc.config.records import of_section
@@ -358,6 +358,8 @@ def _assumption(said: Statement, size: np.ndarray) -> str:
     """Whether what a statement rests on is true of the field: none, holds, broken or unknown."""
     if said.assumption is None:
         return "none"
-    if "crowd" not in said.assumption.numbers:
+    known = said.assumption.numbers
+    if "crowd" not in known:
         return "unknown"
-    return "broken" if is_broken(said, size) else "holds"
+    company = np.sum(size >= size.max() / known["isolation"])
+    return "broken" if company < known["crowd"] else "holds"

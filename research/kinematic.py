@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
-from kinacc.assess.coverage import CROWD, ISOLATION, MISSING_PART, companions
+from kinacc.assess.coverage import MISSING_PART, companions
 from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
@@ -28,6 +28,8 @@ _BATCH = 0.08  # of the budget: readings between two looks at who could be the l
 _DOUBTED = 0.25  # of a batch, spent on the readings the model explains worst
 _CONTRADICTED = 0.01  # chance of the worst reading under the model, all points considered
 _EXPLAINED = 0.5  # least share of the mean square error that joints have to explain
+
+ISOLATION, CROWD = 1.25, 0.05  # assumed of the largest error's company
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,6 @@ class Kinematic(AdaptiveAssessor):
     confidence: float = CONFIDENCE
     name: ClassVar[str] = "kinematic"
     needs: ClassVar[tuple[str, ...]] = ("q_rad", "effects")
-    exchangeable: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         problems = check_budget(self.measurements, self.confidence)

@@ -104,6 +104,45 @@ def shares(table: pd.DataFrame) -> Shares:
     )
 
 
+LEAST_REACHED = 0.55  # share of the combinations; the paper speaks of none that it did not reach
+
+
+def choice(table: pd.DataFrame) -> pd.DataFrame:
+    """The readings of the table, one of them ``chosen``: the paper's sentences are about its maps.
+
+    Of the readings that reach ``LEAST_REACHED`` of their combinations, the one under which most
+    of the seven sentences hold on an arm, in the mean. Readings whose mean is less by no more
+    than the standard error of the difference are ties; the simpler one is taken: fewer angles
+    that are not zero, then nine turns before 27, then the order of ``READINGS``.
+    """
+    rows = []
+    for reading in READINGS:
+        own = table[_mine(table, reading)]
+        if own.empty:
+            continue
+        held = (own["verdict"] == "agrees").groupby(own["seed"]).sum()
+        turned = sum(angle != 0.0 for angle in reading.reference_orientation_deg[1:])
+        rows.append({
+            "reference_frame": reading.reference_frame,
+            "reference_orientation": reading.orientation,
+            "rotations": reading.rotations,
+            "arms": len(held),
+            "reached": own.drop_duplicates("seed")["reached"].mean(),
+            "sentences": held.mean(),
+            "standard_error": held.std(ddof=1) / np.sqrt(len(held)),
+            "simplicity": (turned, reading.rotations == "all_27"),
+        })  # fmt: skip
+    found = pd.DataFrame(rows)
+    able = found[found["reached"] >= LEAST_REACHED]
+    best = able.loc[able["sentences"].idxmax()]
+    error = np.hypot(able["standard_error"], best["standard_error"])
+    ties = able[best["sentences"] - able["sentences"] <= error]
+    found["chosen"] = (
+        found.index == ties["simplicity"].map(tuple).sort_values(kind="stable").index[0]
+    )
+    return found.drop(columns="simplicity")
+
+
 def _mine(table: pd.DataFrame, reading: Reading) -> pd.Series:
     return (
         (table["reference_frame"] == reading.reference_frame)

@@ -1,4 +1,6 @@
-"""How long does a fit take, with standard deviations and what it could not determine?
+"""Fits
+
+A fit with standard deviations and what it could not determine.
 
 Data sets are simulated: an arm that differs from its description, 0.05 mm and 0.1 mrad of noise.
 
@@ -8,18 +10,16 @@ plain kinematics, and neither truncates, finds ranks nor judges standard deviati
 its default Jacobian, "analytic" that of kinacc. Its ``lm`` is taken, which is faster here than
 ``trf``. pybotics fits its parameters to positions alone; to 30 of them, as 500
 take it minutes.
-Limit: three residuals with Jacobians and one triangular factor of 3,000 x 30; of these the factor
-alone takes 2 m n^2 = 5.4 million floating-point operations, and a Gram product half of that.
 
 VEC fits have 1,000 full poses and 216 coefficients beside base and tool, with the rank report. They
-are held to a product of the transposed Jacobian, 6,000 x 216, with itself, which is 0.28 billion
-multiplications and additions. Limit: three such products, and one triangular factor, which takes
-twice the operations of a product at half the speed: seven products.
+are held to a product of the transposed Jacobian, 6,000 x 216, with itself. No fit takes less than
+seven: three such products, and a triangular factor of twice the operations at half the speed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 
 import numpy as np
 from harness import Contender, Work
@@ -30,59 +30,40 @@ GRAM = "one Gram product"
 
 
 def works(smoke: bool) -> list[Work]:
-    """DH fits beside scipy and pybotics, and VEC fits beside their own Gram product."""
-    import scipy
-
-    import kinacc
-
+    """DH fits beside scipy and pybotics, VEC fits and choices of order beside matrix products."""
     poses = 60 if smoke else 500
-    own = Contender("kinacc", kinacc.__version__)
-
-    def by_scipy(name: str, plain: bool, analytic: bool) -> Contender:
-        return Contender(name, scipy.__version__, _scipy(smoke, plain, analytic))
-
-    limit = "three evaluations and a triangular factor of 3,000 x 30"
+    own, scipy = version("kinacc"), version("scipy")
     fitted = [
         Work(
             f"DH fit, {poses} full poses, {name}", "fit", 1,
-            (own, by_scipy("scipy 2-point", plain, False), by_scipy("scipy analytic", plain, True)),
-            _same_cost, {"scipy 2-point": wanted}, limit=limit, today=today,
+            (
+                Contender("kinacc", own, _dh(smoke, plain)),
+                Contender("scipy 2-point", scipy, _scipy(smoke, plain, analytic=False)),
+                Contender("scipy analytic", scipy, _scipy(smoke, plain, analytic=True)),
+            ),
+            _same_cost, {"scipy 2-point": wanted},
         )
-        for name, plain, wanted, today in (
-            ("compiled", False, 10.0, dh_compiled), ("numpy", True, 4.0, dh_plain),
-        )
+        for name, plain, wanted in (("compiled", False, 10.0), ("numpy", True, 4.0))
     ]  # fmt: skip
-    beside, version = _pybotics()
-    contenders = (own,) if beside is None else (own, Contender("pybotics", version, beside))
     count, order = (120, 2) if smoke else (1000, 5)
-    rng = np.random.default_rng(0)
-    rows = rng.normal(size=(6 * count, 36 * (order + 1)))
+    rows = np.random.default_rng(0).normal(size=(6 * count, 36 * (order + 1)))
+    product = Contender(GRAM, np.__version__, lambda: rows.T @ rows)
     return [
         *fitted,
         Work(
-            "DH fit, 30 positions", "fit", 1, contenders, _same_rms, {"pybotics": 200.0},
-            limit=limit, today=dh_positions,
+            "DH fit, 30 positions", "fit", 1,
+            (Contender("kinacc", own, dh_positions()), *_pybotics()), _same_rms,
+            {"pybotics": 200.0},
         ),
         Work(
             f"VEC fit, {count} poses x {rows.shape[1]}, with rank report", "fit", 1,
-            (own, Contender(GRAM, np.__version__, lambda: rows.T @ rows)), _same_vec,
-            {GRAM: 1 / 25}, limit="three Gram products and a triangular factor, as seven products",
-            today=vec_with_rank,
+            (Contender("kinacc", own, vec_with_rank(count, order)), product),
+            lambda outputs: None, {GRAM: 1 / 25},
         ),
     ]  # fmt: skip
 
 
-def dh_compiled(smoke: bool) -> Callable[[], tuple[float, int]]:
-    """A DH fit by compiled kinematics where there are such: cost and undetermined directions."""
-    return _dh(smoke, False)
-
-
-def dh_plain(smoke: bool) -> Callable[[], tuple[float, int]]:
-    """A DH fit without compiled code."""
-    return _dh(smoke, True)
-
-
-def dh_positions(smoke: bool) -> Callable[[], float]:
+def dh_positions() -> Callable[[], float]:
     """A DH fit to positions: the rms of its residuals."""
     from kinacc.calibration import dh_fit
 
@@ -99,11 +80,10 @@ def dh_positions(smoke: bool) -> Callable[[], float]:
     return run
 
 
-def vec_with_rank(smoke: bool) -> Callable[[], tuple[float, int]]:
+def vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
     """A VEC fit with base and tool, and its rank report: cost and rank."""
     from kinacc.calibration import dh_fit, vec_fit
 
-    count, order = (120, 2) if smoke else (1000, 5)
     seen, empty = _wavy(count, order)
     frames = dh_fit.fit_frames(seen, empty.dh, rotation_weight_mm_per_rad=WEIGHT).frames
     prior = vec_fit.Prior(1.0, 1e-3, 1.0, 1e-3)
@@ -160,14 +140,12 @@ def _scipy(smoke: bool, plain: bool, analytic: bool) -> Callable[[], tuple[float
     return run
 
 
-def _pybotics() -> tuple[Callable[[], float] | None, str]:
+def _pybotics() -> tuple[Contender, ...]:
     try:
-        from importlib.metadata import version
-
         from pybotics.optimization import OptimizationHandler, optimize_accuracy
         from pybotics.robot import Robot
     except ImportError:
-        return None, ""
+        return ()
     from scipy.optimize import least_squares
 
     nominal, _, seen, _ = _positions()
@@ -186,7 +164,7 @@ def _pybotics() -> tuple[Callable[[], float] | None, str]:
         found = least_squares(optimize_accuracy, start, method="lm", args=given)
         return float(np.sqrt(2.0 * found.cost / seen.position_mm.size))
 
-    return run, version("pybotics")
+    return (Contender("pybotics", version("pybotics"), run),)
 
 
 def _full_poses(count: int) -> tuple:
@@ -268,8 +246,7 @@ def _compile(plain: bool) -> None:
     """Settle whether kinematics are compiled, which else hangs on what a process has computed."""
     from kinacc.kinematics import dh
 
-    if hasattr(dh, "WORTH_NUMBA"):
-        dh.WORTH_NUMBA = np.inf if plain else 0
+    dh.WORTH_NUMBA = np.inf if plain else 0
 
 
 def _same_cost(outputs: Sequence[tuple[float, int | None]]) -> None:
@@ -287,12 +264,3 @@ def _same_rms(outputs: Sequence[float]) -> None:
     """Residuals of both are the noise: base and tool of their arms have other freedoms."""
     if max(outputs) > 1.1 * min(outputs):
         raise ValueError(f"rms differ: {outputs}")
-
-
-def _same_vec(outputs: Sequence) -> None:
-    """Both kinaccs reach one cost, and see one rank."""
-    fits = [each for each in outputs if isinstance(each, tuple)]
-    cost, rank = fits[0]
-    for other, seen in fits[1:]:
-        if abs(other - cost) > 1e-6 * cost or seen != rank:
-            raise ValueError(f"fits differ: {fits}")

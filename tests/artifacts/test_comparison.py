@@ -39,6 +39,7 @@ def claims():
         "tolerance": [0.2, 0.2],
         "verdict": ["agrees", "agrees"],
         "share": [np.nan, np.nan],
+        "used_to_choose": [False, True],
     }
 
 

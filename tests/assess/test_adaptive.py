@@ -20,7 +20,7 @@ from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
-from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS, Reason
+from kinacc.assess.statement import CANDIDATES, MEASURED, TARGETS
 from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
@@ -257,14 +257,6 @@ def test_the_single_shot_bound_is_exact_where_one_point_decides():
     assert upper == pytest.approx(0.95, abs=0.02)
 
 
-def test_the_recommended_bound_on_all_candidates_holds_where_its_assumption_does():
-    errors = field(60) * 0.7
-    errors[:12] = directions(12)
-    settings = SearchAndConfirm(40, assume="company", crowd=0.2)
-    upper, _ = coverage(settings, errors, 0.1, 120, CANDIDATES)
-    assert upper >= least(120)
-
-
 def test_the_recommended_bound_on_all_but_a_few_candidates_holds_whatever_is_missed():
     # As many large errors as are excepted, and one more: the hardest that there is.
     points, budget, draws = 40, 20, 400
@@ -293,34 +285,12 @@ def test_a_visit_ended_early_speaks_of_all_but_the_points_that_all_can_be_missed
     assert not about.assumption
 
 
-def test_a_visit_ended_early_says_nothing_of_all_the_rest_without_an_assumption():
-    settings = SearchAndConfirm(40, assume="company", crowd=0.5)
-    campaign = settings.begin(Candidates.with_equal_noise(np.full(40, 0.05)))
-    for row, reading in enumerate(field(40)[:30]):
-        assert campaign.next() == row
-        campaign.record(row, reading)
-    about = campaign.statements()[1]
-    assert about.assumption.numbers["crowd"] > 1
-    assert about.excepted == 0
-
-
 def test_no_recommended_bound_is_below_its_value():
     errors = field(40)
     for draw in range(60):
         campaign = conduct(SearchAndConfirm(40), drawn_world(errors, 0.3, key_of(6, draw), 40))
         for said in campaign.statements():
             assert said.upper_mm >= said.value_mm
-
-
-def test_an_error_that_stands_alone_is_seen_to_break_the_assumption():
-    errors = np.vstack([[[3.0, 0.0, 0.0]], 0.1 * directions(79)])
-    said = conduct(
-        SearchAndConfirm(60, assume="company", crowd=0.5),
-        drawn_world(errors, 0.05, key_of(8), 60),
-    )
-    about = said.statements()[1]
-    assert about.target == CANDIDATES
-    assert about.withheld == Reason("stands_alone", {"isolation": 1.25})
 
 
 def test_with_a_reading_for_nearly_every_candidate_the_recommended_bound_assumes_nothing():

@@ -82,7 +82,7 @@ def test_a_lower_bound_holds_however_wilfully_its_readings_were_chosen():
             # A direction that nothing was read of counts as well, if it was chosen before.
             direction = direction_of(mean[row] if count[row] else -errors[row])
             if count[row]:
-                average.record(int(row), direction, reading.tolist(), SIGMA_MM, 0.0)
+                average.record(int(row), direction, reading.tolist(), SIGMA_MM)
             total[row] += reading
             count[row] += 1
         missed += average.bound_mm(np.ones(6)) > 1.0

@@ -134,7 +134,7 @@ def lower_bounds(wanted, campaigns, rng, factor=1.0):
         for number in range(wanted):
             along = 1.0 + sigma * noise.item(number)
             row = number % 7
-            average.record(row, [0.0, 0.6, 0.8], [9.0, 0.6 * along, 0.8 * along], sigma, 0.0)
+            average.record(row, [0.0, 0.6, 0.8], [9.0, 0.6 * along, 0.8 * along], sigma)
             sigma = 0.3 if along > 1.0 else 2.0
         found[campaign] = average.bound_mm(np.full(7, factor))
     return found

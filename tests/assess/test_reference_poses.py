@@ -12,7 +12,6 @@ from kinacc.assess.reference_poses import (
     FALSE_ALARMS,
     Readings,
     alarms,
-    correction,
     found,
     schedule,
     schedule_faults,
@@ -53,7 +52,7 @@ def test_any_number_of_revisits_finds_its_places(references):
         assert set(plan.row_at) <= set(range(measurements))
         counts = np.bincount(list(plan.row_at.values()))
         assert counts.max() - counts.min() <= 1
-    assert not schedule_faults(references + 10, references, True)
+    assert not schedule_faults(references + 10, references)
 
 
 def test_a_plan_names_what_is_read_whatever_is_read():
@@ -66,8 +65,8 @@ def test_a_plan_names_what_is_read_whatever_is_read():
 
 
 def test_revisits_that_cannot_be_are_refused():
-    assert schedule_faults(200, 20, True) == schedule_faults(200, 0, False) == []
-    for wrong in ((200, -1, False), (20, 20, False), (200, 0, True), (200, 2.5, False)):
+    assert schedule_faults(200, 20) == schedule_faults(200, 0) == []
+    for wrong in ((200, -1), (20, 20), (200, 2.5)):
         assert len(schedule_faults(*wrong)) == 1
 
 
@@ -84,9 +83,6 @@ def test_a_drift_is_what_least_squares_make_of_the_references(covariance):
     assert found_change.is_found
     assert_allclose(found_change.change_mm, slope, rtol=1e-9)
     assert_allclose(found_change.deviation_mm, math.sqrt(variance), rtol=1e-9)
-    corrected = correction(plan, readings)
-    assert_allclose(corrected.slope_mm, slope, rtol=1e-9)
-    assert_allclose(corrected.deviation_mm, math.sqrt(variance), rtol=1e-9)
 
 
 @pytest.mark.parametrize("freedom", [math.inf, 0.0, 60.0])
@@ -129,17 +125,17 @@ def test_a_drift_or_step_of_three_deviations_is_said(change, freedom):
 def test_a_moved_tripod_is_said_as_a_step_between_two_readings():
     plan, rng = schedule(200, 180, 20), np.random.default_rng(8)
     change = found(plan, read(plan, rng, lambda time: 8.0 * (time >= 0.6)))
-    (why,) = alarms(change, is_corrected=True)
+    (why,) = alarms(change)
     assert why.code == "step"
     assert why.numbers["after"] <= 120 < why.numbers["before"]
     assert abs(why.numbers["size"] - 8.0) < 3.0 * why.numbers["deviation"]
 
 
-def test_a_drift_withholds_bounds_unless_it_is_corrected_for():
+def test_a_drift_withholds_bounds():
     plan, rng = schedule(200, 180, 20), np.random.default_rng(9)
     change = found(plan, read(plan, rng, lambda time: 6.0 * time))
-    assert [each.code for each in alarms(change, is_corrected=False)] == ["drift"]
-    assert alarms(change, is_corrected=True) == alarms(None, is_corrected=False) == ()
+    assert [each.code for each in alarms(change)] == ["drift"]
+    assert alarms(None) == ()
 
 
 def test_the_drift_that_may_go_unseen_is_found_half_of_the_time():
@@ -173,20 +169,6 @@ def test_an_early_drift_is_said_before_the_campaign_is_over():
     whole = read(plan, rng, lambda time: 20.0 * time)
     assert found(plan, whole.head(14)) is None
     assert found(plan, whole.head(15)).is_found
-    assert correction(plan, whole.head(24)) is None
-
-
-def test_a_correction_misses_the_drift_as_rarely_as_stated():
-    plan, rng = schedule(200, 180, 20), np.random.default_rng(4)
-    widest = np.linalg.eigh(SLANTED)[1][:, -1]
-    along, anywhere = 0, 0
-    for _ in range(1500):
-        readings = read(plan, rng, covariance=SLANTED)
-        slope = correction(plan, readings)
-        along += slope.slope_mm @ widest > slope.along_mm(0.1)
-        anywhere += np.linalg.norm(slope.slope_mm) > slope.anywhere_mm(0.1)
-    assert abs(along / 1500 - 0.1) < 0.025  # the widest direction has the error stated
-    assert anywhere / 1500 <= 0.1  # others less
 
 
 def test_a_noisier_instrument_on_some_visits_costs_no_false_alarms():

@@ -15,7 +15,7 @@ from kinacc.assess.binomial import binomial_interval
 from kinacc.assess.coverage import at_most, companions, hardly_missed
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import is_broken, noisy, truth_mm
+from kinacc.assess.simulate import noisy, truth_mm
 from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
 from kinacc.assess.visits import first_points
 
@@ -77,36 +77,11 @@ def test_a_budget_too_small_to_speak_of_all_candidates_is_told_what_would_do():
         assert said(few) == Reason("excepted_ahead", {"enough": 98, "excepted": left})
 
 
-def test_a_budget_that_asks_for_company_is_told_how_many_readings_it_takes():
-    """Five of a hundred may stand close: all are missed by s points with C(95, s) / C(100, s)."""
-
-    def said(measurements):
-        settings = SearchAndConfirm(measurements, assume="company")
-        return settings.shortfall(100, 6), settings.visit(100)
-
-    assert said(98)[0] is None
-    told = [said(budget) for budget in range(1, 98)]
-    for reason, seen in told:
-        enough = Fraction(comb(95, seen), comb(100, seen)) <= Fraction(25, 1000)
-        assert reason.code == ("assumption_ahead" if enough else "no_bound_on_all")
-    needed = 1 + [reason.code for reason, _ in told].index("assumption_ahead")
-    few = {reason.numbers["needed"] for reason, _ in told if reason.code == "no_bound_on_all"}
-    assert few == {needed}
-
-
 def test_statements_are_held_to_what_they_speak_of():
     size = np.array([0.2, 0.9, 0.4])
     assert truth_mm(Statement(CANDIDATES, 1.0), size, [0, 2]) == 0.9
     assert truth_mm(Statement(MEASURED, 1.0), size, [0, 2]) == 0.4
     assert np.isnan(truth_mm(Statement(MEASURED, 1.0), size, None))
-
-
-@pytest.mark.parametrize(("crowd", "broken"), [(1, False), (2, False), (3, True)])
-def test_an_assumption_is_broken_where_the_largest_has_less_company_than_it_says(crowd, broken):
-    size = np.array([1.0, 0.8, 0.79, 0.1])  # 0.8 is the largest divided by 1.25, 0.79 less
-    assumption = Reason("company", {"crowd": crowd, "isolation": 1.25})
-    assert is_broken(Statement(CANDIDATES, 1.0, assumption=assumption), size) == broken
-    assert not is_broken(Statement(CANDIDATES, 1.0), size)
 
 
 def test_noisy_readings_are_the_errors_and_noise_of_the_covariance_asked_for():
@@ -138,10 +113,9 @@ def test_a_bound_on_readings_of_unequal_noise_takes_each_ones_own_covariance():
     assert bound([narrow, narrow]) < bound([narrow, across]) < bound([narrow, wide])
 
 
-@pytest.mark.parametrize("assume", ["nothing", "company"])
-def test_few_points_of_many_speak_of_all_but_those_that_all_can_be_missed(assume):
+def test_few_points_of_many_speak_of_all_but_those_that_all_can_be_missed():
     candidates = Candidates.with_equal_noise(np.full(100, 0.01))
-    campaign = SearchAndConfirm(12, assume=assume).begin(candidates)
+    campaign = SearchAndConfirm(12).begin(candidates)
     errors = np.random.default_rng(6).normal(size=(100, 3))
     while (row := campaign.next()) is not None:
         campaign.record(row, errors[row])
@@ -149,14 +123,8 @@ def test_few_points_of_many_speak_of_all_but_those_that_all_can_be_missed(assume
     seen = len(campaign.ledger.visited)
     hidden = [Fraction(comb(100 - k, seen), comb(100, seen)) for k in range(1, 101 - seen)]
     crowd = next(k for k, chance in enumerate(hidden, 1) if chance <= Fraction(25, 1000))
-    if assume == "nothing":
-        assert everywhere.withheld is None
-        assert everywhere.excepted == crowd - 1
-        assert everywhere.upper_mm > 0.0
-    else:
-        assert everywhere.withheld == Reason(
-            "all_missed", {"seen": seen, "points": 100, "crowd": crowd}
-        )
-        assert np.isnan(everywhere.upper_mm)
+    assert everywhere.withheld is None
+    assert everywhere.excepted == crowd - 1
+    assert everywhere.upper_mm > 0.0
     assert measured.withheld is None
     assert measured.lower_mm <= measured.value_mm <= measured.upper_mm

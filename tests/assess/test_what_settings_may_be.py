@@ -33,11 +33,6 @@ LIMITS = [
     ("region_share", "deviations", -0.1, REFUSED),
     ("model_invalidation_full", "bound_mm", 0.0, REFUSED),
     ("model_invalidation_full", "bound_mm", 0.001, TAKEN),
-    ("search_and_confirm", "isolation", 1.0, REFUSED),
-    ("search_and_confirm", "isolation", 1.001, TAKEN),
-    ("search_and_confirm", "crowd", 0.0, REFUSED),
-    ("search_and_confirm", "crowd", 0.999, TAKEN),
-    ("search_and_confirm", "crowd", 1.0, REFUSED),
 ]
 
 

@@ -34,13 +34,6 @@ def test_what_is_guarded_against_is_not_assumed(rests_on):
     assert "no reference poses are read again" not in rests_on(references=20)
 
 
-def test_a_drift_that_is_corrected_for_is_assumed_to_be_even(rests_on):
-    found, corrected = rests_on(references=20), rests_on(references=20, correct_drift=True)
-    assert "so little that the reference poses do not show it" in found
-    assert "nothing drifted" not in corrected
-    assert "moved evenly with the readings, if at all: that drift is taken from all" in corrected
-
-
 @pytest.mark.parametrize(("arm_mm", "scatter"), [(0.03, "0.03 mm per axis"), (None, "all of the")])
 def test_the_error_of_a_visit_names_whose_scatter_is_in_it(rests_on, arm_mm, scatter):
     said = rests_on(error_of="visit", arm_mm=arm_mm)

@@ -139,8 +139,8 @@ def test_digits_of_other_alphabets_are_no_numbers_of_options(digits):
     [
         (("--set", "confidence=[1]"), "setting confidence"),
         (("--set", "measurements=true"), "setting measurements"),
-        (("--set", "isolation=" + "[" * 5000), "setting isolation"),
-        (("--set", "isolation=wide"), "setting isolation"),
+        (("--set", "noise_margin=" + "[" * 5000), "setting noise_margin"),
+        (("--set", "noise_margin=wide"), "setting noise_margin"),
         (("--assessor", "invalidation_calibrated", "--set", "alpha=1"), "setting alpha"),
         (("--assessor", "invalidation_calibrated", "--set", "alpha=null"), "setting alpha"),
         (("--noise-mm", "1e-320"), "at least 1e-09 mm"),

@@ -108,26 +108,26 @@ def test_the_single_shot_bound_holds_as_often_as_it_says():
     assert row.stated == 1.0
 
 
-def outcome(budget, lower, upper, repetition=0, truth=1.0, broken=False):
+def outcome(budget, lower, upper, repetition=0, truth=1.0):
     said = Statement(CANDIDATES, lower_mm=lower, upper_mm=upper, confidence=0.95)
-    return Outcome("x", budget, repetition, budget, said, truth, broken)
+    return Outcome("x", budget, repetition, budget, said, truth)
 
 
 def test_rows_count_what_is_stated_wanted_held_and_decided():
     found = [
         outcome(10, 0.9, 1.1, 0),
         outcome(10, 0.5, 0.9, 1),
-        outcome(10, 1.3, 2.0, 2, truth=1.5, broken=True),
+        outcome(10, 1.3, 2.0, 2, truth=1.5),
         outcome(10, 0.9, math.nan, 3),
     ]
     (row,) = rows(found, Aim(CANDIDATES, width_mm=0.5, tolerance_mm=1.2))
     assert row.stated == 0.75
-    assert row.broken == 0.25
     assert row.within == 0.5
-    assert row.holds == 0.5
-    assert (row.holding, row.judged) == (1, 2)
-    assert row.holds_interval == pytest.approx((0.01258, 0.98742), abs=1e-5)  # Clopper, Pearson
-    assert row.excess_mm == pytest.approx(0.0)
+    assert row.holds == pytest.approx(2.0 / 3.0)
+    assert (row.holding, row.judged) == (2, 3)
+    # Clopper, Pearson: 3 p^2 - 2 p^3 = 0.025 below; p^3 = 0.975 above
+    assert row.holds_interval == pytest.approx((0.09430, 0.99160), abs=1e-5)
+    assert row.excess_mm == pytest.approx(0.5 / 3.0)
     assert row.decisions == {"accept": 0.5, "reject": 0.25, "undecided": 0.25}
     assert row.width_mm[0] == pytest.approx(0.2)
     assert row.width_mm[2] == math.inf
@@ -149,7 +149,7 @@ def test_the_budget_named_is_enough_on_all_errors_and_beyond():
     aim = Aim(CANDIDATES, width_mm=0.5, power=0.8)
 
     def row(errors, budget, within):
-        return Row(errors, budget, 1.0, 10, 1.0, (0.1, 0.2, 0.3), 0.0, 1.0, 1.0, 0.0, within,
+        return Row(errors, budget, 1.0, 10, 1.0, (0.1, 0.2, 0.3), 0.0, 1.0, 1.0, within,
                    (0.0, 1.0), {})  # fmt: skip
 
     a = [row("a", 10, 0.9), row("a", 20, 0.9), row("a", 30, 0.9)]
@@ -193,7 +193,7 @@ def test_the_budget_named_first_is_the_smallest_that_is_shown_to_be_enough():
     def row(budget, hits):
         share = hits / 30
         interval = binomial_interval(hits, 30)
-        return Row("a", budget, 1.0, 30, 1.0, (0.1, 0.2, 0.3), 0.0, 1.0, 1.0, 0.0, share, interval,
+        return Row("a", budget, 1.0, 30, 1.0, (0.1, 0.2, 0.3), 0.0, 1.0, 1.0, share, interval,
                    {})  # fmt: skip
 
     found = [row(72, 10), row(108, 26), row(144, 30), row(216, 30)]

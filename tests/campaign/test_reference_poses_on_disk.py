@@ -4,7 +4,6 @@ import numpy as np
 
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign import folder, words
-from kinacc.campaign.plan import from_json, to_json
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import restore
 
@@ -56,13 +55,3 @@ def test_a_drift_is_said_where_the_campaign_stands(make_plan, make_world):
     said = next(each for each in state.statements() if each.target == CANDIDATES)
     assert words.statement(said, state).startswith("No upper bound for the largest error of all")
     assert "the reference poses show a drift of 0." in words.statement(said, state)
-
-
-def test_a_drift_that_is_corrected_for_is_said_beside_the_bounds(make_plan, make_world):
-    plan = make_plan(**PLANNED, correct_drift=True)
-    entries = entries_of(plan, make_world(plan), (0.0, 0.6, 0.0))
-    state = restore(from_json(to_json(plan), "here"), entries)
-    (text,) = words.of_frame(state)
-    assert text.endswith("which is taken from all readings")
-    said = next(each for each in state.statements() if each.target == CANDIDATES)
-    assert said.lower_mm < np.linalg.norm((0.9, -0.6, 0.5)) < said.upper_mm

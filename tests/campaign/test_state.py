@@ -28,7 +28,7 @@ def reading_of(plan, world, state):
 def known(plan):
     """What an assessor may know of the candidates, rows as it numbers them."""
     joints = plan.points.joints[plan.visiting(frozenset())]
-    return {"q_rad": joints, "effects": plan.arm.effects(joints)}
+    return {"q_rad": joints}
 
 
 def entries_of(plan, world):

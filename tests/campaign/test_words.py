@@ -26,12 +26,6 @@ def test_every_reason_that_can_be_given_has_words_and_no_words_are_left_over():
          "3 points read; 90% of the region needs 35"),
         ("much_noise", {"part": 0.317},
          "noise makes up 32% of the mean square of the readings"),
-        ("stands_alone", {"isolation": 1.25},
-         "one measured error is more than 1.25 times all others"),
-        ("crowd", {"crowd": 7, "points": 200, "isolation": 1.25},
-         "at least 7 of the 200 candidates have an error above the largest divided by 1.25"),
-        ("all_missed", {"seen": 60, "points": 200, "crowd": 12},
-         "60 of 200 candidates measured: fewer than 12 large errors could all have been missed"),
     ],
 )  # fmt: skip
 def test_a_reason_is_told_with_its_numbers(code, numbers, text):

@@ -59,68 +59,10 @@ def measurements(folder, poses=60, target="tool"):
     store.write(folder / "measurements.parquet", "measurements", columns, PROVENANCE)
 
 
-def pose_errors(folder):
-    rng = np.random.default_rng(2)
-    rows = [
-        (f"{model}_vs_measured", "cross_validated", row, row, "tool", 0, "train", 0,
-         *(scale * rng.standard_normal(3)), None, None, None)
-        for model, scale in (("vec", 0.1), ("dh", 0.2), ("nominal", 0.7))
-        for row in range(200)
-    ]  # fmt: skip
-    return write(folder, "pose_errors", rows)
-
-
-def accuracy_map(folder):
-    names = (
-        "slice_deg",
-        "radius_mm",
-        "height_mm",
-        "position_max_mm",
-        "orientation_max_mrad",
-        "worst_branch",
-        "orientation_worst_branch",
-        "solutions",
-        "wanted",
-        "extrapolating",
-    )
-    joints = dict.fromkeys([f"q{i}" for i in range(1, 7)])
-    cells = [
-        (angle, 1000.0 + 25 * i, 25.0 * j, None if i == j == 0 else 0.5 + i * j / 100, 1.0, "a",
-         "b", int(i + j > 0), 1, 0)
-        for angle in (0.0, 30.0)
-        for i in range(12)
-        for j in range(7)
-    ]  # fmt: skip
-    rows = [dict(zip(names, each, strict=True)) | joints for each in cells]
-    return write(folder, "accuracy_map", rows)
-
-
-def study_summary(folder):
-    rows = [
-        (assessor, noise, true + slope * noise, 0.7, 1.1, slope * noise, 0.1, 100, 0.01)
-        for assessor, slope in (("maximum", 2.0), ("outlier_rejection", 1.0))
-        for noise in (0.05, 0.1, 0.2)
-        for true in (0.8,)
-    ]
-    return write(folder, "study_summary", rows)
-
-
 def vec_orders(folder, orders=range(1, 8)):
     rows = [(None, order, 1.0, 1.0, 0.7, 1 / order + 0.05 * order, 0.0, 0.0, int(order == 4))
             for order in orders]  # fmt: skip
     return write(folder, "vec_orders", rows)
-
-
-def campaign_bounds(folder):
-    rows = [(n, n, "candidates", 1.0, 0.5, 0.4, 1.0 + 5 / n, 0, 0.95, None, None)
-            for n in (5, 9, 20)]  # fmt: skip
-    return write(folder, "campaign_bounds", rows)
-
-
-PICTURES = {
-    each.__name__: each
-    for each in (accuracy_map, pose_errors, study_summary, vec_orders, campaign_bounds)
-}
 
 
 def table_of(output):
@@ -409,74 +351,6 @@ def test_texts_cannot_control_the_terminal(tmp_path):
     said = show(tmp_path, "measurements", "--columns", "pose,target").output
     assert "\x1b" not in said
     assert "[2Jtool[red]" in said
-
-
-@pytest.mark.parametrize("width", [80, 120])
-@pytest.mark.parametrize("name", PICTURES)
-def test_a_picture_fits_the_terminal_and_needs_neither_colour_nor_more_than_ascii(
-    tmp_path, name, width
-):
-    path = PICTURES[name](tmp_path)
-    said = show(path, "--plot", width=width)
-    assert said.exit_code == 0, said.output
-    assert "\x1b" not in said.output
-    lines = said.output.splitlines()[1:]  # below the path
-    assert 8 < len(lines) < 60
-    assert 40 < max(map(len, lines)) <= width
-    done = subprocess.run(
-        [sys.executable, "-m", "kinacc", "show", path, "--plot"],
-        capture_output=True,
-        env={"PYTHONIOENCODING": "ascii", "COLUMNS": "80", "PYTHONPATH": ":".join(sys.path)},
-    ) if width == 80 and name in ("study_summary", "pose_errors") else None  # fmt: skip
-    assert done is None or (done.returncode == 0 and b"?" not in done.stdout)
-
-
-def test_the_map_shows_the_largest_error_where_it_is_and_blanks_what_is_not_reached(tmp_path):
-    lines = show(accuracy_map(tmp_path), "--plot", "--where", "slice_deg=30").output.splitlines()
-    first = next(i for i, line in enumerate(lines) if "slice 30 deg, max 1.16 mm" in line)
-    rows = [line[4:] for line in lines[first + 1 : first + 5]]
-    assert rows[0][11] == "@"
-    assert rows[-1][0] == " "
-    assert lines[first + 5].split() == ["1000", "1275"]
-    other = show(tmp_path / "accuracy_map", "--plot", "--columns", "orientation_max_mrad").output
-    assert "largest orientation error in mrad" in other
-
-
-def test_the_histogram_shows_every_reading_that_stands_alone(tmp_path):
-    path = write(
-        tmp_path,
-        "pose_errors",
-        [
-            ("vec_vs_measured", "cross_validated", i, i, "tool", 0, "train", 0, x, 0, 0, None, None,
-             None)
-            for i, x in enumerate([*[0.1] * 500, 1.0, 2.0])
-        ],
-    )  # fmt: skip
-    lines = show(path, "--plot").output.splitlines()
-    bottom = next(line for line in lines if line.strip().startswith("0 |"))
-    assert [mark for mark in bottom.partition("|")[2] if mark != " "] == ["█", "▁", "▁"]
-    assert "502 readings, mean 0.106" in "\n".join(lines)
-
-
-def test_one_order_alone_makes_no_curve(tmp_path):
-    said = show(vec_orders(tmp_path, [5]), "--plot")
-    assert said.exit_code == 0
-    assert "order 5 was given, and no other was tried" in said.output
-
-
-def test_a_table_without_a_picture_says_which_have_one(tmp_path):
-    said = show(residuals(tmp_path), "--plot")
-    assert said.exit_code == 2
-    assert ", ".join(PICTURES) in said.output
-
-
-def test_colours_are_for_terminals_that_want_them(tmp_path):
-    path = study_summary(tmp_path)
-    coloured = {"FORCE_COLOR": "1", "TERM": "xterm-256color", "COLORTERM": "truecolor"}
-    assert "38;2;0;142;215" in show(path, "--plot", **coloured).output
-    forbidden = show(path, "--plot", **coloured, NO_COLOR="1").output
-    assert "38;" not in forbidden
-    assert "oo maximum" in forbidden
 
 
 def test_a_reader_who_has_seen_enough_is_left_in_peace(tmp_path):

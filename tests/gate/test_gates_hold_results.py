@@ -214,8 +214,20 @@ def test_without_an_accepted_run_a_gate_against_it_fails(tmp_path):
 def with_claims(tmp_path, **verdicts):
     tables = RunTables(tmp_path)
     names, said = list(verdicts), list(verdicts.values())
-    tables["claims"] = {"claim": np.array(names, object), "verdict": np.array(said, object)}
+    tables["claims"] = {
+        "claim": np.array(names, object),
+        "verdict": np.array(said, object),
+        "used_to_choose": np.array([name.startswith("map_") for name in names]),
+    }
     return tables
+
+
+def test_a_sentence_that_chose_a_reading_is_no_evidence(tmp_path):
+    tables = with_claims(tmp_path, one="agrees", map_nonlinear="differs")
+    for text in ("claims: agree", "claims: agree, except: [map_nonlinear]"):
+        found = judged(tmp_path, text, tables)
+        assert found.verdict == PASSED
+        assert found.figures["claims"] == found.figures["agree"] == 1
 
 
 def test_claims_that_differ_fail_unless_they_are_excepted(tmp_path):

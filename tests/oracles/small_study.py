@@ -23,8 +23,11 @@ measurements:
 calibration:
   vec: {order: 3}
   dh: {truncation: 1.0e-4}
-evaluation:
+evaluation:  # of the maps and points that the oracle reckons
   points: 24
+  reference_frame: slice
+  reference_orientation_deg: [180, 0, 0]
+  rotations: signs_and_zero
 map: {slices_deg: [0, 30], grid_mm: 225}
 study: {noise_mm: [0.05, 0.3], repetitions: 3, measurements: 24, chunks: 2}
 histories: {simulations_searched: 30}

@@ -262,30 +262,3 @@ def test_an_estimate_for_candidates_that_are_not_all_measured_is_said_to_be_low(
     assert report.markdown(part.opened, part.state, part.tables, "picture").count(low) == 1
     every = report.markdown(whole.opened, whole.state, whole.tables, "picture")
     assert "tends to be too low" not in every
-
-
-def test_readings_above_a_bound_that_a_drift_is_taken_from_are_explained_by_the_drift():
-    drift_mm = np.array([1.0, 0.0, 0.0]) / 80
-    found = measured(points=20, budget=80, off_mm=lambda number: number * drift_mm, references=40,
-                     correct_drift=True)  # fmt: skip
-    table, (said, _) = found.tables["campaign_points"], found.state.statements()
-    size, upper = (np.asarray(table[f"{name}_mm"], dtype=float) for name in ("error", "upper"))
-    assert size.max() > said.upper_mm
-    without_mm = report.sizes_without_drift_mm(found.state)
-    true_mm = np.linalg.norm(
-        np.random.default_rng(5).normal(0.0, TRUE_MM, (20, 3))[found.state.rows], axis=1
-    )
-    assert without_mm == pytest.approx(true_mm, abs=0.2)
-    assert (without_mm <= upper).all()
-    text = report.markdown(found.opened, found.state, found.tables, "picture")
-    top = int(np.argmax(size))
-    told = f"that holds the drift: without it the size is {without_mm[top]:.3f} mm"
-    assert f"point {table['point'][top]} the most, {size[top]:.3f} mm; {told}" in text
-    assert told in note(first_of(found), "CHECK")
-    beyond = text.split("Read above their own limit for the drift: ")[1].split(".")[0].split(", ")
-    shown = report.largest_read(table)
-    assert beyond == [table["point"][row] for row in shown if size[row] > upper[row]]
-    for wrong in ("own limit: ", "may be stated too large", "this is the mean of", "not explain"):
-        assert wrong not in text
-    texts = blocks([section(found.state, found.tables, "here")], page.Text)
-    assert any("their own limit for the drift" in each.words for each in texts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,8 @@ from kinacc.workflow.stages import robustness_chunk
 from research import arm_search, fig3_readings
 from research.map_readings import READINGS, SENTENCES, judged_arms, shares
 
+CHOICE = Path(__file__).parents[2] / "research" / "data" / "map_choice.csv"
+
 
 @pytest.fixture(scope="module")
 def config() -> dict:
@@ -24,14 +27,17 @@ def config() -> dict:
 
 
 def test_the_reading_of_the_configuration_has_the_shipped_arm_and_its_verdicts(config):
-    as_shipped = pd.DataFrame(judged_arms(READINGS[0], config, 1, 30))
-    assert READINGS[0].of(config) == config
+    (reading,) = [each for each in READINGS if each.of(config) == config]
+    as_shipped = pd.DataFrame(judged_arms(reading, config, 1, 30))
     assert as_shipped["seed"].unique().tolist() == [int(accepted.rows()[0]["seed"])]
     whole = robustness_chunk.claims_on(0, config)
     verdicts = dict(zip(whole["claim"], whole["verdict"], strict=True))
     found = dict(zip(as_shipped["claim"], as_shipped["verdict"], strict=True))
     assert found == {name: verdicts[name] for name in SENTENCES}
-    assert (as_shipped["reached"] == 1.0).all()
+    chosen = pd.read_csv(CHOICE).query("chosen").iloc[0]
+    assert chosen["rotations"] == reading.rotations
+    assert chosen["reference_orientation"] == reading.orientation
+    assert chosen["reference_frame"] == reading.reference_frame
 
 
 def test_another_reading_has_arms_that_meet_the_paper_under_its_own_plan(config):
@@ -88,7 +94,7 @@ def test_the_picture_names_every_reading_and_writes_every_share():
 def test_an_arm_left_unmeasured_would_not_have_been_accepted(config):
     bench = arm_search.bench_of(config)
     # Of all shipped arms the one that is predicted to be farthest off.
-    assert arm_search.trial(bench, 221).accepted
+    assert arm_search.trial(bench, 145).accepted
     left_out = [
         each.draw
         for each in (arm_search.trial(bench, seed) for seed in range(6))

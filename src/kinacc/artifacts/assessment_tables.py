@@ -20,6 +20,7 @@ from kinacc.artifacts.columns import (
     JOINTS,
     SLIDES,
     Artefact,
+    Column,
     absent_if_unstated,
     error_vector,
     length,
@@ -220,6 +221,12 @@ CLAIMS = Artefact(
         text("verdict", "agrees, differs or not comparable", VERDICTS),
         magnitude(
             "share", "1", "share of further accepted draws of the arm for which it holds", 1.0, True
+        ),
+        Column(
+            "used_to_choose",
+            "bool",
+            "1",
+            "whether the sentence chose a reading of the paper, and is no evidence",
         ),
     ),
     ("claim",),

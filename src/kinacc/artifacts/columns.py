@@ -33,7 +33,7 @@ BY_STD_ERROR = "study_summary.std_error_mm"
 class Column:
     """One column of a table.
 
-    ``kind`` is float, int, int8 or text. ``unit`` is empty for text and names, "1" for pure
+    ``kind`` is float, int, int8, bool or text. ``unit`` is empty for text and names, "1" for pure
     numbers. ``low`` and ``high`` bound what is physically possible, both included; ``choices`` or
     ``pattern`` bound what a text may say. An ``optional`` column is null throughout where a table
     does not state it; one that ``may_be_absent`` is not in the file then. ``same`` is what two runs

@@ -62,7 +62,7 @@ def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]])
     else:
         names = [column.name for column in contract.columns]
     known = {column.name: column for column in contract.for_joints(joint_count(contract, names))}
-    kinds = {"float": np.float64, "int": np.int64, "int8": np.int8}
+    kinds = {"float": np.float64, "int": np.int64, "int8": np.int8, "bool": np.bool_}
     columns: Columns = {}
     for place, name in enumerate(names):
         kind, cells = known[name].kind, [row[place] for row in given]

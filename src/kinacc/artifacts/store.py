@@ -34,6 +34,7 @@ _ARROW_TYPES = {
     "float": pa.float64(),
     "int": pa.int64(),
     "int8": pa.int8(),
+    "bool": pa.bool_(),
     "text": pa.string(),
 }
 _MOST_VALUES = 100_000_000
@@ -205,7 +206,7 @@ def _unpacked(file: pq.ParquetFile, path: Path | str, any_type: bool) -> pa.Tabl
         Problem(f"{path}, column {field.name}", f"is of type {field.type}", "numbers, text")
         for field in file.schema_arrow
         if not (any_type or pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
-        and field.type not in (pa.string(), pa.large_string(), pa.null())
+        and field.type not in (pa.string(), pa.large_string(), pa.bool_(), pa.null())
     )
     _refuse_long_texts(file, path)
     return file.read(use_threads=False)
@@ -275,6 +276,8 @@ def columns_in(table: pa.Table) -> Columns:
 
 
 def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
+    if pa.types.is_boolean(field.type):
+        return np.array(column.to_numpy(zero_copy_only=False))
     if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
         return texts(column.to_pylist())
     if field.nullable or column.null_count:
@@ -318,7 +321,8 @@ def _to_arrow(place: str, column: Column, values: Any) -> tuple[pa.Array | None,
     if not whole.all():
         first = numbers[~whole][0]
         problems.append(Problem(place, f"{first:g} in {rows(~whole)}", "whole numbers"))
-    low, high = (-128, 127) if column.kind == "int8" else (-(2.0**63), 2.0**63 - 1025)
+    limits = {"int8": (-128, 127), "bool": (0, 1), "int": (-(2.0**63), 2.0**63 - 1025)}
+    low, high = limits[column.kind]
     beyond = ~null & ((numbers < low) | (numbers > high))
     if beyond.any() and not problems:
         problems.append(Problem(place, f"too large for {column.kind} in {rows(beyond)}"))
@@ -329,15 +333,8 @@ def _to_arrow(place: str, column: Column, values: Any) -> tuple[pa.Array | None,
 
 
 def _array(values: np.ndarray, null: np.ndarray, kind: pa.DataType) -> pa.Array:
-    """Arrow array of numbers; built from buffers, because pa.array imports pandas (0.5 s)."""
-    data = np.where(null, 0, values).astype(kind.to_pandas_dtype())
-    return pa.Array.from_buffers(kind, len(data), [_validity(null), pa.py_buffer(data)])
-
-
-def _validity(null: np.ndarray) -> pa.Buffer | None:
-    if not null.any():
-        return None
-    return pa.py_buffer(np.packbits(~null, bitorder="little"))
+    """Arrow array of numbers."""
+    return pa.array(np.where(null, 0, values).astype(kind.to_pandas_dtype()), kind, mask=null)
 
 
 def _text_to_arrow(
@@ -351,10 +348,7 @@ def _text_to_arrow(
         return None, [Problem(place, f"{first!r} in {rows(wrong)}", "text")]
     if null.any() and not column.nullable:
         return None, [Problem(place, f"null in {rows(null)}", "text in every row")]
-    words = [(value or "").encode() for value in texts]
-    ends = np.cumsum([0, *map(len, words)], dtype=np.int32)
-    buffers = [_validity(null), pa.py_buffer(ends), pa.py_buffer(b"".join(words))]
-    return pa.Array.from_buffers(pa.string(), len(words), buffers), []
+    return pa.array(texts, pa.string()), []
 
 
 def _as_text(value: Any) -> Any:

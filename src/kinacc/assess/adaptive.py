@@ -161,15 +161,11 @@ class AdaptiveAssessor(Protocol):
 
     ``name`` in tables; ``measurements`` it may spend; ``confidence`` of its bounds and of the
     limits on single points. ``needs``: what it has to know of the candidates beside their noise,
-    names of :class:`Candidates`. ``exchangeable``: it treats the errors of different poses as
-    exchangeable, so that errors drawn one by one can stand for them. ``is_slow``: a campaign of
-    200 takes more than 50 ms.
+    names of :class:`Candidates`.
     """
 
     name: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
-    exchangeable: ClassVar[bool] = True
-    is_slow: ClassVar[bool] = False
     measurements: int
     confidence: float
 

@@ -29,13 +29,12 @@ class Assessor(Protocol):
     """A method of assessment that looks back at one fixed world.
 
     ``name`` is its name in tables; ``switches`` maps each field that is a reading of the paper to
-    its choices; ``measurements`` is the budget; ``is_slow``: an assessment of 200 measurements
-    takes more than 50 ms. What is a key of the configuration's ``study`` has no default here.
+    its choices; ``measurements`` is the budget. What is a key of the
+    configuration's ``study`` has no default here.
     """
 
     name: ClassVar[str]
     switches: ClassVar[dict[str, tuple[str, ...]]] = {}
-    is_slow: ClassVar[bool] = False
     measurements: int
 
     def assess(self, world: World) -> Assessment:

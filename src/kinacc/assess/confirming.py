@@ -10,7 +10,7 @@ from kinacc.assess.adaptive import Candidates, LedgerCampaign
 from kinacc.assess.boundary import EARLY, boundary, look_counts
 from kinacc.assess.lower_average import SHARE, LowerAverage, direction_of
 from kinacc.assess.noise_taken import AS_STATED, NoisePlan
-from kinacc.assess.reference_poses import part_of_drift, schedule
+from kinacc.assess.reference_poses import schedule
 from kinacc.assess.sequential_limits import Looks
 
 _VISIT_PART = 0.05  # of the lower bound's error, for single points until the average speaks
@@ -26,8 +26,7 @@ class ConfirmingCampaign(LedgerCampaign):
     readings count for the lower bound; where no more readings are left than must still count, that
     point is read. Decisions go by means of whole blocks and planned noise: scatter within a block
     has no part in them. ``references`` readings beside these go to reference poses, in their places
-    of the sequence whatever is read. ``corrects``: their drift is taken from all readings in the
-    end, and ``drift_part`` of the allowed errors is for its uncertainty.
+    of the sequence whatever is read.
     """
 
     def __init__(
@@ -38,7 +37,6 @@ class ConfirmingCampaign(LedgerCampaign):
         noise: NoisePlan = AS_STATED,
         wrong_rate: float = 0.0,
         references: int = 0,
-        corrects: bool = False,
     ) -> None:
         super().__init__(settings, candidates)
         self.first, self.noise_plan, self.factor = first, noise, noise.margin
@@ -50,7 +48,6 @@ class ConfirmingCampaign(LedgerCampaign):
         self.counts = look_counts(self.extra)
         wanted = math.floor(SHARE * self.extra) if self.extra > 1 else 0
         self.lower_error = (1.0 - _VISIT_PART) * allowed if wanted else 0.0
-        self.drift_part = part_of_drift(allowed, self.extra, self.plan) if corrects else 0.0
         upper = self.boundary_of(allowed)
         # Where the noise is an estimate, half of the error of single points is for its limit.
         self.single_error = allowed - self.lower_error
@@ -58,8 +55,7 @@ class ConfirmingCampaign(LedgerCampaign):
         each = single / max(min(first, candidates.points), 1)
         shares = _first_most(np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0))
         if not wrong_rate:
-            kept = (1.0 - self.drift_part) * self.lower_error
-            self.average = LowerAverage(wanted, kept, noise.freedom)
+            self.average = LowerAverage(wanted, self.lower_error, noise.freedom)
             self.looks = Looks(self.ledger, upper, each, shares, self.factor)
         else:
             from kinacc.assess.guarded_looks import GuardedAverage, GuardedLooks
@@ -112,8 +108,7 @@ class ConfirmingCampaign(LedgerCampaign):
             self._left -= 1
             if self._counted and not is_planned:
                 noise = self._noise_along(point, covariance_mm2)
-                reading, time = self.ledger.readings[-1][1], self.plan.time(taken)
-                self.average.record(point, self._direction, reading, noise, time)
+                self.average.record(point, self._direction, self.ledger.readings[-1][1], noise)
                 # A bound stated inside a block is of a mean of its own: a new block begins.
                 self._begins = self.average.at_stage
         self.looks.update(point)

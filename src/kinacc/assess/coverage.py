@@ -8,7 +8,6 @@ from math import comb
 from kinacc.assess.adaptive import Ledger
 from kinacc.assess.statement import CANDIDATES, Reason, Statement
 
-ISOLATION, CROWD = 1.25, 0.05  # assumed of the largest error's company (.search_and_confirm)
 MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
 
 

@@ -31,7 +31,7 @@ def guarded_by_spending(
 class GuardedLooks(Looks):
     """As :class:`Looks`; upper limits count every reading by its clipped score.
 
-    No drift is taken from guarded readings. Lower limits of single points are not guarded: only
+    Lower limits of single points are not guarded: only
     all of them together say something (:meth:`largest_lower_mm`). ``wrong``: readings of the
     campaign that may be wrong at most.
     """
@@ -51,7 +51,7 @@ class GuardedLooks(Looks):
         self._readings: dict[int, list[list[float]]] = {}
         self._covariances: dict[int, list[np.ndarray]] = {}
 
-    def update(self, point: int, time: float = 0.0) -> None:
+    def update(self, point: int) -> None:
         """Take the reading just recorded, and look at the point where that is due."""
         _, reading, covariance = self.ledger.readings[-1]
         planned = self.ledger.candidates.covariance_mm2[point]
@@ -59,12 +59,9 @@ class GuardedLooks(Looks):
         self._covariances.setdefault(point, []).append(
             planned if covariance is None else np.asarray(covariance, dtype=float)
         )
-        super().update(point, time)
+        super().update(point)
 
-    def corrected_limits_mm(
-        self, boundary: Boundary, factor: np.ndarray, astray_mm: float
-    ) -> np.ndarray:
-        """As of :class:`Looks`; ``astray_mm`` is 0."""
+    def _limits_of(self, boundary: Boundary, factor: np.ndarray) -> np.ndarray:
         found = np.full(len(self.upper_mm), math.inf)
         for point in self.ledger.visited:
             own, looks = factor.item(point), range(self.done(point))

@@ -10,7 +10,7 @@ largest. No share is paid for the number of points.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -24,8 +24,8 @@ LATE = 3.0  # with this power of their share the error is spent: most of it in t
 class LowerAverage:
     """Readings that count, up to ``wanted``, and the bounds of its stages.
 
-    Of every one that counted, in order: its point, what it read along its direction (mm), the
-    standard deviation of that (mm), and its direction times its time.
+    Of every one that counted, in order: its point, what it read along its direction (mm), and the
+    standard deviation of that (mm).
     """
 
     def __init__(self, wanted: int, error: float, freedom: float = math.inf) -> None:
@@ -35,7 +35,6 @@ class LowerAverage:
         self._rows: list[int] = []
         self._along_mm: list[float] = []
         self._noise_mm: list[float] = []
-        self._turned: list[list[float]] = []
 
     def record(
         self,
@@ -43,17 +42,12 @@ class LowerAverage:
         direction: list[float],
         reading_mm: list[float],
         noise_mm: float,
-        time: float,
     ) -> None:
-        """Take a reading (3,) at a row, of deviation ``noise_mm`` along ``direction`` (3,).
-
-        ``time``: its place in the sequence over its length.
-        """
+        """Take a reading (3,) at a row, of deviation ``noise_mm`` along ``direction`` (3,)."""
         (u, v, w), (x, y, z) = direction, reading_mm
         self._rows.append(row)
         self._along_mm.append(u * x + v * y + w * z)
         self._noise_mm.append(noise_mm)
-        self._turned.append([u * time, v * time, w * time])
 
     @property
     def taken(self) -> int:
@@ -81,21 +75,10 @@ class LowerAverage:
 
     def bound_mm(self, factor: np.ndarray) -> float:
         """The largest bound of the stages reached, 0 before; noise (m,) times as planned."""
-        return self.corrected_bound_mm(factor, (0.0, 0.0, 0.0), 0.0)
-
-    def corrected_bound_mm(
-        self, factor: np.ndarray, slope_mm: Sequence[float], astray_mm: float
-    ) -> float:
-        """As :meth:`bound_mm`, without a drift: ``slope_mm`` (3,) over the whole sequence.
-
-        It is known but for ``astray_mm`` in any direction.
-        """
         if not self.has_spoken:
             return 0.0
         weight = 1.0 / np.array(self._noise_mm)
-        turned = np.cumsum(np.array(self._turned) * weight[:, None], axis=0)
-        drift = turned @ np.array(slope_mm) + np.linalg.norm(turned, axis=1) * astray_mm
-        found = np.cumsum(np.array(self._along_mm) * weight) - drift
+        found = np.cumsum(np.array(self._along_mm) * weight)
         variance, total = np.cumsum(factor[self._rows] ** 2), np.cumsum(weight)
         return max(
             float((found[at] - z * math.sqrt(variance[at])) / total[at])

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from kinacc.assess.adaptive import Ledger
 from kinacc.assess.change_shapes import Shapes, half_found, likelier, shapes_of
@@ -86,13 +85,10 @@ def poses_of(references: int) -> int:
     return min(POSES, max(references // 4, 1)) if references else 0
 
 
-def schedule_faults(measurements: int, references: int, correct_drift: bool) -> list[Problem]:
-    """What is wrong with a number of revisits in so many readings, and with correcting by them."""
+def schedule_faults(measurements: int, references: int) -> list[Problem]:
+    """What is wrong with a number of revisits in so many readings."""
     if not isinstance(references, (int, np.integer)) or references < 0:
         return [Problem("references", f"{references!r}", "a whole number, 0 or more")]
-    if correct_drift and not references:
-        fix = "plan 20 revisits, or do not correct"
-        return [Problem("correct_drift", "no revisits show a drift", "references above 0", fix)]
     poses = poses_of(references)
     if (least := references + 2 * poses) > measurements:
         what = f"{references} revisits of {poses} poses take {least} readings or more"
@@ -177,17 +173,9 @@ class Change:
         return Reason("step", numbers | {"after": self.between[0], "before": self.between[1]})
 
 
-def alarms(change: Change | None, is_corrected: bool) -> tuple[Reason, ...]:
-    """Why no bounds are stated: what is found, but for a drift where that is corrected for."""
-    if change is None or not change.is_found or (is_corrected and change.between is None):
-        return ()
-    return (change.reason,)
-
-
-def awaited(plan: Schedule, taken: int) -> Reason | None:
-    """Why a drift cannot be corrected for after so many readings; None where it can."""
-    left = plan.left(taken)
-    return Reason("references_left", {"left": left}) if left else None
+def alarms(change: Change | None) -> tuple[Reason, ...]:
+    """Why no bounds are stated: a drift or step that is found."""
+    return (change.reason,) if change is not None and change.is_found else ()
 
 
 def stages(plan: Schedule) -> tuple[tuple[int, float], ...]:
@@ -254,53 +242,3 @@ def _shapes(plan: Schedule, readings: Readings) -> Shapes:
 def _about(place: np.ndarray, gap: int) -> tuple[int, int]:
     """Numbers (from 1) of the reference readings on both sides of a gap."""
     return int(place[gap - 1]) + 1, int(place[gap]) + 1
-
-
-@dataclass(frozen=True)
-class Correction:
-    """A linear drift as the references show it, to be taken from readings, and how sure it is.
-
-    ``slope_mm`` (3,): drift over the whole campaign; ``deviation_mm``: its standard deviation per
-    axis, the largest. A reading at time t is corrected by t times the slope.
-    """
-
-    slope_mm: np.ndarray
-    deviation_mm: float
-
-    def along_mm(self, error: float, freedom: float = math.inf) -> float:
-        """What the slope falls short by in one direction, but for probability ``error``."""
-        if math.isinf(freedom):
-            return -self.deviation_mm * float(scipy.special.ndtri(error))
-        return -self.deviation_mm * float(scipy.special.stdtrit(freedom, error))
-
-    def anywhere_mm(self, error: float, freedom: float = math.inf) -> float:
-        """What the slope is off by in any direction, but for probability ``error``."""
-        if math.isinf(freedom):
-            return self.deviation_mm * math.sqrt(float(scipy.special.chdtri(3.0, error)))
-        ratio = float(scipy.special.fdtri(3.0, freedom, 1.0 - error))
-        return self.deviation_mm * math.sqrt(3.0 * ratio)
-
-
-def correction(plan: Schedule, readings: Readings) -> Correction | None:
-    """The linear drift of all planned readings; None before the last of them."""
-    if len(readings.place) < len(plan.row_at) or not plan.poses:
-        return None
-    shapes = _shapes(plan, readings)
-    slope = shapes.unit[0] @ readings.vector_mm / shapes.length[0]
-    covariance = readings.root_mm @ readings.root_mm.T / shapes.length[0] ** 2
-    return Correction(slope, math.sqrt(float(np.linalg.eigvalsh(covariance)[-1])))
-
-
-def part_of_drift(allowed: float, confirming: int, plan: Schedule) -> float:
-    """Part of an allowed error that goes to the correction; the limits have the rest.
-
-    The part at which both together are narrowest where one point has ``confirming`` readings after
-    its first, at 0.6 of the time: fixed before anything is read.
-    """
-    place = np.array(list(plan.row_at))
-    shapes = shapes_of(tuple(plan.time(place)), tuple(plan.row_at.values()), (1.0,) * len(place))
-    parts = np.arange(0.05, 0.96, 0.05)
-    ndtri = scipy.special.ndtri
-    limits = ndtri((1.0 - parts) * allowed) / math.sqrt(confirming + 1)
-    widths = limits + 0.6 / shapes.length[0] * ndtri(parts * allowed)
-    return float(parts[np.argmax(widths)])

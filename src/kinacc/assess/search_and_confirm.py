@@ -10,15 +10,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.confirming import ConfirmingCampaign
-from kinacc.assess.corrected_drift import Corrected, corrected
-from kinacc.assess.coverage import (
-    CROWD,
-    ISOLATION,
-    at_most,
-    companions,
-    excepted,
-    hardly_missed,
-)
+from kinacc.assess.coverage import excepted, hardly_missed
 from kinacc.assess.future_visit import of_future_visits
 from kinacc.assess.noise_taken import (
     ESTIMATED,
@@ -31,7 +23,6 @@ from kinacc.assess.population import LargestSize, largest_size
 from kinacc.assess.reference_poses import (
     Change,
     alarms,
-    awaited,
     found,
     planned_readings,
     schedule_faults,
@@ -49,16 +40,13 @@ from kinacc.assess.statement import (
 from kinacc.assess.visits import FIRST_SHARE
 from kinacc.errors import Problem, refuse
 
-NOTHING, COMPANY = "nothing", "company"
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
 MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
 MOST_WRONG = 0.1  # of the readings: with more, clipped scores tell hardly anything
-_ALONE = 0.1  # chance of so little company below which the assumption counts as broken
 _MISSED = 0.5  # of the allowed error, where candidates are left that may hold the largest
 _WORDS = {
     "noise": (KNOWN, ESTIMATED),
     "error_of": (MEAN, VISIT),
-    "assume": (NOTHING, COMPANY),
 }
 
 
@@ -77,11 +65,7 @@ class SearchAndConfirm(AdaptiveAssessor):
     normal with known covariance (eq. 9). ``candidates``: the same where all are visited. Otherwise
     half of the allowed error is for the largest errors that all were missed: the upper bound is of
     all but the fewest candidates with which that is improbable enough, and assumes nothing but the
-    random order. ``assume: company`` asks for a bound on all of them that rests on an assumption:
-    at least so many candidates (stated in it) have an error above the largest divided by
-    ``isolation`` that missing them all is improbable. Withheld where that number is more than
-    ``crowd`` of the candidates, and where the largest error measured stands so far above all others
-    that the assumption is broken by what was seen.
+    random order.
 
     Where too few readings are planned at points read before to check a noise that is stated as
     known, it is taken ``noise_margin`` times as large, and always at least as large as readings of
@@ -91,9 +75,8 @@ class SearchAndConfirm(AdaptiveAssessor):
     withheld (:mod:`kinacc.assess.noise_alarms`). ``error_of: visit`` bounds what 95 % of future
     visits to the worst pose keep; ``arm_mm`` is the arm's own standard deviation per axis, all of
     the noise where it is null. ``references`` readings return to reference poses by plan; where
-    these show a drift or step, bounds are withheld, or with ``correct_drift`` a linear drift is
-    taken from all readings and both bounds are wider by what is not known of it
-    (:mod:`kinacc.assess.reference_poses`). ``allowance_mm`` is what no repeat sees; it widens both
+    these show a drift or step, bounds are withheld (:mod:`kinacc.assess.reference_poses`).
+    ``allowance_mm`` is what no repeat sees; it widens both
     bounds. ``wrong_rate`` is the largest share of readings that go wrong and are guarded against
     (:mod:`kinacc.assess.wrong_readings`): it is lost from the confidence. Without it, bounds are
     withheld where a reading stands apart (:mod:`kinacc.assess.suspicious_readings`). The value is
@@ -107,13 +90,9 @@ class SearchAndConfirm(AdaptiveAssessor):
     noise_margin: float = MARGIN
     wrong_rate: float = 0.0
     references: int = 0
-    correct_drift: bool = False
     error_of: str = MEAN
     arm_mm: float | None = None
     allowance_mm: float = 0.0
-    assume: str = NOTHING
-    isolation: float = ISOLATION
-    crowd: float = CROWD
     name: ClassVar[str] = "search_and_confirm"
 
     def __post_init__(self) -> None:
@@ -121,15 +100,11 @@ class SearchAndConfirm(AdaptiveAssessor):
         for each, words in _WORDS.items():
             if getattr(self, each) not in words:
                 problems.append(Problem(each, f"{getattr(self, each)!r}", ", ".join(words)))
-        if not self.isolation > 1.0:
-            problems.append(Problem("isolation", f"{self.isolation}", "above 1"))
-        if not 0.0 < self.crowd < 1.0:
-            problems.append(Problem("crowd", f"{self.crowd}", "above 0 and below 1"))
         if not 1.0 <= self.noise_margin <= 10.0:
             problems.append(Problem("noise_margin", f"{self.noise_margin}", "from 1 to 10"))
         if not 0.0 <= self.allowance_mm < math.inf:
             problems.append(Problem("allowance_mm", f"{self.allowance_mm}", "0 or above, in mm"))
-        problems += schedule_faults(self.measurements, self.references, self.correct_drift)
+        problems += schedule_faults(self.measurements, self.references)
         problems += noise_faults(self)
         if not 0.0 <= self.wrong_rate <= MOST_WRONG:
             problems.append(Problem("wrong_rate", f"{self.wrong_rate}", f"from 0 to {MOST_WRONG}"))
@@ -143,10 +118,6 @@ class SearchAndConfirm(AdaptiveAssessor):
             )
             allowed = "0 where the campaign estimates the noise"
             problems.append(Problem("wrong_rate", what, allowed, fix))
-        if self.wrong_rate and self.correct_drift:
-            what = f"{self.wrong_rate:g}, and a drift is taken from readings that may be wrong"
-            fix = "leave one of them: suspicious readings are named where wrong_rate is 0"
-            problems.append(Problem("wrong_rate", what, "0 where a drift is corrected for", fix))
         refuse(problems, f"{self.name} cannot work with these settings")
 
     def enough_for_all(self, points: int) -> int:
@@ -167,20 +138,8 @@ class SearchAndConfirm(AdaptiveAssessor):
         enough = self.enough_for_all(points) + self.references
         if self.measurements >= enough:
             return None
-        error, seen = _MISSED * (1.0 - self.confidence), self.visit(points)
-        if self.assume == NOTHING:
-            left = excepted(points, seen, error)
-            return Reason("excepted_ahead", {"enough": enough, "excepted": left})
-        most = max(1.0, self.crowd * points)
-        if companions(points, seen, error) <= most:
-            return Reason("assumption_ahead", {"enough": enough})
-        budgets = range(self.measurements, enough + 1)
-        needed = next(
-            each
-            for each in budgets
-            if companions(points, replace(self, measurements=each).visit(points), error) <= most
-        )
-        return Reason("no_bound_on_all", {"needed": needed})
+        left = excepted(points, self.visit(points), _MISSED * (1.0 - self.confidence))
+        return Reason("excepted_ahead", {"enough": enough, "excepted": left})
 
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
@@ -201,10 +160,8 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
             noise_plan(settings, first),
             settings.wrong_rate,
             settings.references,
-            settings.correct_drift,
         )
         self.noise = CampaignNoise(settings, self.noise_plan, self.ledger, self.blocks, first)
-        self._told: tuple[int, Corrected | None] = (-1, None)
         self._alarmed: tuple[int, tuple[Reason, ...]] = (-1, ())  # after so many readings
         self._changed: tuple[int, Change | None] = (-1, None)
         self._speaks_from = max(math.ceil(FIRST_SHARE * first), 1)
@@ -216,8 +173,6 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
             left = Reason("first_visit", {"left": self._speaks_from - seen})
             return Statement(MEASURED, withheld=left), Statement(CANDIDATES, withheld=left)
         against = self.noise.missing() or self._withheld()
-        if not against and self.settings.correct_drift:
-            against = awaited(self.plan, self.ledger.taken)
         posterior = self._posterior()
         value_mm = posterior.quantile_mm(0.5, measured_only=True)
         if against:
@@ -244,16 +199,12 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         return self._changed[1]
 
     def point_limits(self) -> dict[int, tuple[float, float]]:
-        """The limits that hold at every look, with the noise as bounds take it.
-
-        Of corrected readings where there are any.
-        """
+        """The limits that hold at every look, with the noise as bounds take it."""
         if self.noise.missing():
             return dict.fromkeys(self.ledger.visited, (0.0, math.inf))
         error = 1.0 - self.settings.confidence
         upper, single = self._limits_mm(error), self._single_factor()
-        looks = self.without_drift.looks if self.without_drift else self.looks
-        lower = looks.lower_limits_mm(single)
+        lower = self.looks.lower_limits_mm(single)
         if self.settings.wrong_rate:
             lower = np.zeros_like(lower)  # any single point may have been read wrong
         return {row: (float(lower[row]), float(upper[row])) for row in self.ledger.visited}
@@ -268,34 +219,10 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
             return said
         return of_future_visits(said, self.noise.arms_mm(noise))
 
-    @property
-    def without_drift(self) -> Corrected | None:
-        """The campaign without its drift, where that is wanted and all references are read."""
-        if not self.settings.correct_drift or self.noise.missing():
-            return None
-        if self._told[0] != self.ledger.taken:
-            error = 1.0 - self.settings.confidence
-            factor = self._factor_of_references(error)
-            part = self.drift_part * self.noise_plan.mean_share * error
-            told = corrected(self, part, factor, self.noise_plan.freedom)
-            self._told = self.ledger.taken, told
-        return self._told[1]
-
-    def _factor_of_references(self, error: float) -> float:
-        """Factor on the noise of the reference poses, the largest."""
-        return float(self.noise.taken(error).factor.own[: self.plan.poses].max())
-
     def _limits_mm(self, error: float) -> np.ndarray:
         """Upper limits (m,) of single points for an allowed error."""
-        plan, told = self.noise_plan, self.without_drift
-        own, allowed = self.noise.taken(error).factor.own, plan.mean_share * error
-        boundary = self.boundary_of((1.0 - self.drift_part) * allowed, plan.freedom)
-        if told is None:
-            return self.looks.limits_mm(boundary, own)
-        astray_mm = told.drift.along_mm(self.drift_part * allowed, plan.freedom)
-        return told.looks.corrected_limits_mm(
-            boundary, own, self._factor_of_references(error) * astray_mm
-        )
+        plan, own = self.noise_plan, self.noise.taken(error).factor.own
+        return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), own)
 
     def _single_factor(self) -> np.ndarray:
         """Factors (m,) on the noise that lower limits of single points rest on."""
@@ -314,7 +241,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
             first = {"readings": len(suspicious), "number": suspicious[0].number}
             found = (Reason("wrong_readings", first),)
         # A few wrong readings look like too much scatter: what tells more comes first.
-        drift = alarms(self.change(), self.settings.correct_drift)
+        drift = alarms(self.change())
         return (*found, *drift, *self.noise.alarms())
 
     def suspicious(self) -> tuple[Suspicious, ...]:
@@ -326,9 +253,8 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         factor = self.noise.taken(1.0 - self.settings.confidence).factor.value
         # Where all readings scatter more than stated, none is wrong for doing so too.
         factor = max(factor, self.noise.usual_scatter())
-        ledger = self.without_drift.ledger if self.without_drift else self.ledger
         return suspicious_readings(
-            readings_by_row(ledger, self.blocks, self.counts),
+            readings_by_row(self.ledger, self.blocks, self.counts),
             self.extra + self.settings.references,
             self.ledger.candidates.points,
             Noise(factor, self.noise_plan.freedom),
@@ -347,16 +273,11 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         return largest + self.settings.allowance_mm
 
     def _lower_mm(self) -> float:
-        told = self.without_drift
-        own = self.noise.taken(1.0 - self.settings.confidence).factor.own
-        if not self.average.has_spoken:
-            looks = told.looks if told else self.looks
-            found = looks.largest_lower_mm(self._single_factor())
-        elif told is None:
+        if self.average.has_spoken:
+            own = self.noise.taken(1.0 - self.settings.confidence).factor.own
             found = self.average.bound_mm(own)
         else:
-            slope_mm = told.drift.slope_mm.tolist()
-            found = self.average.corrected_bound_mm(own, slope_mm, told.looks.astray_mm)
+            found = self.looks.largest_lower_mm(self._single_factor())
         return max(found - self.settings.allowance_mm, 0.0)
 
     def _about_candidates(self, said: Statement, value_mm: float) -> Statement:
@@ -366,36 +287,10 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         if seen == points:
             return known
         left = excepted(points, seen, _MISSED * allowed)
-        floor_mm = value_mm if not left or self.settings.assume == COMPANY else 0.0
-        upper_mm = self._upper_mm((1.0 - _MISSED) * allowed, floor_mm)
-        if left and self.settings.assume == COMPANY:
-            return self._in_company(replace(known, upper_mm=upper_mm), left + 1)
+        upper_mm = self._upper_mm((1.0 - _MISSED) * allowed, 0.0 if left else value_mm)
         return replace(known, upper_mm=upper_mm, excepted=left)
 
-    def _in_company(self, known: Statement, crowd: int) -> Statement:
-        """On all candidates, if the largest error is one of ``crowd`` or more that are alike."""
-        points, seen = self.ledger.candidates.points, len(self.ledger.visited)
-        factor = self.settings.isolation
-        assumption = Reason("crowd", {"crowd": crowd, "points": points, "isolation": factor})
-        resting = replace(known, upper_mm=factor * known.upper_mm, assumption=assumption)
-        withheld = None
-        if crowd > self.settings.crowd * points:
-            withheld = Reason("all_missed", {"seen": seen, "points": points, "crowd": crowd})
-        elif self._stands_alone(crowd, known.lower_mm):
-            withheld = Reason("stands_alone", {"isolation": factor})
-        return replace(resting, upper_mm=math.nan, withheld=withheld) if withheld else resting
-
-    def _stands_alone(self, crowd: int, lower_mm: float) -> bool:
-        """Whether hardly any measured error can be as large as the assumption says many are."""
-        visited = self.ledger.visited
-        company = int(np.sum(self.looks.upper_mm[visited] >= lower_mm / self.settings.isolation))
-        points = self.ledger.candidates.points
-        return at_most(company, crowd, points, len(visited)) < _ALONE
-
     def _posterior(self) -> LargestSize:
-        # A drift that is not found is a worse guess of the drift than none.
-        change, ledger = self.change() if self.without_drift else None, self.ledger
-        if self.without_drift and change and change.is_found:
-            ledger = self.without_drift.ledger
+        ledger = self.ledger
         unmeasured = ledger.candidates.points - len(ledger.visited)
         return largest_size(ledger.sizes_mm(), ledger.noise_mm[ledger.visited], unmeasured)

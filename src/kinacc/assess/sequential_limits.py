@@ -25,11 +25,8 @@ class Looks:
     ``upper`` says at which counts points are looked at and how wide the upper limits are;
     ``lower_error`` is what the lower limits of one point may miss by, ``shares`` (L,) its parts by
     look. ``factor`` is how much larger than planned the noise is taken where points are chosen.
-    ``astray_mm``: what a drift that was taken from readings is off by in any direction, over the
-    whole sequence. upper_mm: (m,), infinite before the first look.
+    upper_mm: (m,), infinite before the first look.
     """
-
-    astray_mm = 0.0
 
     def __init__(
         self, ledger: Ledger, upper: Boundary, lower_error: float, shares: np.ndarray, factor: float
@@ -43,11 +40,10 @@ class Looks:
         self._size_mm = np.full((points, looks), np.nan)  # of the mean at every look
         self._noise_mm = np.full((points, looks), np.nan)  # its standard deviation where even
         self._even = np.ones((points, looks), dtype=bool)  # all readings so far as planned
-        self._time = np.zeros((points, looks))  # of readings from which a drift was taken
         self._unequal: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
 
-    def update(self, point: int, time: float = 0.0) -> None:
-        """Look at a point if its number of readings asks for it; ``time`` is the mean of these."""
+    def update(self, point: int) -> None:
+        """Look at a point if its number of readings asks for it."""
         count, look = self.ledger.count.item(point), self._done[point]
         if count != self._counts[look]:
             return
@@ -55,8 +51,6 @@ class Looks:
         mean, noise = self.ledger.mean_mm[point], self.ledger.noise(point)
         if not self.ledger.as_planned(point):
             self._even[point, look] = False
-        if time:
-            self._time[point, look] = time
         x, y, z = mean.tolist()
         self._size_mm[point, look] = math.sqrt(x * x + y * y + z * z)
         if isinstance(noise, float):
@@ -86,21 +80,14 @@ class Looks:
         """
         if boundary is self.boundary and (factor == self.factor).all():
             return self.upper_mm
-        return self.corrected_limits_mm(boundary, factor, 0.0)
+        return self._limits_of(boundary, factor)
 
-    def corrected_limits_mm(
-        self, boundary: Boundary, factor: np.ndarray, astray_mm: float
-    ) -> np.ndarray:
-        """As :meth:`limits_mm`, where a drift was taken from readings.
-
-        ``astray_mm``: what it falls short by along one direction, over the whole sequence.
-        """
+    def _limits_of(self, boundary: Boundary, factor: np.ndarray) -> np.ndarray:
         width = np.where(self._even, boundary.z, boundary.alone) * factor[:, None]
-        at_looks = self._size_mm + width * self._noise_mm + astray_mm * self._time
+        at_looks = self._size_mm + width * self._noise_mm
         found = np.where(np.isnan(at_looks), math.inf, at_looks).min(axis=1)
         for point, look in self._unequal:
-            limit = self._limit(point, look, boundary, factor.item(point))
-            found[point] = min(found[point], limit + astray_mm * self._time.item(point, look))
+            found[point] = min(found[point], self._limit(point, look, boundary, factor.item(point)))
         return found
 
     def largest_lower_mm(self, factor: np.ndarray) -> float:
@@ -128,12 +115,11 @@ class Looks:
 
     def _below(self, point: int, look: int, factor: float) -> float:
         error = self.lower_error * self.shares.item(look)
-        astray = self._time.item(point, look) * self.astray_mm
         if (point, look) in self._unequal:
             mean, spread = self._unequal[point, look]
-            return lower_limit_mm(mean, factor**2 * spread, error) - astray
+            return lower_limit_mm(mean, factor**2 * spread, error)
         mean = np.array([self._size_mm.item(point, look), 0.0, 0.0])
-        return lower_limit_mm(mean, factor * self._noise_mm.item(point, look), error) - astray
+        return lower_limit_mm(mean, factor * self._noise_mm.item(point, look), error)
 
     def _limit(self, point: int, look: int, boundary: Boundary, factor: float) -> float:
         width = boundary.z if self._even[point, look] else boundary.alone

@@ -83,11 +83,3 @@ def _visits_mm(size_mm: np.ndarray, arm_mm: float | np.ndarray) -> np.ndarray:
     safe = np.where(arm > 0.0, arm, 1.0)
     found = safe * np.sqrt(chndtrix(SHARE, 3.0, (size_mm / safe) ** 2))
     return np.where(arm > 0.0, found, size_mm)
-
-
-def is_broken(said: Statement, size_mm: np.ndarray) -> bool:
-    """Whether too few candidates of sizes (m,) keep the largest company for a statement."""
-    if said.assumption is None or "crowd" not in said.assumption.numbers:
-        return False
-    known = said.assumption.numbers
-    return int(np.sum(size_mm >= size_mm.max() / known["isolation"])) < known["crowd"]

@@ -1,4 +1,4 @@
-"""What a plan keeps of the arm: enough to say what an error of a joint does at the tool."""
+"""What a plan keeps of the arm: its nominal chain and the measured point."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.assess.error_effects import joint_errors
 from kinacc.kinematics.dh import PARAMETERS, DHModel
-from kinacc.kinematics.robot import Robot
 
 if TYPE_CHECKING:
     from kinacc.deployment.record import Calibration
@@ -32,12 +30,6 @@ class Arm:
         robot = calibration.robot
         tool = calibration.point(point).position_mm
         return cls(robot.dh, robot.joint_map, robot.base.rotation, tool)
-
-    def effects(self, joints: np.ndarray) -> np.ndarray:
-        """Motion (m, 3, 6 k) of the point per mm and mrad of a joint's error, robot's base."""
-        limits = np.zeros(self.dh.joints)
-        robot = Robot("", self.dh, limits, limits, self.joint_map, "")
-        return self.turn @ joint_errors(robot, joints, self.point_mm)
 
     def as_entry(self) -> dict:
         """The arm in plain numbers."""

@@ -74,9 +74,7 @@ def plan_of(
     kept = Arm.of(arm, about.get("point"))
     to_base = _to_base(arm)
     noise = instruments[0].in_base(to_base, points.modelled_mm)
-    effects = kept.effects(points.joints)
-    candidates = Candidates(noise[order], q_rad=points.joints[order], effects=effects[order])
-    begun = assessor.begin(candidates)
+    begun = assessor.begin(Candidates(noise[order], q_rad=points.joints[order]))
     route = order[: begun.first]
     if by_travel:
         unit = travel_unit(arm.robot)

@@ -141,8 +141,6 @@ def forecast(
 
 def why_none(state: State) -> Reason | None:
     """Why no forecast can be made; None where one can."""
-    if not state.plan.assessor.exchangeable:
-        return Reason("not_exchangeable")
     read = len({each.reading.point for each in (*state.told, *state.in_hand)})
     if read < FEWEST_POINTS:
         return Reason("few_read", {"read": read, "needed": FEWEST_POINTS})

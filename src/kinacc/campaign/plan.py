@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kinacc import removed
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE, IN_RESEARCH, RECOMMENDED
 from kinacc.assess.statement import CANDIDATES, TARGETS
@@ -134,8 +135,7 @@ class Plan:
 
     def candidates(self, rows: np.ndarray) -> Candidates:
         """The candidates in the order of ``rows``, with the noise of the first instrument."""
-        joints = self.points.joints[rows]
-        return Candidates(self.covariance_mm2[rows], q_rad=joints, effects=self.arm.effects(joints))
+        return Candidates(self.covariance_mm2[rows], q_rad=self.points.joints[rows])
 
 
 def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:
@@ -259,7 +259,7 @@ def _plan(content: Mapping) -> Plan:
         ),
         np.array(content["order"], dtype=int),
         np.array(content["route"], dtype=int),
-        assessor_of(content["assessor"]["name"], content["assessor"]["settings"]),
+        _kept_assessor(**content["assessor"]),
         tuple(map(_instrument, content["instruments"])),
         Pose(*(numbers(content["to_base"][each]) for each in ("rotation", "position_mm"))),
         Arm.of_entry(content["arm"]),
@@ -267,6 +267,15 @@ def _plan(content: Mapping) -> Plan:
         content["seed"],
         content["about"],
         tuple(map(str, content.get("overruled", ()))),
+    )
+
+
+def _kept_assessor(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
+    used = [each for each, value in removed.SETTINGS.items() if settings.get(each, value) != value]
+    fix = "begin a new campaign; readings can be recorded in it again"
+    refuse(Problem(f"setting {each}", "is gone from kinacc", fix=fix) for each in used)
+    return assessor_of(
+        name, {k: value for k, value in settings.items() if k not in removed.SETTINGS}
     )
 
 

@@ -33,10 +33,9 @@ class Row:
 
     ``width_mm``: 5, 50 and 95 % quantiles of upper minus lower bound, 0 where they contradict each
     other (infinite: no bound).
-    ``stated``: share with an upper bound; ``broken``: share whose upper bound rests on an
-    assumption that is not true of the errors simulated. Of the upper bounds stated, those left out:
-    ``excess_mm``, mean of bound minus truth, and ``holds``, share at or above the truth (NaN where
-    there are none); ``judged`` is how many these are, ``holding`` how many of them hold.
+    ``stated``: share with an upper bound. Of the upper bounds stated: ``excess_mm``, mean of bound
+    minus truth, and ``holds``, share at or above the truth (NaN where there are none); ``judged``
+    is how many these are, ``holding`` how many of them hold.
     ``attainable_mm``, ``proven_mm``: the same excess of the best design that knows all errors, and
     what no bound that can be relied on stays below; NaN or infinite where none can be had.
     ``within``: share whose width is as wanted, ``interval`` its exact 95 % limits.
@@ -52,7 +51,6 @@ class Row:
     excess_mm: float
     holds: float
     stated: float
-    broken: float
     within: float
     interval: tuple[float, float]
     decisions: dict[str, float]
@@ -119,8 +117,7 @@ def repetitions_to_show(share: float, power: float) -> int | None:
 def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
     count = len(group)
     stated = [each for each in group if not math.isnan(each.said.upper_mm)]
-    sound = [each for each in stated if not each.broken]
-    holds = [each.said.upper_mm >= each.truth_mm for each in sound]
+    holds = [each.said.upper_mm >= each.truth_mm for each in stated]
     wanted = math.inf if aim.width_mm is None else aim.width_mm
     within = sum(each.width_mm <= wanted for each in stated)
     said = []
@@ -133,10 +130,9 @@ def _row(errors: str, budget: int, group: list[Outcome], aim: Aim) -> Row:
         count,
         float(np.mean([each.truth_mm for each in group])),
         tuple(quantiles([max(each.width_mm, 0.0) for each in group], (0.05, 0.5, 0.95))),
-        _mean([each.said.upper_mm - each.truth_mm for each in sound]),
+        _mean([each.said.upper_mm - each.truth_mm for each in stated]),
         _mean(holds),
         len(stated) / count,
-        (len(stated) - len(sound)) / count,
         within / count,
         binomial_interval(within, count),
         {kind: said.count(kind) / count for kind in VERDICTS} if said else {},

@@ -7,8 +7,6 @@ from kinacc.assess.statement import Reason
 REASONS = {
     # assumptions
     "drawn_at_random": "the points were drawn at random from the region",
-    "crowd": "at least {crowd} of the {points} candidates have an error above the largest divided "
-    "by {isolation:g}",
     # of statements withheld
     "nothing_measured": "nothing measured yet",
     "first_visit": "{left} more points of the first visit have to be read before anything is said",
@@ -16,9 +14,6 @@ REASONS = {
     "predicted": "every reading ({read}) equals the predicted position to the last digit, which "
     "none of an instrument does: were predictions recorded?",
     "unmeasured": "{left} of {points} candidates are not measured",
-    "all_missed": "{seen} of {points} candidates measured: fewer than {crowd} large errors could "
-    "all have been missed",
-    "stands_alone": "one measured error is more than {isolation:g} times all others",
     "few_points": "{read} points read; {share:.0%} of the region needs {needed}",
     "few_sizes": "{read} points read; a distribution needs at least {needed}, of different size",
     "much_noise": "noise makes up {part:.0%} of the mean square of the readings",
@@ -47,19 +42,11 @@ REASONS = {
     "({freedom:.0f} degrees of freedom), and bounds take it so large: readings may be wrong",
     "noise_bounded": "nothing repeats, so the noise is bounded by the size of all readings: at "
     "most {factor:.2f} times as large as planned with",
-    "references_left": "{left} readings of reference poses are left, and the drift is corrected "
-    "for by all of them",
     # of budgets that are small
-    "no_bound_on_all": "no bound on all candidates would ever be stated: that takes {needed} "
-    "readings at least",
-    "assumption_ahead": "with {enough} readings, the bound on all candidates would need no "
-    "assumption",
     "excepted_ahead": "the bound will be on all candidates but {excepted:.0f}; with {enough:.0f} "
     "readings it would be on all of them",
     # of forecasts that are not made
     "few_read": "{read} points were read, {needed} are needed",
-    "not_exchangeable": "simulated errors know nothing of each other, and this assessor rests on "
-    "how errors of different poses belong together: see kinacc plan-campaign",
     # of decisions on a tolerance
     "between": "the tolerance lies between lower and upper bound: measure more",
     "contradict": "the bounds contradict each other or the value: is the noise stated too small?",
@@ -80,8 +67,7 @@ ADVICE = {
     "wrong_readings": "look at each reading named: where something went wrong, strike it (kinacc "
     "campaign strike FOLDER NUMBER --reason ..) and read on; where nothing is found, begin a new "
     "campaign with --wrong-readings",
-    "drift": "find what moved or warmed up, and begin a new campaign, with --correct-drift where "
-    "the drift stays",
+    "drift": "find what moved or warmed up, and begin a new campaign",
     "step": "find what moved, and begin a new campaign",
 }
 

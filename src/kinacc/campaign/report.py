@@ -161,7 +161,7 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     points = found["campaign_points"]
     shown = largest_read(points)
     lines += ["## Largest errors", "", *_largest(points, shown), ""]
-    lines += beyond_limits(points, shown, without_mm=sizes_without_drift_mm(state))
+    lines += beyond_limits(points, shown)
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
     lines += [f"{head(opened, state)}."]
     return "\n".join(lines) + "\n"
@@ -240,30 +240,19 @@ def read_above(state: State, points: Columns) -> list[str]:
     """What is to be said where points read more than an upper bound that is stated."""
     size = _as_shown(points["error_mm"])
     measured = int(np.sum(~np.isnan(size)))
-    without_mm = sizes_without_drift_mm(state)
-    own = size if without_mm is None else _as_shown(without_mm)
     lines = []
     for said in words.distinct(state):
         upper_mm = round(said.upper_mm, _DECIMALS)
         above = np.flatnonzero(size > upper_mm)
         if not above.size:
             continue
-        # Where a drift is corrected for, the bound is on readings without it.
-        still = above[own[above] > upper_mm]
-        top = still[np.argmax(own[still])] if still.size else above[np.argmax(size[above])]
+        top = above[np.argmax(size[above])]
         noise_mm, count = float(points["noise_mm"][top]), int(points["readings"][top])
-        drift = "" if without_mm is None else f" ({own[top]:.3f} mm without the drift)"
-        most = "the most" if size[top] == size[above].max() else "one of them"
         if said.target == REGION:
             why = f"the bound leaves out {1.0 - said.share:.1%} of the region"
-        elif not still.size:
+        elif size[top] - said.upper_mm > _UNLIKELY * noise_mm:
             why = (
-                f"that holds the drift: without it the size is {own[top]:.3f} mm, and the bound is "
-                "on readings without it"
-            )
-        elif own[top] - said.upper_mm > _UNLIKELY * noise_mm:
-            why = (
-                f"its noise, {noise_mm:.3f} mm per axis, does not explain that{drift}: the noise "
+                f"its noise, {noise_mm:.3f} mm per axis, does not explain that: the noise "
                 "is stated too small, or this is one of the few campaigns the confidence allows to "
                 "be wrong"
             )
@@ -271,12 +260,12 @@ def read_above(state: State, points: Columns) -> list[str]:
             readings = "1 reading" if count == 1 else f"{count} readings"
             why = (
                 "the bound is on the error that stays when a pose is measured again, and this is "
-                f"the mean of {readings} with noise of {noise_mm:.3f} mm per axis{drift}"
+                f"the mean of {readings} with noise of {noise_mm:.3f} mm per axis"
             )
         lines.append(
             f"At most {said.upper_mm:.3f} mm for {words.target(said)}: {above.size} of the "
-            f"{measured} measured points read more than that, point {points['point'][top]} {most}, "
-            f"{size[top]:.3f} mm; {why}."
+            f"{measured} measured points read more than that, point {points['point'][top]} the "
+            f"most, {size[top]:.3f} mm; {why}."
         )
     return lines
 
@@ -301,45 +290,20 @@ def _largest(points: Columns, shown: np.ndarray) -> list[str]:
     return lines
 
 
-def sizes_without_drift_mm(state: State) -> np.ndarray | None:
-    """Sizes of mean readings in the order of ``campaign_points``, NaN where unread.
-
-    Without the drift that bounds and limits are corrected for; None where there is none.
-    """
-    told = getattr(state.campaign, "without_drift", None)
-    if told is None:
-        return None
-    sizes = np.full(len(state.rows) + len(state.left_out), math.nan)
-    sizes[told.ledger.visited] = told.ledger.sizes_mm()
-    return sizes
-
-
 def beyond_limits(
     points: Columns,
     shown: np.ndarray,
     written: Callable[[str], str] = in_markdown,
-    without_mm: np.ndarray | None = None,
 ) -> list[str]:
-    """What is to be said where rows that are shown read more than their limit, or limits cross.
-
-    ``without_mm``: the sizes without the drift that limits are corrected for, None where none is.
-    """
+    """What is to be said where rows that are shown read more than their limit, or limits cross."""
     size, lower, upper = (_as_shown(points[f"{name}_mm"])[shown] for name in _SIZES)
-    own = size if without_mm is None else _as_shown(without_mm)[shown]
     once = np.asarray(points["readings"], dtype=float)[shown] == 1.0
 
     def named(rows: np.ndarray) -> str:
         return ", ".join(written(points["point"][row]) for row in shown[rows])
 
     lines = []
-    if (drifted := (size > upper) & (own <= upper)).any():
-        lines += [
-            f"Read above their own limit for the drift: {named(drifted)}. A limit is on readings "
-            "without the drift, which is taken from all of them; the error shown is the mean of "
-            "what was read, with the drift.",
-            "",
-        ]
-    if (above := (size > upper) & (own > upper)).any():
+    if (above := size > upper).any():
         text = (
             f"Read above their own limit: {named(above)}. A limit is on the error that stays when "
             "a pose is measured again, and the narrowest of those at several looks; the "
@@ -414,9 +378,4 @@ def _of_the_frame(told: Mapping[str, object]) -> str:
     """What the bounds rest on where the frame may move, by an assessor's settings."""
     if not told.get("references", 0):
         return "nothing drifted or moved: no reference poses are read again that would show it"
-    if told.get("correct_drift", False):
-        return (
-            "the frame moved evenly with the readings, if at all: that drift is taken from all "
-            "readings, and the bounds are wider by what is not known of it"
-        )
     return "nothing drifted or moved so little that the reference poses do not show it"

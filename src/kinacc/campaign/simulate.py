@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of
-from kinacc.assess.simulate import carry_on, is_broken, noisy, truth_mm
+from kinacc.assess.simulate import carry_on, noisy, truth_mm
 from kinacc.assess.statement import Statement
 from kinacc.errors import Problem, refuse
 from kinacc.study.fields import ErrorField
@@ -20,8 +20,8 @@ from kinacc.study.fields import ErrorField
 class Outcome:
     """One simulated campaign: what it said of one target, and the truth it is graded against.
 
-    ``broken``: what the statement rests on is not true of these errors. ``limits``: how near to the
-    truth its bounds could come on average, with the errors known beforehand.
+    ``limits``: how near to the truth its bounds could come on average, with the errors known
+    beforehand.
     """
 
     field: str
@@ -30,7 +30,6 @@ class Outcome:
     readings: int
     said: Statement
     truth_mm: float
-    broken: bool = False
     limits: WidthLimits = NONE
 
     @property
@@ -100,7 +99,6 @@ def outcomes(
                         readings,
                         said,
                         truth_mm(said, sizes, visited, arm_mm),
-                        broken=is_broken(said, sizes),
                         limits=limits,
                     )
                 )

@@ -157,16 +157,6 @@ def of_distance(begun: Plan) -> list[Problem]:
     return problems
 
 
-def of_budget(begun: Plan) -> list[Problem]:
-    """A budget with which no bound on all candidates is ever stated."""
-    short = begun.assessor.shortfall(*begun.points.joints.shape)
-    if short is None or short.code != "no_bound_on_all":
-        return []
-    what = f"{begun.assessor.measurements} readings for {len(begun.points)} candidates"
-    fix = "give a larger --budget or fewer candidates (--drawn); --sure begins it all the same"
-    return [Problem("--budget", f"{what}: {words.reason(short)}", fix=fix)]
-
-
 def unusual_mm(sizes_mm: Sequence[float], noise_mm: float) -> float:
     """Size beyond which a reading is unusual after readings of ``sizes_mm``; inf where few are."""
     if len(sizes_mm) < _USUAL_READINGS:

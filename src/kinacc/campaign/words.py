@@ -67,8 +67,10 @@ def arrangements(plan: Plan) -> list[str]:
             f"with {of.confidence - of.wrong_rate:.1%} confidence"
         )
     if of.references:
-        what = "taken from all readings" if of.correct_drift else "said, and no bound is stated"
-        lines.append(f"{of.references} readings return to reference poses: a drift found is {what}")
+        lines.append(
+            f"{of.references} readings return to reference poses: a drift found is said, and no "
+            "bound is stated"
+        )
         lines.append(
             "a drift of one standard deviation over the campaign is found in under 10 % of "
             "campaigns, and bounds then hold less often (docs/drift-and-steps.md)"
@@ -132,15 +134,12 @@ def _no_more(count: int) -> str:
 def conditions(said: Statement, state: State) -> str:
     """On what an upper bound hangs."""
     of: Any = state.plan.assessor
-    moved = "nothing moved (base, tool, instrument)"
-    if getattr(of, "correct_drift", False):
-        moved = "the frame moved evenly with the readings, if at all"
     needed = [reason(said.assumption) or "", _noise_assumed(said, state)]
     if getattr(of, "wrong_rate", 0.0):
         needed.append(f"at most {of.wrong_rate:.1%} of the readings are wrong")
     if getattr(of, "allowance_mm", 0.0):
         needed.append(f"what no repeat sees is at most {of.allowance_mm:g} mm")
-    needed.append(moved)
+    needed.append("nothing moved (base, tool, instrument)")
     named = [each for each in needed if each]
     return f"{', '.join(named[:-1])} and {named[-1]}"
 
@@ -277,9 +276,7 @@ def of_frame(state: State) -> list[str]:
     unseen = f"a drift of {change.unseen_mm:.3f} mm would be found in half of the cases"
     if not change.is_found:
         return [f"the reference poses show no drift and no step; {unseen}"]
-    corrected = change.reason not in state.campaign.alarms()
-    taken = ", which is taken from all readings" if corrected else ""
-    return [f"{reason(change.reason)}{taken}"]
+    return [str(reason(change.reason))]
 
 
 def not_counted(state: State) -> list[str]:

@@ -59,11 +59,9 @@ _WORKSHOP = {
     "noise": ("noise", "known"),
     "wrong_readings": ("wrong_rate", None),
     "references": ("references", None),
-    "correct_drift": ("correct_drift", False),
     "error": ("error_of", "mean"),
     "arm_mm": ("arm_mm", None),
     "allowance_mm": ("allowance_mm", None),
-    "assume": ("assume", "nothing"),
 }
 
 
@@ -167,7 +165,7 @@ def assessor(
 
 def _as_options(text: str) -> str:
     """A sentence with the options that settings come from."""
-    for setting in ("wrong_rate", "correct_drift", "references", "error_of"):
+    for setting in ("wrong_rate", "references", "error_of"):
         text = re.sub(rf"\b{setting}\b", _OPTIONS[setting], text)
     return text
 

@@ -226,7 +226,6 @@ def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
 
     # A screen holds no more: files have all columns.
     widths = ("median", "q95") if aim.tolerance_mm is None else ("median",)
-    any_broken = any(row.broken for row in found)
     fields = [
         Field("errors", np.array([row.errors for row in found], dtype=object), "", "simulated"),
         Field("budget", np.array([row.budget for row in found]), "1", "readings allowed"),
@@ -243,10 +242,8 @@ def as_sheet(asked: Simulation, found: list[Row]) -> Sheet:
         Field("proven_mm", finite(column(lambda row: row.proven_mm)), "mm",
               "excess below which no bound stays that can be relied on"),
         Field("stated", column(lambda row: row.stated), "1", "share with an upper bound"),
-        Field("assumption_broken", column(lambda row: row.broken), "1",
-              "share whose bound rests on an assumption these errors break", any_broken),
         Field("holds", column(lambda row: row.holds), "1",
-              "share of the other upper bounds that hold", False),
+              "share of the upper bounds that hold", False),
         Field("bounds_held", np.array([_counted(row) for row in found], dtype=object), "",
               "the same, counted"),
         Field("holds_low", column(lambda row: row.holds_interval[0]), "1", "95 % limits", False),

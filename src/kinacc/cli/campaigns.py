@@ -89,7 +89,7 @@ def start(given: Mapping, out: Output) -> None:
         calibration, points, instruments, given["point"], limits.implausible_mm
     )
     left_mm = calibration.residual.position_mm if calibration.residual else math.nan
-    problems = [*slips.of_noise(instruments, left_mm), *slips.of_budget(begun)]
+    problems = slips.of_noise(instruments, left_mm)
     problems += [*slips.of_distance(begun), *known_noise.doubts(tested)]
     problems += slips.of_repeats(instruments, Path(given["calibration"]))
     problems += [] if unsure is None else unsure.asked()

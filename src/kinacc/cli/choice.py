@@ -118,7 +118,6 @@ campaign_options = together(
         help="Readings at reference poses, to find drifts and steps.  [20 where the budget is at "
         "least 1.4 times the candidates, else 0]",
     ),
-    option("--correct-drift", is_flag=True, help="Take a linear drift from all readings."),
     option(
         "--error",
         type=click.Choice(["mean", "visit"]),
@@ -128,12 +127,6 @@ campaign_options = together(
     ),
     option("--arm-mm", type=float, help="The arm's own repeatability, for --error visit. [noise]"),
     option("--allowance-mm", type=float, help="What no repeat sees, added to the bounds. [0]"),
-    option(
-        "--assume",
-        type=click.Choice(["nothing", "company"]),
-        default="nothing",
-        help="What a bound on all candidates may rest on where fewer are measured.",
-    ),
     option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]"),
     option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
     option("--confidence", type=float, help=f"How surely each bound is to hold. [{CONFIDENCE}]"),

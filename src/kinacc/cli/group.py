@@ -15,9 +15,8 @@ from typing import NoReturn
 
 import click
 
-from kinacc import __version__
+from kinacc import __version__, removed
 from kinacc.cli.exit_codes import AGAINST, NOBODY_READS, STOPPED, TERMINATED, UNUSABLE
-from kinacc.cli.removed import REMOVED_COMMANDS
 from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
 from kinacc.workflow.start import ONE_THREAD
 
@@ -70,17 +69,6 @@ _MEANT = {
     "undo": "strike",
     "validate": "check-data",
 }
-# Spellings of options that are gone with the next version, by command.
-_FORMERLY = {
-    "check-data": {"--figure": "--picture"},
-    "export": {"--to": "--out"},
-    "campaign": {"--to": "--out", "--output": "--out"},
-    "predict": {"--output": "--out"},
-    "compensate": {"--output": "--out"},
-    "compare": {"--output": "--out"},
-    "plan-poses": {"--output": "--out"},
-    "plan-campaign": {"--output": "--out"},
-}
 
 
 class InOrder(click.Group):
@@ -97,8 +85,8 @@ class InOrder(click.Group):
         word = args[0]
         if word in self.commands or word.startswith("-"):
             return super().resolve_command(context, args)
-        if word in REMOVED_COMMANDS:
-            raise click.UsageError(f"{word} is gone: {REMOVED_COMMANDS[word]}", context)
+        if word in removed.COMMANDS:
+            raise click.UsageError(f"{word} is gone: {removed.COMMANDS[word]}", context)
         names = self.list_commands(context)
         meant = _MEANT.get(word.lower(), "")
         if meant.partition(" ")[0] not in names:
@@ -156,8 +144,9 @@ class Commands(Lazy):
         context.meta[_ASKS_HELP] = not {*own}.isdisjoint(_HELP)
         for i, word in enumerate(own):
             name, mark, value = word.partition("=")
-            new = _FORMERLY.get(own[0], {}).get(name)
-            if new:
+            if gone := removed.OPTIONS.get(own[0], {}).get(name):
+                raise click.UsageError(f"{name} is gone: {gone}", context)
+            if new := removed.RENAMED.get(own[0], {}).get(name):
                 args = [*args[:i], f"{new}{mark}{value}", *args[i + 1 :]]
                 click.echo(f"{name} is called {new} now, and goes with the next version", err=True)
         return super().parse_args(context, args)

@@ -27,7 +27,6 @@ _NUMERICAL_ZERO = 1e-9  # of the largest in its column
 _DECIMALS = {"mm": 3}  # at least, where there are that many: what instruments resolve
 _BEYOND = 1e15  # nobody counts so many digits
 _MIXED = 1e3  # from the smallest to the largest number of a column that has several units
-_IN_ASCII = str.maketrans("─│┌┐└┘├┤┬┴┼", "-|+++++++++")
 _NONE = "-"
 _MANY = 200
 
@@ -92,27 +91,9 @@ class Screen:
         """Columns of characters."""
         return self.console.width
 
-    @property
-    def has_colours(self) -> bool:
-        """Whether shades can be told apart: 256 colours or more, and none forbidden them."""
-        return self.console.color_system in ("256", "truecolor") and not self.console.no_color
-
-    @property
-    def has_unicode(self) -> bool:
-        """Whether block characters can be printed."""
-        return not self.console.options.ascii_only
-
     def words(self, text: str, style: str = "") -> None:
         """A paragraph, wrapped."""
         self.parts.append(Text(printable(text), style))
-
-    def picture(self, text: Text) -> None:
-        """Lines that are left as they are."""
-        if not self.has_unicode:
-            text.plain = text.plain.translate(_IN_ASCII)
-        text.no_wrap = True
-        text.overflow = "crop"
-        self.parts.append(text)
 
     def text(self) -> str:
         """All of it, no line longer than the terminal is wide, in the characters it can print."""

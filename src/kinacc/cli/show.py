@@ -52,7 +52,6 @@ class _Rows(click.ParamType):
     help=f"Rows: of both ends on the screen [{_ROWS}], the first in CSV, JSON and --out [all].",
 )
 @click.option("--describe", is_flag=True, help="Say what the columns mean, and what they hold.")
-@click.option("--plot", is_flag=True, help="Draw it in the terminal, where there is a picture.")
 @click.option("--csv", "as_csv", is_flag=True, help="Print rows with all digits as CSV.")
 @answers("Print rows as JSON.", table=True)
 def show(
@@ -62,16 +61,13 @@ def show(
     conditions: tuple[str, ...],
     rows: int | None,
     describe: bool,
-    plot: bool,
     as_csv: bool,
     out: Output,
 ) -> None:
     """Show a TABLE of results, or what is in the folder PATH, of results or of a campaign.
 
     A table is a Parquet file, named with or without its ending, alone or after its folder. What is
-    the same in every row stands above the table; what does not fit the screen is named. There are
-    pictures of accuracy_map, pose_errors, study_summary, vec_orders and campaign_bounds. They show
-    the rows of --where and, in a map, the first error among --columns.
+    the same in every row stands above the table; what does not fit the screen is named.
 
     \b
     Example:
@@ -79,27 +75,21 @@ def show(
       kinacc show results/ur10_b
       kinacc show results/ur10_b residuals --where fold=-
       kinacc show results/ur10_b/measurements --columns "pose,q*" --csv > joints.csv
-      kinacc show results/ur10_b pose_errors --plot
     """
     from kinacc.cli import show_files, show_table
 
-    refuse(at_odds({"--csv": as_csv, "--json": out.as_json, "--plot": plot}))
-    refuse(at_odds({"--plot": plot, "--describe": describe, "--out": out.table is not None}))
+    refuse(at_odds({"--csv": as_csv, "--json": out.as_json}))
+    refuse(at_odds({"--describe": describe, "--out": out.table is not None}))
     answer = Answer(out, as_csv)
     place = show_files.found(path, name)
     if place.is_dir():
         given = {"--columns": columns, "--where": conditions, "--describe": describe}
-        refuse(_of_tables(place, {**given, "--plot": plot}))
+        refuse(_of_tables(place, given))
         listed = show_files.listing(place)
         answer.give(listed.sheet, rows, below=listed.below)
         return
     kept = show_table.where(show_table.read(place), conditions)
     chosen = show_table.choose(kept, columns)
-    if plot:
-        from kinacc.cli.show_pictures import drawn
-
-        answer.show(drawn(kept, columns))
-        return
     above, below = show_table.words(chosen, describe)
     if describe:
         answer.give(show_table.described(chosen), rows, above, below)

@@ -12,7 +12,6 @@ from kinacc.artifacts.columns import texts
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.campaign.journal import PLAN
 from kinacc.cli.sheet import Field, Sheet
-from kinacc.cli.show_pictures import PICTURES
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, first_few
 
@@ -113,8 +112,6 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
         ],
     )
     below = [f"{_typed('show', folder, names[0])} shows one; --describe says what its columns mean"]
-    if drawn := [name for name in names if name in PICTURES]:
-        below.append(f"--plot draws {', '.join(drawn)}")
     pictures = sorted({each.stem for each in (folder / "figures").glob("*.*")})
     if pictures:
         below.insert(0, f"figures/: {', '.join(pictures)}")

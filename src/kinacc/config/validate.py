@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from kinacc import removed
 from kinacc.config.names import LONGEST
 from kinacc.config.reading import KeyPath
-from kinacc.config.removed import REMOVED_KEYS
 from kinacc.config.schema import DATASET_NAME, Key, Section, defaults, settings
 from kinacc.config.values import INVALID, Place, check, nearest, shown, unknown_key
 from kinacc.errors import Problem, first_few
@@ -45,8 +45,8 @@ def check_section(
         return {}, [Problem(place(path), what, ", ".join(section.names))]
     for name, value in content.items():
         here, entry = (*path, name), section.entry(name)
-        if entry is None and name in REMOVED_KEYS:
-            problems.append(Problem(place(here), f"{name} is gone", fix=REMOVED_KEYS[name]))
+        if entry is None and name in removed.KEYS:
+            problems.append(Problem(place(here), f"{name} is gone", fix=removed.KEYS[name]))
         elif entry is None:
             what, fix = unknown_key(name, section, settings())
             problems.append(Problem(place(here), what, ", ".join(section.names), fix))

@@ -209,11 +209,14 @@ def _campaign(
 
 def _claims(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome:
     table = tables["claims"]
-    verdict = dict(zip(map(str, table["claim"]), map(str, table["verdict"]), strict=True))
+    # Sentences that chose a reading of the paper are no evidence.
+    rows = zip(table["claim"], table["verdict"], table["used_to_choose"], strict=True)
+    verdict = {str(claim): str(said) for claim, said, chose in rows if not chose}
+    known = [str(each) for each in table["claim"]]
     excepted = gate["except"]
-    unknown = [each for each in excepted if each not in verdict]
+    unknown = [each for each in excepted if each not in known]
     if unknown:
-        close = [near for each in unknown if (near := nearest(each, tuple(verdict)))]
+        close = [near for each in unknown if (near := nearest(each, tuple(known)))]
         fix = f"did you mean {first_few(close)}?" if close else "kinacc show RESULTS claims has all"
         says = f"except names {first_few(unknown)}, which no claim is called"
         return _outcome(gate, dataset, FAILED, says, fix)
@@ -228,7 +231,7 @@ def _claims(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome:
         says += f"; those that differ are excepted: {first_few(differ)}"
     if without:
         says += f"; not comparable: {first_few(without)}"
-    if agree := [each for each in excepted if verdict[each] == "agrees"]:
+    if agree := [each for each in excepted if verdict.get(each) == "agrees"]:
         says += f"; excepted, though they agree: {first_few(agree)}"
     figures = {"claims": len(verdict), "agree": count, "differ": len(differ)}
     figures |= {"differ_not_excepted": len(left)}

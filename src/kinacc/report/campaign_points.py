@@ -10,7 +10,7 @@ from bokeh.models import CDSView, ColumnDataSource, HoverTool, IndexFilter
 
 from kinacc.artifacts.columns import Columns
 from kinacc.campaign import instrument
-from kinacc.campaign.report import beyond_limits, largest_read, sizes_without_drift_mm
+from kinacc.campaign.report import beyond_limits, largest_read
 from kinacc.campaign.state import State
 from kinacc.report import pictures
 from kinacc.report.campaign_course import mm, of_tolerance, tolerance
@@ -51,8 +51,7 @@ def points(state: State, tables: Mapping[str, Columns], key: str) -> tuple[Block
 
 
 def _beyond(state: State, table: Columns, largest: np.ndarray) -> list[str]:
-    without_mm = sizes_without_drift_mm(state)
-    return [each for each in beyond_limits(table, largest, str, without_mm) if each]
+    return [each for each in beyond_limits(table, largest, str) if each]
 
 
 def _point_data(

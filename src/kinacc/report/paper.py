@@ -47,6 +47,7 @@ def tables_section(tables: Mapping[str, Columns], robot: Robot) -> Section:
 def claims_section(tables: Mapping[str, Columns], robot: Robot) -> Section:
     """The section of a page on every row of ``claims``, those that differ first."""
     claims = tables["claims"]
+    chose = np.flatnonzero(claims["used_to_choose"])
     return Section(
         "claims",
         "Claims of the paper",
@@ -56,7 +57,10 @@ def claims_section(tables: Mapping[str, Columns], robot: Robot) -> Section:
         "that differs here may hold on another arm or with another choice the paper leaves open: "
         "docs/claims.md tells which do.",
         "Read those that differ with their tests before you rely on them for another robot.",
-        tuple(_of_verdict(claims, each) for each in (_DIFFERS, _NOT_COMPARABLE, _AGREES)),
+        (
+            *(_of_verdict(claims, each) for each in (_DIFFERS, _NOT_COMPARABLE, _AGREES)),
+            _table(claims, "Sentences that chose a reading of the paper: no evidence", chose),
+        ),
     )
 
 
@@ -125,27 +129,34 @@ def _parameters(known: Mapping[str, dict]) -> Table:
 
 def _of_verdict(claims: Columns, verdict: str) -> Block:
     """The claims of one verdict; those that differ are open to be read, the others folded."""
-    mine = [i for i, each in enumerate(claims["verdict"]) if each == verdict]
+    counted = ~np.asarray(claims["used_to_choose"], dtype=bool)
+    mine = np.flatnonzero((claims["verdict"] == verdict) & counted)
     caption = {
         _DIFFERS: "Differs here",
         _AGREES: "Agrees",
         _NOT_COMPARABLE: "Not comparable: nothing to judge it by here",
     }[verdict]
-    if not mine:
+    return _table(claims, caption, mine, folded=verdict != _DIFFERS)
+
+
+def _table(claims: Columns, caption: str, mine: np.ndarray, folded: bool = True) -> Block:
+    if not mine.size:
         return Text(f"{caption}: none.")
     shared = np.isfinite(np.asarray(claims["share"], dtype=float))
     heads = ("the paper says", "paper", "here", "tolerance", "how it is tested", "claim")
     heads += ("holds on further arms",) if shared.any() else ()
+    heads += ("verdict",) if claims["used_to_choose"][mine].any() else ()
     rows = []
     for i in mine:
         numbers = (_short(float(claims[name][i])) for name in ("paper", "reproduced", "tolerance"))
         share = float(claims["share"][i])
         held = (f"{share:.0%}" if np.isfinite(share) else "-",) if shared.any() else ()
+        held += (str(claims["verdict"][i]),) if claims["used_to_choose"][i] else ()
         rows.append(
             (str(claims["statement"][i]), *numbers, str(claims["statistic"][i]),
              str(claims["claim"][i]), *held)
         )  # fmt: skip
-    return Table(caption, heads, tuple(rows), frozenset({1, 2, 3}), folded=verdict != _DIFFERS)
+    return Table(caption, heads, tuple(rows), frozenset({1, 2, 3}), folded=folded)
 
 
 def _short(value: float) -> str:

@@ -54,13 +54,15 @@ def are_measured(points: Mapping, measurements: Mapping) -> bool:
 
 
 def claims_counted(claims: Mapping) -> str:
-    """How many of the paper's claims have which verdict."""
-    verdicts = list(claims["verdict"])
+    """How many of the paper's claims have which verdict, without those that chose a reading."""
+    chose = np.asarray(claims["used_to_choose"], dtype=bool)
+    verdicts = list(claims["verdict"][~chose])
     told = ", ".join(f"{verdicts.count(name)} {words}" for name, words in _VERDICTS.items())
-    return f"of {len(verdicts)} claims {told}"
+    told = f"of {len(verdicts)} claims {told}"
+    return f"{told}; {chose.sum()} that chose a reading are not counted" if chose.any() else told
 
 
 def claims_that_differ(claims: Mapping) -> list[str]:
-    """Ids of the claims that the results contradict."""
-    pairs = zip(claims["claim"], claims["verdict"], strict=True)
-    return [str(claim) for claim, verdict in pairs if verdict == VERDICTS[1]]
+    """Ids of the claims that the results contradict, without those that chose a reading."""
+    counted = (claims["verdict"] == VERDICTS[1]) & ~np.asarray(claims["used_to_choose"], dtype=bool)
+    return [str(claim) for claim in claims["claim"][counted]]

@@ -26,7 +26,8 @@ class Claim:
     ``statistic`` says in words what is computed and when the statement holds; ``evidence`` names
     the artefacts it is computed from and nothing else. A claim with a ``paper`` value agrees when
     the value is met within ``tolerance`` (same unit); a sentence agrees when its finding holds.
-    ``arm_specific`` claims compare with the paper's own arm and say nothing on another robot.
+    ``arm_specific`` claims compare with the paper's own arm and say nothing on another robot. A
+    sentence that was ``used_to_choose`` a reading of the paper is no evidence for it.
     """
 
     id: str
@@ -37,6 +38,7 @@ class Claim:
     paper: float = math.nan
     tolerance: float = math.nan
     arm_specific: bool = False
+    used_to_choose: bool = False
 
 
 def verdict(claim: Claim, finding: Finding) -> str:

@@ -51,6 +51,7 @@ def _row(claim: Claim, tables: Tables, paper_arm: bool, shares: Mapping[str, flo
         "tolerance": claim.tolerance,
         "verdict": judged,
         "share": shares.get(claim.id, math.nan),
+        "used_to_choose": claim.used_to_choose,
     }
 
 

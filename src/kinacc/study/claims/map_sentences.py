@@ -33,7 +33,10 @@ class _Slice:
 
 
 def map_claims() -> list[Claim]:
-    """Claims about where the largest errors lie and where the maps break."""
+    """Claims about where the largest errors lie and where the maps break.
+
+    They chose the reading of Fig. 3 (research, rule ``map_choice``).
+    """
     evidence = ("accuracy_map",)
     return [
         Claim(
@@ -43,6 +46,7 @@ def map_claims() -> list[Claim]:
             "over slices, position or orientation; holds below 0.5",
             evidence,
             _nonlinear,
+            used_to_choose=True,
         ),
         Claim(
             "map_largest_changes_location",
@@ -51,6 +55,7 @@ def map_claims() -> list[Claim]:
             "the slice, position or orientation; holds above 0",
             evidence,
             _changes_location,
+            used_to_choose=True,
         ),
         Claim(
             "map_position_outer_reaches",
@@ -59,6 +64,7 @@ def map_claims() -> list[Claim]:
             "holds above 2/3",
             evidence,
             _outer_reaches,
+            used_to_choose=True,
         ),
         Claim(
             "map_position_less_predictable_inside",
@@ -67,6 +73,7 @@ def map_claims() -> list[Claim]:
             "distance between those at 0 and 60 deg; holds above 1",
             evidence,
             _less_predictable_inside,
+            used_to_choose=True,
         ),
         Claim(
             "map_orientation_less_predictable",
@@ -75,6 +82,7 @@ def map_claims() -> list[Claim]:
             "position; holds above 1",
             evidence,
             _orientation_less_predictable,
+            used_to_choose=True,
         ),
         Claim(
             "map_orientation_near_discontinuities",
@@ -84,6 +92,7 @@ def map_claims() -> list[Claim]:
             "holds below 1",
             evidence,
             _near_discontinuities,
+            used_to_choose=True,
         ),
         Claim(
             "map_discontinuities_at_wrist_changes",
@@ -93,6 +102,7 @@ def map_claims() -> list[Claim]:
             "of combinations reached, changes; holds above 0.5",
             evidence,
             _at_wrist_changes,
+            used_to_choose=True,
         ),
     ]
 
