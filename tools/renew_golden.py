@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Make the golden results anew: python tools/renew_golden.py [CASE ..]
 
-CASE is a data set, faults, foreign, exports or campaign; all without one. Prints what differs from before.
+CASE is a data set, faults, foreign, exports or campaign; all without one. Prints what differs from
+before.
 """
 
 import json
