@@ -184,7 +184,7 @@ def html(
 
 def records(table: Columns, rows: Sequence[int] | np.ndarray | None = None) -> list[dict]:
     """Rows of a table, all of them or those numbered, each as a dict by column."""
-    order = range(len(next(iter(table.values())))) if rows is None else rows
+    order = range(max(map(len, table.values()), default=0)) if rows is None else rows
     return [{name: column[row] for name, column in table.items()} for row in order]
 
 
