@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+
 import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, GroupFilter
 from bokeh.plotting import figure as BokehFigure
