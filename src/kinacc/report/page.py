@@ -196,7 +196,7 @@ def cell(value: object, form: str = "") -> str:
         or (isinstance(value, (float, np.floating)) and np.isnan(value))
     ):
         return "–"
-    return str(value) if isinstance(value, str) else format(value, form)
+    return value if isinstance(value, str) else format(value, form)
 
 
 def _laid_out(section: Section | Part) -> object:
