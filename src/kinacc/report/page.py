@@ -128,15 +128,17 @@ class FirstScreen:
     """What a reader sees without moving: the answer in words, a table, and what follows.
 
     ``badge`` is a remark at the right of the title and whether it is a warning; ``answers`` are
-    sentences, the first the most important; ``notes`` are lines under a name in capitals.
+    sentences, the first the most important, unless the template of ``answer`` has them; ``notes``
+    are lines under a name in capitals.
     """
 
     title: str
     subtitle: str
     badge: tuple[str, bool]
-    answers: tuple[str, ...]
-    tables: tuple[Table, ...]
-    notes: tuple[tuple[str, tuple[Text, ...]], ...]
+    answers: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    notes: tuple[tuple[str, tuple[Text, ...]], ...] = ()
+    answer: Part | None = None
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,7 @@ def html(
     environment = _environment()
     return environment.get_template("page.html").render(
         page=page,
+        answer=page.first.answer and _made(page.first.answer),
         sections=[_laid_out(each) for each in page.sections],
         marks={k: str(v) for k, v in {**_MADE_BY, **page.marks, **(marks or {})}.items()},
         read=read or {},
@@ -203,11 +206,16 @@ def _laid_out(section: Section | Part) -> object:
     """What the page's template reads of a section: words by name, and its body."""
     if isinstance(section, Section):
         return section
-    pictures = {each.key: each for each in section.pictures}
-    template = _environment().get_template(f"{section.key}.html")
-    body = template.make_module({**section.values, "pictures": pictures})
+    body = _made(section)
     words = {name: getattr(body, name) for name in _WORDS}
     return {**words, "key": section.key, "body": body}
+
+
+def _made(part: Part):
+    """The template of a part with its values."""
+    pictures = {each.key: each for each in part.pictures}
+    template = _environment().get_template(f"{part.key}.html")
+    return template.make_module({**part.values, "pictures": pictures, "robot_itself": ROBOT_ITSELF})
 
 
 def printed(words: str) -> str:
