@@ -199,3 +199,8 @@ def test_a_clone_in_a_folder_with_odd_letters_runs_and_braces_in_a_file_are_refu
     assert code == 2
     assert "{data}/poses.csv" in text
     assert "Traceback" not in text
+    braces = clone.rename(tmp_path / "a {dataset}")
+    code, text = ended(braces, ("snakemake", "-n"))
+    assert code == 1, text
+    assert "braces in its name" in text
+    assert "Traceback" not in text
