@@ -11,17 +11,19 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.artifacts.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
 from kinacc.calibration.constraints import frame_terms
 from kinacc.calibration.frames import Frames, stacked
-from kinacc.calibration.observations import Observations
+from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.summary import LARGE_SHARE
-from kinacc.deployment import drift_chance, drift_pairs
+from kinacc.deployment import drift_chance, drift_pairs, folder
 from kinacc.deployment.drift_joint import joint_of
 from kinacc.deployment.drift_pairs import Setup
 from kinacc.deployment.handful import LEAST_HELD_OUT
@@ -29,6 +31,7 @@ from kinacc.deployment.record import Calibration
 from kinacc.deployment.verify import frames_under, says_there
 from kinacc.errors import FitError, InputError
 from kinacc.geometry import Pose, compose
+from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import configurations
 
@@ -60,6 +63,39 @@ class Session:
     temperature_c: float
     bound_mm: float
     tolerance_mm: float
+
+
+def session_of(
+    tables: Mapping[str, Columns], name: str, date: str, base: str, tool: str
+) -> Session:
+    """A line of a series from the tables of its results."""
+    arm = robots.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    calibration, measured = folder.calibration(tables, arm, name=name), tables["measurements"]
+    warmth = np.asarray(measured.get("temperature_c", ()), dtype=float)
+    warmth = warmth[np.isfinite(warmth)]
+    return Session(
+        name=name,
+        date=date,
+        digest="",
+        base=base,
+        tool=tool,
+        calibration=calibration,
+        observations=from_columns(measured, arm),
+        held_out_mm=_held_out_mm(tables["pose_errors"], calibration.choice),
+        temperature_c=float(warmth.mean()) if len(warmth) else np.nan,
+        bound_mm=np.nan,
+        tolerance_mm=np.nan,
+    )
+
+
+def _held_out_mm(errors: Mapping, model: str) -> np.ndarray:
+    """Position errors (m,) of a model where every one was tried, as ``kinacc fitted`` has them."""
+    held = np.asarray(errors["estimate"]) == "cross_validated"
+    kind, row = np.asarray(errors["comparison"])[held], np.asarray(errors["row"])[held]
+    tried = [row[kind == each] for each in dict.fromkeys(kind)]
+    common = reduce(np.intersect1d, tried) if tried else row
+    ours = (kind == Comparison(MEASURED, model).name) & np.isin(row, common)
+    return np.linalg.norm([np.asarray(errors[f"e{axis}_mm"])[held][ours] for axis in "xyz"], axis=0)
 
 
 def history(sessions: Sequence[Session], rotation_weight_mm_per_rad: float, seed: int) -> Columns:

@@ -16,8 +16,10 @@ from kinacc.artifacts import store, sums
 from kinacc.artifacts.atomic import unfinished, write_whole
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.comparison import compare_tables
+from kinacc.artifacts.history_tables import MOVED, OPEN, RECALIBRATE, SAME
 from kinacc.calibration.summary import selected
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.deployment import drift, folder
+from kinacc.errors import FitError, InputError, Problem, first_few, refuse
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.run_tables import RunTables, errors_of
@@ -25,7 +27,8 @@ from kinacc.measurements.folds import configurations_of
 
 NOTE = "accepted.json"
 CONFIDENCE = 0.99
-MOVED = 3.0  # standard deviations beyond which a parameter counts as moved
+_SEED = 16
+_FAR = 3.0  # standard deviations beyond which a parameter counts as moved
 
 
 def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) -> dict:
@@ -59,9 +62,12 @@ def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) ->
     return note
 
 
-def compared(now: Path, before: Path) -> Iterator[Outcome]:
+def compared(
+    now: Path, before: Path, rotation_weight_mm_per_rad: float = 500.0
+) -> Iterator[Outcome]:
     """A data set beside the accepted one: equal tables where inputs are the same, else better,
-    same, worse or undecided by held-out errors, and the parameters that moved.
+    same, worse or undecided by held-out errors, whether the arm changed, and the parameters that
+    moved.
     """
     if not (before / "measurements.parquet").is_file():
         says = f"there is no accepted run of {now.name} in {before.parent}"
@@ -73,6 +79,7 @@ def compared(now: Path, before: Path) -> Iterator[Outcome]:
         yield _equal(now, before)
     else:
         yield _errors_beside(now, before)
+        yield _arm_beside(now, before, rotation_weight_mm_per_rad)
         yield _parameters_beside(now, before)
 
 
@@ -132,6 +139,44 @@ def _errors_beside(now: Path, before: Path) -> Outcome:
     return Outcome(now.name, "held-out errors", "accepted", verdict, says, fix, figures)
 
 
+def _arm_beside(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Outcome:
+    """Whether the accepted calibration still holds, by :mod:`kinacc.deployment.drift`.
+
+    A refit takes up what a knocked joint does, so that held-out errors do not show it. The
+    instrument counts as set up anew, the tool as the same.
+    """
+    try:
+        sessions = [
+            drift.session_of(
+                folder.read_tables(each, "robot", "measurements", "pose_errors"),
+                name,
+                name,
+                MOVED,
+                SAME,
+            )
+            for name, each in (("1 accepted", before), ("2 now", now))
+        ]
+        rows = drift.history(sessions, rotation_weight_mm_per_rad, _SEED)
+    except (FitError, InputError) as error:
+        says = f"undecided: {getattr(error, 'problems', (error,))[0]}"
+        return Outcome(now.name, "arm", "accepted", UNDECIDED, says)
+    row = {name: values[1] for name, values in rows.items()}
+    moved_mm, chance_mm = float(row["moved_mm"]), float(row["chance_mm"])
+    figures: dict[str, float | int | str | None]
+    figures = {"moved_mm": moved_mm, "chance_mm": chance_mm, "result": "same"}
+    says = f"moved by {moved_mm:.3f} mm, by chance up to {chance_mm:.3f} mm"
+    if row["verdict"] == OPEN:
+        says = f"undecided: {row['reason']}"
+        return Outcome(now.name, "arm", "accepted", UNDECIDED, says, figures=figures)
+    if row["verdict"] != RECALIBRATE:
+        return Outcome(now.name, "arm", "accepted", PASSED, f"same: {says}", figures=figures)
+    joint = "" if np.isnan(row["joint"]) else f", as joint {row['joint']:.0f} would"
+    fix = f"kinacc compare {before} {now}"
+    figures["result"] = "worse"
+    says = f"worse: the accepted calibration holds no more; {says}{joint}"
+    return Outcome(now.name, "arm", "accepted", FAILED, says, fix, figures)
+
+
 def _sample(tables: RunTables) -> chance.Sample:
     model = selected(tables["model_selection"])
     sizes, rows = errors_of(tables, model, "held_out", "position")
@@ -144,7 +189,7 @@ def _parameters_beside(now: Path, before: Path) -> Outcome:
     moved = [*_moved(new, old)]
     says = "no DH parameter moved beyond its uncertainty"
     if moved:
-        says = f"{len(moved)} DH parameters moved by more than {MOVED:g} standard deviations: "
+        says = f"{len(moved)} DH parameters moved by more than {_FAR:g} standard deviations: "
         says += first_few(moved)
     verdict = WARNED if moved else PASSED
     return Outcome(now.name, "parameters", "accepted", verdict, says,
@@ -155,7 +200,7 @@ def _moved(new: Columns, old: Columns) -> Iterator[str]:
     for name in ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad"):
         change = new[name] - old[name]
         std = np.hypot(new[f"std_{name}"], old[f"std_{name}"])  # NaN where undetermined
-        for row in np.flatnonzero(np.abs(change) > MOVED * std):
+        for row in np.flatnonzero(np.abs(change) > _FAR * std):
             unit = "mm" if name.endswith("mm") else "mrad"
             factor = 1.0 if unit == "mm" else 1e3
             shown = f"{factor * change[row]:+.3g} {unit}"

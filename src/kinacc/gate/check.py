@@ -8,6 +8,7 @@ from typing import Any
 
 from kinacc.artifacts import campaign_tables, store, sums
 from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.config.schema import defaults
 from kinacc.errors import InputError, Problem, and_more
 from kinacc.gate.accepted import compared
 from kinacc.gate.conformity import check_file
@@ -53,7 +54,10 @@ def check_results(
     outcomes += judged(results, chosen, against, broken)
     if against is not None:
         for name in names:
-            outcomes += [] if name in broken else compared(results / name, against / name)
+            if name not in broken:
+                own = configurations.get(name, defaults())["calibration"]
+                weight = own["rotation_weight_mm_per_rad"]
+                outcomes += compared(results / name, against / name, weight)
     return CheckReport(str(results), str(against or ""), tuple(outcomes))
 
 
