@@ -78,7 +78,7 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
         panels = figure.subplots(2, slices.size, sharex=True, sharey=True, squeeze=False)
         for row, (column, words, unit) in enumerate(ROWS):
             values = floats(accuracy_map, column)
-            norm = _norm(values)
+            norm = Normalize(*colour_range(values))
             for ax, angle in zip(panels[row], slices, strict=True):
                 mine = slice_deg == angle
                 grid = _grid(radii, heights, radius[mine], height[mine], values[mine])
@@ -123,14 +123,13 @@ def _grid(
     return grid
 
 
-def _norm(values: np.ndarray) -> Normalize:
+def colour_range(values: np.ndarray) -> tuple[float, float]:
+    """Ends of a scale of colours: apart, even where all values are the same or there is none."""
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return Normalize(0, 1)
+        return 0.0, 1.0
     low, high = float(finite.min()), float(finite.max())
-    if high - low < 1e-3 * abs(high):
-        low, high = 0.9 * low, 1.1 * high + 1e-3
-    return Normalize(low, high)
+    return (low, high) if high - low > 1e-3 * abs(high) else (0.9 * low, 1.1 * high + 1e-3)
 
 
 def _panel(ax: Axes, r_edges: np.ndarray, h_edges: np.ndarray, grid: np.ndarray, norm: Normalize):
