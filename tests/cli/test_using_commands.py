@@ -187,7 +187,7 @@ def test_compare_writes_a_page_that_opens_with_what_moved(folder, tmp_path):
     page = tmp_path / "moved.html"
     done = call("compare", "mh180", folder, "--robot", "mh180", "--page", page)
     assert done.exit_code == 0, done.output
-    assert "the modelled poses differ by" in page.read_text("utf-8")
+    assert "flange poses differ" in page.read_text("utf-8")
     done = call("compare", "mh180", folder, "--robot", "mh180", "--page", page)
     assert done.exit_code == 2
     assert "--force" in done.output
