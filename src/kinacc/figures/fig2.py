@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import Axes3D, proj3d
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
@@ -22,11 +21,10 @@ from kinacc.figures.columns import floats
 from kinacc.kinematics import dh, tables
 from kinacc.kinematics import robot as robots
 
-SIDES = 16  # of the prisms that stand for links and joints
+JOINT_SHARE = 0.03  # of the reach: half the length of the thickest joint
 LEGEND_IN = 0.34  # height of the legend below the axes
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
 LINK, JOINT = "#f2a93b", "#5b6470"
-LIGHT = np.array([0.3, -0.6, 0.74])
 
 
 def run(inputs: Mapping, settings: Mapping) -> Figure:
@@ -118,62 +116,23 @@ def _legend(figure: Figure, points: int, measured: bool, space: bool) -> None:
     figure.legend(handles, names, loc="lower left", ncols=2 if space else 1)
 
 
-def _prism(begin: np.ndarray, end: np.ndarray, radius: float, colour: str):
-    """Return faces and shaded colours of a prism from ``begin`` to ``end``."""
-    axis = end - begin
-    length = np.linalg.norm(axis)
-    if length < 1e-9:
-        return [], []
-    axis = axis / length
-    across = np.cross(axis, [1.0, 0, 0] if abs(axis[0]) < 0.9 else [0, 1.0, 0])
-    across /= np.linalg.norm(across)
-    third = np.cross(axis, across)
-    turn = np.linspace(0, 2 * np.pi, SIDES + 1)
-    normals = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * third
-    pieces = max(1, round(length / 120))  # short pieces, so that depth sorting sees them apart
-    along = np.linspace(0, 1, pieces + 1)
-    rings = [begin + length * t * axis + radius * normals for t in along]
-    faces = [
-        np.array([a[i], a[i + 1], b[i + 1], b[i]]) for a, b in pairwise(rings) for i in range(SIDES)
-    ]
-    middle = (normals[:-1] + normals[1:]) / 2
-    shades = [_shade(colour, n) for n in middle] * pieces
-    faces += [rings[0][:-1], rings[-1][:-1]]
-    return faces, [*shades, _shade(colour, -axis), _shade(colour, axis)]
-
-
-def _shade(colour: str, normal: np.ndarray) -> tuple[float, float, float]:
-    light = 0.62 + 0.38 * float(normal @ LIGHT / np.linalg.norm(LIGHT))
-    red, green, blue = to_rgb(colour)
-    return float(red) * light, float(green) * light, float(blue) * light
-
-
 def _arm(ax: Axes3D, model: dh.DHModel, q_rad: np.ndarray, tool_mm: np.ndarray) -> np.ndarray:
-    """Draw links (along d, then along a) and joints (about their axes); return the frames."""
+    """Draw links (along d, then along a) and joints (along their axes); return the frames."""
     frames = dh.chain(model, q_rad[None])
     rotation, origin = frames.rotation[0], frames.position_mm[0]
     reach = float(np.abs(model.a_mm).sum() + np.abs(model.d_mm).sum())
-    faces, colours = [], []
-
-    def add(begin: np.ndarray, end: np.ndarray, radius: float, colour: str) -> None:
-        more = _prism(begin, end, radius, colour)
-        faces.extend(more[0])
-        colours.extend(more[1])
-
-    for i in range(model.joints):
-        thick = reach * (0.030 - 0.016 * i / model.joints)
-        axis = rotation[i][:, 2]
-        corner = origin[i] + model.d_mm[i] * axis
-        add(origin[i], corner, thick, LINK)
-        add(corner, origin[i + 1], thick, LINK)
-        half = 1.7 * thick * axis
-        add(origin[i] - half, origin[i] + half, 1.3 * thick, JOINT)
     tip = origin[-1] + rotation[-1] @ tool_mm
-    add(origin[-1], tip, reach * 0.008, JOINT)
-    ax.add_collection3d(
-        Poly3DCollection(faces, facecolors=colours, edgecolors=colours, lw=0.15, zorder=3)
-    )
+    _bar(ax, [origin[-1], tip], JOINT, 1.5)
+    for i in range(model.joints):
+        axis, thick = rotation[i][:, 2], 8.0 - 4.5 * i / model.joints
+        _bar(ax, [origin[i], origin[i] + model.d_mm[i] * axis, origin[i + 1]], LINK, thick)
+        half = JOINT_SHARE * reach * thick / 8.0 * axis
+        _bar(ax, [origin[i] - half, origin[i] + half], JOINT, 1.3 * thick)
     return np.concatenate([origin, tip[None]])
+
+
+def _bar(ax: Axes3D, points: list[np.ndarray], colour: str, width_pt: float) -> None:
+    ax.plot(*np.transpose(points), color=colour, lw=width_pt, solid_joinstyle="round", zorder=3)
 
 
 def _first_axis(ax: Axes3D, lowest_mm: float) -> None:
@@ -190,36 +149,24 @@ def _sector(ax: Axes3D, cylinder: Mapping[str, Any]) -> np.ndarray:
     first_deg, last_deg = cylinder["angle_deg"]
     turn = np.radians(np.linspace(float(first_deg), float(last_deg), 31))
 
-    def arc(radius, height):
-        return np.stack(
-            [radius * np.cos(turn), radius * np.sin(turn), np.full(turn.size, height)], axis=-1
-        )
-
-    corners = {(r, h): arc(r, h) for r in (inner, outer) for h in (low, high)}
-    walls = [
-        np.concatenate([corners[r, low], corners[r, high][::-1]]) for r in (inner, outer) if r > 0
-    ]
-    walls += [np.concatenate([corners[inner, h], corners[outer, h][::-1]]) for h in (low, high)]
-    walls += [
-        np.array(
-            [
-                corners[inner, low][end],
-                corners[outer, low][end],
-                corners[outer, high][end],
-                corners[inner, high][end],
-            ]
-        )
-        for end in (0, -1)
-    ]
-    ax.add_collection3d(Poly3DCollection(walls, facecolors=style.SKY, alpha=0.14, lw=0, zorder=1))
-    edges = list(corners.values())
-    for end in (0, -1):
-        edges += [np.array([corners[r, low][end], corners[r, high][end]]) for r in (inner, outer)]
-        edges += [np.array([corners[inner, h][end], corners[outer, h][end]]) for h in (low, high)]
+    arcs = {
+        (r, h): np.stack([r * np.cos(turn), r * np.sin(turn), np.full(turn.size, h)], axis=-1)
+        for r in (inner, outer)
+        for h in (low, high)
+    }
+    sides = [((r, low), (r, high)) for r in (inner, outer) if r > 0]
+    sides += [((inner, h), (outer, h)) for h in (low, high)]
+    walls = [np.concatenate([arcs[one], arcs[other][::-1]]) for one, other in sides]
+    round_ = [(inner, low), (outer, low), (outer, high), (inner, high)]
+    ends = [np.array([arcs[each][end] for each in round_]) for end in (0, -1)]
+    ax.add_collection3d(
+        Poly3DCollection(walls + ends, facecolors=style.SKY, alpha=0.14, lw=0, zorder=1)
+    )
+    edges = [*arcs.values(), *(np.concatenate([each, each[:1]]) for each in ends)]
     # Not as a 3D one: for the limits of the axes, which are set, matplotlib 3.9 wants lines alike.
     lines = Line3DCollection(edges, colors=style.BLUE, linewidths=0.9, zorder=4)
     ax.add_collection(lines, autolim=False)
-    return np.concatenate(list(corners.values()))
+    return np.concatenate(list(arcs.values()))
 
 
 def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
@@ -234,25 +181,10 @@ def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
     ax.set_zlabel("z (mm)", labelpad=1)
     ax.tick_params(pad=-2, labelsize=style.SMALL_PT)
     ax.tick_params(axis="z", pad=2)
-    widest = _round_step((high - low).max() / 5)
-    for axis, first, last in zip((ax.xaxis, ax.yaxis, ax.zaxis), low, high, strict=True):
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
         axis._axinfo["grid"].update(color="#e3e3e3", linewidth=0.5)
-        axis.set_major_locator(MultipleLocator(_tick_step(first, last, widest)))
-
-
-def _tick_step(low: float, high: float, widest: float) -> float:
-    """Return the largest round step up to ``widest`` with at least three ticks in the range."""
-    step = widest
-    while np.floor(high / step) - np.ceil(low / step) < 2:
-        step = _round_step(step / 2.6)  # the next smaller one of 1, 2, 5
-    return step
-
-
-def _round_step(least: float) -> float:
-    """Return the smallest of 1, 2, 5 times a power of ten that is at least ``least``."""
-    power = 10.0 ** np.floor(np.log10(least))
-    return float(next(m * power for m in (1, 2, 5, 10) if m * power >= least))
+        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10], min_n_ticks=3))
 
 
 def _fill(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
@@ -42,42 +41,7 @@ PARTLY: dict[str, Any] = {"marker": ".", "ms": 1.6, "mew": 0, "mfc": "white", "l
 RING: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "none", "ls": ""}
 HEAD = "Map error, DH to VEC, in slices at these angles about the robot's first axis"
 DEFAULT_CELL_MM = 25.0
-
-
-@dataclass(frozen=True)
-class Panels:
-    """Sizes in inches: panels of equal scale side by side, a colour bar at the right."""
-
-    columns: int
-    panel_w: float
-    panel_h: float
-    name_h: float = 0.0
-    left: float = 0.62
-    right: float = 0.72
-    gap: float = 0.1
-    head: float = 0.56
-    between: float = 0.3
-    foot: float = 0.68
-
-    @property
-    def width(self) -> float:
-        """Width of the figure."""
-        return self.left + self.columns * (self.panel_w + self.gap) + self.right
-
-    @property
-    def height(self) -> float:
-        """Height of the figure."""
-        return self.name_h + self.head + 2 * self.panel_h + self.between + self.foot
-
-    def box(self, row: int, column: int) -> tuple[float, float, float, float]:
-        """Left, bottom, width and height of a panel in figure fractions.
-
-        ``column`` equal to the number of columns is the place of the colour bar.
-        """
-        x = self.left + column * (self.panel_w + self.gap)
-        y = self.foot + (1 - row) * (self.panel_h + self.between)
-        w = self.panel_w if column < self.columns else 0.09
-        return x / self.width, y / self.height, w / self.width, self.panel_h / self.height
+MARGINS_IN = (1.6, 1.5)  # of all panels together: beside them, and above and below
 
 
 def run(inputs: Mapping, settings: Mapping) -> Figure:
@@ -103,48 +67,39 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     solutions, wanted = floats(accuracy_map, "solutions"), floats(accuracy_map, "wanted")
     partly = (solutions > 0) & (solutions < wanted)
     unreached = False
-    layout = _layout(slices.size, *edges, named=bool(dataset), wordy=bool(partly.any()))
+    wide = slices.size > 2
+    width = style.DOUBLE_COLUMN_IN if wide else style.SINGLE_COLUMN_IN
+    panel_w = (width - MARGINS_IN[0]) / slices.size
+    ratio = float(np.ptp(edges[1]) / np.ptp(edges[0]))
+    panel_h = min(max(panel_w, 0.5) * ratio, 3.2)
+    margin = MARGINS_IN[1] + (0.17 if dataset else 0.0) + (0.0 if wide else 0.31)
     with style.house():
-        figure = style.new_figure(layout.width, layout.height, arranged=False)
+        figure = style.new_figure(width, 2 * panel_h + margin)
+        panels = figure.subplots(2, slices.size, sharex=True, sharey=True, squeeze=False)
         for row, (column, words, unit) in enumerate(ROWS):
             values = floats(accuracy_map, column)
-            norm = _norm(values)
-            for place, angle in enumerate(slices):
+            norm = Normalize(*colour_range(values))
+            for ax, angle in zip(panels[row], slices, strict=True):
                 mine = slice_deg == angle
                 grid = _grid(radii, heights, radius[mine], height[mine], values[mine])
                 unreached |= bool(np.isnan(grid).any())
-                ax = figure.add_axes(layout.box(row, place))
                 mesh = _panel(ax, *edges, grid, norm)
                 some = mine & partly
                 ax.plot(radius[some], height[some], **PARTLY, rasterized=True)
                 title = _largest(ax, radii, heights, grid, unit)
                 ax.set_title(title if row else f"{angle:g}°\n{title}", fontsize=style.SMALL_PT)
-                ax.tick_params(labelleft=place == 0, labelbottom=row == 1)
             bar = figure.colorbar(
-                mesh, cax=figure.add_axes(layout.box(row, slices.size)), ticks=MaxNLocator(4)
+                mesh, ax=list(panels[row]), ticks=MaxNLocator(4), fraction=0.08 / slices.size
             )
             bar.set_label(f"{words}\nerror ({unit})")
             bar.outline.set_linewidth(0.4)
-        _words(figure, layout, unreached, bool(partly.any()), dataset)
+        panels[1, (slices.size - 1) // 2].set_xlabel("Radius (mm)")
+        figure.supylabel("Height (mm)", fontsize=style.TEXT_PT)
+        head = HEAD if wide else fill(HEAD, 40)
+        name = style.shortened(dataset or "", int(15 * width))
+        figure.suptitle("\n".join(filter(None, [name, head])), parse_math=False)
+        _legend(figure, unreached, bool(partly.any()), wide)
     return figure
-
-
-def _layout(
-    count: int, r_edges: np.ndarray, h_edges: np.ndarray, named: bool, wordy: bool
-) -> Panels:
-    """Fit ``count`` panels into the column width, at the same scale in both directions.
-
-    ``named`` leaves room for the data set's name, ``wordy`` for three entries in the legend.
-    """
-    wide = count > 2
-    width = style.DOUBLE_COLUMN_IN if wide else style.SINGLE_COLUMN_IN
-    free = width - Panels.left - Panels.right - count * Panels.gap
-    ratio = float(np.ptp(h_edges) / np.ptp(r_edges))
-    panel_w = min(max(free / count, 0.5), 3.2 / ratio)
-    foot = Panels.foot + (0.0 if wide or not wordy else 0.17)
-    head = Panels.head + (0.0 if wide else 0.14)
-    name_h = 0.17 if named else 0.0
-    return Panels(count, panel_w, panel_w * ratio, name_h=name_h, head=head, foot=foot)
 
 
 def _edges(levels: np.ndarray) -> np.ndarray:
@@ -168,14 +123,13 @@ def _grid(
     return grid
 
 
-def _norm(values: np.ndarray) -> Normalize:
+def colour_range(values: np.ndarray) -> tuple[float, float]:
+    """Ends of a scale of colours: apart, even where all values are the same or there is none."""
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return Normalize(0, 1)
+        return 0.0, 1.0
     low, high = float(finite.min()), float(finite.max())
-    if high - low < 1e-3 * abs(high):
-        low, high = 0.9 * low, 1.1 * high + 1e-3
-    return Normalize(low, high)
+    return (low, high) if high - low > 1e-3 * abs(high) else (0.9 * low, 1.1 * high + 1e-3)
 
 
 def _panel(ax: Axes, r_edges: np.ndarray, h_edges: np.ndarray, grid: np.ndarray, norm: Normalize):
@@ -208,48 +162,15 @@ def _largest(ax: Axes, radii: np.ndarray, heights: np.ndarray, grid: np.ndarray,
     return f"max {grid[row, column]:.2f} {unit}"
 
 
-def _words(
-    figure: Figure, layout: Panels, unreached: bool, partly: bool, dataset: str | None
-) -> None:
-    """Write axis names, the legend and the data set's name into the margins."""
-    left, right = layout.left / layout.width, 1 - (layout.right + layout.gap) / layout.width
-    middle = (layout.foot + layout.panel_h + layout.between / 2) / layout.height
-    figure.text(
-        0.05 / layout.width, middle, "Height (mm)", rotation=90, va="center", ha="left",
-        fontsize=style.TEXT_PT,
-    )  # fmt: skip
-    figure.text(
-        (left + right) / 2,
-        (layout.foot - 0.31) / layout.height,
-        "Radius (mm)",
-        ha="center",
-        va="center",
-        fontsize=style.TEXT_PT,
-    )
-    figure.text(
-        0.5,
-        1 - (layout.name_h + 0.03) / layout.height,
-        HEAD if layout.columns > 2 else fill(HEAD, 40),
-        ha="center",
-        va="top",
-        fontsize=style.TEXT_PT,
-    )
+def _legend(figure: Figure, unreached: bool, partly: bool, wide: bool) -> None:
+    """Write below the panels what marks mean."""
     handles: list[Any] = [Line2D([], [], **RING, mec=style.INK, mew=0.9)]
     names = ["largest in the slice"]
     if unreached:
         handles.append(Patch(**UNREACHED))
         names.append("not reachable")
     if partly:
-        handles.append(
-            (Patch(facecolor=MIDDLE), Line2D([0.25, 0.5, 0.75], [0.5] * 3, **PARTLY | {"ms": 3}))
-        )
+        dots = Line2D([0.25, 0.5, 0.75], [0.5] * 3, **PARTLY | {"ms": 3})
+        handles.append((Patch(facecolor=MIDDLE), dots))
         names.append("some poses not reachable")
-    figure.legend(
-        handles,
-        names,
-        loc="lower center",
-        bbox_to_anchor=((left + right) / 2, 0.04 / layout.height),
-        borderpad=0,
-        ncols=3 if layout.columns > 2 else 2,
-    )
-    style.name_dataset(figure, dataset)
+    figure.legend(handles, names, loc="outside lower center", ncols=3 if wide else 2)

@@ -11,13 +11,13 @@ from bokeh.models import (
     ColumnDataSource,
     Filter,
     GroupFilter,
-    IntersectionFilter,
     LinearColorMapper,
 )
 from bokeh.models.renderers import GlyphRenderer
 from bokeh.plotting import figure as BokehFigure
 
 from kinacc.artifacts.columns import Columns
+from kinacc.figures.fig3 import colour_range
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.map_cells import Cells, cells, largest_of
@@ -127,11 +127,21 @@ def _picture(table: Columns, drawn: Cells, robot: Robot) -> Picture:
     for along in (plot.x_range, plot.y_range):
         along.update(range_padding=0.02)
     shown = GroupFilter("slice", 0, name=f"{_KEY}-slice")
-    _unreached(plot, data, drawn, shown)
+    _cells(
+        plot, data, drawn, shown & GroupFilter("some", 0),
+        [("", "@radius{0} mm out, @height{0} mm high: no pose reached")],
+        fill_color=_UNREACHED, line_color=None, fill_alpha=0.5,
+        hatch_pattern="/", hatch_color=GREY, hatch_scale=8.0,
+    )  # fmt: skip
     parts = {each: _coloured(plot, data, drawn, shown, each) for each in _QUANTITIES}
-    _some_reached(plot, data, shown)
+    dots = shown & GroupFilter("partly", 1)
+    _marks(plot, data, dots, size=3, color="#ffffff", line_color=None)
     for quantity in (_POSITION, _ORIENTATION):
-        parts[quantity] += _rings(plot, data, shown, quantity)
+        top = shown & GroupFilter(f"top_{quantity.column}", 1)
+        for colour, width in (("#ffffff", 5), ("#1d1d1f", 2)):  # to be seen on every colour
+            name = f"{_KEY}-{quantity.column}-ring-{width}"
+            look = {"size": 18, "fill_color": None, "line_color": colour, "line_width": width}
+            parts[quantity].append(_marks(plot, data, top, **look, name=name))
     for quantity, models in parts.items():
         for model in models:
             model.visible = quantity == _POSITION
@@ -161,97 +171,54 @@ def _picture(table: Columns, drawn: Cells, robot: Robot) -> Picture:
     )
 
 
-def _view(*filters: Filter) -> CDSView:
-    return CDSView(filter=IntersectionFilter(operands=list(filters)))
-
-
-def _cell(
-    plot: BokehFigure, data: ColumnDataSource, drawn: Cells, view: CDSView, **look: object
-) -> GlyphRenderer:
+def _cells(
+    plot: BokehFigure, data: ColumnDataSource, drawn: Cells, filters: Filter,
+    told: Sequence[tuple[str, str]], **look: object,
+) -> GlyphRenderer:  # fmt: skip
+    """Cells of a slice, and what hovering over them says."""
     width: float | str = "wide" if drawn.merged else float(drawn.wide_mm[0])
     height: float | str = "high" if drawn.merged else float(drawn.high_mm[0])
-    part = plot.rect(
-        "radius", "height", width=width, height=height, source=data, view=view, **look
-    )  # fmt: skip
+    view = CDSView(filter=filters)
+    part = plot.rect("radius", "height", width, height, source=data, view=view, **look)
     part.selection_glyph = part.glyph.clone(line_color=VERMILION, line_width=3)
     part.nonselection_glyph = None  # what is not selected looks as before
+    pictures.hover(plot, told, part)
     return part
 
 
-def _unreached(plot: BokehFigure, data: ColumnDataSource, drawn: Cells, shown: GroupFilter) -> None:
-    part = _cell(
-        plot, data, drawn, _view(shown, GroupFilter("some", 0)),
-        fill_color=_UNREACHED, line_color=None,
-        fill_alpha=0.5, hatch_pattern="/", hatch_color=GREY, hatch_scale=8.0,
-    )  # fmt: skip
-    told = [("", "@radius{0} mm out, @height{0} mm high: no pose reached")]
-    pictures.hover(plot, told, part)
-
-
 def _coloured(
-    plot: BokehFigure,
-    data: ColumnDataSource,
-    drawn: Cells,
-    shown: GroupFilter,
-    quantity: _Quantity,
+    plot: BokehFigure, data: ColumnDataSource, drawn: Cells, shown: Filter, quantity: _Quantity
 ) -> list[Any]:
     """The cells in the colours of a quantity, and their scale: one for all slices."""
     values = np.asarray(data.data[quantity.column], dtype=float)
-    low, high = _span(values) if quantity != _REACHED else (0.0, 100.0)
+    low, high = colour_range(values) if quantity != _REACHED else (0.0, 100.0)
     colour = {
         "field": quantity.column,
         "transform": LinearColorMapper(palette=pictures.COLOURMAP, low=low, high=high),
     }
-    part = _cell(
-        plot, data, drawn, _view(shown, GroupFilter("some", 1)),
-        fill_color=colour, line_color=colour, line_width=0.6,  # no gap between cells
-        name=f"{_KEY}-{quantity.column}",
-    )  # fmt: skip
     told = [
         ("", "@radius{0} mm out, @height{0} mm high"),
         ("position, mm", "@position{0.000}"),
         ("orientation, mrad", "@orientation{0.000}"),
         ("poses reached, %", "@reached{0}"),
     ]
-    pictures.hover(plot, told, part)
-    bar = part.construct_color_bar(
-        title=quantity.unit, width=10, name=f"{_KEY}-{quantity.column}-scale"
-    )
+    name = f"{_KEY}-{quantity.column}"
+    part = _cells(
+        plot, data, drawn, shown & GroupFilter("some", 1), told,
+        fill_color=colour, line_color=colour, line_width=0.6, name=name,  # no gap between cells
+    )  # fmt: skip
+    bar = part.construct_color_bar(title=quantity.unit, width=10, name=f"{name}-scale")
     plot.add_layout(bar, "right")
     return [part, bar]
 
 
-def _span(values: np.ndarray) -> tuple[float, float]:
-    """Ends of a scale of colours: apart, even where all values are the same or there is none."""
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return 0.0, 1.0
-    low, high = float(known.min()), float(known.max())
-    return (low, high) if high - low > 1e-3 * abs(high) else (0.9 * low, 1.1 * high + 1e-3)
-
-
-def _some_reached(plot: BokehFigure, data: ColumnDataSource, shown: GroupFilter) -> None:
-    if np.any(data.data["partly"]):
-        plot.scatter(
-            "radius", "height", source=data, view=_view(shown, GroupFilter("partly", 1)), size=3,
-            color="#ffffff", line_color=None, nonselection_fill_alpha=1.0,
-        )  # fmt: skip
-
-
-def _rings(
-    plot: BokehFigure, data: ColumnDataSource, shown: GroupFilter, quantity: _Quantity
-) -> list[GlyphRenderer]:
-    """A ring about the largest value of the slice, dark on light, to be seen on every colour."""
-    rings = []
-    for name, colour, width in (("light", "#ffffff", 5), ("dark", "#1d1d1f", 2)):
-        ring = plot.scatter(
-            "radius", "height", source=data, size=18, fill_color=None, line_color=colour,
-            line_width=width, view=_view(shown, GroupFilter(f"top_{quantity.column}", 1)),
-            name=f"{_KEY}-{quantity.column}-{name}-ring",
-        )  # fmt: skip
-        ring.nonselection_glyph = None
-        rings.append(ring)
-    return rings
+def _marks(
+    plot: BokehFigure, data: ColumnDataSource, filters: Filter, **look: object
+) -> GlyphRenderer:
+    view = CDSView(filter=filters)
+    mark = plot.scatter("radius", "height", source=data, view=view, **look)
+    mark.nonselection_glyph = None
+    return mark
 
 
 def _details(data: ColumnDataSource, robot: Robot) -> dict[str, str]:

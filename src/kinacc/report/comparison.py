@@ -102,7 +102,7 @@ def _answers(case: Case, calibrations: Sequence[Calibration]) -> list[str]:
     if np.isfinite(found.probability):
         lines.append(by_parameters(found, case.measured))
     lines += [
-        moved(f"from {case.names[0]} to {case.names[1]}, flange poses move", found.as_they_stand),
+        moved(f"from {case.names[0]} to {case.names[1]}, flange poses differ", found.as_they_stand),
         moved("after the best base and tool", found.apart_from_frames),
     ]
     unfitted = [name for name, each in zip(case.names, calibrations, strict=True) if not each.known]

@@ -19,10 +19,10 @@ from kinacc.report import (
     selection,
     study,
 )
-from kinacc.report.page import FirstScreen, Page, Section
+from kinacc.report.page import FirstScreen, Page, Part, Section
 
 # In the order of the page: what a section reads, and how it is made.
-_OF_THE_FIT: tuple[tuple[str, Callable[..., Section]], ...] = (
+_OF_THE_FIT: tuple[tuple[str, Callable[..., Part]], ...] = (
     ("history", robot_history.section),
     ("pose_errors", residuals.section),
     ("accuracy_map", accuracy_map.section),
@@ -30,7 +30,7 @@ _OF_THE_FIT: tuple[tuple[str, Callable[..., Section]], ...] = (
     ("dh_covariance", identifiability.section),
     ("dh_model", parameters.section),
 )
-_OF_THE_STUDY: tuple[tuple[str, Callable[..., Section]], ...] = (
+_OF_THE_STUDY: tuple[tuple[str, Callable[..., Part]], ...] = (
     ("study_summary", study.section),
     ("histories", histories.section),
     ("claims", paper.tables_section),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -83,7 +84,7 @@ def _over_order(tried: Sequence[Mapping]) -> Picture:
     )
     at = {"x": "order", "y": "held_out_rms_mm", "source": data}
     ring = {"fill_color": None, "line_color": VERMILION, "line_width": 2.5}
-    parts = {
+    parts: dict[str, Any] = {
         "line": plot.line(**at, color=BLUE, line_width=1.5),
         "bars": plot.segment("order", "none", "order", "none", source=data, color=BLUE),
         "dots": plot.scatter(**at, size=6, color=BLUE),
