@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Make the golden results anew: python tools/renew_golden.py [CASE ..]
 
-CASE is a data set, faults, foreign or exports; all without one. Prints what differs from before.
+CASE is a data set, faults, foreign, exports or campaign; all without one. Prints what differs from
+before.
 """
 
 import json
@@ -81,6 +82,11 @@ def renew_exports() -> None:
             (folder / name).write_text(text)
 
 
+def renew_campaign() -> None:
+    """What a campaign makes of its journal, which stays as it was recorded."""
+    _write(cases.GOLDEN / "campaign" / "course.json", cases.campaign_course())
+
+
 def _write(path: Path, found: object) -> None:
     text = json.dumps(found, indent=1, default=_plain) + "\n"
     if path.is_file() and path.read_text() != text:
@@ -93,8 +99,13 @@ def _plain(value: object) -> object:
 
 
 if __name__ == "__main__":
-    wanted = sys.argv[1:] or [*cases.DATA_SETS, "faults", "foreign", "exports"]
+    wanted = sys.argv[1:] or [*cases.DATA_SETS, "faults", "foreign", "exports", "campaign"]
     renew_inputs()
-    others = {"faults": renew_faults, "foreign": renew_foreign, "exports": renew_exports}
+    others = {
+        "faults": renew_faults,
+        "foreign": renew_foreign,
+        "exports": renew_exports,
+        "campaign": renew_campaign,
+    }
     for case in wanted:
         others.get(case, lambda case=case: renew_data_set(case))()

@@ -24,6 +24,7 @@ from good_files import File, simulated  # noqa: E402
 from measurements.files_as_they_come import FILES  # noqa: E402
 
 from kinacc.artifacts import store  # noqa: E402
+from kinacc.campaign import folder as campaigns  # noqa: E402
 from kinacc.cli.group import main  # noqa: E402
 from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
 from kinacc.workflow.stages import (  # noqa: E402
@@ -198,6 +199,28 @@ def understanding(name: str, folder: Path) -> dict:
     rows = {key: values for key, values in rows.items() if not np.isnan(values).any()}
     file = {k: v for k, v in described["measurements"]["file"].items() if "path" not in k}
     return {"exit_code": 0, "rows": len(columns["pose"]), "first": rows, "file": file}
+
+
+def campaign_course() -> dict:
+    """Points asked for, statements after every reading and limits of points of the campaign."""
+    course = []
+    opened = campaigns.open_(GOLDEN / "campaign")
+
+    def watch(campaign, reading) -> None:
+        said = [
+            {
+                "target": each.target,
+                "withheld": each.withheld.code if each.withheld else "",
+                "excepted": each.excepted,
+                "mm": [each.value_mm, each.lower_mm, each.upper_mm],
+            }
+            for each in campaign.statements()
+        ]
+        course.append({"reading": reading.number, "point": reading.reading.point, "said": said})
+
+    state = opened.state(watch)
+    limits = {str(row): list(each) for row, each in state.campaign.point_limits().items()}
+    return {"course": course, "limits_mm": limits, "struck": [e.number for e, _ in state.struck]}
 
 
 def call(*words: object):

@@ -37,7 +37,7 @@ def same(found, golden):
     if isinstance(golden, list):
         return len(found) == len(golden) and all(map(same, found, golden))
     if isinstance(golden, float):
-        return np.isclose(found, golden, rtol=1e-6, atol=1e-6)
+        return np.isclose(found, golden, rtol=1e-6, atol=1e-6, equal_nan=True)
     return found == golden
 
 
@@ -74,6 +74,11 @@ def test_exports_are_as_before(model, formats):
             assert same(json.loads(text), json.loads(golden))
         else:
             assert text == golden
+
+
+def test_a_campaign_makes_its_golden_statements():
+    golden = json.loads((cases.GOLDEN / "campaign" / "course.json").read_text())
+    assert same(json.loads(json.dumps(cases.campaign_course())), golden)
 
 
 def test_golden_files_are_small():

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
-from kinacc.campaign.arm import Arm
 from kinacc.campaign.instrument import INSTRUMENT, Instrument
 from kinacc.campaign.plan import Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
@@ -71,7 +70,6 @@ def plan_of(
     the random order.
     """
     order = np.random.default_rng(seed).permutation(len(points))
-    kept = Arm.of(arm, about.get("point"))
     to_base = _to_base(arm)
     noise = instruments[0].in_base(to_base, points.modelled_mm)
     begun = assessor.begin(Candidates(noise[order], q_rad=points.joints[order]))
@@ -81,7 +79,7 @@ def plan_of(
         route = route[_visit_path(points.joints[route] / unit, start / unit, begun.reference_poses)]
     return Plan(
         points, order, route, assessor, tuple(instruments), to_base,
-        kept, limits, seed, about,
+        arm.robot.dh.prismatic, limits, seed, about,
     )  # fmt: skip
 
 

@@ -14,14 +14,12 @@ from kinacc import removed
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE, IN_RESEARCH, RECOMMENDED
 from kinacc.assess.statement import CANDIDATES, TARGETS
-from kinacc.campaign.arm import Arm, numbers
 from kinacc.campaign.instrument import BASE, INSTRUMENT, Instrument
 from kinacc.campaign.laser_tracker import LaserTracker
 from kinacc.config import json_files, schema
 from kinacc.config.values import check
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
-from kinacc.kinematics.dh import PARAMETERS
 
 FORMAT = 1
 _ABOUT = ("robot", "calibration", "model", "point")
@@ -79,7 +77,7 @@ class Plan:
 
     ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
     in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
-    ``arm`` tells what errors of its joints do. ``about`` names robot, calibration, model and point.
+    ``slides`` (k,): which joints slide. ``about`` names robot, calibration, model and point.
     ``overruled``: what spoke against beginning it so, a sentence each.
     """
 
@@ -89,16 +87,11 @@ class Plan:
     assessor: AdaptiveAssessor
     instruments: tuple[Instrument, ...]
     to_base: Pose
-    arm: Arm
+    slides: np.ndarray
     limits: Limits
     seed: int
     about: Mapping[str, str]
     overruled: tuple[str, ...] = ()
-
-    @property
-    def slides(self) -> np.ndarray:
-        """Which joints (k,) slide."""
-        return self.arm.dh.prismatic
 
     @cached_property
     def covariance_mm2(self) -> np.ndarray:
@@ -182,6 +175,14 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
+def numbers(value: object) -> np.ndarray:
+    """Nested lists of numbers as an array; ValueError where they hold anything else."""
+    found = np.array(value)
+    if found.dtype.kind not in "iuf":
+        raise ValueError("text or nothing in place of numbers")
+    return found.astype(float)
+
+
 def to_json(plan: Plan) -> bytes:
     """The plan as text; ``from_json`` gives back equal numbers."""
     points = [
@@ -214,7 +215,7 @@ def to_json(plan: Plan) -> bytes:
             "rotation": plan.to_base.rotation.tolist(),
             "position_mm": plan.to_base.position_mm.tolist(),
         },
-        "arm": plan.arm.as_entry(),
+        "arm": {"prismatic": plan.slides.tolist()},
         "limits": asdict(plan.limits),
         "seed": plan.seed,
         "order": plan.order.tolist(),
@@ -262,7 +263,7 @@ def _plan(content: Mapping) -> Plan:
         _kept_assessor(**content["assessor"]),
         tuple(map(_instrument, content["instruments"])),
         Pose(*(numbers(content["to_base"][each]) for each in ("rotation", "position_mm"))),
-        Arm.of_entry(content["arm"]),
+        np.array(content["arm"]["prismatic"], dtype=bool),
         Limits(**content["limits"]),
         content["seed"],
         content["about"],
@@ -293,8 +294,7 @@ def _checked(plan: Plan) -> Plan:
     """The plan, where its arrays fit each other; ValueError where they do not."""
     points, (count, joints) = plan.points, plan.points.joints.shape
     fits = {
-        "points": joints == plan.arm.dh.joints
-        and points.modelled_mm.shape == (count, 3)
+        "points": points.modelled_mm.shape == (count, 3)
         and all(isinstance(each, str) for each in points.label)
         and points.slope.shape == (count, 3, joints)
         and (points.directions is None or points.directions.shape == (count, joints))
@@ -312,12 +312,7 @@ def _checked(plan: Plan) -> Plan:
             for each in plan.instruments
         ),
         "to_base": plan.to_base.rotation.shape == (3, 3) and plan.to_base.position_mm.shape == (3,),
-        "arm": plan.arm.joint_map.shape == (joints, joints)
-        and plan.arm.turn.shape == (3, 3)
-        and plan.arm.point_mm.shape == (3,)
-        and all(
-            getattr(plan.arm.dh, each).shape == (joints,) for each in (*PARAMETERS, "prismatic")
-        ),
+        "arm": plan.slides.shape == (joints,),
         "about": isinstance(plan.about, Mapping)
         and all(isinstance(plan.about.get(each), str) for each in _ABOUT),
     }
