@@ -21,8 +21,8 @@ _HEAD = """\
 # Commands and their options
 
 What `kinacc COMMAND --help` says, of every command. [What options and exit codes
-mean](commands.md) that all commands share is on a page of its own; what a stage
-(`kinacc run STAGE --help`) leaves is on that of [artefacts](artifacts.md).
+mean](commands.md) that all commands share is on a page of its own; the tables that commands
+leave are on that of [artefacts](artifacts.md).
 
 Written from the commands by `python tools/document_commands.py`.
 """
