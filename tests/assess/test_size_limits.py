@@ -11,10 +11,10 @@ from scipy.optimize import minimize
 from scipy.special import chndtr, ndtri
 from scipy.stats import ncx2
 
-from kinacc.assess import limits, plain_sizes, population
+from kinacc.assess import population
 from kinacc.assess.ellipsoid import largest_size, mahalanobis_beyond, nearest_in_ball
-from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.size_kernels import reading_below, reading_densities, size_at
+from kinacc.assess.limits import lower_limit_mm, reading_below, size_at, upper_limit_mm
+from kinacc.assess.size_kernels import reading_densities
 
 
 def random_covariance(rng: np.random.Generator, condition: float) -> np.ndarray:
@@ -51,22 +51,6 @@ def test_size_at_inverts_the_probability_and_is_zero_where_no_size_is_as_likely(
             assert reading_below(x, a) == pytest.approx(probability, abs=1e-9)
         else:
             assert reading_below(x, 0.0) <= probability
-
-
-def test_sizes_without_the_compiler_have_the_same_digits():
-    rng = np.random.default_rng(5)
-    sizes = np.concatenate([rng.uniform(0.0, 12.0, 1000), 10.0 ** rng.uniform(-6, 4, 1000)])
-    chances = np.concatenate([rng.uniform(size=1000), 10.0 ** rng.uniform(-12, -1, 1000)])
-    for x, chance in zip(sizes.tolist(), chances.tolist(), strict=True):
-        assert plain_sizes.size_at(x, chance) == size_at(x, chance)
-
-
-def test_limits_of_many_readings_are_compiled_and_the_same(monkeypatch):
-    mean = np.array([0.3, -0.1, 0.2])
-    few = upper_limit_mm(mean, 0.05, 0.01), lower_limit_mm(mean, 0.05, 0.01)
-    monkeypatch.setattr(limits, "_FEW", 0)
-    monkeypatch.setattr(plain_sizes, "size_at", None)
-    assert (upper_limit_mm(mean, 0.05, 0.01), lower_limit_mm(mean, 0.05, 0.01)) == few
 
 
 def test_nearest_point_of_the_ball_meets_the_conditions_of_its_problem():
