@@ -22,7 +22,7 @@ OPTIONS = {
     },
     "show": {"--plot": "pictures are in the folder figures and on the page: kinacc report RESULTS"},
     "plan-campaign": _CAMPAIGN,
-    "campaign": _CAMPAIGN,
+    "campaign": _CAMPAIGN | {"--head": "now --sha256 with --readings, as a report gives them"},
 }
 # Options that are taken under their former names too.
 RENAMED = {

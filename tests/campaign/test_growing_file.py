@@ -261,7 +261,6 @@ def test_a_campaign_of_an_earlier_version_goes_on(day):
     path = day.folder / "readings.jsonl"
     entry = json.loads(path.read_text())["entry"]
     path.unlink()
-    (day.folder / "head.json").unlink()
     with campaigns.writing(day.folder) as opened:
         opened.write({key: entry[key] for key in ("kind", "readings", "file")})
     assert "was recorded before" in day.refuses(rows[:3])

@@ -52,7 +52,7 @@ def measured(
         asking.record(row, seen, used.covariance_mm2)
         at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, used.name)
         entries.append(folder.readings_entry([at]))
-    journal_ = journal.Journal((*entries, *extra), "cd", (), 0, 0)
+    journal_ = journal.Journal((*entries, *extra), "cd", (), 0)
     campaign = Opened(Path("check"), plan, journal_, "ab")
     state, tables = report.tables(campaign)
     return SimpleNamespace(opened=campaign, state=state, tables=tables)

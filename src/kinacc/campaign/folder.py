@@ -113,22 +113,20 @@ def doubts(opened: Opened) -> list[str]:
     return lines
 
 
-def held_to(opened: Opened, head: str | None, readings: int | None) -> list[Problem]:
-    """What speaks against a journal being the one of which a report gave ``head``, or later.
+def held_to(opened: Opened, sha256: str | None, readings: int | None) -> list[Problem]:
+    """What speaks against a journal being the one of a report, or going on from it.
 
-    ``readings``: how many the report says there were.
+    ``readings``: how many the report states; ``sha256``: of the journal up to them.
     """
-    path = str(opened.folder / journal.JOURNAL)
-    chain = opened.journal.chain
-    if head is not None and head not in chain:
-        what = f"holds no entry {head}: it was shortened or rewritten, or is of another campaign"
-        return [Problem(path, what, f"ends at {opened.journal.last}")]
-    upto = len(chain) if head is None else chain.index(head) + 1
-    count = state.readings_in(opened.journal.entries[:upto])
-    if readings is None or count == readings or (head is None and count > readings):
-        return []
-    where = path if head is None else f"{path}, up to {head}"
-    return [Problem(where, f"{count} readings", f"{readings} as reported")]
+    path, known = str(opened.folder / journal.JOURNAL), opened.journal
+    counts = [state.readings_in(known.entries[:end]) for end in range(len(known.entries) + 1)]
+    if readings is not None and counts[-1] < readings:
+        return [Problem(path, f"{counts[-1]} readings", f"{readings} as reported")]
+    ends = [end for end, count in enumerate(counts) if readings is None or count == readings]
+    if sha256 is not None and sha256 not in map(known.sha256, ends):
+        what = "is not the journal of that report: it was shortened or rewritten"
+        return [Problem(path, what, f"its SHA-256 is {known.sha256()}")]
+    return []
 
 
 def readings_entry(

@@ -1,10 +1,9 @@
-"""The journal of a campaign: one line per event, appended, flushed to disk, chained by hashes.
+"""The journal of a campaign: one line per event, appended and flushed to disk.
 
 A line that was confirmed is on disk. A last line that was cut off, because the process or the
 machine died while writing it, was never confirmed and is left out; the next line takes its place.
-Each line carries a hash of itself and the line before, the first of the plan: a file that was
-edited, or belongs to another plan, is noticed. What was confirmed last stands in a file beside it:
-a journal that has lost whole lines at its end is noticed too.
+Each line carries a checksum of the plan, its number and its entry: one that was edited, is missing
+before others, or belongs to another plan is noticed.
 """
 
 from __future__ import annotations
@@ -19,65 +18,61 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kinacc.artifacts.atomic import synchronise, taken, write_whole
+from kinacc.artifacts.atomic import synchronise, taken
 from kinacc.config import json_files
 from kinacc.errors import InputError, MachineError, Problem, refused
 
-PLAN, JOURNAL, LOCK, HEAD = "campaign.json", "readings.jsonl", "lock", "head.json"
+PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
 _PATIENCE_S = 5.0
-_HASH = 16
+_DIGITS = 16  # of a checksum
 _MOST_BYTES = 400_000_000  # of a million readings, the largest budget, with joints
 
 
 @dataclass(frozen=True)
 class Journal:
-    """What a journal holds: its entries, the hash of every line, and where the last one ends.
+    """What a journal holds: its entries and its lines as they are on disk.
 
-    ``seed`` is what the hash of the first line hangs on. ``cut_off``: bytes after the last line, of
-    one that was not written to its end.
+    ``seed`` is the digest of the plan. ``cut_off``: bytes after the last line, of one that was not
+    written to its end.
     """
 
     entries: tuple[Mapping, ...]
     seed: str
-    chain: tuple[str, ...]
-    end: int
+    lines: tuple[bytes, ...]
     cut_off: int
 
-    @property
-    def last(self) -> str:
-        """Hash of the last line, which all lines before it go into."""
-        return self.chain[-1] if self.chain else self.seed
+    def sha256(self, entries: int | None = None) -> str:
+        """SHA-256 of the file up to so many entries, all of them by default."""
+        return hashlib.sha256(b"".join(self.lines[:entries])).hexdigest()
 
 
 def read(path: Path, seed: str) -> Journal:
     """The journal at ``path``, empty where there is no file; ``seed`` is the digest of the plan.
 
-    Raises InputError where a line does not follow from the one before, and where lines are missing
-    at the end that were confirmed.
+    Raises InputError where a line cannot be read, or is not the one that was written there. Lines
+    of earlier versions carry no checksum of their own (``chain``), and are taken as they are.
     """
     content = _content(path)
     entries: list[Mapping] = []
-    chain, end, headed = [seed], 0, 0
-    whole = content.split(b"\n")[:-1]
+    whole = content.splitlines(keepends=True)
+    if whole and not whole[-1].endswith(b"\n"):
+        whole.pop()
     for number, line in enumerate(whole, start=1):
         try:
             parsed = json.loads(line)
-            entry, said = parsed["entry"], parsed["chain"]
-            follows = _chained(chain[-1], entry)
+            entry = parsed["entry"]
+            matches = "chain" in parsed or parsed["sum"] == _checksum(seed, number, entry)
         except (ValueError, KeyError, TypeError, RecursionError):
             if number == len(whole) and b"\0" in line:
                 break  # a machine that lost power may leave zeros where nothing was written yet
             raise _damaged(f"{path}, line {number}", "cannot be read") from None
-        if said != follows:
+        if not matches:
             what = "was changed, or belongs to another campaign"
             what += f", or {PLAN} was changed" if number == 1 else ""
             raise _damaged(f"{path}, line {number}", what)
-        headed += "head" in parsed
         entries.append(entry)
-        chain.append(follows)
-        end += len(line) + 1
-    _require_confirmed(path, chain, headed)
-    return Journal(tuple(entries), seed, tuple(chain[1:]), end, len(content) - end)
+    lines = tuple(whole[: len(entries)])
+    return Journal(tuple(entries), seed, lines, len(content) - sum(map(len, lines)))
 
 
 def _content(path: Path) -> bytes:
@@ -96,52 +91,24 @@ def _content(path: Path) -> bytes:
         raise _damaged(str(path), f"cannot be read: {error.strerror}") from None
 
 
-def _require_confirmed(path: Path, chain: list[str], headed: int) -> None:
-    """Raise InputError where a journal does not go as far as was confirmed.
-
-    ``headed``: lines after which the head was written; the last of them may not have come to that.
-    """
-    beside = path.with_name(HEAD)
-    if not beside.exists():
-        if headed > 1:
-            raise _damaged(str(beside), "is missing")
-        return  # begun by an earlier version, or nothing was confirmed yet
-    try:
-        head = json.loads(_content(beside))
-        count, last = head["entries"], head["chain"]
-        known = isinstance(count, int) and count > 0
-    except (ValueError, KeyError, TypeError, RecursionError):
-        known = False
-    if not known:
-        raise _damaged(str(beside), "cannot be read")
-    if count >= len(chain):
-        what = f"ends after entry {len(chain) - 1}, and entry {count} was confirmed"
-        raise _damaged(str(path), what)
-    if chain[count] != last:
-        raise _damaged(str(path), f"entry {count} is not the one that was confirmed")
-
-
 def append(path: Path, known: Journal, entry: Mapping) -> None:
     """Add an entry; when this returns, it is on disk. The caller holds the lock.
 
     Raises InputError where the disk does not take it.
     """
-    chain = _chained(known.last, entry)
-    told = {"chain": chain, "entry": entry, "head": HEAD}
+    told = {"entry": entry, "sum": _checksum(known.seed, len(known.entries) + 1, entry)}
     line = json.dumps(told, sort_keys=True).encode() + b"\n"
-    head = json.dumps({"chain": chain, "entries": len(known.entries) + 1}).encode() + b"\n"
     fresh = not path.exists()
     try:
         with open(path, "ab") as file:
             if known.cut_off:
-                file.truncate(known.end)
+                file.truncate(sum(map(len, known.lines)))
             file.write(line)
             file.flush()
             os.fsync(file.fileno())
         if fresh:
             synchronise(path.parent)
-        write_whole(path.with_name(HEAD), head, on_disk=True)
-    except (OSError, MachineError) as error:
+    except OSError as error:
         raise _not_written(path, error) from None
 
 
@@ -169,9 +136,9 @@ def writing(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         yield
 
 
-def _chained(before: str, entry: Mapping) -> str:
-    text = before + json.dumps(entry, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:_HASH]
+def _checksum(seed: str, number: int, entry: Mapping) -> str:
+    text = f"{seed} {number} {json.dumps(entry, sort_keys=True)}"
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
 
 
 def _damaged(where: str, what: str) -> InputError:
@@ -179,8 +146,8 @@ def _damaged(where: str, what: str) -> InputError:
     return InputError(Problem(where, what, fix=fix))
 
 
-def _not_written(path: Path, error: OSError | MachineError) -> MachineError:
-    told = refused(error, path, "cannot be written") if isinstance(error, OSError) else error
+def _not_written(path: Path, error: OSError) -> MachineError:
+    told = refused(error, path, "cannot be written")
     fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
     return MachineError([replace(each, fix=fix) for each in told.problems])
 

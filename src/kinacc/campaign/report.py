@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from kinacc import __version__
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.assess.adaptive import Campaign
@@ -16,6 +17,7 @@ from kinacc.assess.statement import MEAN, REGION
 from kinacc.campaign import consistency, nearness, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
+from kinacc.campaign.journal import JOURNAL
 from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
 from kinacc.config.names import in_markdown
@@ -163,7 +165,11 @@ def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: s
     lines += ["## Largest errors", "", *_largest(points, shown), ""]
     lines += beyond_limits(points, shown)
     lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
-    lines += [f"{head(opened, state)}."]
+    lines += [
+        "## What this report was made of",
+        "",
+        *(f"- {each}" for each in made_of(opened, state)),
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -197,11 +203,19 @@ def _conformity(state: State) -> list[str]:
     return lines
 
 
-def head(opened: Opened, state: State) -> str:
-    """By what a journal is known: ``kinacc campaign verify`` holds a later one to it."""
-    count = state.numbered
-    readings = f"{count} reading{'' if count == 1 else 's'}"
-    return f"campaign {opened.digest}, {readings}, head {opened.journal.last}"
+def made_of(opened: Opened, state: State) -> list[str]:
+    """Digests, number of readings, version and settings: ``kinacc campaign verify`` takes them."""
+    told = {key: value for key, value in vars(state.plan.assessor).items() if value is not None}
+    settings = ", ".join(f"{key}={value}" for key, value in told.items())
+    entries = opened.journal.entries
+    files = {str(each["file"]): each.get("path") for each in entries if "file" in each}
+    readings = f"{state.numbered} reading{'' if state.numbered == 1 else 's'}"
+    return [
+        f"campaign {opened.digest}, kinacc {__version__}",
+        f"{readings}; SHA-256 of {JOURNAL} {opened.journal.sha256()}",
+        *(f"{path or 'a measured file'}: digest {digest}" for digest, path in files.items()),
+        f"{state.plan.assessor.name}: {settings}",
+    ]
 
 
 def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markdown) -> list[str]:

@@ -242,22 +242,21 @@ def report(folder, to, formats, out) -> None:
 
 @campaign.command("verify")
 @click.argument("folder", type=click.Path())
-@option("--head", help="Head of the journal, as a report gives it.")
+@option("--sha256", help="SHA-256 of the journal, as a report gives it.")
 @option("--readings", type=click.IntRange(0), help="Number of readings, as a report gives it.")
 @answers("Print what was found as JSON.")
-def verify(folder, head, readings, out) -> None:
+def verify(folder, sha256, readings, out) -> None:
     """Say whether the journal in FOLDER is whole, and still holds what a report was made of.
 
-    Every line follows from the one before, so that a line cannot be changed or taken out without a
-    trace; lines at the end can, if all files of the folder are rewritten. A report states the head
-    of the journal and the number of readings: kept elsewhere, they tell a shortened journal, with
-    exit code 1. Readings that were taken since do no harm.
+    Each line has a checksum. A report states the number of readings and the SHA-256 of the journal:
+    kept elsewhere, they tell a journal that was shortened or rewritten, with exit code 1. Readings
+    that were taken since do no harm.
 
     \b
     Example:
       kinacc campaign verify check
-      kinacc campaign verify check --head 5bd24b8a6c2fd9b1 --readings 57
+      kinacc campaign verify check --readings 57 --sha256 5bd24b8a..
     """
     from kinacc.cli import campaigns
 
-    campaigns.verify(folder, head, readings, out)
+    campaigns.verify(folder, sha256, readings, out)

@@ -241,22 +241,22 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     out.say({**facts, "folder": str(into), "files": written, "page": out.page}, "\n".join(lines))
 
 
-def verify(path: str, head: str | None, readings: int | None, out: Output) -> None:
+def verify(path: str, sha256: str | None, readings: int | None, out: Output) -> None:
     """Say what the journal holds, and whether it goes on from the one a report was made of."""
     opened = open_(path)
-    problems = folders.held_to(opened, head, readings)
+    problems = folders.held_to(opened, sha256, readings)
     count = readings_in(opened.journal.entries)
     entries = len(opened.journal.entries)
-    said = f"{count} reading{'' if count == 1 else 's'}, head {opened.journal.last}"
-    lines = [f"{opened.folder}: each of {entries} entries follows from the one before; {said}"]
+    said = f"{count} reading{'' if count == 1 else 's'}, SHA-256 {opened.journal.sha256()}"
+    lines = [f"{opened.folder}: {entries} entries are as they were written; {said}"]
     lines += map(str, problems)
-    if not problems and (head, readings) != (None, None):
+    if not problems and (sha256, readings) != (None, None):
         lines.append("it holds what was reported")
     if not out.as_json:
         say_doubts(opened)
     facts = {
         "campaign": opened.digest,
-        "head": opened.journal.last,
+        "sha256": opened.journal.sha256(),
         "entries": entries,
         "readings": count,
         "problems": [asdict(each) for each in problems],

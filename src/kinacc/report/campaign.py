@@ -14,7 +14,7 @@ from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, folder, nearness, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.reasons import ADVICE
-from kinacc.campaign.report import facts, grounds, head, read_above
+from kinacc.campaign.report import facts, grounds, made_of, read_above
 from kinacc.campaign.state import State
 from kinacc.report.campaign_answers import against, answers, leading, sentence
 from kinacc.report.campaign_course import course, mm, scatter
@@ -264,7 +264,7 @@ def _grounds(opened: Opened, state: State) -> Section:
     return Section(
         "grounds",
         "What the bounds rest on",
-        head(opened, state),
+        "; ".join(made_of(opened, state)[:2]),
         "The conditions of every statement on this page, and how the campaign was fixed before its "
         "first reading.",
         "Good: each of them holds in your cell. Bad: one that does not; the bounds then say "
