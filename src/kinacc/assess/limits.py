@@ -34,21 +34,16 @@ def lower_limit_mm(mean_mm: np.ndarray, noise: float | np.ndarray, error: float)
         return noise * size_at(_size(mean_mm) / noise, 1.0 - error)
     from scipy.special import chdtri
 
-    from kinacc.assess.ellipsoid import mahalanobis_beyond
+    from kinacc.assess.ellipsoid import BallDistances
 
     # The true error lies in this ellipsoid with the confidence asked for; take its smallest size.
     # An error of any size outside is rejected whatever its direction.
     wanted = math.sqrt(float(chdtri(3, error)))
-    low, high = 0.0, _size(mean_mm)
-    if mahalanobis_beyond(mean_mm, noise, 0.0) <= wanted:
+    distances = BallDistances(np.asarray(mean_mm)[None], noise[None])
+    if distances.beyond(0.0)[0] <= wanted:
         return 0.0
-    while high - low > 1e-9 * high:
-        middle = 0.5 * (low + high)
-        if mahalanobis_beyond(mean_mm, noise, middle) > wanted:
-            low = middle
-        else:
-            high = middle
-    return low
+    size = _size(mean_mm)
+    return brentq(lambda low: distances.beyond(low)[0] - wanted, 0.0, size, xtol=1e-12 * size)
 
 
 def _size(vector: np.ndarray) -> float:
