@@ -33,6 +33,7 @@ key = $(shell { cat $(1); pwd; } | cksum | tr -d ' ')
 PACKAGES := .venv/.packages-$(call key,requirements/run.txt)
 KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
+CLUSTER := .venv/.cluster-$(call key,requirements/cluster.txt)
 AUDIT := .venv-audit/.audit-$(call key,requirements/audit.txt)
 PEERS := .venv-bench/.peers-$(call key,requirements/run.txt requirements/bench.txt pyproject.toml)
 
@@ -55,7 +56,7 @@ lint: $(KINACC) $(TOOLS)
 check: lint
 	$(PYTEST) -m "not slow"
 
-test: lint
+test: lint $(CLUSTER)
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
 	$(PYTEST)
@@ -110,6 +111,13 @@ $(KINACC): $(PACKAGES)
 $(TOOLS): $(PACKAGES)
 	@echo "kinacc: installing the test tools pinned in requirements/test.txt"
 	@$(PIP) --require-hashes -r requirements/test.txt
+	@touch $@
+
+# Apart from the environment: Snakemake imports every plugin it finds, at every start.
+$(CLUSTER): $(PACKAGES)
+	@echo "kinacc: installing the plugins pinned in requirements/cluster.txt into .venv/cluster"
+	@rm -rf .venv/cluster
+	@$(PIP) --require-hashes --no-deps --target .venv/cluster -r requirements/cluster.txt
 	@touch $@
 
 PEERS_PIP = .venv-bench/bin/python -m pip install -qq --disable-pip-version-check

@@ -27,6 +27,9 @@ from kinacc.workflow.start import ONE_THREAD
 
 os.environ.update(ONE_THREAD)
 
+if {*"{}"} & {*str(workflow.current_basedir)}:
+    raise WorkflowError("the workflow's folder has braces in its name: rename the folder")
+
 try:
     if workflow.modifier.namespace:  # a module of another workflow, which hands over `config`
         data = read_data_sets([], config, absolute=True)

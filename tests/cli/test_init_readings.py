@@ -336,7 +336,6 @@ def test_none_of_the_readings_is_an_answer(file, tmp_path):
     path = file(*ASKED["a tool centre point"])
     done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", input="0\n")
     assert done.exit_code == 2
-    assert "the measured point" in done.output
     path = file(*ASKED["two orientations"])
     done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", input="0\n")
     assert done.exit_code == 0, done.output
@@ -455,4 +454,3 @@ def test_points_that_a_controller_calculated_are_remarked_on(file, tmp_path):
     path = file(Q, (by_axis("{a}_mm"), IT.controller))
     done = call("init", path, "--robot", "ur10", "--out", tmp_path / "cell", "--yes")
     assert done.exit_code == 0, done.output
-    assert "closer than an instrument measures" in done.output

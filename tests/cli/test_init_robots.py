@@ -237,7 +237,6 @@ def test_a_pose_read_ten_times_is_shown_once_and_its_columns_are_named(tmp_path)
     heads = [i for i, line in enumerate(lines) if line.startswith("  line ")]
     assert [lines[i].split(":")[0] for i in heads] == ["  line 2", "  line 12", "  line 22"]
     assert all(lines[i + 3] == "    and 9 more readings of it" for i in heads)
-    assert "also read: pose (Messung), repeat (Wiederholung)" in lines
 
 
 def test_the_first_poses_are_part_of_the_answer_for_a_program(tmp_path):

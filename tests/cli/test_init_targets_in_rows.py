@@ -28,10 +28,9 @@ def grouped(*points, labels="ABC"):
 
 def test_groups_of_points_are_the_targets_where_they_keep_their_distances(tmp_path):
     points = grouped(IT.point, IT.point + IT.turn.apply([150.0, 20.0, 0.0]), LOWER)
-    section, told = described(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
+    section, _ = described(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
     assert section["columns"]["target"] == "Group"
     assert targets(section) == {"SMR_A": COUNT, "SMR_B": COUNT, "SMR_C": COUNT}
-    assert "Group names the targets" in " ".join(told["told"])
 
 
 def test_groups_of_the_same_points_are_readings_of_one_target(tmp_path):
@@ -45,7 +44,6 @@ def test_groups_from_two_places_of_the_tracker_are_no_targets(tmp_path):
     points = grouped(IT.point, np.stack([-y + 900.0, x, z], axis=1))
     said = refused(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
     assert "rows of equal joints lie more than 5 mm apart" in said
-    assert "a column session" in said
 
 
 def in_one_nest(radius, **more):

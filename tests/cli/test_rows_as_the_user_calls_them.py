@@ -81,7 +81,6 @@ def test_nothing_is_left_out_without_a_word_on_the_half_page(results):
     page = call("fitted", results).output
     data = " ".join(page.split("check  ")[0].split())
     assert f"1 row holds no reading: line {EMPTY + 2} ({NAMES[EMPTY]}) of tracker.csv" in data
-    assert "columns not used: Operator " in f"{data} "
     table = store.read(results / "summary.parquet")
     told = [str(text) for text in table["text"][table["topic"] == "left_out"]]
     assert any(NAMES[EMPTY] in text for text in told)
@@ -129,6 +128,5 @@ def test_the_rows_of_a_workbook_are_called_rows_in_every_answer(tmp_path):
     before, worst = whole.split("worst rows")
     assert f"row {COUNT + 3}: statistics of the rows" in before
     assert f"row {WRONG + 3}, " in worst
-    assert "is farthest from where it was fitted without them:" in " ".join(worst.split())
     assert "row 35, " in before
     assert "line" not in whole

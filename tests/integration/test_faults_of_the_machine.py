@@ -19,6 +19,7 @@ from whole_project import PARTS, ROOT, write_poses
 RUN = ("snakemake", "-c1", "--nocolor", "--configfile", "config.yaml", "small.yaml", "--")
 FIT = (*RUN, "results/own/vec_model.parquet")
 STAGE = FIT
+CALIBRATE = ("kinacc", "calibrate", "config.yaml", "small.yaml", "--cores", "1")
 FIRST = "results/own/measurements.parquet"
 
 
@@ -73,25 +74,40 @@ def half_written(folder: Path) -> list[Path]:
 
 def test_a_run_killed_with_all_its_processes_is_continued_by_the_same_command(fresh):
     folder, wanted = fresh
-    run = started(folder, FIT)
-    until((folder / FIRST).exists, run)
-    os.killpg(run.pid, signal.SIGKILL)
-    run.communicate()
+    for name in ("config.yaml", FIRST, "results/own/vec_fit.parquet"):
+        run = started(folder, FIT)
+        until((folder / name).exists, run)
+        os.killpg(run.pid, signal.SIGKILL)
+        run.communicate()
     code, text = ended(folder, FIT)
     assert code == 0, text
     assert tables(folder, wanted) == wanted
     assert not half_written(folder)
 
 
-@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
-def test_a_run_that_is_stopped_keeps_its_finished_tables(fresh, by):
+@pytest.mark.parametrize(
+    ("words", "by", "code", "limit_s"),
+    [
+        (FIT, signal.SIGINT, 1, 60.0),  # Snakemake waits for a job that it is just beginning
+        (CALIBRATE, signal.SIGINT, 130, 3.0),
+        (CALIBRATE, signal.SIGTERM, 143, 3.0),
+    ],
+)
+def test_a_run_that_is_stopped_ends_soon_and_the_same_command_goes_on(
+    fresh, words, by, code, limit_s
+):
     folder, wanted = fresh
-    run = started(folder, FIT)
+    run = started(folder, words)
     until((folder / FIRST).exists, run)
-    os.killpg(run.pid, by) if by == signal.SIGINT else run.send_signal(by)
-    run.communicate(timeout=60)
-    assert run.returncode != 0
+    began = time.monotonic()
+    os.killpg(run.pid, by)
+    text, _ = run.communicate(timeout=60)  # when all processes that write to it have ended
+    assert run.returncode == code, text
+    assert time.monotonic() - began < limit_s
     assert (folder / FIRST).read_bytes() == wanted["measurements"]
+    again, text = ended(folder, words)
+    assert again == 0, text
+    assert tables(folder, wanted) == wanted
     assert not half_written(folder)
 
 
@@ -182,4 +198,9 @@ def test_a_clone_in_a_folder_with_odd_letters_runs_and_braces_in_a_file_are_refu
     code, text = ended(clone, ("kinacc", "calibrate", "own.yaml"))
     assert code == 2
     assert "{data}/poses.csv" in text
+    assert "Traceback" not in text
+    braces = clone.rename(tmp_path / "a {dataset}")
+    code, text = ended(braces, ("snakemake", "-n"))
+    assert code == 1, text
+    assert "braces in its name" in text
     assert "Traceback" not in text

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from parsed import read
 
 from kinacc.artifacts.allowed import ERRORS
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
-from kinacc.report.page import FirstScreen, Page, Section, html
+from kinacc.report.page import Picture
 
 TRAVEL_RAD = np.pi / 2  # either way; of the sliding joint 100 mm
 SLIDES = np.array([False, False, False, True])
@@ -169,31 +170,27 @@ def everything() -> dict:
     }
 
 
-def as_page(*sections: Section) -> str:
-    """Sections as a page whose first screen says nothing."""
-    first = FirstScreen("made up", "", ("", False), (), (), ())
-    return html(Page(first, sections))
-
-
-def table(section: Section, caption: str):
+def table(section, caption: str):
     """The one table of a section whose caption begins so."""
-    (found,) = (b for b in section.blocks if getattr(b, "rows", None) and _caption(b, caption))
+    (found,) = (each for each in read(section).tables if each.caption.startswith(caption))
     return found
 
 
-def _caption(block, caption: str) -> bool:
-    return block.caption.startswith(caption)
-
-
-def picture(section: Section, key: str):
+def picture(section, key: str):
     """The picture of a section by its key."""
-    (found,) = (block for block in section.blocks if getattr(block, "key", "") == key)
+    (found,) = (each for each in pictures_of(section) if each.key == key)
     return found
 
 
-def words(section: Section) -> str:
+def pictures_of(section) -> list:
+    """The pictures of a section."""
+    blocks = getattr(section, "pictures", None) or getattr(section, "blocks", ())
+    return [each for each in blocks if isinstance(each, Picture)]
+
+
+def words(section) -> str:
     """All paragraphs of a section."""
-    return "\n".join(block.words for block in section.blocks if hasattr(block, "words"))
+    return "\n".join(read(section).paragraphs)
 
 
 def data(found) -> dict:

@@ -6,10 +6,12 @@ from itertools import product
 
 import numpy as np
 import pytest
+from parsed import as_page as page
+from parsed import read
 
 from kinacc.kinematics import robot
 from kinacc.report import accuracy_map, map_cells
-from kinacc.report.page import FirstScreen, Page, Picture, Table, Text, html
+from kinacc.report.page import Picture
 
 ARM = robot.load("mh180")
 UNREACHED = 5
@@ -52,9 +54,13 @@ def section_of(table: dict[str, np.ndarray]):
     return accuracy_map.section({"accuracy_map": table}, ARM)
 
 
-def block(section, kind):
-    (found,) = [each for each in section.blocks if isinstance(each, kind)]
+def listed_in(section):
+    (found,) = read(section).tables
     return found
+
+
+def caption_of(section) -> str:
+    return read(section).captions["map"].replace("\n", " ")
 
 
 def data_of(picture: Picture) -> dict[str, np.ndarray]:
@@ -62,17 +68,13 @@ def data_of(picture: Picture) -> dict[str, np.ndarray]:
     return source.data
 
 
-def page(*sections) -> str:
-    return html(Page(FirstScreen("title", "", ("", False), (), (), ()), sections))
-
-
 def test_the_cell_of_the_largest_difference_stands_first_with_the_joints_to_drive_to():
     section = section_of(made_up())
-    listed = block(section, Table)
+    listed = listed_in(section)
     assert len(listed.rows) == 10
     assert listed.rows[0][1:5] == ("1250", "50", "0.900", "1.100")
     assert "10.0,\u00a020.0,\u00a030.0" in listed.rows[0][-1]
-    assert data_of(block(section, Picture))["position"][listed.picks[0]] == pytest.approx(0.9)
+    assert data_of(section.pictures[0])["position"][listed.picks[0]] == pytest.approx(0.9)
     assert listed.choices[0] == (("Slice", listed.rows[0][0]), ("Quantity", "position"))
 
 
@@ -80,14 +82,14 @@ def test_a_button_chooses_what_the_controls_of_the_picture_have():
     section = section_of(made_up())
     labels = {
         control.label: {option.label for option in control.options}
-        for control in block(section, Picture).controls
+        for control in section.pictures[0].controls
     }
-    for chosen in block(section, Table).choices:
+    for chosen in listed_in(section).choices:
         assert all(option in labels[control] for control, option in chosen)
 
 
 def test_controls_set_only_what_is_in_the_picture():
-    picture = block(section_of(made_up()), Picture)
+    picture = section_of(made_up()).pictures[0]
     there = {each.name: each for each in picture.plot.references() if each.name}
     for control in picture.controls:
         for option in control.options:
@@ -97,16 +99,18 @@ def test_controls_set_only_what_is_in_the_picture():
 
 def test_it_is_said_to_be_about_models_and_not_about_the_robot():
     section = section_of(made_up())
-    assert "nothing is an error of the robot itself" in section.population
-    assert "12 cells" in section.population
-    assert "no bound" in section.judged
+    assert "nothing is an error of the robot itself" in read(section).population
+    assert "12 cells" in read(section).population
+    assert "no bound" in read(section).judged
 
 
 def test_cells_that_no_pose_reaches_are_told_apart_from_cells_without_difference():
     table = made_up()
     table["extrapolating"][UNREACHED] = 4
-    picture = block(section_of(table), Picture)
-    assert "no pose reached (1 of 12 cells, in 1 of them only at joints beyond" in picture.caption
+    picture = section_of(table).pictures[0]
+    assert "no pose reached (1 of 12 cells, in 1 of them only at joints beyond" in caption_of(
+        section_of(table)
+    )
     data = data_of(picture)
     assert np.flatnonzero(data["some"] == 0).tolist() == [UNREACHED]
     looks = [getattr(each.glyph, "hatch_pattern", None) for each in picture.plot.renderers]
@@ -115,20 +119,20 @@ def test_cells_that_no_pose_reaches_are_told_apart_from_cells_without_difference
 
 def test_the_largest_of_every_slice_is_marked_and_an_unreached_slice_has_none():
     table = made_up()
-    data = data_of(block(section_of(table), Picture))
+    data = data_of(section_of(table).pictures[0])
     assert np.flatnonzero(data["top_position"]).tolist() == [4, LARGEST]
     assert np.flatnonzero(data["top_orientation"]).tolist() == [0, 6]
     unreached(table, list(range(6)))
-    data = data_of(block(section_of(table), Picture))
+    data = data_of(section_of(table).pictures[0])
     assert np.flatnonzero(data["top_position"]).tolist() == [LARGEST]
 
 
 def test_poses_that_are_only_partly_reached_are_said_to_be():
     table = made_up()
-    assert "white dot" not in block(section_of(table), Picture).caption
+    assert "white dot" not in caption_of(section_of(table))
     table["solutions"][0] = 9
-    picture = block(section_of(table), Picture)
-    assert "white dot" in picture.caption
+    picture = section_of(table).pictures[0]
+    assert "white dot" in caption_of(section_of(table))
     assert data_of(picture)["reached"][0] == pytest.approx(50.0)
 
 
@@ -136,22 +140,22 @@ def test_a_space_out_of_reach_is_said_to_be_and_nothing_is_listed():
     table = made_up()
     unreached(table, list(range(12)))
     section = section_of(table)
-    assert "out of the robot's reach" in block(section, Text).words
-    assert "no pose reached (12 of 12 cells)" in block(section, Picture).caption
+    assert "out of the robot's reach" in read(section).paragraphs[0]
+    assert "no pose reached (12 of 12 cells)" in caption_of(section)
 
 
 def test_a_single_cell_is_a_map():
     one = {name: values[:1] for name, values in made_up().items()}
     section = section_of(one)
-    assert len(block(section, Table).rows) == 1
-    assert data_of(block(section, Picture))["position"].tolist() == pytest.approx([0.1])
+    assert len(listed_in(section).rows) == 1
+    assert data_of(section.pictures[0])["position"].tolist() == pytest.approx([0.1])
 
 
 def test_a_map_made_before_joints_were_kept_is_shown_without_them():
     old = {name: values for name, values in made_up().items() if name[:1] != "q"}
     section = section_of(old)
-    assert block(section, Table).rows[0][3] == "0.900"
-    assert not [name for name in block(section, Picture).details if name[:1] == "q"]
+    assert listed_in(section).rows[0][3] == "0.900"
+    assert not [name for name in section.pictures[0].details if name[:1] == "q"]
 
 
 def test_of_more_cells_than_can_be_drawn_the_largest_are_kept():
@@ -170,8 +174,8 @@ def test_of_more_cells_than_can_be_drawn_the_largest_are_kept():
 def test_a_button_of_a_merged_cell_points_at_the_cell_it_is_in(monkeypatch):
     monkeypatch.setattr(map_cells.cells, "__defaults__", (4,))
     section = section_of(made_up())
-    picture, listed = block(section, Picture), block(section, Table)
-    assert "drawn as one" in picture.caption
+    picture, listed = section.pictures[0], listed_in(section)
+    assert "drawn as one" in caption_of(section)
     assert data_of(picture)["position"][listed.picks[0]] == pytest.approx(0.9)
 
 

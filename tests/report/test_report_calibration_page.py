@@ -2,7 +2,6 @@
 
 import numpy as np
 from made_up_results import (
-    as_page,
     check,
     covariance,
     everything,
@@ -11,6 +10,7 @@ from made_up_results import (
     pose_errors,
     robot,
 )
+from parsed import as_page
 
 from kinacc.report import data_check, identifiability, residuals
 

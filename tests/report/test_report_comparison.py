@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from parsed import read
 
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.cli import comparison_report
@@ -20,7 +21,6 @@ from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.comparison import comparison_page
-from kinacc.report.page import Picture, Table
 
 STD = 0.02  # mm and mrad
 
@@ -62,9 +62,9 @@ def bent():
 
 def test_an_arm_that_changed_is_said_to_with_the_joint_and_against_chance(bent):
     assert bent.first.badge == ("CHANGED", True)
-    assert "From March to November, the modelled poses moved by" in bent.first.answers[0]
-    assert "by chance alone" in bent.first.answers[0]
-    assert "the arm itself" in bent.first.answers[1]
+    assert bent.first.answers[0].startswith("The arm has changed")
+    plain, apart = ([float(each) for each in row[1:]] for row in bent.first.tables[0].rows)
+    assert plain[0] > apart[0] > 2 * apart[1] > 0.0  # rms, and rms by chance
     assert note(bent, "PARAMETERS").startswith(
         "Changed the most: j3.alpha by +1 mrad (35.4 standard"
     )
@@ -82,7 +82,6 @@ def test_a_base_that_moved_is_not_taken_for_the_arm():
     stands, stays = built.first.tables[0].rows
     assert float(stands[1]) > 0.5
     assert float(stays[1]) < 1e-6
-    assert "little of it is the arm itself" in built.first.answers[1]
 
 
 def test_a_change_at_poses_of_one_alone_that_the_model_may_lack_is_in_doubt():
@@ -115,7 +114,7 @@ def test_terminal_page_and_json_call_no_arm_changed_that_was_measured_elsewhere(
         told, facts = in_words(found, both, measured), comparison_report.answer(
             found, both, measured).facts  # fmt: skip
         built = comparison_page(found, both, q_rad, measured)
-        text = " ".join(built.first.answers)
+        text = " ".join(built.first.answers).lower()
         assert facts["verdict"] == said
         assert built.first.badge == (said.upper(), True)
         for each in (told, text):
@@ -153,8 +152,8 @@ def test_models_without_parameters_are_not_compared_where_one_was_never_measured
 def test_a_robot_that_was_never_fitted_gives_distances_and_no_verdict():
     built = paged(arm(j2_a_mm=0.5), arm("ur10.yaml", fitted=False))
     assert built.first.badge == ("CHANCE NOT KNOWN", False)
-    assert "There is no verdict on a change: how sure ur10.yaml is" in built.first.answers[-1]
-    assert not any(isinstance(each, Picture) for each in built.sections[-1].blocks)
+    assert "the uncertainty of ur10.yaml is not known" in built.first.answers[-1]
+    assert not built.sections[-1].pictures
 
 
 def test_the_same_readings_and_other_robots_are_no_change():
@@ -168,18 +167,18 @@ def test_the_same_readings_and_other_robots_are_no_change():
 
 
 def test_what_the_poses_leave_open_is_not_counted(bent):
-    table = next(each for each in bent.sections[-1].blocks if isinstance(each, Table))
+    table = read(bent.sections[-1]).tables[0]
     row = next(each for each in table.rows if each[0] == "j1.d")
-    assert row[6:] == ("-", "undetermined in both")
-    bars = next(each for each in bent.sections[-1].blocks if isinstance(each, Picture))
+    assert row[6:] == ("–", "undetermined in both")
+    bars = bent.sections[-1].pictures[0]
     data = bars.plot.select({"name": "parameters"})[0].data
     assert data["said"][[*data["called"]].index("j1.d")] == "no standard deviation"
 
 
 def test_the_poses_that_moved_the_most_are_those_of_the_picture(bent):
     where = next(each for each in bent.sections if each.key == "where")
-    table = next(each for each in where.blocks if isinstance(each, Table))
-    picture = next(each for each in where.blocks if isinstance(each, Picture))
+    table = read(where).tables[0]
+    picture = where.pictures[0]
     data = picture.plot.renderers[0].data_source.data
     assert [data["number"][pick] for pick in table.picks] == [int(row[0]) for row in table.rows]
     assert float(table.rows[0][2]) == pytest.approx(max(data["apart_mm"]), abs=5e-4)

@@ -15,6 +15,7 @@ from made_up_results import (
     table,
     words,
 )
+from parsed import read
 
 from kinacc.report import data_check
 
@@ -37,7 +38,7 @@ def test_a_synthetic_arm_has_no_file_to_check():
     tables["measurements"]["row"][:] = np.nan
     found = data_check.section(tables, robot())
     assert "no measured file to check" in words(found)
-    assert "of a synthetic arm" in found.population
+    assert "of a synthetic arm" in read(found).population
 
 
 def test_findings_stand_the_gravest_first_with_what_to_do_and_why_they_were_accepted():
@@ -47,7 +48,7 @@ def test_findings_stand_the_gravest_first_with_what_to_do_and_why_they_were_acce
         ("outliers", "warning", "1 row is off", "line 3", None, None, 1),
         ("left_out", "note", "column temp is not read", None, None, None, 0),
     )
-    found = table(section(data_check=told), "What the check found: 3 findings")
+    found = table(section(data_check=told), "Findings of the check: 3 findings")
     assert [row[0] for row in found.rows] == ["stops", "warning", "note"]
     assert found.rows[0] == (
         *("stops", "base_jump", "the base moved", "lines 9-12", "say so"),
@@ -60,7 +61,7 @@ def test_findings_stand_the_gravest_first_with_what_to_do_and_why_they_were_acce
 
 def test_nobody_accepted_anything_and_no_column_says_so():
     told = check(("outliers", "warning", "1 row is off", "line 3", None, None, 1))
-    assert len(table(section(data_check=told), "What the check found").heads) == 5
+    assert len(table(section(data_check=told), "Findings of the check").heads) == 5
 
 
 def test_rows_left_out_are_told_with_their_reason_and_the_selected_models_error():
@@ -104,14 +105,14 @@ def test_nothing_measured_twice_shows_no_noise_and_a_file_may_state_some():
     told = measured(section(measurements=readings))
     assert told["noise of a reading"].startswith("unknown")
     stated = told["noise as the file states it"]
-    assert stated == "standard deviation x 0.02, y 0.03, z 0.03 mm (the middle one of 1 reading)"
+    assert stated == "standard deviation x 0.02, y 0.03, z 0.03 mm (median of 1 reading)"
 
 
 def test_positions_only_say_that_the_turn_of_the_tool_is_judged_nowhere():
     readings = measurements([[0.0] * 4, [0.1] * 4])
     for part in "wxyz":
         readings[f"q{part}"][:] = np.nan
-    assert "judged nowhere" in measured(section(measurements=readings))["orientation"]
+    assert "not measured" in measured(section(measurements=readings))["orientation"]
     readings["qw"][0] = 1.0
     told = measured(section(measurements=readings))["orientation"]
     assert told == "measured in 1 of 2 readings"
@@ -156,4 +157,4 @@ def test_a_joint_beyond_its_limits_is_drawn_beyond_its_frame():
 
 def test_one_row_is_enough_for_a_section():
     found = section(measurements=measurements([[0.0] * 4]), pose_errors=pose_errors(rows=1))
-    assert found.population.startswith("1 reading of 1 target at 1 pose of a measured arm")
+    assert read(found).population.startswith("1 reading of 1 target at 1 pose of a measured arm")

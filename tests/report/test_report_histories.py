@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import made_up_study as made_up
 import numpy as np
+from parsed import Shown, as_page, read
 
 from kinacc.kinematics import robot
 from kinacc.report import histories
-from kinacc.report.page import FirstScreen, Page, Picture, Section, Table, html
+from kinacc.report.page import Part, Picture
 
 ARM = robot.load("mh180")
 
 
-def section_of(**changed) -> Section:
+def section_of(**changed) -> Part:
     return histories.section({**made_up.points(), **made_up.histories(**changed)}, ARM)
 
 
-def tables_of(section: Section) -> list[Table]:
-    return [each for each in section.blocks if isinstance(each, Table)]
+def tables_of(section: Part) -> tuple[Shown, ...]:
+    return read(section).tables
 
 
-def pictures_of(section: Section) -> list[Picture]:
-    return [each for each in section.blocks if isinstance(each, Picture)]
+def pictures_of(section: Part) -> tuple[Picture, ...]:
+    return section.pictures
 
 
 def data_of(picture: Picture) -> dict[str, np.ndarray]:
@@ -91,7 +92,6 @@ def test_rows_in_any_order_make_the_same_pictures():
 
 
 def test_the_page_is_the_same_twice_and_takes_no_markup_from_a_table():
-    first = FirstScreen("title", "", ("", False), (), (), ())
-    one, other = (html(Page(first, (section_of(rule_met=np.zeros(10)),))) for _ in range(2))
+    one, other = (as_page(section_of(rule_met=np.zeros(10))) for _ in range(2))
     assert one == other
     assert "<b>simulation</b>" not in one

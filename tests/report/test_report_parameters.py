@@ -18,6 +18,7 @@ from made_up_results import (
     table,
     vec_model,
 )
+from parsed import read
 
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import PARAMETERS, DHModel, forward
@@ -150,9 +151,9 @@ def test_the_band_is_of_what_is_shown():
 
 
 def test_results_without_a_covariance_show_curves_without_bands():
-    found = picture(section(), "curves-eps")
-    assert "not known" in found.caption
-    assert not found.plot.select({"type": VArea})
+    found = section()
+    assert "not known" in read(found).captions["curves-eps"]
+    assert not picture(found, "curves-eps").plot.select({"type": VArea})
 
 
 def test_the_control_of_joints_sets_what_is_there():
@@ -186,5 +187,5 @@ def test_backlash_and_bending_stand_in_tables_where_they_were_fitted():
     assert table(found, "Joints that bend").rows == (
         ("joint 2", "2", "not determined", "urad per N m"),
     )
-    plain = [getattr(block, "caption", "") for block in section().blocks]
+    plain = [each.caption for each in read(section()).tables]
     assert not any(each.startswith(("Offsets", "Joints that bend")) for each in plain)

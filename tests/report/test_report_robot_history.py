@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from made_up_history import history
+from parsed import as_page, read
 
 from kinacc.deployment.history_words import first_words
 from kinacc.kinematics import robot
 from kinacc.report import robot_history
-from kinacc.report.page import FirstScreen, Page, Picture, Table, Text, html
 
 ARM = robot.load("mh180")
 
@@ -19,31 +19,31 @@ def section_of(table):
 
 def test_every_line_has_a_row_with_its_verdict_first():
     found = section_of(history(6, changed=3, open_=4))
-    (table,) = (each for each in found.blocks if isinstance(each, Table))
+    (table,) = read(found).tables
     assert [row[:3] for row in table.rows[2:5]] == [
-        ("2026-03-16", "holds", ""),
+        ("2026-03-16", "holds", "–"),
         ("2026-04-15", "recalibrate", "4"),
-        ("2026-05-15", "cannot be told", ""),
+        ("2026-05-15", "cannot be told", "–"),
     ]
     assert table.marked == {4: "too few poses"}
 
 
 def test_pictures_show_each_line_and_say_what_it_means():
     found = section_of(history(6, changed=3))
-    errors, moved = (each for each in found.blocks if isinstance(each, Picture))
+    errors, moved = found.pictures
     assert errors.plot.x_range is moved.plot.x_range
     (data,) = {each.data_source for each in moved.plot.renderers if each.data_source.name}
     np.testing.assert_allclose(data.data["moved_mm"][3], 0.45, rtol=1e-6)
     assert data.data["joint_said"][3] == "joint 4"
-    page = html(Page(FirstScreen("a", "b", ("c", False), ("d",), (), ()), (found,)))
+    page = as_page(found)
     assert "Recalibrate: 0.30 mm beyond chance, joint 4" not in page  # the last line still holds
     assert "The last calibration still holds, that of 2026-04-15" in page
 
 
 def test_a_first_line_has_nothing_to_be_held_to():
     found = section_of(history(1))
-    assert sum(isinstance(each, Picture) for each in found.blocks) == 1
-    (words,) = (each.words for each in found.blocks if isinstance(each, Text))
+    assert len(found.pictures) == 1
+    (words,) = read(found).paragraphs
     assert words.startswith("The first line of its series")
 
 

@@ -13,6 +13,7 @@ from made_up_results import (
     table,
     words,
 )
+from parsed import read
 
 from kinacc.calibration import summary
 from kinacc.report import selection as page_section
@@ -45,7 +46,7 @@ def test_the_selected_model_is_marked_and_its_gain_stands_in_standard_errors():
     )
     assert told.marked == {1: "selected"}
     assert "VEC is selected: on held-out poses" in words(found)
-    assert found.population.startswith("position errors at 40 configurations")
+    assert read(found).population.startswith("position errors at 40 configurations")
 
 
 def test_a_gain_within_its_errors_leaves_dh_selected_and_says_so():
@@ -58,7 +59,7 @@ def test_nothing_held_out_says_that_there_is_nothing_to_judge_by():
     found = section(
         model_selection=selection(np.nan, np.nan, "dh"), pose_errors=pose_errors("train")
     )
-    assert found.population.startswith("no pose was held out")
+    assert read(found).population.startswith("no pose was held out")
     assert "no pose was held out to judge VEC by" in words(found)
     assert table(found, "Models at held-out poses").rows[1][2:] == ("–",) * 5
 
@@ -71,7 +72,7 @@ def test_a_model_no_nearer_than_nominal_is_warned_about():
 def test_a_stated_order_is_said_to_be_stated_and_has_no_picture():
     found = section()
     assert "2, is stated and no other was tried" in words(found)
-    assert not [block for block in found.blocks if getattr(block, "key", "")]
+    assert not found.pictures
 
 
 def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
@@ -80,7 +81,7 @@ def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
     columns = data(shown)
     assert list(columns["order"]) == [0, 2, 4]  # of the choice that has seen all rows
     assert [each > 0 for each in columns["chosen"]] == [False, True, False]
-    assert "Lowest at order 4, chosen: 2" in shown.described
+    assert "Lowest at order 4, chosen: 2" in read(found).described["orders"]
     assert set_nothing_that_is_not_there(shown)
     tried = table(found, "Orders tried")
     assert tried.rows[1] == ("2", "0.3", "0.4", "0.7", "0.3100", "0.00600", "0.00700")
@@ -92,7 +93,7 @@ def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
 
 def test_choices_for_folds_alone_stand_in_the_table():
     found = section(vec_orders=orders(*TRIED[3:]))
-    assert not [block for block in found.blocks if getattr(block, "key", "")]
+    assert not found.pictures
     assert table(found, "Orders chosen").rows[0][0] == "without fold 0"
 
 

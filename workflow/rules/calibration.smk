@@ -74,8 +74,6 @@ rule fit_vec:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
-    resources:
-        mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values(
             "robot",
@@ -110,8 +108,6 @@ rule fit_compliance:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
-    resources:
-        mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values(
             "robot",
@@ -186,8 +182,6 @@ rule residuals:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
-    resources:
-        mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values("robot", "calibration"),
         files=content(),
@@ -273,8 +267,6 @@ rule history:
         "results/{dataset}/logs/history.log",
     conda:
         "../envs/kinacc.yaml"
-    resources:
-        mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values("seed", "series", "calibration", "tolerance.mm"),
         seed=seed,

@@ -79,8 +79,6 @@ rule report:
         "data_set"
     conda:
         "../envs/kinacc.yaml"
-    resources:
-        mem_mb=lambda w, attempt: 1000 * attempt,
     params:
         settings=values(),
         seed=seed,

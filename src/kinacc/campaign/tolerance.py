@@ -10,7 +10,6 @@ from kinacc.calibration.summary import LARGE_SHARE, Tolerance
 from kinacc.campaign import words
 
 BOUND, MEAN = "bound", "mean"
-NONE_SET = "Tolerance: none set."
 OF_CONFIGURATION, OF_CAMPAIGN = "the configuration's", "the campaign's"
 OF_BOTH = f"{OF_CONFIGURATION} and {OF_CAMPAIGN}"
 _FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all

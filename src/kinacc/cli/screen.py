@@ -1,26 +1,23 @@
-"""Text for a terminal of any width, with and without colours: words and tables, by rich."""
+"""Text for a terminal of any width, with and without colours: words by rich, and tables."""
 
 from __future__ import annotations
 
 import re
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import zip_longest
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.console import Console, Group, RenderableType
-from rich.table import Table
+from rich.console import Console
 from rich.text import Text
 
 from kinacc.cli.output import plain
 from kinacc.cli.sheet import Field, Sheet
 
 _GAP = 2
-_FLEXIBLE = 24  # a column of longer texts may be made as narrow as this
-_NARROWEST = 12  # or any text as narrow as this, names broken, where that spares every column
+_NARROWEST = 12  # characters of a text that is broken
 _LONGEST_NAME, _LONGEST_TEXT = 40, 300
-_HEADINGS = (40, 16, 13, 10, 8, 0)  # characters before one is broken, as far as there is room
 _DIGITS_OF_LARGEST, _DIGITS_OF_TYPICAL = 5, 3
 _MOST_DECIMALS = 7
 _NUMERICAL_ZERO = 1e-9  # of the largest in its column
@@ -28,50 +25,35 @@ _DECIMALS = {"mm": 3}  # at least, where there are that many: what instruments r
 _BEYOND = 1e15  # nobody counts so many digits
 _MIXED = 1e3  # from the smallest to the largest number of a column that has several units
 _NONE = "-"
-_MANY = 200
 
 
 @dataclass(frozen=True)
-class _Shown:
-    """A column as it is printed: name, heading on its lines, cells.
-
-    ``folds``: a text is told on several lines, names too, broken after underscores.
-    """
+class _Column:
+    """A column as it is printed. Headings and texts are broken at spaces and underscores."""
 
     name: str
-    heading: tuple[str, ...]
+    heading: str
     cells: tuple[str, ...]
     is_text: bool
-    folds: bool = False
 
     @property
     def natural(self) -> int:
-        """Characters of the widest line."""
-        return max(map(len, (*self.heading, *self.cells)))
+        """Characters of the longest cell or of the heading."""
+        return max(map(len, (self.heading, *self.cells)))
 
     @property
     def is_long(self) -> bool:
-        """Whether it is a text that may be told on several lines: no name, but words."""
-        words = self.natural > _LONGEST_NAME or any(" " in each for each in self.cells)
-        return self.natural > _FLEXIBLE and self.is_text and words
+        """Whether its texts are sentences, which give way to other columns."""
+        return self.is_text and max(map(len, self.cells)) > _LONGEST_NAME
 
-    @property
-    def least(self) -> int:
+    def least(self, breaks_names: bool) -> int:
         """Characters it cannot do without."""
-        if self.folds and self.is_text:
-            words = (word for each in self.cells for word in _parts(each))
-            return min(self.natural, max(_NARROWEST, *map(len, (*self.heading, *words))))
-        return max(_FLEXIBLE, *map(len, self.heading)) if self.is_long else self.natural
-
-    def broken(self, width: int = 0) -> _Shown:
-        """With a heading on as many lines as it takes not to be wider than its cells, or this."""
-        heading = _broken(" ".join(self.heading), max(width, *map(len, self.cells)))
-        return replace(self, heading=heading)
-
-    def cell(self, row: int, width: int) -> Text:
-        """What stands in a row, on its lines."""
-        lines = _broken(self.cells[row], width) if self.folds else (self.cells[row],)
-        return Text("\n".join(lines))
+        if self.is_text and not self.is_long and not breaks_names:
+            return max(map(len, (*_parts(self.heading), *self.cells)))
+        broken = (self.heading, *self.cells) if self.is_text else (self.heading,)
+        parts = [len(part) for text in broken for part in _parts(text)]
+        whole = [_NARROWEST] if self.is_text else [*map(len, self.cells)]
+        return min(self.natural, max(*parts, *whole))
 
 
 @dataclass
@@ -79,7 +61,7 @@ class Screen:
     """What is to be printed, for the terminal that is there."""
 
     console: Console
-    parts: list[RenderableType] = field(default_factory=list)
+    parts: list[Text] = field(default_factory=list)
 
     @classmethod
     def here(cls) -> Screen:
@@ -119,26 +101,39 @@ class Screen:
         fields = [each for each in sheet.fields if each.on_screen]
         if hoist:
             fields = self._hoisted(fields)
-        if rows is None or count <= rows:
-            head, tail = count, count
-        else:
-            head, tail = rows - rows // 3, count - rows // 3
-        places = [*range(head), *range(tail, count)]
-        shown = [_shown(each, places) for each in fields]
-        kept = _that_fit(shown, self.width)
-        widths = _widths(kept, self.width)
-        self.parts.append(_table(kept, widths, range(head), True))
+        head = count if rows is None or count <= rows else rows - rows // 3
+        tail = count if head == count else count - (rows or 0) // 3
+        columns = [_column(each, [*range(head), *range(tail, count)]) for each in fields]
+        kept, widths = _that_fit(columns, self.width)
+        self.parts.append(Text("\n".join(_heading(kept, widths)), "bold", no_wrap=True))
+        rule = "-" if self.console.options.ascii_only else "─"
+        self.parts.append(Text(rule * (sum(widths) + _GAP * (len(widths) - 1)), "dim"))
+        self._rows(kept, widths, range(head))
         if head < count:
             self.words(f".. {tail - head:,} more rows (--rows all) ..", "dim")
-            if tail < count:
-                self.parts.append(_table(kept, widths, range(head, len(places)), False))
-        names = {each.name for each in kept}
-        if left_out := [each.name for each in shown if each.name not in names]:
+            self._rows(kept, widths, range(head, head + count - tail))
+        if left_out := [each.name for each in columns if each not in kept]:
             self.words(
                 f"{self.width} characters are too narrow for {', '.join(left_out)}: "
                 f"{option.format(left_out[0])}",
                 "dim",
             )
+
+    def _rows(self, columns: Sequence[_Column], widths: Sequence[int], rows: range) -> None:
+        lines = [
+            line
+            for row in rows
+            for line in _lines(
+                [
+                    _broken(each.cells[row], width)
+                    for each, width in zip(columns, widths, strict=True)
+                ],
+                columns,
+                widths,
+            )
+        ]
+        if lines:
+            self.parts.append(Text("\n".join(lines), no_wrap=True))
 
     def record(self, sheet: Sheet) -> None:
         """A sheet of one row, a line per column."""
@@ -239,108 +234,79 @@ def _alike(values: np.ndarray) -> bool:
     return all(plain(value) == first for value in values)
 
 
-def _shown(column: Field, places: Sequence[int]) -> _Shown:
+def _column(column: Field, places: Sequence[int]) -> _Column:
     cells = tuple(
         each if len(each) <= _LONGEST_TEXT else f"{each[:_LONGEST_TEXT]} .."
         for each in (" ".join(each.split("\n")) for each in _cells(column, places))
     )
     is_text = any(isinstance(column.values[place], str) for place in places)
-    return _Shown(column.name, (column.heading,), cells, is_text)
-
-
-def _broken(name: str, width: int) -> tuple[str, ...]:
-    """A name or text on lines no longer than ``width``, if it can be broken after underscores."""
-    parts = _parts(name)
-    width = max([width, *map(len, parts)])
-    lines = [""]
-    for part in parts:
-        if len(lines[-1]) + len(part) > width:
-            lines.append("")
-        lines[-1] += part if part != " " or lines[-1] else ""
-    return tuple(line.rstrip() for line in lines)
+    return _Column(column.name, column.heading, cells, is_text)
 
 
 def _parts(name: str) -> list[str]:
     """What stays together when a name or a text is broken."""
-    return re.findall(r"[^_ ]+_?|_| ", name)
+    return re.findall(r"[^_ ]{1,40}_?|_| ", name) or [""]
 
 
-def _that_fit(columns: Sequence[_Shown], width: int) -> list[_Shown]:
-    """The columns that stand beside each other, one at least, headings broken where that helps.
+def _broken(name: str, width: int) -> list[str]:
+    """A name or text on lines no longer than ``width``, if it can be broken so."""
+    if len(name) <= width:
+        return [name]
+    lines = [""]
+    for part in _parts(name):
+        if lines[-1] and len(lines[-1]) + len(part) > width:
+            lines.append("")
+        lines[-1] += part if part != " " or lines[-1] else ""
+    return [line.rstrip() for line in lines]
 
-    Where all of them stand if names and short texts are folded too, they are. Else long texts give
-    way to the others; of each the first ones are taken.
+
+def _that_fit(columns: Sequence[_Column], width: int) -> tuple[list[_Column], list[int]]:
+    """The first columns that stand beside each other, one at least, and their widths.
+
+    Names are broken where all columns stand then; else sentences give way to other columns.
     """
-    if _sum(columns) <= width:
-        return list(columns)
-    broken = [each.broken() for each in columns]
-    taken: list[int] = []
-    for of_long in (False, True):
-        for i, each in enumerate(broken):
-            if each.is_long != of_long:
-                continue
-            if taken and _sum([broken[j] for j in (*taken, i)]) > width:
-                break
-            taken.append(i)
-    if len(taken) < len(columns) and len(columns[0].cells) <= _MANY:
-        folded = [replace(each, folds=True).broken() for each in columns]
-        if _sum(folded) <= width:
-            return folded
-    taken.sort()
-    for longest in _HEADINGS:
-        kept = [columns[i].broken(longest) for i in taken]
-        if _sum(kept) <= width:
+    every = [each.least(True) for each in columns]
+    if sum(every) + _GAP * (len(every) - 1) <= width:
+        whole = [each.least(False) for each in columns]
+        fits = sum(whole) + _GAP * (len(whole) - 1) <= width
+        return list(columns), _widened(columns, whole if fits else every, width)
+    taken: dict[int, int] = {}
+    for place in sorted(range(len(columns)), key=lambda place: columns[place].is_long):
+        needs = columns[place].least(False)
+        if taken and sum(taken.values()) + needs + _GAP * len(taken) > width:
             break
-    return kept
+        taken[place] = needs
+    kept = [columns[place] for place in sorted(taken)]
+    return kept, _widened(kept, [taken[place] for place in sorted(taken)], width)
 
 
-def _sum(columns: Sequence[_Shown]) -> int:
-    return sum(each.least + _GAP for each in columns) - _GAP
-
-
-def _widths(columns: Sequence[_Shown], width: int) -> list[int]:
-    """Widths of columns: what is left over goes to the longest texts, the shorter ones first."""
-    widths = [each.least for each in columns]
+def _widened(columns: Sequence[_Column], least: Sequence[int], width: int) -> list[int]:
+    """Widths of columns: what is left over goes to the narrower ones first."""
+    widths = list(least)
     left = width - sum(widths) - _GAP * (len(columns) - 1)
     wanting = [i for i, each in enumerate(columns) if each.natural > widths[i]]
     for rank, i in enumerate(sorted(wanting, key=lambda i: columns[i].natural)):
-        more = min(columns[i].natural - widths[i], left // (len(wanting) - rank))
+        more = max(0, min(columns[i].natural - widths[i], left // (len(wanting) - rank)))
         widths[i] += more
         left -= more
     return widths
 
 
-def _table(
-    columns: Sequence[_Shown], widths: Sequence[int], rows: Sequence[int], headed: bool
-) -> RenderableType:
-    """Rows of columns; many by themselves, where no text is wrapped: rich takes 0.5 ms for each."""
-    table = Table(
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        show_header=headed,
-        pad_edge=False,
-        padding=(0, _GAP - 1, 0, 0),
-        header_style="bold",
-        border_style="dim",
-    )
-    height = max(len(each.heading) for each in columns)
-    for each, width in zip(columns, widths, strict=True):
-        blank = [""] * (height - len(each.heading))
-        table.add_column(
-            Text("\n".join([*blank, *each.heading])),
-            width=width,
-            justify="left" if each.is_text else "right",
-            overflow="fold",
+def _heading(columns: Sequence[_Column], widths: Sequence[int]) -> list[str]:
+    """Lines of the headings, which end on the last."""
+    broken = [_broken(each.heading, width) for each, width in zip(columns, widths, strict=True)]
+    height = max(map(len, broken))
+    return _lines([[""] * (height - len(each)) + each for each in broken], columns, widths)
+
+
+def _lines(
+    cells: Sequence[Sequence[str]], columns: Sequence[_Column], widths: Sequence[int]
+) -> list[str]:
+    """Lines of cells beside each other: texts at the left of their column, numbers at the right."""
+    return [
+        (" " * _GAP).join(
+            part.ljust(width) if each.is_text else part.rjust(width)
+            for part, each, width in zip(parts, columns, widths, strict=True)
         )
-    if len(rows) > _MANY and not any(each.is_long for each in columns):
-        lines = [
-            (" " * _GAP).join(
-                each.cells[row].ljust(width) if each.is_text else each.cells[row].rjust(width)
-                for each, width in zip(columns, widths, strict=True)
-            )
-            for row in rows
-        ]
-        return Group(table, *lines)
-    for row in rows:
-        table.add_row(*(e.cell(row, width) for e, width in zip(columns, widths, strict=True)))
-    return table
+        for parts in zip_longest(*cells, fillvalue="")
+    ]

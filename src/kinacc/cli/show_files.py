@@ -7,13 +7,18 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinacc.artifacts import assessment_tables, store
+from kinacc.artifacts import assessment_tables, store, sums
 from kinacc.artifacts.columns import texts
 from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.campaign.journal import PLAN
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, first_few
+
+_CALIBRATED = {
+    *("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors"),
+    *("model_selection", "summary"),
+}
 
 
 @dataclass(frozen=True)
@@ -112,10 +117,18 @@ def _of_tables(folder: Path, names: list[str]) -> Listing:
         ],
     )
     below = [f"{_typed('show', folder, names[0])} shows one; --describe says what its columns mean"]
+    if _of_dataset(folder) and (missing := _missing(folder, names)):
+        below.insert(0, f"missing: {', '.join(missing)} ({_command(missing[0])})")
     pictures = sorted({each.stem for each in (folder / "figures").glob("*.*")})
     if pictures:
         below.insert(0, f"figures/: {', '.join(pictures)}")
     return Listing(sheet, tuple(below))
+
+
+def _missing(folder: Path, names: list[str]) -> list[str]:
+    """Tables that every calibration leaves, or that a stage left here, and that are gone."""
+    left = {Path(name).stem for name in sums.stated(folder) if name.endswith(".parquet")}
+    return [name for name in ARTEFACTS if name in left | _CALIBRATED and name not in names]
 
 
 def _of_folders(folder: Path, within: list[Path]) -> Listing:

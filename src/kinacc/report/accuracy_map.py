@@ -21,7 +21,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.map_cells import Cells, cells, largest_of
-from kinacc.report.page import Control, Option, Picture, Section, Table, Text
+from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import GREY, VERMILION
 
 _KEY = "map"
@@ -43,39 +43,28 @@ _REACHED = _Quantity("reached", "share of poses reached", "%")
 _QUANTITIES = (_POSITION, _ORIENTATION, _REACHED)
 
 
-def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
+def section(tables: Mapping[str, Columns], robot: Robot) -> Part:
     """The section of a page on the cells of ``accuracy_map``."""
     table = tables["accuracy_map"]
     drawn = cells(table)
-    return Section(
-        _KEY,
-        "Accuracy map: where the models differ",
-        f"{_space(table)}; VEC minus DH in up to {int(table['wanted'].max())} poses a cell. Both "
-        "are models: nothing here is measured, and nothing is an error of the robot itself",
-        "By how much the tool of the VEC model is elsewhere than that of the DH model at the same "
-        "joints: in every cell the largest of all turns of the flange and all postures tried. It "
-        "is the error of a controller that uses the DH model, as far as the VEC model is right.",
-        "Good: small beside your tolerance, and even. Bad: bright cells where the robot works. "
-        "The map is no bound on the robot's error: only a campaign gives one.",
-        "Work where the difference is small, or let kinacc compensate correct the poses by the "
-        "VEC model. Where a bright cell matters, drive to the joints that it shows and measure.",
-        (_picture(table, drawn, robot), *_largest(table, drawn, robot)),
-    )
-
-
-def _space(table: Columns) -> str:
-    """The cells in words: how many, in which slices, over which radii and heights."""
-    slices = np.unique(table["slice_deg"])
-    shown = [f"{each:g}" for each in slices]
-    angles = ", ".join(shown) if len(shown) < 7 else f"{shown[0]} to {shown[-1]}"
-    spans = (
-        f"{name} {np.min(values):.0f} to {np.max(values):.0f} mm"
-        for name, values in (("radius", table["radius_mm"]), ("height", table["height_mm"]))
-    )
-    return (
-        f"{len(table['radius_mm'])} cells of the evaluation space, at {angles} deg, "
-        + ", ".join(spans)
-    )
+    none = np.asarray(table["solutions"]) == 0
+    values = {
+        "cells": len(none),
+        "slices": [_degrees(each) for each in np.unique(table["slice_deg"])],
+        "spans": {
+            name: (np.min(table[f"{name}_mm"]), np.max(table[f"{name}_mm"]))
+            for name in ("radius", "height")
+        },
+        "wanted": int(table["wanted"].max()),
+        "unreached": int(none.sum()),
+        "beyond": int((none & (np.asarray(table["extrapolating"]) > 0)).sum()),
+        "whole": bool((drawn.reached == 1).all()),
+        "partly": bool(((drawn.reached > 0) & (drawn.reached < 1)).any()),
+        "merged": drawn.merged,
+        "slides": any(robot.dh.prismatic),
+        "largest": _largest(table, drawn, robot),
+    }
+    return Part(_KEY, values, (_picture(table, drawn, robot),))
 
 
 def _degrees(angle: float) -> str:
@@ -161,18 +150,14 @@ def _picture(table: Columns, drawn: Cells, robot: Robot) -> Picture:
         )
         for each in _QUANTITIES
     )
-    caption = _caption(table, drawn)
-    largest = float(np.nanmax(table["position_max_mm"])) if drawn.reached.any() else np.nan
-    told = f"; the largest position difference is {largest:.3f} mm" if drawn.reached.any() else ""
     return Picture(
         _KEY,
         plot,
-        f"Map of the largest difference in every cell of a slice{told}. {caption}",
-        caption,
-        (Control("Slice", slices), Control("Quantity", quantities)),
-        _details(data, robot),
-        names,
-        "Select a cell to see its values, and the pose and joints of its largest difference.",
+        controls=(Control("Slice", slices), Control("Quantity", quantities)),
+        details=_details(data, robot),
+        names=names,
+        invitation="Select a cell to see its values, and the pose and joints of its largest "
+        "difference.",
     )
 
 
@@ -269,28 +254,6 @@ def _rings(
     return rings
 
 
-def _caption(table: Columns, drawn: Cells) -> str:
-    words = (
-        "Colours are on one scale over all slices; the ring is at the largest value of the slice. "
-    )
-    none = np.asarray(table["solutions"]) == 0
-    if none.any():
-        words += f"Hatched grey: no pose reached ({none.sum()} of {len(none)} cells"
-        beyond = none & (np.asarray(table["extrapolating"]) > 0)
-        if beyond.any():
-            words += f", in {beyond.sum()} of them only at joints beyond those measured"
-        words += "). "
-    elif (drawn.reached < 1).any():
-        words += "Some pose is reached in every cell. "
-    else:
-        words += "Every pose is reached in every cell. "
-    if ((drawn.reached > 0) & (drawn.reached < 1)).any():
-        words += "A white dot: some of its poses are not reached. "
-    if drawn.merged:
-        words += "Neighbouring cells are drawn as one, with the largest of their values. "
-    return words + "Radius and height are drawn at different scales."
-
-
 def _details(data: ColumnDataSource, robot: Robot) -> dict[str, str]:
     joints = {
         name: f"J{name[1:]} {{}} {'mm' if robot.dh.prismatic[int(name[1:]) - 1] else 'deg'}"
@@ -310,45 +273,22 @@ def _details(data: ColumnDataSource, robot: Robot) -> dict[str, str]:
     }
 
 
-def _largest(table: Columns, drawn: Cells, robot: Robot) -> tuple[Table | Text, ...]:
+def _largest(table: Columns, drawn: Cells, robot: Robot) -> list[dict]:
     """The cells of the largest position differences, to be shown in the picture."""
     size = np.asarray(table["position_max_mm"], dtype=float)
     order = np.argsort(np.where(np.isnan(size), np.inf, -size), kind="stable")
     order = order[: min(_LARGEST, int(np.isfinite(size).sum()))]
-    if not len(order):
-        return (Text("No cell is reached in any pose: the space lies out of the robot's reach."),)
-    slides = any(robot.dh.prismatic)
-    heads = (
-        *("slice", "radius, mm", "height, mm", "position, mm", "orientation, mrad"),
-        *("pose", "joints, deg" + (" or mm" if slides else "")),
-    )
-    rows = tuple(
-        (
-            _degrees(table["slice_deg"][row]),
-            f"{table['radius_mm'][row]:.0f}",
-            f"{table['height_mm'][row]:.0f}",
-            f"{size[row]:.3f}",
-            f"{table['orientation_max_mrad'][row]:.3f}",
-            _in_one_piece(", ", str(table["worst_branch"][row]).split(", ")),
-            _in_one_piece(",\u00a0", _worst_joints(table, row, robot)),
-        )
-        for row in order
-    )
-    caption = (
-        f"The {len(order)} cells of the largest position difference, with pose and joints of it. "
-        "A pose is the turn of the flange about its axes X, Y, Z (+, 0 or -), then the posture"
-    )
-    return (
-        Table(
-            caption,
-            heads,
-            rows,
-            frozenset({1, 2, 3, 4}),
-            picked_in=_KEY,
-            picks=tuple(int(drawn.of_row[row]) for row in order),
-            choices=tuple((("Slice", row[0]), ("Quantity", _POSITION.label)) for row in rows),
-        ),
-    )
+    return [
+        each
+        | {
+            "slice": _degrees(each["slice_deg"]),
+            "pose": _in_one_piece(", ", str(each["worst_branch"]).split(", ")),
+            "joints": _in_one_piece(",\u00a0", _worst_joints(table, row, robot)),
+            "pick": int(drawn.of_row[row]),
+            "choices": (("Slice", _degrees(each["slice_deg"])), ("Quantity", _POSITION.label)),
+        }
+        for row, each in zip(order, records(table, order), strict=True)
+    ]
 
 
 def _worst_joints(table: Columns, row: int, robot: Robot) -> list[str]:

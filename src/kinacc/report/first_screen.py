@@ -12,16 +12,9 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
-from kinacc.campaign.tolerance import NONE_SET
-from kinacc.report.page import ROBOT_ITSELF, FirstScreen, Table, Text, printed
+from kinacc.report.page import FirstScreen, Part, Text, printed
 
-_FIGURES = {
-    "mean": "mean",
-    "quantile_99": f"{LARGE_SHARE:.0%} are below",
-    "largest": "largest seen",
-}
 _OF_THE_PAPER = {"claims": "CLAIMS", "differ": "DIFFER"}
-_NO_CAMPAIGN = "Largest error of any pose: not assessed (no campaign); the largest seen is"
 _ACCEPTED = "; accepted: "  # in front of the reason, where a finding was accepted
 _FOR = {  # commands that follow, and what they are for
     "export": "files of the model for controllers and simulators:",
@@ -75,14 +68,39 @@ def screen(
     }
     if data["poses"].value == data["readings"].value:
         del about["readings"]
+    errors = of(facts, "held_out_error") or of(facts, "training_error")
+    rows = [_model(facts, model, known) for model, known in errors.items()]
+    best = next(each for each in rows if "remark" in each)
+    values = {
+        "rows": rows,
+        "best": best,
+        "nominal": next(each for each in rows if each["model"] == NOMINAL),
+        "held_out": bool(of(facts, "held_out_error")),
+        "fitted": bool(of(facts, "robot")["base and tool"]["fitted"].value),
+        "answers": answers,
+        "share": LARGE_SHARE,
+        "digits": _decimals([each["mean"] for each in rows]),
+        "digits_best": _decimals([best["mean"]]),
+        "digits_turned": _decimals([each["turned_mean"] for each in rows if "turned_mean" in each]),
+    }
     return FirstScreen(
         name if name == robot else f"{robot} “{name}”",
         ", ".join(about.values()),
         _badge(facts, synthetic),
-        tuple(_sentences(facts, answers)),
-        _errors(facts),
-        tuple(_notes(facts, remedies, answers)),
+        notes=tuple(_notes(facts, remedies, answers)),
+        answer=Part("first", values),
     )
+
+
+def _model(facts: Sequence[Fact], model: str, errors: Mapping[str, Fact]) -> dict:
+    """Errors of a model, held out where poses were; ``turned_`` those of orientation, mrad."""
+    row = {"model": model, "called": model_called(facts, model), "name": model_name(model)}
+    row |= {name: each.value for name, each in errors.items()}
+    if of(facts, "held_out_error"):
+        turned = of(facts, "held_out_orientation_error").get(model, {})
+        row |= {f"turned_{name}": each.value for name, each in turned.items()}
+    known = of(facts, "selection").get(model, {})
+    return row | ({"remark": "selected"} if known and known["selected"].value else {})
 
 
 def _badge(facts: Sequence[Fact], synthetic: bool) -> tuple[str, bool]:
@@ -99,81 +117,6 @@ def _badge(facts: Sequence[Fact], synthetic: bool) -> tuple[str, bool]:
     if not left:
         return f"DATA: {counted(len(doubts), 'problem')}, accepted", False
     return f"DATA: {counted(len(left), 'problem')}", True
-
-
-def _sentences(facts: Sequence[Fact], answers: Answers) -> list[str]:
-    """How good, of which poses that holds, and what is known of the largest error."""
-    chosen = of(facts, "selection")
-    best = next(model for model, known in chosen.items() if known["selected"].value)
-    held_out, trained = of(facts, "held_out_error"), of(facts, "training_error")
-    errors = held_out or trained
-    size = {key: errors[best][key].value for key in _FIGURES}
-    plain = errors[NOMINAL]["mean"].value
-    digits = _decimals([size["mean"]])
-    rows = counted(errors[best]["n"].value, "row")
-    whom = "measured poses that its fit had not seen" if held_out else "the poses it was fitted to"
-    fitted = of(facts, "robot")["base and tool"]["fitted"].value
-    placed = ", with the best base and tool," if fitted else ""
-    lines = [
-        f"The calibrated model ({model_name(best)}) misses {whom} by {size['mean']:.{digits}f} "
-        f"mm on average, {LARGE_SHARE:.0%} of them by less than {size['quantile_99']:.{digits}f} "
-        "mm.",
-        f"The arm as its maker describes it{placed} misses them by {plain:.{digits}f} mm on "
-        f"average. These are errors of models: {ROBOT_ITSELF}.",
-    ]
-    if held_out:
-        lines.append(
-            f"Observed on {rows}, each left out of the fit in turn; it says nothing of poses "
-            "elsewhere."
-        )
-    else:
-        lines.append("No pose was held out: errors at other poses are larger, and unknown.")
-    if answers.history:
-        lines.append(answers.history)
-    tolerance = [answers.tolerance] if answers.tolerance else []
-    if answers.campaign:
-        first, *others = answers.campaign
-        others.append(
-            f"That is about the campaign's own poses: among the {rows} up to "
-            f"{size['largest']:.{digits}f} mm was seen."
-        )
-        return [
-            *lines,
-            f"Largest error, by a campaign at poses of its own: {first}",
-            *others,
-            *tolerance,
-        ]
-    return [*lines, f"{_NO_CAMPAIGN} {size['largest']:.{digits}f} mm.", *(tolerance or [NONE_SET])]
-
-
-def _errors(facts: Sequence[Fact]) -> tuple[Table, ...]:
-    """Errors of every model at the same rows, position and, where measured, orientation."""
-    held_out = of(facts, "held_out_error")
-    errors = held_out or of(facts, "training_error")
-    turned = of(facts, "held_out_orientation_error") if held_out else {}
-    chosen = of(facts, "selection")
-    count = next(iter(errors.values()))["n"].value
-    where = "poses left out of the fit in turn" if held_out else "poses that were fitted"
-    heads = ["model", *(f"{words}, mm" for words in _FIGURES.values())]
-    heads += [f"{words}, mrad" for words in _FIGURES.values()] if turned else []
-    digits = _decimals([figures["mean"].value for figures in errors.values()])
-    turned_digits = _decimals([figures["mean"].value for figures in turned.values()])
-    rows, marked = [], {}
-    for number, (model, figures) in enumerate(errors.items()):
-        cells = [model_called(facts, model)]
-        cells += [f"{figures[key].value:.{digits}f}" for key in _FIGURES]
-        if turned:
-            known = turned.get(model, {})
-            cells += [
-                f"{known[key].value:.{turned_digits}f}" if key in known else "" for key in _FIGURES
-            ]
-        rows.append(tuple(cells))
-        if model in chosen and chosen[model]["selected"].value:
-            marked[number] = "selected"
-    caption = f"Error at {where}, the same {counted(count, 'row')} for every model"
-    if turned:
-        caption += "; position in mm, orientation in mrad"
-    return (Table(caption, tuple(heads), tuple(rows), frozenset(range(1, len(heads))), marked),)
 
 
 def _decimals(means: Sequence[float]) -> int:

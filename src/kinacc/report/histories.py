@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, GroupFilter
@@ -12,9 +11,9 @@ from bokeh.plotting import figure as BokehFigure
 from kinacc.artifacts.columns import Columns
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
-from kinacc.report.page import Control, Option, Picture, Section, Table
+from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, GREY, ORANGE, VERMILION
-from kinacc.report.study import Truth, truth
+from kinacc.report.study import TRUE, Truth, truth
 
 _CALLED = {
     "rejected": "Fig. 5: the bound is rejected",
@@ -34,78 +33,66 @@ _DETAILS = {
 }
 
 
-class _Example(NamedTuple):
-    """Rows (n,) of one example by iteration, and what is the same in all of them."""
-
-    name: str
-    rows: np.ndarray
-    eta_mm: float
-    alpha: float
-    noise_mm: float
-    simulation: int
-
-    @property
-    def called(self) -> str:
-        return _CALLED.get(self.name, self.name.replace("_", " "))
-
-
-def _examples(histories: Columns) -> list[_Example]:
-    there = list(dict.fromkeys(map(str, histories["example"])))
-    found = []
-    for name in sorted(there, key=lambda each: [*_CALLED, each].index(each)):
-        mine = np.flatnonzero(np.asarray(histories["example"]) == name)
-        mine = mine[np.argsort(histories["iteration"][mine], kind="stable")]
-        first = mine[0]
-        eta, alpha, noise = (float(histories[c][first]) for c in ("eta_mm", "alpha", "noise_mm"))
-        found.append(_Example(name, mine, eta, alpha, noise, int(histories["simulation"][first])))
-    return found
-
-
-def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
+def section(tables: Mapping[str, Columns], robot: Robot) -> Part:
     """The section of a page on ``histories``, whose truth is that of ``study.truth``."""
-    histories, held_to = tables["histories"], truth(tables)
-    examples = _examples(histories)
-    data = _data(histories, examples)
+    rows, held_to = records(tables["histories"]), truth(tables)
+    names = list(dict.fromkeys([*_CALLED, *(str(each["example"]) for each in rows)]))
+    rows.sort(key=lambda each: (names.index(each["example"]), each["iteration"]))
+    examples: dict[str, list[dict]] = {}
+    for number, row in enumerate(rows):
+        examples.setdefault(row["example"], []).append(row | {"pick": number})
+    called = {each: _CALLED.get(each, each.replace("_", " ")) for each in examples}
+    data = _data(rows, list(examples))
     shown = GroupFilter("example", 0, name=_SHOWN)
-    errors = _magnitudes(examples, data, shown, held_to)
-    starts = np.cumsum([0, *(len(each.rows) for each in examples[:-1])]).tolist()
-    first = examples[0]
-    return Section(
-        "histories",
-        "Model invalidation, reading by reading (Figs. 5 and 6)",
-        f"{len(examples)} simulations of the study, {len(first.rows)} readings each, noise "
-        f"{first.noise_mm:g} mm per axis; errors of the points: {held_to.what}",
-        "Model invalidation tests one bound on the largest error. It measures a new point while "
-        "the rejection probability is at most alpha, else the worst point again, whose readings "
-        "it averages. If the probability is above alpha at the end, the bound is rejected.",
-        "Good: a bound below the largest error is rejected, and the readings go to the points "
-        "beyond it. Bad: a bound that is too small is not rejected, because the worst point was "
-        "not reached or noise hid it.",
-        "Nothing is to be done: this is how the paper's method works. For a bound with a "
-        "confidence run a campaign (kinacc campaign start).",
-        (
-            errors,
-            _probability(data, shown, errors),
-            _outcomes(histories, examples, held_to),
-            *(_again(histories, *each) for each in zip(examples, starts, strict=True)),
-        ),
+    options = tuple(
+        Option(label, ((_SHOWN, "group", number),)) for number, label in enumerate(called.values())
     )
+    errors = _magnitudes(data, shown, held_to, Control("Example", options))
+    values = {
+        "truth": held_to,
+        "outcomes": [_outcome(called[name], each) for name, each in examples.items()],
+        "again": {called[name]: _again(each) for name, each in examples.items()},
+        "readings": len(next(iter(examples.values()))),
+        "noise_mm": rows[0]["noise_mm"],
+    }
+    return Part("histories", values, (errors, _probability(data, shown, errors)))
 
 
-def _data(histories: Columns, examples: list[_Example]) -> ColumnDataSource:
-    rows = np.concatenate([each.rows for each in examples])
-    number = np.repeat(np.arange(len(examples), dtype=np.int8), [len(e.rows) for e in examples])
-    columns: dict[str, np.ndarray] = {"example": number}
-    for name in ("iteration", "point", "repeat"):
-        columns[name] = np.asarray(histories[name])[rows].astype(np.int32)
-    for name in ("measured", "averaged", "true"):
-        columns[name] = np.asarray(histories[f"{name}_mm"])[rows]
-    columns["probability"] = np.asarray(histories["rejection_probability"])[rows]
-    columns["eta"] = np.asarray(histories["eta_mm"])[rows]
-    columns["alpha"] = np.asarray(histories["alpha"])[rows]
-    columns["again"] = (columns["repeat"] > 1).astype(np.int8)
-    columns["from"], columns["to"] = columns["iteration"] - 0.5, columns["iteration"] + 0.5
-    return pictures.source("histories", columns)
+def _data(rows: Sequence[Mapping], examples: Sequence[str]) -> ColumnDataSource:
+    columns = {name: np.array([each[name] for each in rows]) for name in rows[0]}
+    data = {"example": np.array([examples.index(each["example"]) for each in rows], np.int8)}
+    data |= {name: columns[name].astype(np.int32) for name in ("iteration", "point", "repeat")}
+    for name in ("measured", "averaged", "true", "eta"):
+        data[name] = columns[f"{name}_mm"]
+    data |= {"probability": columns["rejection_probability"], "alpha": columns["alpha"]}
+    data["again"] = (columns["repeat"] > 1).astype(np.int8)
+    data |= {"from": columns["iteration"] - 0.5, "to": columns["iteration"] + 0.5}
+    return pictures.source("histories", data)
+
+
+def _outcome(called: str, rows: Sequence[Mapping]) -> dict:
+    """What became of the bound of an example."""
+    final = rows[-1]
+    beyond = final["rejection_probability"] > final["alpha"]
+    found = {
+        "called": called,
+        "outcome": "rejected" if beyond else "not rejected",
+        "points": len({each["point"] for each in rows}),
+        "repeats": sum(each["repeat"] > 1 for each in rows),
+    }
+    if not final["rule_met"]:
+        found["remark"] = f"the nearest there is: {final['rule']}"
+    return {**final, **found}
+
+
+def _again(rows: Sequence[Mapping]) -> list[dict]:
+    """The last reading of every point that was measured more than once, most readings first."""
+    first: dict[int, int] = {}
+    for row in rows:
+        first.setdefault(row["point"], row["iteration"])
+    last = {row["point"]: {**row, "first": first[row["point"]]} for row in rows}
+    again = [each for each in last.values() if each["repeat"] > 1]
+    return sorted(again, key=lambda each: (-each["repeat"], each["point"]))
 
 
 def _parts(
@@ -141,32 +128,17 @@ def _level(
 
 
 def _magnitudes(
-    examples: list[_Example], data: ColumnDataSource, shown: GroupFilter, held_to: Truth
+    data: ColumnDataSource, shown: GroupFilter, held_to: Truth, control: Control
 ) -> Picture:
     plot = pictures.figure("iteration", "size of the error, mm", height_px=360)
     _level(plot, data, shown, "true", color=GREY, line_width=2, legend_label="error of the point")
     _parts(plot, data, shown, {0: "measured", 1: "averaged"})
     _level(plot, data, shown, "eta", color=VERMILION, line_width=2, legend_label="bound tested")
-    ends = np.array([0.5, max(len(each.rows) for each in examples) + 0.5])
-    plot.line(
-        ends,
-        held_to.largest_mm,
-        color=GREY,
-        line_width=2.5,
-        line_dash="8 4",
-        legend_label=held_to.called,
-    )
+    ends = np.array([0.5, np.max(data.data["to"])])
+    plot.line(ends, held_to.largest_mm, **TRUE, legend_label=held_to.called)
     pictures.from_zero(plot)
     pictures.legend_above(plot)
-    caption = "Each reading in the order taken. Diamonds: a point read again, and the average."
-    options = tuple(
-        Option(each.called, ((_SHOWN, "group", number),)) for number, each in enumerate(examples)
-    )
-    control = Control("Example", options)
-    return Picture(
-        "history-errors", plot, f"Errors over the readings of one simulation. {caption}", caption,
-        (control,), _DETAILS,
-    )  # fmt: skip
+    return Picture("history-errors", plot, controls=(control,), details=_DETAILS)
 
 
 def _probability(data: ColumnDataSource, shown: GroupFilter, beside: Picture) -> Picture:
@@ -176,75 +148,4 @@ def _probability(data: ColumnDataSource, shown: GroupFilter, beside: Picture) ->
     _parts(plot, data, shown, {0: "probability", 1: "probability"})
     plot.y_range.update(start=-0.03, end=1.03)
     pictures.legend_above(plot)
-    caption = (
-        "The probability after each reading. Above alpha the next reading is at the worst point "
-        "again. Example, selection and range are those of the picture above."
-    )
-    return Picture(
-        "history-probability", plot, f"Rejection probability over the readings. {caption}", caption,
-        details=_DETAILS,
-    )  # fmt: skip
-
-
-def _outcomes(histories: Columns, examples: list[_Example], held_to: Truth) -> Table:
-    rows, remarks = [], {}
-    for number, each in enumerate(examples):
-        final = float(histories["rejection_probability"][each.rows[-1]])
-        repeats = int((np.asarray(histories["repeat"])[each.rows] > 1).sum())
-        rows.append(
-            (
-                each.called,
-                str(each.simulation),
-                f"{each.eta_mm:.3f}",
-                f"{each.alpha:g}",
-                f"{final:.3f}",
-                "rejected" if final > each.alpha else "not rejected",
-                str(len(np.unique(np.asarray(histories["point"])[each.rows]))),
-                str(repeats),
-            )
-        )
-        if not histories["rule_met"][each.rows[0]]:
-            remarks[number] = f"the nearest there is: {histories['rule'][each.rows[0]]}"
-    heads = (
-        *("example", "simulation", "bound, mm", "alpha", "probability at the end", "outcome"),
-        *("points", "readings again"),
-    )
-    caption = f"What became of the bounds; {held_to.called}: {held_to.largest_mm:.3f} mm"
-    return Table(caption, heads, tuple(rows), frozenset({1, 2, 3, 4, 6, 7}), remarks)
-
-
-def _again(histories: Columns, each: _Example, first_row: int) -> Table:
-    """Points that were measured more than once, those of most readings first."""
-    point, repeat = (np.asarray(histories[name])[each.rows] for name in ("point", "repeat"))
-    last = {int(p): i for i, p in enumerate(point)}
-    known = sorted(
-        (p for p, i in last.items() if repeat[i] > 1), key=lambda p: (-repeat[last[p]], p)
-    )
-    rows = []
-    for p in known:
-        row = each.rows[last[p]]
-        true = float(histories["true_mm"][row])
-        rows.append(
-            (
-                str(p),
-                str(int(np.flatnonzero(point == p)[0]) + 1),
-                str(repeat[last[p]]),
-                f"{histories['averaged_mm'][row]:.3f}",
-                f"{true:.3f}",
-                "yes" if true > each.eta_mm else "no: noise alone",
-            )
-        )
-    heads = (
-        *("point", "first at iteration", "readings", "average, mm", "error of the point, mm"),
-        "beyond the bound",
-    )
-    return Table(
-        f"{each.called[0].upper()}{each.called[1:]}: points measured again",
-        heads,
-        tuple(rows),
-        frozenset(range(5)),
-        folded=True,
-        picked_in="history-errors",
-        picks=tuple(first_row + last[p] for p in known),
-        choices=((("Example", each.called),),) * len(rows),
-    )
+    return Picture("history-probability", plot, details=_DETAILS)

@@ -13,17 +13,15 @@ from kinacc.calibration import blind_words, summary
 from kinacc.calibration.blind_groups import of_arm
 from kinacc.calibration.blind_words import parameter_name, short_name
 from kinacc.calibration.identified import FIXED, IDENTIFIED, PRIOR, UNDETERMINED
-from kinacc.calibration.misfit import Misfit, in_words, misfit
-from kinacc.calibration.summary_words import counted
+from kinacc.calibration.misfit import in_words, misfit
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
-from kinacc.report.page import Block, Picture, Section, Table, Text
+from kinacc.report.page import Part, Picture, records
 
 _MOST = 50  # parameters of the picture; of more, those of base and targets are left out
 _CLOSE = 0.95  # |correlation| at which two parameters are hardly told apart
 _PAIRS = 10
-_NONE = "–"
 _STATUSES = {
     IDENTIFIED: "determined by the poses",
     PRIOR: "known beforehand (prior)",
@@ -32,79 +30,49 @@ _STATUSES = {
 }
 
 
-def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
+def section(tables: Mapping[str, Columns], robot: Robot) -> Part:
     """The section of a page on ``dh_identified`` and ``dh_covariance``."""
-    told = tables["dh_identified"]
-    pairs = _Pairs(tables["dh_covariance"])
-    return Section(
-        "identifiability",
-        "What the poses leave open",
-        f"{counted(len(told['parameter']), 'parameter')} of the DH fit{_frames(told)}: "
-        f"{_counts(told)}",
-        "Which parameters the measured poses determine, which they cannot tell apart, and which "
-        "are only known together.",
-        "Good: all that is open is open for any poses of such an arm; it changes no pose, and is "
-        "no fault. Bad: what other poses would show; two parameters whose correlation is near 1 "
-        "or -1, of which one stands in for the other.",
-        "Measure poses that show it (kinacc plan-poses proposes them), or state what is known "
-        "(calibration.frames, calibration.dh.parameters). Do not read a meaning into the value of "
-        "an undetermined parameter, or of one of a close pair.",
-        (
-            *_open(told, tables["measurements"], robot),
-            *_rank(tables.get("dh_fit")),
-            *((_heat_map(pairs), pairs.closest()) if len(pairs.names) > 1 else ()),
-            _every(told, misfit(tables, robot, "dh")),
-        ),
-    )
-
-
-def _frames(told: Columns) -> str:
-    return "" if of_arm([str(each) for each in told["parameter"]]).all() else ", base and tool too"
-
-
-def _counts(told: Columns) -> str:
+    told, pairs = tables["dh_identified"], _Pairs(tables["dh_covariance"])
+    open_ = blind_words.listed(told)
+    weak = blind_words.weak(open_)
     status = list(told["status"])
-    return ", ".join(
-        f"{status.count(each)} {words}" for each, words in _STATUSES.items() if each in status
-    )
+    values = {
+        "parameters": len(status),
+        "frames": not of_arm([str(each) for each in told["parameter"]]).all(),
+        "counts": {words: status.count(each) for each, words in _STATUSES.items()},
+        "weak": weak,
+        "always": [text for text in open_ if not text.endswith(blind_words.WEAK)],
+        "pointing": list(summary.of_pointing(tables["measurements"], robot)) if weak else [],
+        "rank": _rank(tables.get("dh_fit")),
+        "pairs": pairs.closest(),
+        "close": pairs.close,
+        "limit": _CLOSE,
+        "drawn": len(pairs.names),
+        "left_out": pairs.left_out,
+        "every": [_known(each) for each in records(told)],
+        "deviations": in_words([misfit(tables, robot, "dh")]),
+    }
+    return Part("identifiability", values, (_heat_map(pairs),) if len(pairs.names) > 1 else ())
 
 
-def _open(told: Columns, measurements: Columns, robot: Robot) -> list[Block]:
-    """What cannot be told apart, in sentences; first what further poses would settle."""
-    said = blind_words.listed(told)
-    weak = blind_words.weak(said)
-    always = [text for text in said if not text.endswith(blind_words.WEAK)]
-    if not said:
-        return [Text("Nothing is left open: the poses determine every parameter.")]
-    settled = "others may: measure such (kinacc plan-poses) or state it (calibration.frames)"
-    rows = [(text, settled) for text in weak]
-    rows += [(text, "no pose of such an arm does: no fault") for text in always]
-    heads = ("these poses do not show", "do others?")
-    blocks: list[Block] = [Table("What cannot be told apart", heads, tuple(rows))]
-    for each in summary.of_pointing(measurements, robot) if weak else ():
-        blocks.append(
-            Text(f"The flange points one way in all poses (within {each.value:.2g} {each.unit}).")
-        )
-    return blocks
-
-
-def _rank(fit: Columns | None) -> list[Block]:
-    """How well the directions of parameters are seen that were fitted, and that were not."""
+def _rank(fit: Columns | None) -> dict | None:
+    """How well the directions of parameters are determined that were fitted, and that were not."""
     if fit is None:
-        return []
+        return None
     quantity, value = np.asarray(fit["quantity"]), np.asarray(fit["value"], dtype=float)
-    single = {name: float(value[quantity == name][0]) for name in ("rank", "rank_threshold")}
-    seen, rank = value[quantity == "singular_value"], int(single["rank"])
-    if not rank or not len(seen):
-        return []
-    share = seen / seen[0]
-    text = (
-        f"Directions of parameters, base and tool projected out: {rank} of {len(seen)} are fitted. "
-        f"The poses show the weakest of them {share[rank - 1]:.2g} times as much as the strongest"
-    )
-    if rank < len(seen):
-        text += f", the strongest of those not fitted {share[rank]:.1g} times"
-    return [Text(f"{text}; the limit is {single['rank_threshold']:g} (calibration.dh.truncation).")]
+    rank, threshold = (value[quantity == name][0] for name in ("rank", "rank_threshold"))
+    share = value[quantity == "singular_value"]
+    if not rank or not len(share):
+        return None
+    share = share / share[0]
+    return {"rank": int(rank), "threshold": threshold, "share": share}
+
+
+def _known(row: dict) -> dict:
+    """A parameter as a person calls it, with its standard deviation in mm or mrad."""
+    scale, unit = (1e3, "mrad") if is_angle(str(row["parameter"])) else (1.0, "mm")
+    known = f"{scale * row['std']:.3g} {unit}" if np.isfinite(row["std"]) else None
+    return row | {"called": parameter_name(str(row["parameter"])), "known": known}
 
 
 class _Pairs:
@@ -124,27 +92,26 @@ class _Pairs:
         self.left_out = len(every) - len(self.names)
         self.matrix = matrix[np.ix_(known, known)]
 
-    def closest(self) -> Table:
+    @property
+    def close(self) -> int:
+        """Number of pairs that are hardly told apart."""
+        below = np.tril_indices(len(self.names), -1)
+        return int(np.sum(np.abs(self.matrix[below]) >= _CLOSE))
+
+    def closest(self) -> list[dict]:
         """The pairs of the largest |correlation|, each with its place in the picture."""
         first, second = np.tril_indices(len(self.names), -1)
         order = np.argsort(-np.abs(self.matrix[first, second]), kind="stable")[:_PAIRS]
-        first, second = first[order], second[order]
-        rows = tuple(
-            (
-                parameter_name(self.names[i]),
-                parameter_name(self.names[j]),
-                f"{self.matrix[i, j]:+.3f}",
-            )
-            for i, j in zip(first, second, strict=True)
-        )
-        return Table(
-            f"The {counted(len(rows), 'pair')} that go together most",
-            ("parameter", "and", "correlation"),
-            rows,
-            numeric=frozenset({2}),
-            picked_in="correlations",
-            picks=tuple(int(i * len(self.names) + j) for i, j in zip(first, second, strict=True)),
-        )
+        called = [parameter_name(each) for each in self.names]
+        return [
+            {
+                "first": called[i],
+                "second": called[j],
+                "correlation": self.matrix[i, j],
+                "pick": int(i * len(called) + j),
+            }
+            for i, j in zip(first[order], second[order], strict=True)
+        ]
 
 
 def _heat_map(pairs: _Pairs) -> Picture:
@@ -176,16 +143,9 @@ def _heat_map(pairs: _Pairs) -> Picture:
     plot.grid.grid_line_color = None
     plot.xaxis.major_label_orientation = "vertical"
     plot.axis.major_label_text_font_size = "8pt"
-    close = int(np.sum(np.abs(pairs.matrix[np.tril_indices(len(short), -1)]) >= _CLOSE))
-    caption = (
-        f"Colour: how far two parameters go together, sign left aside; a dot marks {_CLOSE:g} and "
-        f"more ({counted(close, 'pair')}). Undetermined parameters have no correlation"
-        + (f"; {pairs.left_out} are left out." if pairs.left_out else ".")
-    )
-    words = f"Correlations of {len(short)} parameters of the DH fit. {caption}"
     details = {"first": "{}", "second": "{}", "correlation": "correlation {}"}
     invitation = "Select a cell to read its two parameters."
-    return Picture("correlations", plot, words, caption, details=details, invitation=invitation)
+    return Picture("correlations", plot, details=details, invitation=invitation)
 
 
 def _cells(pairs: _Pairs, short: list[str]) -> ColumnDataSource:
@@ -203,16 +163,3 @@ def _cells(pairs: _Pairs, short: list[str]) -> ColumnDataSource:
         "mark": np.where((size >= _CLOSE) & (down != across), 6.0, 0.0),
     }
     return pictures.source("correlations", columns)
-
-
-def _every(told: Columns, fits: Misfit) -> Table:
-    rows = []
-    for name, status, std, why in zip(
-        *(told[each] for each in ("parameter", "status", "std", "statement")), strict=True
-    ):
-        scale, unit = (1e3, "mrad") if is_angle(str(name)) else (1.0, "mm")
-        known = f"{scale * std:.3g} {unit}" if np.isfinite(std) else _NONE
-        rows.append((parameter_name(str(name)), str(status), known, str(why or _NONE)))
-    heads = ("parameter", "status", "standard deviation", "why it is not identified")
-    caption = f"Status of every parameter; standard deviations are {in_words([fits])}"
-    return Table(caption, heads, tuple(rows), frozenset({2}), folded=True)

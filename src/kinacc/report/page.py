@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,12 +10,17 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from kinacc import __version__
+from kinacc.artifacts.columns import Columns
+from kinacc.calibration.summary_words import counted
 
 if TYPE_CHECKING:
     from bokeh.models import Plot
 
 TEMPLATES = "templates"
+_WORDS = ("title", "population", "shows", "judged", "to_do")  # what the template of a Part sets
 _MADE_BY = {"kinacc_version": __version__}
 ROBOT_ITSELF = (
     "the robot itself improves only once the calibration is loaded into its controller, or its "
@@ -80,7 +84,7 @@ class Picture:
 
     key: str
     plot: Plot
-    described: str
+    described: str = ""
     caption: str = ""
     controls: tuple[Control, ...] = ()
     details: Mapping[str, str] = field(default_factory=dict)
@@ -88,23 +92,7 @@ class Picture:
     invitation: str = "Select a point to see what it is."
 
 
-@dataclass(frozen=True)
-class Image:
-    """A picture as it was drawn before: SVG or PNG bytes."""
-
-    described: str
-    content: bytes
-    kind: str
-    caption: str = ""
-
-    @property
-    def source(self) -> str:
-        """The bytes as an address of the page's own."""
-        media = {"svg": "image/svg+xml", "png": "image/png"}[self.kind]
-        return f"data:{media};base64,{base64.b64encode(self.content).decode()}"
-
-
-Block = Table | Text | Picture | Image
+Block = Table | Text | Picture
 
 
 @dataclass(frozen=True)
@@ -124,19 +112,33 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Part:
+    """A section whose words stand in the template of its ``key``, over values and pictures.
+
+    The template sets title, population, shows, judged and to_do, and prints tables and pictures.
+    """
+
+    key: str
+    values: Mapping[str, object]
+    pictures: tuple[Picture, ...] = ()
+
+
+@dataclass(frozen=True)
 class FirstScreen:
     """What a reader sees without moving: the answer in words, a table, and what follows.
 
     ``badge`` is a remark at the right of the title and whether it is a warning; ``answers`` are
-    sentences, the first the most important; ``notes`` are lines under a name in capitals.
+    sentences, the first the most important, unless the template of ``answer`` has them; ``notes``
+    are lines under a name in capitals.
     """
 
     title: str
     subtitle: str
     badge: tuple[str, bool]
-    answers: tuple[str, ...]
-    tables: tuple[Table, ...]
-    notes: tuple[tuple[str, tuple[Text, ...]], ...]
+    answers: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    notes: tuple[tuple[str, tuple[Text, ...]], ...] = ()
+    answer: Part | None = None
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ class Page:
     """A whole page: the answer, then the evidence; ``marks`` say what it is about."""
 
     first: FirstScreen
-    sections: tuple[Section, ...]
+    sections: tuple[Section | Part, ...]
     marks: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -169,17 +171,51 @@ def html(
         }
         for each, (document, root) in zip(pictures, drawn, strict=True)
     }
-    return _template().render(
+    environment = _environment()
+    return environment.get_template("page.html").render(
         page=page,
+        answer=page.first.answer and _made(page.first.answer),
+        sections=[_laid_out(each) for each in page.sections],
         marks={k: str(v) for k, v in {**_MADE_BY, **page.marks, **(marks or {})}.items()},
         read=read or {},
         style=_text("page.css"),
         script=_text("page.js"),
         library=library() if pictures else "",
         pictures=_embedded({"documents": data, "places": places}),
-        kind=lambda block: type(block).__name__,
-        plain=json.dumps,
     )
+
+
+def records(table: Columns, rows: Sequence[int] | np.ndarray | None = None) -> list[dict]:
+    """Rows of a table, all of them or those numbered, each as a dict by column."""
+    order = range(max(map(len, table.values()), default=0)) if rows is None else rows
+    return [{name: column[row] for name, column in table.items()} for row in order]
+
+
+def cell(value: object, form: str = "") -> str:
+    """A value as a table shows it: a number in the format given, a dash where there is none."""
+    if (
+        value is None
+        or value == ""
+        or (isinstance(value, (float, np.floating)) and np.isnan(value))
+    ):
+        return "–"
+    return value if isinstance(value, str) else format(value, form)
+
+
+def _laid_out(section: Section | Part) -> object:
+    """What the page's template reads of a section: words by name, and its body."""
+    if isinstance(section, Section):
+        return section
+    body = _made(section)
+    words = {name: getattr(body, name) for name in _WORDS}
+    return {**words, "key": section.key, "body": body}
+
+
+def _made(part: Part):
+    """The template of a part with its values."""
+    pictures = {each.key: each for each in part.pictures}
+    template = _environment().get_template(f"{part.key}.html")
+    return template.make_module({**part.values, "pictures": pictures, "robot_itself": ROBOT_ITSELF})
 
 
 def printed(words: str) -> str:
@@ -191,8 +227,10 @@ def printed(words: str) -> str:
     return words.replace("\u00a0", " ")
 
 
-def _pictures(sections: Sequence[Section]) -> Iterator[Picture]:
-    return (block for each in sections for block in each.blocks if isinstance(block, Picture))
+def _pictures(sections: Sequence[Section | Part]) -> Iterator[Picture]:
+    for each in sections:
+        blocks = each.pictures if isinstance(each, Part) else each.blocks
+        yield from (block for block in blocks if isinstance(block, Picture))
 
 
 def _embedded(value: object) -> str:
@@ -208,14 +246,16 @@ def _text(name: str) -> str:
 
 
 @cache
-def _template():
-    from jinja2 import BaseLoader, Environment, StrictUndefined
+def _environment():
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     environment = Environment(
-        loader=BaseLoader(),
+        loader=FunctionLoader(_text),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.from_string(_text("page.html"))
+    environment.filters |= {"cell": cell, "counted": counted, "printed": printed}
+    environment.globals |= {"kind": lambda block: type(block).__name__, "plain": json.dumps}
+    return environment

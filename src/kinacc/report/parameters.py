@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from bokeh.models import ColumnDataSource
@@ -14,18 +13,16 @@ from kinacc.artifacts.error_models import model_name
 from kinacc.calibration import summary
 from kinacc.calibration.blind_words import parameter_name, short_name
 from kinacc.calibration.identified import FIXED, IDENTIFIED, PRIOR, UNDETERMINED
-from kinacc.calibration.misfit import Misfit, in_words, misfit, misfits
-from kinacc.calibration.summary_words import counted
+from kinacc.calibration.misfit import in_words, misfit, misfits
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
 from kinacc.deployment.folder import uncertainty
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
 from kinacc.report import pictures
-from kinacc.report.page import Block, Control, Option, Picture, Section, Table
+from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
 
-_NONE = "–"
 _WIDE = 2.0  # standard deviations either way that bars and bands reach
 _LOOK = {
     IDENTIFIED: ("circle", BLUE),
@@ -38,106 +35,80 @@ _KINDS = {"delta": ("shift", "mm", 1.0), "eps": ("turn", "mrad", 1e3)}
 _LEAST_POINTS, _POINTS_EACH = 80, 4  # of a curve, and of every order in it
 
 
-def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
+def section(tables: Mapping[str, Columns], robot: Robot) -> Part:
     """The section of a page on ``dh_model``, ``vec_model`` and how sure they are."""
     found = parameters(tables["dh_model"], tables["dh_identified"], robot)
-    measurements = tables["measurements"]
-    fitted = int(np.sum(np.asarray(measurements["subset"]) == "train"))
-    chosen = model_name(summary.selected(tables["model_selection"]))
     curves = _Curves(tables, robot)
-    return Section(
-        "parameters",
-        "Parameters and how sure they are",
-        f"DH and VEC model fitted to {counted(fitted, 'reading')} (selected: {chosen}); bars and "
-        f"bands reach {_WIDE:g} standard deviations either way",
-        "How far the calibrated arm differs from the maker's, parameter by parameter, and how far "
-        "each value may be off; then what the VEC model adds that no DH table can say.",
-        "Good: bars shorter than their distance from zero; tenths of a mm, a few mrad, as making "
-        "explains. Bad: many mm or degrees (a wrong robot file, unit or zero); curves "
-        "that rise at an end, where few poses hold them. Standard deviations, bars and bands are "
-        f"{in_words(misfits(tables, robot))}. Where a model leaves errors that neighbouring poses "
-        "share, they are too short.",
-        "Check large differences against the robot file first. More poses, spread further, "
-        "shorten the bars. Load values only as a set (kinacc export): single ones make up for "
-        "each other.",
-        (
-            *(_differences(found, unit) for unit in ("mm", "mrad")),
-            _table(found, misfit(tables, robot, "dh")),
-            *_bending(tables.get("compliance_model")),
-            *(curves.picture(kind) for kind in _KINDS),
-            curves.largest(),
-            *_directions(tables["vec_model"]),
-        ),
-    )
+    offsets = [each for each in records(tables["vec_model"]) if each["direction"]]
+    values = {
+        "fitted": np.sum(np.asarray(tables["measurements"]["subset"]) == "train"),
+        "selected": model_name(summary.selected(tables["model_selection"])),
+        "wide": _WIDE,
+        "deviations": in_words(misfits(tables, robot)),
+        "deviations_dh": in_words([misfit(tables, robot, "dh")]),
+        "parameters": found,
+        "bending": summary.bending(tables.get("compliance_model")),
+        "order": curves.model.order,
+        "banded": bool(np.isfinite(curves.std).any()),
+        "errors": {name: _KINDS[name.partition("_")[0]][1] for name in ERRORS},
+        "largest": curves.largest(),
+        "offsets": offsets,
+    }
+    drawn = [_differences(found, unit) for unit in ("mm", "mrad")]
+    return Part("parameters", values, (*drawn, *(curves.picture(kind) for kind in _KINDS)))
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One DH parameter, ``nominal`` and ``calibrated`` in mm or rad with its ``std``, NaN if none.
+def parameters(model: Columns, told: Columns, robot: Robot) -> list[dict]:
+    """Every DH parameter that is there: not the angle beta of a joint that has none.
 
-    ``status`` is that of ``dh_identified``.
+    ``nominal`` and ``calibrated`` are in deg or mm; ``difference`` and ``std`` in ``unit``.
     """
-
-    name: str
-    nominal: float
-    calibrated: float
-    std: float
-    status: str
-
-    @property
-    def unit(self) -> str:
-        """Unit of difference and standard deviation."""
-        return "mrad" if is_angle(self.name) else "mm"
-
-    @property
-    def scale(self) -> float:
-        """Number of ``unit`` in the parameter's own unit."""
-        return 1e3 if is_angle(self.name) else 1.0
-
-    @property
-    def difference(self) -> float:
-        """Calibrated minus nominal in ``unit``."""
-        return self.scale * (self.calibrated - self.nominal)
-
-    @property
-    def spread(self) -> float:
-        """Standard deviation in ``unit``."""
-        return self.scale * self.std
-
-
-def parameters(model: Columns, told: Columns, robot: Robot) -> list[Parameter]:
-    """Every DH parameter that is there: not the angle beta of a joint that has none."""
     status = dict(zip(told["parameter"], told["status"], strict=True))
     fitted = DHModel.from_columns(model, robot.dh.prismatic)
     order = np.argsort(model["joint"], kind="stable")
     found = []
-    for joint in range(fitted.joints):
-        for column in PARAMETERS:
-            name = f"j{joint + 1}.{column}"
-            nominal, calibrated = (float(getattr(of, column)[joint]) for of in (robot.dh, fitted))
-            std = float(np.asarray(model[f"std_{column}"], dtype=float)[order][joint])
-            each = Parameter(name, nominal, calibrated, std, str(status.get(name, FIXED)))
-            if column != "beta_rad" or each.status != FIXED or nominal or calibrated:
-                found.append(each)
+    for joint, column in np.ndindex(fitted.joints, len(PARAMETERS)):
+        name = f"j{joint + 1}.{PARAMETERS[column]}"
+        known = status.get(name, FIXED)
+        values = [float(getattr(of, PARAMETERS[column])[joint]) for of in (robot.dh, fitted)]
+        if PARAMETERS[column] == "beta_rad" and known == FIXED and not any(values):
+            continue
+        angle = is_angle(name)
+        scale = 1e3 if angle else 1.0
+        nominal, calibrated = np.rad2deg(values) if angle else values
+        std = np.asarray(model[f"std_{PARAMETERS[column]}"], dtype=float)[order][joint]
+        found.append(
+            {
+                "short": short_name(name),
+                "called": parameter_name(name),
+                "status": str(known),
+                "nominal": nominal,
+                "calibrated": calibrated,
+                "of": "deg" if angle else "mm",
+                "difference": scale * (values[1] - values[0]),
+                "std": scale * std,
+                "unit": "mrad" if angle else "mm",
+            }
+        )
     return found
 
 
-def _differences(found: Sequence[Parameter], unit: str) -> Picture:
-    mine = [each for each in found if each.unit == unit]
-    what = "lengths" if unit == "mm" else "angles"
-    named = [short_name(each.name) for each in mine]
-    difference = np.array([each.difference for each in mine])
-    reach = _WIDE * np.array([each.spread for each in mine])
-    columns = {
-        "short": np.array(named, dtype=object),
-        "called": np.array([parameter_name(each.name) for each in mine], dtype=object),
-        "status": np.array([each.status for each in mine], dtype=object),
+def _differences(found: Sequence[Mapping], unit: str) -> Picture:
+    mine = [each for each in found if each["unit"] == unit]
+    texts = ("short", "called", "status")
+    columns = {name: np.array([each[name] for each in mine], dtype=object) for name in texts}
+    difference, std = (np.array([each[name] for each in mine]) for name in ("difference", "std"))
+    columns |= {
         "difference": difference,
-        "std": np.array([each.spread for each in mine]),
-        "low": difference - reach,
-        "high": difference + reach,
+        "std": std,
+        "low": difference - _WIDE * std,
+        "high": difference + _WIDE * std,
     }
-    data = pictures.source(f"differences-{what}", columns)
+    statuses = dict.fromkeys(columns["status"])
+    for status in statuses:
+        columns[f"size_{status}"] = np.where(columns["status"] == status, 9.0, 0.0)
+    key = f"differences-{'lengths' if unit == 'mm' else 'angles'}"
+    data = pictures.source(key, columns)
     plot = pictures.figure(
         "",
         f"calibrated - nominal, {unit}",
@@ -146,89 +117,25 @@ def _differences(found: Sequence[Parameter], unit: str) -> Picture:
             (f"difference, {unit}", "@difference{0.0000}"),
             ("standard deviation", "@std{0.0000}"),
         ],
-        x_range=named,
+        x_range=list(columns["short"]),
     )
     plot.hspan(y=0.0, line_color="grey", line_dash="dotted")
     plot.segment("short", "low", "short", "high", source=data, line_color=BLUE, line_width=2)
-    for status in dict.fromkeys(each.status for each in mine):
+    for status in statuses:
         marker, colour = _LOOK[status]
-        size = np.array([9.0 if each.status == status else 0.0 for each in mine])
-        data.data[f"size_{status}"] = size.astype(np.float32)
         plot.scatter(
-            "short",
-            "difference",
-            source=data,
-            marker=marker,
-            size=f"size_{status}",
-            color=colour,
-            line_width=2,
-            legend_label=status,
-        )
+            "short", "difference", source=data, marker=marker, size=f"size_{status}",
+            color=colour, line_width=2, legend_label=status,
+        )  # fmt: skip
     plot.xaxis.major_label_orientation = "vertical"
-    plot.legend.update(orientation="horizontal", spacing=14)
-    plot.add_layout(plot.legend[0], "above")
-    caption = (
-        f"Difference of the {what} of the DH model, with {_WIDE:g} standard deviations either way."
-    )
-    if any(each.status == UNDETERMINED for each in mine):
-        caption += (
-            " Undetermined ones have no bar: where they stand is a convention, the least change of "
-            "all that fit, and no measurement."
-        )
-    far = max(mine, key=lambda each: abs(each.difference))
-    words = f"{caption} The largest: {parameter_name(far.name)}, {far.difference:+.3f} {unit}."
+    pictures.legend_above(plot, len(statuses))
     details = {
         "called": "{}",
         "status": "{}",
         "difference": f"difference {{}} {unit}",
         "std": f"standard deviation {{}} {unit}",
     }
-    return Picture(f"differences-{what}", plot, words, caption, details=details)
-
-
-def _table(found: Sequence[Parameter], fits: Misfit) -> Table:
-    rows = tuple(
-        (
-            parameter_name(each.name),
-            *(_value(each, value) for value in (each.nominal, each.calibrated)),
-            f"{_number(each.difference, '+')} {each.unit}",
-            f"{each.spread:.4f} {each.unit}" if np.isfinite(each.spread) else _NONE,
-            each.status,
-        )
-        for each in found
-    )
-    heads = ("parameter", "nominal", "calibrated", "difference", "standard deviation", "status")
-    caption = f"DH parameters, nominal and calibrated; standard deviations are {in_words([fits])}"
-    return Table(caption, heads, rows, frozenset({1, 2, 3, 4}), folded=True)
-
-
-def _value(each: Parameter, value: float) -> str:
-    if is_angle(each.name):
-        return f"{_number(np.rad2deg(value))} deg"
-    return f"{_number(value)} mm"
-
-
-def _number(value: float, sign: str = "") -> str:
-    """Four decimals, and no minus zero."""
-    return f"{round(value, 4) + 0.0:{sign}.4f}"
-
-
-def _bending(table: Columns | None) -> list[Block]:
-    """How far joints turn under gravity, where they do."""
-    columns = {
-        "compliance_rad_per_nm": "urad per N m",
-        "lever_coefficient_rad_per_mm": "urad per mm of lever",
-    }
-    rows = []
-    for joint in summary.bending(table):
-        for name, unit in columns.items():
-            if joint[name] is not None:
-                std = joint[f"std_{name}"]
-                sure = "not determined" if std is None else f"{1e6 * std:.3g}"
-                rows.append((f"joint {joint['joint']}", f"{1e6 * joint[name]:.4g}", sure, unit))
-    heads = ("joint", "coefficient", "standard deviation", "unit")
-    caption = "Joints that bend under gravity (compliance model)"
-    return [Table(caption, heads, tuple(rows), frozenset({1, 2}))] if rows else []
+    return Picture(key, plot, details=details)
 
 
 class _Curves:
@@ -251,7 +158,7 @@ class _Curves:
         self.values = np.empty((self.model.joints, len(ERRORS), count))
         self.std = np.full(self.values.shape, np.nan)
         for joint, error in np.ndindex(self.values.shape[:2]):
-            scale = _scale(ERRORS[error])
+            scale = _KINDS[ERRORS[error].partition("_")[0]][2]
             shared = _shared(ERRORS[error], joints[joint], bool(self.prismatic[joint]))
             own = scale * (basis - shared @ np.linalg.lstsq(shared, basis, rcond=None)[0])
             self.values[joint, error] = own @ self.model.coefficients[joint, error]
@@ -280,86 +187,41 @@ class _Curves:
         plot.hspan(y=0.0, line_color="grey", line_dash="dotted")
         banded = bool(np.isfinite(self.std).any())
         for name, (dash, colour) in zip(mine, _LINES, strict=True):
+            shared = {"source": self.data, "color": colour, "legend_label": name}
+            at = f"j1_{name}"
             if banded:
-                band = plot.varea(
-                    "q1",
-                    f"j1_{name}_low",
-                    f"j1_{name}_high",
-                    source=self.data,
-                    fill_color=colour,
-                    fill_alpha=0.18,
-                    legend_label=name,
-                )
+                band = plot.varea("q1", f"{at}_low", f"{at}_high", **shared, alpha=0.18)
                 band.glyph.name = f"{name}-band"
-            line = plot.line(
-                "q1",
-                f"j1_{name}",
-                source=self.data,
-                color=colour,
-                line_dash=dash,
-                line_width=2,
-                legend_label=name,
-            )
+            line = plot.line("q1", at, **shared, line_dash=dash, line_width=2)
             line.glyph.name = f"{name}-line"
         plot.xaxis[0].name = f"{kind}-axis"
-        plot.legend.click_policy = "hide"
-        plot.legend.update(orientation="horizontal", spacing=14)
-        plot.add_layout(plot.legend[0], "above")
+        pictures.legend_above(plot, 3)
         options = tuple(
             Option(f"{n + 1}", tuple(self._sets(kind, mine, n, banded)))
             for n in range(self.model.joints)
         )
-        bands = (
-            f"Bands: {_WIDE:g} standard deviations either way."
-            if banded
-            else "How sure the curves are is not known: these results hold no covariance."
-        )
-        caption = (
-            f"The {what}s that the VEC model (order {self.model.order}) puts in front of a joint, "
-            "less what neighbouring joints or a DH table can take over (constants, and across the "
-            f"axis one wave a turn: no pose tells whose they are). {bands} A click in the legend "
-            "hides a curve."
-        )
-        control = Control("Joint", options)
-        return Picture(f"curves-{kind}", plot, caption, caption, (control,))
+        return Picture(f"curves-{kind}", plot, controls=(Control("Joint", options),))
 
-    def _sets(self, kind: str, mine: Sequence[str], joint: int, banded: bool):
-        at = f"j{joint + 1}"
+    def _sets(self, kind: str, mine: Sequence[str], joint: int, banded: bool) -> Iterator[tuple]:
         for name in mine:
-            yield f"{name}-line", "x", pictures.field(f"q{joint + 1}")
-            yield f"{name}-line", "y", pictures.field(f"{at}_{name}")
+            at = f"j{joint + 1}_{name}"
+            parts = {"line": {"y": at}}
             if banded:
-                yield f"{name}-band", "x", pictures.field(f"q{joint + 1}")
-                yield f"{name}-band", "y1", pictures.field(f"{at}_{name}_low")
-                yield f"{name}-band", "y2", pictures.field(f"{at}_{name}_high")
+                parts["band"] = {"y1": f"{at}_low", "y2": f"{at}_high"}
+            for part, columns in parts.items():
+                for prop, column in {"x": f"q{joint + 1}", **columns}.items():
+                    yield f"{name}-{part}", prop, pictures.field(column)
         yield f"{kind}-axis", "axis_label", self._label(joint)
 
-    def largest(self) -> Table:
+    def largest(self) -> list[dict]:
         """The largest of each error over the joint's range, with its standard deviation there."""
-        rows = []
-        for joint in range(self.model.joints):
-            cells = [f"joint {joint + 1}"]
-            for error in range(len(ERRORS)):
-                at = int(np.argmax(np.abs(self.values[joint, error])))
-                std = self.std[joint, error, at]
-                sure = f" ± {std:.3f}" if np.isfinite(std) else ""
-                cells.append(f"{self.values[joint, error, at]:+.3f}{sure}")
-            rows.append(tuple(cells))
-        units = [_KINDS[name.partition("_")[0]][1] for name in ERRORS]
-        heads = tuple(f"{name}, {unit}" for name, unit in zip(ERRORS, units, strict=True))
-        sure = ", with one standard deviation" if np.isfinite(self.std).any() else ""
-        return Table(
-            f"The largest of every error of a joint that no DH table can say{sure}",
-            ("DH joint", *heads),
-            tuple(rows),
-            frozenset(range(1, len(heads) + 1)),
-            folded=True,
-        )
-
-
-def _scale(error: str) -> float:
-    """Number of mm or mrad in the unit of an error."""
-    return _KINDS[error.partition("_")[0]][2]
+        rows: list[dict] = [{"joint": joint + 1} for joint in range(self.model.joints)]
+        for joint, error in np.ndindex(self.values.shape[:2]):
+            at = int(np.argmax(np.abs(self.values[joint, error])))
+            std = self.std[joint, error, at]
+            sure = f" ± {std:.3f}" if np.isfinite(std) else ""
+            rows[joint][ERRORS[error]] = f"{self.values[joint, error, at]:+.3f}{sure}"
+        return rows
 
 
 def _shared(error: str, joint: np.ndarray, slides: bool) -> np.ndarray:
@@ -384,18 +246,3 @@ def _spread(known: Uncertainty | None, joint: int, error: int, basis: np.ndarray
     mine = [place[name] for name in names]
     block = known.covariance[np.ix_(mine, mine)]
     return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", basis, block, basis), 0.0))
-
-
-def _directions(table: Columns) -> list[Block]:
-    """What a joint turns further by the direction it comes from, where that was fitted."""
-    direction = np.asarray(table["direction"]).astype(int)
-    rows = []
-    for i in np.flatnonzero(direction):
-        std = 1e3 * float(table["std"][i])
-        value = f"{1e3 * float(table['coefficient'][i]):+.4f}"
-        sure = f"{std:.4f}" if np.isfinite(std) else _NONE
-        sign = "falling" if direction[i] < 0 else "rising"
-        rows.append((f"joint {int(table['joint'][i])}", sign, value, sure))
-    heads = ("DH joint", "its angle was", "eps_z, mrad", "standard deviation")
-    caption = "Offsets by the direction of travel (backlash) of the VEC model"
-    return [Table(caption, heads, tuple(rows), frozenset({2, 3}))] if rows else []

@@ -130,6 +130,45 @@ def choice(
     )
 
 
+def points(
+    plot: bokeh_figure,
+    data: ColumnDataSource,
+    x: str,
+    series: Sequence[tuple[str, str, str, str, float]],
+    key: str,
+) -> None:
+    """Points of sizes over ``x``; ``series``: column, label, colour, marker and opacity of each."""
+    for column, label, colour, marker, filled in series:
+        drawn = plot.scatter(
+            x, column, source=data, size=5, marker=marker, color=colour, fill_alpha=filled,
+            line_alpha=0.6, legend_label=label, nonselection_alpha=0.25,
+            selection_line_color=VERMILION, selection_fill_color=VERMILION,
+        )  # fmt: skip
+        drawn.glyph.name = f"{key}-{column}"
+    legend_above(plot)
+    from_zero(plot)
+
+
+def over_joint(
+    key: str,
+    data: ColumnDataSource,
+    slides: np.ndarray,
+    series: Sequence[tuple[str, str, str, str, float]],
+    y_label: str,
+    hover: Sequence[tuple[str, str]],
+) -> tuple[bokeh_figure, Control]:
+    """Points of sizes over one of the joints ``q1`` to ``qk`` of the data, and which joint."""
+    axes = [
+        (f"{n}", f"q{n}", f"joint {n}, {'mm' if slide else 'deg'}")
+        for n, slide in enumerate(slides, start=1)
+    ]
+    plot = figure(axes[0][2], y_label, hover=hover)
+    points(plot, data, "q1", series, key)
+    plot.xaxis[0].name = f"{key}-axis"
+    glyphs = {f"{key}-{column}": ("x",) for column, *_ in series}
+    return plot, choice("Joint", axes, glyphs, f"{key}-axis")
+
+
 def in_space(
     name: str,
     data: ColumnDataSource,

@@ -13,7 +13,7 @@ from kinacc.artifacts.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
 from kinacc.deployment.history_words import sentence
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
-from kinacc.report.page import Picture, Section, Table, Text
+from kinacc.report.page import Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
 
 _LOOKS = {
@@ -46,33 +46,20 @@ _DETAILS = {
 }
 
 
-def section(tables: Mapping[str, Columns], robot: Robot) -> Section:
+def section(tables: Mapping[str, Columns], robot: Robot) -> Part:
     """The section of a page on ``history``, one row a line by date."""
     history = tables["history"]
-    data, count = _data(history), len(history["date"])
+    data = _data(history)
     errors = _errors(history, data)
-    pictures_of = [errors]
+    drawn = [errors]
     if np.isfinite(np.asarray(history["chance_mm"], dtype=float)).any():
-        pictures_of.append(_moved(history, data, errors.plot.x_range))
-    first, last = history["date"][0], history["date"][-1]
-    lines = f"{count} lines of its series, {first} to {last}" if count > 1 else f"one line, {first}"
-    return Section(
-        "history",
-        "History of this arm",
-        f"{lines}; the other sections are about the last one",
-        "Each line is calibrated on its own. The calibration in force, that of the last line which "
-        "was the first or said recalibrate, is held to the poses of every later one, and what its "
-        "predictions moved, after the best base and tool where these moved, to what chance moves.",
-        "Good: both means stay together and what moved stays below what chance shows. Bad: a mark "
-        "above that bar, and errors of the calibration in force that leave those of a new one.",
-        "Recalibrate where the last line says so: put the calibration of that line into use, and "
-        "look at the joint named. Else go on with the one in force.",
-        (Text(_as_sentence(sentence(history))), *pictures_of, _table(history)),
-    )
-
-
-def _as_sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}."
+        drawn.append(_moved(history, data, errors.plot.x_range))
+    rows = [
+        each | {"called": model_name(str(each["model"]))}
+        | ({"remark": each["reason"]} if each["reason"] else {})
+        for each in records(history)
+    ]  # fmt: skip
+    return Part("history", {"rows": rows, "sentence": sentence(history)}, tuple(drawn))
 
 
 def _data(history: Columns) -> ColumnDataSource:
@@ -120,11 +107,8 @@ def _errors(history: Columns, data: ColumnDataSource) -> Picture:
         )  # fmt: skip
     pictures.from_zero(plot)
     pictures.legend_above(plot, 3)
-    caption = "Errors at the poses of each line, of the calibration made of it and of that before."
-    return Picture(
-        "robot-history-errors", plot, f"Position errors over time. {caption}", caption,
-        details=_DETAILS, invitation="Select a line to see what it says.",
-    )  # fmt: skip
+    invitation = "Select a line to see its numbers."
+    return Picture("robot-history-errors", plot, details=_DETAILS, invitation=invitation)
 
 
 def _told(whose: str, label: str) -> list[tuple[str, str]]:
@@ -163,39 +147,4 @@ def _moved(history: Columns, data: ColumnDataSource, days: object) -> Picture:
     highest = np.nanmax([*history["moved_mm"], *history["chance_mm"]])
     plot.y_range.update(start=-_BELOW * float(highest))
     pictures.legend_above(plot, 5)
-    caption = (
-        "What predictions at common poses moved since the calibration in force; the bar is what "
-        "chance shows of an arm that did not change."
-    )
-    return Picture(
-        "robot-history-moved", plot, f"Movement over time. {caption}", caption, details=_DETAILS
-    )
-
-
-def _table(history: Columns) -> Table:
-    heads = (
-        *("date", "verdict", "joint", "moved, mm", "by chance, mm"),
-        *("held out: mean, mm", "99 %", "largest"),
-        *("in force before: mean, mm", "99 %", "largest"),
-        *("base", "tool", "configurations", "°C", "model", "bound, mm"),
-    )
-    errors = [f"{whose}_{each}_mm" for whose in _WHOSE for each in _STATISTICS]
-    rows, why = [], {}
-    for row in range(len(history["date"])):
-        cells = [str(history[name][row]) for name in ("date", "verdict")]
-        cells += [_number(history, "joint", row, 0)]
-        cells += [_number(history, each, row) for each in ("moved_mm", "chance_mm", *errors)]
-        cells += [str(history[name][row] or "") for name in ("base", "tool")]
-        cells += [str(int(history["configurations"][row]))]
-        cells += [_number(history, "temperature_c", row, 1)]
-        cells += [model_name(str(history["model"][row])), _number(history, "bound_mm", row)]
-        rows.append(tuple(cells))
-        if history["reason"][row]:
-            why[row] = str(history["reason"][row])
-    numeric = frozenset({*range(2, 11), 13, 14, 16})
-    return Table("Every line of the series", heads, tuple(rows), numeric, why)
-
-
-def _number(history: Columns, name: str, row: int, digits: int = 3) -> str:
-    value = float(history[name][row])
-    return f"{value:.{digits}f}" if np.isfinite(value) else ""
+    return Picture("robot-history-moved", plot, details=_DETAILS)

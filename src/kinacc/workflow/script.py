@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import traceback
 import warnings
@@ -65,6 +66,7 @@ class Stage:
 @contextmanager
 def stage(snakemake: Any) -> Iterator[Stage]:
     """The job of a script. Errors and warnings go to its log, in one line each to the terminal."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # ends compiled loops too, and without a traceback
     dataset, (log,) = snakemake.wildcards.dataset, snakemake.log
     label = " ".join([dataset, snakemake.rule, snakemake.wildcards.get("scatteritem", "")]).strip()
     with open(log, "w", encoding="utf-8", buffering=1) as file, warnings.catch_warnings():

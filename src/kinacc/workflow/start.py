@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -22,7 +23,7 @@ def run_workflow(target: str, configs: Sequence[str], cores: int, more: Sequence
     """Exit code of Snakemake after it made a target of the workflow.
 
     ``more`` are options of the user for Snakemake; without any it prints only what goes wrong and
-    the progress of stages. Ctrl-C and SIGTERM are passed on, and Snakemake ends its jobs.
+    the progress of stages. Ctrl-C and SIGTERM end Snakemake and its jobs.
     """
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--cores", str(cores), "--configfile", *configs]
@@ -31,13 +32,13 @@ def run_workflow(target: str, configs: Sequence[str], cores: int, more: Sequence
     command += more or ["--quiet", "all"]
     command += ["--no-hooks", "--", target]
 
-    def ignore_interrupts() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # this process passes them on
-
-    with subprocess.Popen(command, preexec_fn=ignore_interrupts) as started:
+    # A group of its own: Ctrl-C reaches this process alone, which passes it on.
+    with subprocess.Popen(command, process_group=0) as started:
         try:
             return started.wait()
         except KeyboardInterrupt:
-            started.terminate()
+            # Jobs of a cluster have to be cancelled. Here, killed at any moment, a run can go on.
+            elsewhere = any(word.startswith(("--profile", "--executor", "-e")) for word in more)
+            os.killpg(started.pid, signal.SIGINT if elsewhere else signal.SIGKILL)
             started.wait()
             raise
