@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
-from kinacc.assess.coverage import MISSING_PART, companions
+from kinacc.assess.coverage import companions
 from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
@@ -23,6 +23,7 @@ from research.kinematic_model import (
     posterior,
 )
 
+MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
 _DRAWS = 400
 _BATCH = 0.08  # of the budget: readings between two looks at who could be the largest
 _DOUBTED = 0.25  # of a batch, spent on the readings the model explains worst

@@ -11,7 +11,7 @@ from scipy.stats import binom, gamma
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
-from kinacc.assess.ellipsoid import BallDistances, mahalanobis_beyond
+from kinacc.assess.ellipsoid import BallDistances
 from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.gamma_quantile import GammaQuantile
 from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, boundary
@@ -107,19 +107,6 @@ def test_the_share_of_the_region_keeps_its_confidence(sigma):
 def test_too_few_points_for_a_share_are_told_how_many_it_takes():
     (said,) = conduct(RegionShare(20), drawn_world(np.eye(3), 0.1, key_of(1), 1)).statements()
     assert said.withheld == Reason("few_points", {"read": 3, "share": 0.9, "needed": 35})
-
-
-def test_distances_of_many_points_are_those_of_each():
-    rng = np.random.default_rng(5)
-    roots = rng.normal(size=(60, 3, 3))
-    covariances = roots @ np.swapaxes(roots, 1, 2) + 1e-6 * np.eye(3)
-    readings = 2.0 * rng.normal(size=(60, 3))
-    distances = BallDistances(readings, covariances)
-    for radius in (0.0, 0.3, 1.5, 20.0):
-        each = [
-            mahalanobis_beyond(*pair, radius) for pair in zip(readings, covariances, strict=True)
-        ]
-        assert distances.beyond(radius) == pytest.approx(each, rel=1e-9, abs=1e-12)
 
 
 def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():

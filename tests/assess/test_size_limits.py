@@ -7,14 +7,13 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 from scipy.special import chndtr, ndtri
 from scipy.stats import ncx2
 
-from kinacc.assess import limits, plain_sizes, population
-from kinacc.assess.ellipsoid import largest_size, mahalanobis_beyond, nearest_in_ball
-from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.size_kernels import reading_below, reading_densities, size_at
+from kinacc.assess import population
+from kinacc.assess.ellipsoid import BallDistances, largest_size
+from kinacc.assess.limits import lower_limit_mm, reading_below, size_at, upper_limit_mm
+from kinacc.assess.size_kernels import reading_densities
 
 
 def random_covariance(rng: np.random.Generator, condition: float) -> np.ndarray:
@@ -53,116 +52,10 @@ def test_size_at_inverts_the_probability_and_is_zero_where_no_size_is_as_likely(
             assert reading_below(x, 0.0) <= probability
 
 
-def test_sizes_without_the_compiler_have_the_same_digits():
-    rng = np.random.default_rng(5)
-    sizes = np.concatenate([rng.uniform(0.0, 12.0, 1000), 10.0 ** rng.uniform(-6, 4, 1000)])
-    chances = np.concatenate([rng.uniform(size=1000), 10.0 ** rng.uniform(-12, -1, 1000)])
-    for x, chance in zip(sizes.tolist(), chances.tolist(), strict=True):
-        assert plain_sizes.size_at(x, chance) == size_at(x, chance)
-
-
-def test_limits_of_many_readings_are_compiled_and_the_same(monkeypatch):
-    mean = np.array([0.3, -0.1, 0.2])
-    few = upper_limit_mm(mean, 0.05, 0.01), lower_limit_mm(mean, 0.05, 0.01)
-    monkeypatch.setattr(limits, "_FEW", 0)
-    monkeypatch.setattr(plain_sizes, "size_at", None)
-    assert (upper_limit_mm(mean, 0.05, 0.01), lower_limit_mm(mean, 0.05, 0.01)) == few
-
-
-def test_nearest_point_of_the_ball_meets_the_conditions_of_its_problem():
-    rng = np.random.default_rng(1)
-    for _ in range(10_000):
-        covariance = random_covariance(rng, 10.0 ** rng.uniform(0, 6))
-        reading, radius = rng.normal(size=3), rng.uniform(0.01, 1.5)
-        x = nearest_in_ball(reading, covariance, radius)
-        size = math.sqrt(x @ x)
-        if math.sqrt(reading @ reading) <= radius:
-            assert np.array_equal(x, reading)
-            continue
-        # x - y + t S x = 0 with t >= 0 and |x| at the radius.
-        pull = covariance @ x
-        t = float(pull @ (reading - x)) / float(pull @ pull)
-        assert size == pytest.approx(radius, rel=1e-12)
-        assert t >= 0.0
-        assert np.abs(x - reading + t * pull).max() < 1e-9
-
-
-def test_nearest_point_of_the_ball_to_fifty_digits():
-    mpmath.mp.dps = 50
-    rng = np.random.default_rng(2)
-    worst = 0.0
-    for _ in range(1000):
-        covariance = random_covariance(rng, 10.0 ** rng.uniform(0, 6))
-        reading = rng.normal(size=3)
-        radius = rng.uniform(0.05, 0.99) * math.sqrt(reading @ reading)
-        found = nearest_in_ball(reading, covariance, radius)
-        worst = max(worst, np.abs(found - exact_nearest(reading, covariance, radius)).max())
-    assert worst < 1e-9
-
-
-def exact_nearest(reading, covariance, radius) -> np.ndarray:
-    """The same point from the secular equation in 50 digits, by bisection and Newton."""
-    s, y = ([mpmath.mpf(v) for v in each.ravel().tolist()] for each in (covariance, reading))
-    radius = mpmath.mpf(float(radius))
-
-    def solved(t, right):
-        """(1 + t S)^-1 right by Cramer's rule, five times as fast as a general solver here."""
-        a, b, c, d, e, f = (t * s[i] for i in (0, 1, 2, 4, 5, 8))
-        a, d, f = a + 1, d + 1, f + 1
-        first = (d * f - e * e, c * e - b * f, b * e - c * d)
-        second = (first[1], a * f - c * c, b * c - a * e)
-        third = (first[2], second[2], a * d - b * b)
-        whole = a * first[0] + b * first[1] + c * first[2]
-        return [_dot(row, right) / whole for row in (first, second, third)]
-
-    def size(x):
-        return mpmath.sqrt(_dot(x, x))
-
-    low, high = mpmath.mpf(0), mpmath.mpf(1)
-    while size(solved(high, y)) > radius:
-        low, high = high, high * 8
-    for _ in range(25):
-        middle = (low + high) / 2
-        low, high = (middle, high) if size(solved(middle, y)) > radius else (low, middle)
-    t = low
-    for _ in range(8):
-        x = solved(t, y)
-        length = size(x)
-        slope = _dot(x, solved(t, [_dot(s[i : i + 3], x) for i in (0, 3, 6)])) / length
-        t += (length - radius) / slope * length / radius
-    return np.array([float(each) for each in solved(t, y)])
-
-
-def _dot(one, other):
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
-def test_nearest_point_of_the_ball_agrees_with_a_general_solver_where_that_converges():
-    rng = np.random.default_rng(3)
-    converged = 0
-    for _ in range(60):
-        covariance = random_covariance(rng, 10.0)
-        reading, radius = rng.normal(size=3), 0.4
-        inverse = np.linalg.inv(covariance) / 1000.0
-        solved = minimize(
-            lambda x, y=reading, w=inverse: (x - y) @ w @ (x - y),
-            0.3 * reading / np.linalg.norm(reading),
-            jac=lambda x, y=reading, w=inverse: 2 * w @ (x - y),
-            constraints={"type": "ineq", "fun": lambda x: 0.16 - x @ x, "jac": lambda x: -2 * x},
-            method="SLSQP",
-            options={"ftol": 1e-14, "maxiter": 500},
-        )
-        if solved.success:
-            converged += 1
-            assert nearest_in_ball(reading, covariance, radius) == pytest.approx(solved.x, abs=1e-5)
-    assert converged > 30
-
-
 def test_with_equal_noise_the_nearest_point_is_the_candidate_of_eq_21():
     reading = np.array([0.3, -0.4, 1.2])
-    found = nearest_in_ball(reading, 0.04 * np.eye(3), 0.65)
-    assert found == pytest.approx(0.5 * reading)
-    assert mahalanobis_beyond(reading, 0.04 * np.eye(3), 0.65) == pytest.approx(0.65 / 0.2)
+    distances = BallDistances(reading[None], 0.04 * np.eye(3)[None])
+    assert distances.beyond(0.65) == pytest.approx(0.65 / 0.2)
 
 
 def test_largest_size_of_an_ellipsoid_against_a_dense_search():

@@ -8,8 +8,6 @@ from math import comb
 from kinacc.assess.adaptive import Ledger
 from kinacc.assess.statement import CANDIDATES, Reason, Statement
 
-MISSING_PART = 0.4  # of the error of the statement on all candidates, spent on unmeasured ones
-
 
 def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statement, ...]:
     """A statement on the measured points, and the same on all candidates where they are all."""

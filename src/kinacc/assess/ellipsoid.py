@@ -9,44 +9,6 @@ import numpy as np
 _STEPS = 100
 
 
-def nearest_in_ball(
-    reading_mm: np.ndarray, covariance_mm2: np.ndarray, radius_mm: float
-) -> np.ndarray:
-    """Point (3,) of the ball with the least Mahalanobis distance to a reading (3,).
-
-    Replaces the candidate of eq. 21, which is this point only where the covariance (3, 3) is a
-    multiple of the identity. Minimise (x - y)' S^-1 (x - y) over |x| <= radius: a convex problem,
-    x = (I + t S)^-1 y with t >= 0 where |x| meets the radius. Newton's method on 1/|x| - 1/radius,
-    which is concave in t, climbs to the root from t = 0 without overshooting.
-    """
-    if radius_mm <= 0.0:
-        return np.zeros(3)
-    variance, axes = np.linalg.eigh(covariance_mm2)
-    y = axes.T @ reading_mm
-    if math.sqrt(float(y @ y)) <= radius_mm:
-        return np.array(reading_mm, dtype=float)
-    t = 0.0
-    for _ in range(_STEPS):
-        shrunk = y / (1.0 + t * variance)
-        square = float(shrunk @ shrunk)
-        size = math.sqrt(square)
-        slope = float(shrunk @ (shrunk * variance / (1.0 + t * variance)))
-        step = square / slope * (size - radius_mm) / radius_mm
-        t += step
-        if step <= 1e-15 * t:
-            break
-    x = y / (1.0 + t * variance)
-    return axes @ (x * (radius_mm / math.sqrt(float(x @ x))))
-
-
-def mahalanobis_beyond(
-    reading_mm: np.ndarray, covariance_mm2: np.ndarray, radius_mm: float
-) -> float:
-    """Mahalanobis distance (1) from a reading (3,) to the nearest point of the ball; 0 inside."""
-    gap = reading_mm - nearest_in_ball(reading_mm, covariance_mm2, radius_mm)
-    return math.sqrt(max(float(gap @ np.linalg.solve(covariance_mm2, gap)), 0.0))
-
-
 def largest_size(mean_mm: np.ndarray, covariance_mm2: np.ndarray, deviations: float) -> float:
     """Largest |x| with (x - mean)' S^-1 (x - mean) <= deviations^2, mm.
 
@@ -99,9 +61,13 @@ def _squared_steps(parts: list[tuple[float, float]], t: float) -> float:
 
 
 class BallDistances:
-    """Mahalanobis distances from many readings to balls of any radius, computed together.
+    """Mahalanobis distances from readings to the nearest points of balls of any radius.
 
-    means_mm: (n, 3); covariances_mm2: (n, 3, 3). As :func:`mahalanobis_beyond`, for all rows.
+    means_mm: (n, 3); covariances_mm2: (n, 3, 3). The nearest point replaces the candidate of
+    eq. 21, which it is only where the covariance is a multiple of the identity. To minimise
+    (x - y)' S^-1 (x - y) over |x| <= radius is a convex problem: x = (I + t S)^-1 y with t >= 0
+    where |x| meets the radius. Newton's method on 1/|x| - 1/radius, which is concave in t, climbs
+    to the root from t = 0 without overshooting.
     """
 
     def __init__(self, means_mm: np.ndarray, covariances_mm2: np.ndarray) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from kinacc.assess.plain_sizes import reading_below
+from scipy.optimize import brentq
+
+from kinacc.assess.limits import reading_below
 from kinacc.assess.statement import VISIT, Statement
 
 SHARE = 0.95  # of future visits
@@ -23,16 +25,8 @@ def visit_mm(size_mm: float, arm_mm: float, share: float = SHARE) -> float:
     if math.isnan(size_mm) or arm_mm <= 0.0:
         return size_mm
     a = size_mm / arm_mm
-    low, high = a, a + _WIDEST
-    while high - low > 1e-12 * high:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if reading_below(middle, a) < share:
-            low = middle
-        else:
-            high = middle
-    return high * arm_mm
+    beyond = (a, a + _WIDEST)
+    return arm_mm * brentq(lambda x: reading_below(x, a) - share, *beyond, xtol=1e-14, rtol=1e-14)
 
 
 def of_future_visits(said: Statement, arms_mm: tuple[float, float, float]) -> Statement:

@@ -1,4 +1,4 @@
-"""Compiled limits on the size of an error from the size of a reading with equal noise per axis.
+"""Compiled densities of the size of a reading with equal noise per axis.
 
 Sizes are in units of the noise's standard deviation per axis. The size x of a reading at a point
 of true size a is noncentral chi distributed with three degrees of freedom (eq. 9).
@@ -9,16 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import register_jitable
 
-from kinacc.assess import plain_sizes
 from kinacc.compiled import compiled
 
 _NO_SIZE = 1e-12  # of the noise: what readings below it count as
-
-# Compiled from the very functions that serve where little is asked.
-reading_below = register_jitable(plain_sizes.reading_below)
-size_at = compiled(plain_sizes.size_at)
 
 
 @compiled
