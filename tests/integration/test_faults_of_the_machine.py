@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -18,7 +17,6 @@ from whole_project import PARTS, ROOT, write_poses
 
 RUN = ("snakemake", "-c1", "--nocolor", "--configfile", "config.yaml", "small.yaml", "--")
 FIT = (*RUN, "results/own/vec_model.parquet")
-STAGE = FIT
 CALIBRATE = ("kinacc", "calibrate", "config.yaml", "small.yaml", "--cores", "1")
 FIRST = "results/own/measurements.parquet"
 
@@ -134,12 +132,18 @@ def test_a_stage_whose_disk_fills_leaves_nothing_half_written_and_is_continued(f
     folder, wanted = fresh
     code, text = ended(folder, (*RUN, FIRST, "results/own/data_check.parquet"))
     assert code == 0, text
-    small = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))  # noqa: E731
-    code, text = ended(folder, STAGE, preexec_fn=small)
+    script = folder / "workflow/scripts/fit_vec.py"
+    good = script.read_text()
+    full = "import resource\n\nresource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+    script.write_text(full + good)
+    code, text = ended(folder, FIT)
     assert code == 1, text
+    assert "own fit_vec: results/own/vec_model.parquet: cannot be written: file too" in text
+    assert "Traceback" not in text
     assert not [*folder.glob("results/own/vec*.parquet")]
     assert not half_written(folder)
-    code, text = ended(folder, STAGE)
+    script.write_text(good)
+    code, text = ended(folder, FIT)
     assert code == 0, text
     assert tables(folder, wanted) == wanted
 
@@ -167,7 +171,7 @@ def test_a_corrupted_table_is_refused_by_the_next_stage_and_made_again(project):
     good = path.read_bytes()
     middle = len(good) // 2
     path.write_bytes(good[:middle] + bytes([good[middle] ^ 1]) + good[middle + 1 :])
-    code, text = ended(folder, STAGE)
+    code, text = ended(folder, FIT)
     assert code == 1, text
     assert "measurements.parquet" in text
     assert "Traceback" not in text

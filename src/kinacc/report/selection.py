@@ -91,7 +91,7 @@ def _over_order(tried: Sequence[Mapping]) -> Picture:
         "ring": plot.scatter(**at, size="chosen", **ring, legend_label="chosen"),
     }
     for name, glyph in parts.items():
-        glyph.glyph.name = f"orders-{name}"  # type: ignore[attr-defined]
+        glyph.glyph.name = f"orders-{name}"
     plot.yaxis[0].name = "orders-axis"
     options = []
     for name, label in _SHOWN.items():

@@ -8,7 +8,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,11 +69,13 @@ def stage(snakemake: Any) -> Iterator[Stage]:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # ends compiled loops too, and without a traceback
     dataset, (log,) = snakemake.wildcards.dataset, snakemake.log
     label = " ".join([dataset, snakemake.rule, snakemake.wildcards.get("scatteritem", "")]).strip()
-    with open(log, "w", encoding="utf-8", buffering=1) as file, warnings.catch_warnings():
+    Path(log).write_text("")
+    with warnings.catch_warnings():
 
         def tell(text: str, details: str = "") -> None:
             print(f"{label}: {text}", file=sys.stderr, flush=True)
-            file.write(f"{text}\n{details}")
+            with suppress(OSError), open(log, "a", encoding="utf-8") as file:  # a full disk
+                file.write(f"{text}\n{details}")
 
         def show(message, category, filename, lineno, *_) -> None:
             is_plain = category is UserWarning
