@@ -26,6 +26,9 @@ from kinacc.workflow.outdated import CALIBRATION
 from kinacc.workflow.start import ONE_THREAD
 
 os.environ.update(ONE_THREAD)
+if os.path.isdir(source := os.path.join(str(workflow.current_basedir), "src")):
+    # A Python of conda finds the clone's kinacc by it.
+    os.environ["PYTHONPATH"] = os.pathsep.join([source, os.environ.get("PYTHONPATH", "")])
 
 if {*"{}"} & {*str(workflow.current_basedir)}:
     raise WorkflowError("the workflow's folder has braces in its name: rename the folder")
