@@ -47,18 +47,6 @@ def skew(vector: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def vee(matrix: np.ndarray) -> np.ndarray:
-    """Vector (..., 3) of the skew-symmetric part of ``matrix`` (..., 3, 3)."""
-    return 0.5 * np.stack(
-        [
-            matrix[..., 2, 1] - matrix[..., 1, 2],
-            matrix[..., 0, 2] - matrix[..., 2, 0],
-            matrix[..., 1, 0] - matrix[..., 0, 1],
-        ],
-        axis=-1,
-    )
-
-
 def rotation_x(angle_rad: np.ndarray | float) -> np.ndarray:
     """Rotation (..., 3, 3) about x by ``angle_rad`` (...)."""
     return _axis_rotation(angle_rad, 0)

@@ -10,7 +10,7 @@ import pytest
 
 from kinacc import geometry
 from kinacc.calibration import dh_fit, vec_fit
-from kinacc.calibration.frames import Frames, coordinates, inverse_left_jacobian, left_jacobian
+from kinacc.calibration.frames import Frames, coordinates, left_jacobian
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.system import FlangeModel, PoseSystem
 from kinacc.errors import InputError
@@ -128,7 +128,7 @@ def test_blocks_and_residual_agree_whatever_the_block_length(monkeypatch):
 
 
 @pytest.mark.parametrize("length", [0.0, 1e-9, 9e-4, 1.1e-3, 0.5, 3.0])
-def test_left_jacobian_and_its_inverse(length):
+def test_the_left_jacobian_is_the_derivative_of_the_rotation_vector(length):
     axis = np.array([0.6, -0.48, 0.64])
     w = length * axis
     forward = left_jacobian(w)
@@ -139,7 +139,6 @@ def test_left_jacobian_and_its_inverse(length):
             exp_so3(w - shift) @ exp_so3(w).T
         )
         np.testing.assert_allclose(forward[:, column], moved / 2e-6, atol=1e-8)
-    np.testing.assert_allclose(inverse_left_jacobian(w[None])[0] @ forward, np.eye(3), atol=1e-9)
 
 
 def test_fewer_residuals_than_parameters_is_said_with_both_numbers():

@@ -128,11 +128,6 @@ def to_table(
     return pa.Table.from_arrays(arrays, schema=schema)
 
 
-def as_read(artefact: str, columns: Mapping[str, Any]) -> Columns:
-    """Columns as :func:`read` gives them once they are written; see :func:`to_table` for errors."""
-    return columns_in(to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-")))
-
-
 def digest_of(artefact: str, columns: Mapping[str, Any]) -> str:
     """Digest of the columns of an artefact, whatever made them."""
     table = to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-"))

@@ -216,13 +216,3 @@ def left_jacobian(w_rad: np.ndarray) -> np.ndarray:
         return np.eye(3) + 0.5 * cross + cross @ cross / 6.0
     versine, excess = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     return np.eye(3) + versine * cross + excess * (cross @ cross)
-
-
-def inverse_left_jacobian(w_rad: np.ndarray) -> np.ndarray:
-    """Inverse left Jacobians (n, 3, 3) of rotation vectors (n, 3) shorter than 2 pi."""
-    angle = np.linalg.norm(w_rad, axis=-1)
-    small = angle < _SMALL_ANGLE_RAD
-    half = 0.5 * np.where(small, 1.0, angle)
-    factor = np.where(small, 1 / 12 + angle**2 / 720, (1 - half / np.tan(half)) / (4 * half**2))
-    cross = skew(w_rad)
-    return np.eye(3) - 0.5 * cross + factor[:, None, None] * (cross @ cross)

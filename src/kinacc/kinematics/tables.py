@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -36,11 +36,6 @@ def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorMo
 def of_kind(kind: str) -> type[ErrorModel]:
     """The class of models of one kind."""
     return loaded(MODELS[kind])
-
-
-def fitted_range(models: Iterable[ErrorModel]) -> tuple[np.ndarray, np.ndarray]:
-    """DH joints (k,), (k,) that models of one data set were fitted over."""
-    return next(each.domain for each in models if each.domain is not None)
 
 
 def frame(columns: Columns, model: str, name: str, session: str | None = None) -> Pose:

@@ -11,7 +11,6 @@ from kinacc.measurements.column_names import UNITS, plain
 from kinacc.measurements.grid import Row, header_cells, is_blank, is_comment, number_of
 from kinacc.measurements.intake.decimals import shaped_as_number
 from kinacc.measurements.robot_programs import numbers_within
-from kinacc.measurements.table import RawTable
 
 _UNITS = re.compile(
     r"\b(?:units?|einheit(?:en)?|unit[eéà]s?|unidad(?:es)?|単位)\b[^:=\n]{0,20}[:=]\s*([^;\n#]+)",
@@ -170,8 +169,3 @@ def stated_above(texts: Sequence[str]) -> dict[str, str]:
         if frame := _FRAME.search(text):
             found.setdefault("frame", frame[1].strip(" ,\t\"'"))
     return found
-
-
-def nothing_in(cells: Sequence) -> bool:
-    """Whether all cells are empty or say that there is nothing."""
-    return all(map(RawTable.is_gap, cells))
