@@ -1,7 +1,7 @@
-"""How often check-results calls a week worse: python benchmarks/weeks.py [SAME] [OTHER]
+"""How often check-results calls a week worse: python benchmarks/weeks.py [SAME] [OTHER] [POSES]
 
-Pairs of weeks of one arm (an accepted draw of the synthetic arm, 60 full poses, tracker noise of
-0.02 mm, set up anew, warmed up differently), each calibrated with a DH model, held out in five
+Pairs of weeks of one arm (an accepted draw of the synthetic arm, POSES full poses, tracker noise
+of 0.02 mm, set up anew, warmed up differently), each calibrated with a DH model, held out in five
 shares. SAME pairs have no change; in OTHER pairs joint 4 is off by 2 mrad in the second week.
 Worse is what `--against` fails for: held-out errors, or the accepted calibration holds no more.
 """
@@ -29,20 +29,21 @@ from kinacc.synthetic.accepted import accepted_draw
 from kinacc.synthetic.draw import physical_robot
 from kinacc.synthetic.physical import Visits
 
-POSES, WEIGHT, FOLDS = 60, 500.0, 5
+WEIGHT, FOLDS = 500.0, 5
 ARM = robots.load("mh180")
 
 
 def measured(seed: int, week: int, q_rad: np.ndarray, offset_rad: np.ndarray) -> Observations:
     """A week's readings: the tracker anywhere, the arm as warm as it is."""
+    poses = len(q_rad)
     draw, rng = accepted_draw(seed % 21), np.random.default_rng([seed, week])
     visits = Visits(
         q_rad + offset_rad,
         plan.directions(q_rad),
-        plan.time_h(POSES) + rng.uniform(0.0, 6.0),
-        rng.standard_normal((POSES, 6)),
+        plan.time_h(poses) + rng.uniform(0.0, 6.0),
+        rng.standard_normal((poses, 6)),
     )
-    run = tracker.Run(visits, *rng.standard_normal((2, POSES, 3)))
+    run = tracker.Run(visits, *rng.standard_normal((2, poses, 3)))
     arm = physical_robot(100_000 + seed, draw.scales, draw.geometry)
     seen = full_poses(q_rad, tracker.measured(arm, run, 0.02), plan.directions(q_rad))
     anywhere = Pose(exp_so3(rng.normal(size=3)), 2000.0 * rng.normal(size=3))
@@ -61,7 +62,7 @@ def session(seen: Observations, name: str) -> drift.Session:
         return dh_fit.fit(part, ARM.dh, free=free, rotation_weight_mm_per_rad=WEIGHT,
                           threshold=1e-4, frame_terms=terms)  # fmt: skip
 
-    held_out_mm = np.zeros(POSES)
+    held_out_mm = np.zeros(len(seen))
     for fold in range(FOLDS):
         found = fit(seen.select(seen.fold != fold))
         out = seen.fold == fold
@@ -73,15 +74,15 @@ def session(seen: Observations, name: str) -> drift.Session:
                          seen, held_out_mm, *[np.nan] * 3)  # fmt: skip
 
 
-def verdict(seed: int, changed: bool) -> str:
+def verdict(seed: int, changed: bool, poses: int) -> str:
     """What a pair of weeks is called."""
     rng = np.random.default_rng([seed, 99])
-    pool = plan.configurations(ARM, 4 * POSES)
-    first, second = (pool[rng.choice(len(pool), POSES, replace=False)] for _ in range(2))
+    pool = plan.configurations(ARM, 4 * poses)
+    first, second = (pool[rng.choice(len(pool), poses, replace=False)] for _ in range(2))
     knock = 2e-3 * (np.arange(6) == 3) * changed
     weeks = session(measured(seed, 1, first, np.zeros(6)), "1")
     later = session(measured(seed, 2, second, knock), "2")
-    samples = [chance.Sample(each.held_out_mm, np.arange(POSES)) for each in (later, weeks)]
+    samples = [chance.Sample(each.held_out_mm, np.arange(poses)) for each in (later, weeks)]
     worse = chance.change("mean", *samples, False, accepted.CONFIDENCE)
     if not worse.open and worse.least > 0.0:
         return "worse: held-out errors"
@@ -89,11 +90,13 @@ def verdict(seed: int, changed: bool) -> str:
     return {"holds": "same", "recalibrate": "worse: arm"}.get(row["verdict"][1], "undecided")
 
 
-def main(same: int, other: int) -> None:
+def main(same: int, other: int, poses: int) -> None:
     """Print how many pairs are called what."""
     for name, count, changed in (("no change", same, False), ("joint 4", other, True)):
-        print(name, dict(Counter(verdict(seed, changed) for seed in range(count))), flush=True)
+        found = Counter(verdict(seed, changed, poses) for seed in range(count))
+        print(f"{name}, {poses} poses: {dict(found)}", flush=True)
 
 
 if __name__ == "__main__":
-    main(*(int(each) for each in (*sys.argv[1:], "1000", "100")[:2]))
+    given = [int(each) for each in sys.argv[1:]]
+    main(*given, *(1000, 100, 60)[len(given) :])

@@ -49,7 +49,7 @@ def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(be
     assert call("campaign", "verify", folder).exit_code == 0
     done = call("campaign", *known)
     assert done.exit_code == 1
-    recorded(folder, Arm(folder), 2)  # others in their place
+    recorded(folder, Arm(folder, 1.1 * SIGMA_MM), 2)  # others in their place
     assert call("campaign", "verify", folder, "--readings", 7).exit_code == 0
     assert call("campaign", *known).exit_code == 1
 

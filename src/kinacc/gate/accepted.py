@@ -62,9 +62,7 @@ def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) ->
     return note
 
 
-def compared(
-    now: Path, before: Path, rotation_weight_mm_per_rad: float = 500.0
-) -> Iterator[Outcome]:
+def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iterator[Outcome]:
     """A data set beside the accepted one: equal tables where inputs are the same, else better,
     same, worse or undecided by held-out errors, whether the arm changed, and the parameters that
     moved.
