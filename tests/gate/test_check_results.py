@@ -16,6 +16,7 @@ from stages_by_hand import perform
 from whole_project import finished
 
 from kinacc.artifacts import store
+from kinacc.gate.accepted import compared
 
 __all__ = ["finished"]
 
@@ -198,6 +199,27 @@ def test_too_few_poses_decide_nothing(made, tmp_path):
         perform(stage, [str(config)], tmp_path / "few")
     found = told(tmp_path / "few", "--against", made["first"])["held-out errors"]
     assert found["verdict"] == "undecided"
+
+
+def test_a_knocked_joint_makes_the_accepted_calibration_hold_no_more(made, tmp_path):
+    """A fit takes up what the joint does: held-out errors are the same."""
+    config, now = tmp_path / "small.yaml", tmp_path / "results" / "mh180"
+    config.write_text(SMALL % (0.05, 2))
+    perform("measurements", [str(config)], tmp_path / "results")
+    columns = store.read(now / "measurements.parquet")
+    columns["q4"] = columns["q4"] + 2e-3
+    marks = store.read_metadata(now / "measurements.parquet")
+    store.write(now / "measurements.parquet", "measurements", columns, marks)
+    for stage in ("vec", "dh", "residuals"):
+        perform(stage, [str(config)], tmp_path / "results")
+    found = {each.name: each for each in compared(now, made["first"] / "mh180", 500.0)}
+    assert found["held-out errors"].figures["result"] == "same"
+    assert found["arm"].verdict == "failed"
+    assert found["arm"].figures["moved_mm"] > found["arm"].figures["chance_mm"]
+    unchanged = {
+        each.name: each for each in compared(made["next"] / "mh180", made["first"] / "mh180", 500.0)
+    }
+    assert unchanged["arm"].verdict == "passed"
 
 
 def test_a_joint_that_moved_is_named(made, here):
