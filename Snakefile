@@ -23,12 +23,9 @@ from kinacc.workflow import running
 from kinacc.workflow.code import code_digest
 from kinacc.workflow.data_sets import RESULTS, campaign_files, digests, read_data_sets
 from kinacc.workflow.outdated import CALIBRATION
-from kinacc.workflow.start import ONE_THREAD
+from kinacc.workflow.start import job_environment
 
-os.environ.update(ONE_THREAD)
-if os.path.isdir(source := os.path.join(str(workflow.current_basedir), "src")):
-    # A Python of conda finds the clone's kinacc by it.
-    os.environ["PYTHONPATH"] = os.pathsep.join([source, os.environ.get("PYTHONPATH", "")])
+os.environ.update(job_environment(str(workflow.current_basedir)))
 
 if {*"{}"} & {*str(workflow.current_basedir)}:
     raise WorkflowError("the workflow's folder has braces in its name: rename the folder")

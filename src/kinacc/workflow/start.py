@@ -19,6 +19,15 @@ ONE_THREAD = dict.fromkeys(
 _PROFILE = SNAKEFILE.parent / "profiles" / "default"
 
 
+def job_environment(workflow: str) -> dict[str, str]:
+    """Variables of every job: one thread, and in a clone its sources, for a Python of conda."""
+    source = os.path.join(workflow, "src")
+    if not os.path.isdir(source):
+        return ONE_THREAD
+    paths = [source, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return ONE_THREAD | {"PYTHONPATH": os.pathsep.join(paths)}
+
+
 def run_workflow(target: str, configs: Sequence[str], cores: int, more: Sequence[str] = ()) -> int:
     """Exit code of Snakemake after it made a target of the workflow.
 
