@@ -49,7 +49,14 @@ class Grid:
         return Grid(tuple(fit) or self.orders[:1], self.priors)
 
     def priors_of(self, order: int) -> tuple[Prior, ...]:
-        """The priors to try an order with: not those that have fallen to nothing before it."""
+        """The priors to try an order with: not those that have fallen to nothing before it.
+
+        Of order 1 and below the first of each standard deviation: priors fall from order 2 on, and
+        rounding would choose among equal ones.
+        """
+        if order <= 1:
+            stds = [prior.delta_mm for prior in self.priors]
+            return tuple(p for i, p in enumerate(self.priors) if p.delta_mm not in stds[:i])
         if len(self.orders) == 1:
             return self.priors
         return tuple(p for p in self.priors if p.decay ** (order - 1) >= LEAST_PRIOR)
