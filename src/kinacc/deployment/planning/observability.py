@@ -21,6 +21,7 @@ INDICES = {
     "O5": "inverse of the sum of the inverse singular values",
 }
 _TINY = 1e-300
+_TIE = 1e-6  # of the log determinant and of an index: what is less may be rounding
 _SUBSPACE = 6  # weakest directions the bounds look at
 
 
@@ -60,7 +61,7 @@ def best_addition(
     """
     if index == "O1":
         gains = _log_gains(normal, rows[free])
-        place = int(np.argmax(gains))
+        place = int(np.argmax(gains >= gains.max() - _TIE))
         _, log_determinant = np.linalg.slogdet(normal)
         mean = (log_determinant + gains[place]) / len(normal)
         return int(free[place]), float(np.exp(0.5 * mean) / np.sqrt(poses))
@@ -75,8 +76,8 @@ def best_addition(
         squares = np.linalg.eigvalsh(normal + np.swapaxes(added, 1, 2) @ added)
         found = of_values(index, squares, poses)
         top = float(found.max())
-        number = int(free[part[found >= top * (1.0 - 1e-12)]].min())
-        if top > value * (1.0 + 1e-12) or best < 0:
+        number = int(free[part[found >= top * (1.0 - _TIE)]].min())
+        if top > value * (1.0 + _TIE) or best < 0:
             best, value = number, top
     return best, value
 
