@@ -12,6 +12,8 @@ from good_files import File, measured, simulated
 
 from kinacc.checks.suspicion import STOPPING
 from kinacc.config.schema import settings
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import forward
 
 
 def good(name: str) -> File:
@@ -75,6 +77,15 @@ def test_a_measured_file_whose_largest_error_hangs_on_three_rows(tmp_path):
 )
 def test_simulated_files_raise_no_suspicion(robot, kind, tmp_path):
     assert simulated(robot, **kind).check(tmp_path).suspicions == ()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_readings_without_noise_of_the_arm_as_described_raise_no_suspicion(seed, tmp_path):
+    arm = robots.load("irb120")
+    q = np.round(np.random.default_rng(seed).uniform(-1.0, 1.0, (40, 6)), 6)
+    columns = dict(zip((f"q{i}_rad" for i in range(1, 7)), q.T, strict=True))
+    columns |= dict(zip(("x_mm", "y_mm", "z_mm"), forward(arm, q).position_mm.T, strict=True))
+    assert File(columns, "irb120").check(tmp_path).suspicions == ()
 
 
 @pytest.mark.parametrize("name", QUICK)
