@@ -25,7 +25,6 @@ _CAP = 10.0  # sigma
 _BETTER = 0.85  # of what is left overall: a split of a good file leaves all but a few per cent
 _BETTER_THERE = 0.55  # of what is left of the readings after the split
 _PLAIN = 0.5  # share at which no other place need be tried
-_EXACT = 1e-6  # mm and rad: what is left of simulated readings by rounding
 
 Progress = Callable[[Iterable, str], Iterable]
 
@@ -84,8 +83,8 @@ def fit(seen: Seen, model: DHModel) -> Fitted:
         left,
         left_mm,
         np.where(np.isfinite(left_rad), left_rad, -1.0),
-        max(tails.limit(left_mm, 3), _EXACT),
-        max(tails.limit(left_rad, 3), _EXACT),
+        tails.limit(left_mm, 3),
+        tails.limit(left_rad, 3),
     )
 
 
@@ -114,7 +113,7 @@ def with_jumps(seen: Seen, model: DHModel, progress: Progress) -> Fitted:
 
 def _next(fitted: Fitted, model: DHModel) -> tuple[Jump, Fitted] | None:
     """The next jump and the fit without it; None where there is none."""
-    if fitted.trial.sigma_mm < _EXACT:
+    if fitted.trial.sigma_mm < tails.ROUNDING:
         return None
     # Poses of equal joints are one: read often, they make no jump any surer.
     few = len(np.unique(np.round(fitted.seen.q, 6), axis=0)) < _FEW

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 
 FAMILY_WISE = 0.01
+ROUNDING = 1e-6  # mm and rad: what is nearer is equal, as readings without noise are
 _MOST_FREEDOM, _LEAST_FREEDOM = 10.0, 4.0
 _BULK = 0.9
 _APART = 1.25  # of the next: what is less makes no difference to the largest
@@ -20,7 +21,7 @@ _APART = 1.25  # of the next: what is less makes no difference to the largest
 def limit(lengths: np.ndarray, dimensions: int, count: int | None = None) -> float:
     """Largest length to be expected among ``count`` vectors (as many as ``lengths`` if None).
 
-    ``lengths`` (m,) of vectors of ``dimensions`` components about their own centre.
+    ``lengths`` (m,), mm or rad, of vectors of ``dimensions`` components about their own centre.
     """
     lengths = lengths[np.isfinite(lengths)]
     if lengths.size == 0:
@@ -31,7 +32,7 @@ def limit(lengths: np.ndarray, dimensions: int, count: int | None = None) -> flo
         return np.inf
     freedom = _freedom(outer / middle, dimensions)
     tail = _length(1.0 - FAMILY_WISE / max(count, 1), dimensions, freedom)
-    return float(middle * tail / _length(0.5, dimensions, freedom))
+    return max(float(middle * tail / _length(0.5, dimensions, freedom)), ROUNDING)
 
 
 def detached(lengths: np.ndarray) -> int:
@@ -50,7 +51,7 @@ def detached(lengths: np.ndarray) -> int:
         excess = float(np.mean(rest[:-1] - rest[-1]))
         gap = ordered[count - 1] - ordered[count]
         chance = (1.0 + count * gap / (tail * excess)) ** -tail if excess > 0.0 else 1.0
-        if chance < FAMILY_WISE / most and ordered[count - 1] > _APART * ordered[count]:
+        if chance < FAMILY_WISE / most and ordered[count - 1] > _APART * ordered[count] + ROUNDING:
             return count
     return 0
 

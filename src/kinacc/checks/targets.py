@@ -10,7 +10,6 @@ from kinacc.checks.noise import Distance
 from kinacc.checks.suspicion import Suspicion, suspicion
 
 _FEWEST = 4  # rows on either side of a move
-_LEAST_MM = 1e-6
 
 
 def found(cells: Cells, distances: list[Distance]) -> tuple[list[Suspicion], np.ndarray]:
@@ -72,7 +71,7 @@ def _move(distance: Distance) -> tuple[int | None, float]:
         ]
     )
     # A distance that only drifts is no move: it must leave what both sides scatter by far.
-    limit = max(tails.limit(np.abs(rest), 1), _LEAST_MM)
+    limit = tails.limit(np.abs(rest), 1)
     return (place, size) if abs(size) > limit else (None, 0.0)
 
 
@@ -93,7 +92,7 @@ def _singles(cells: Cells, distances: list[Distance], moves) -> list[Suspicion]:
         if place is not None:
             length[place:] -= size
         away = np.abs(length - np.median(length))
-        limit = max(tails.limit(away, 1, len(away) * len(moves)), _LEAST_MM)
+        limit = tails.limit(away, 1, len(away) * len(moves))
         for row in np.flatnonzero(away > limit):
             line = int(cells.line[distance.rows[row, 0]])
             off.setdefault(line, set()).update((distance.one, distance.other))
