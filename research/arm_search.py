@@ -12,13 +12,13 @@ from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.kinematics import robot, vec
 from kinacc.kinematics.robot import Robot
+from kinacc.study import in_memory
 from kinacc.study.claims.numbers import number_claims
 from kinacc.synthetic import columns
 from kinacc.synthetic.accepted import GEOMETRY, AcceptedDraw, geometry_columns
 from kinacc.synthetic.draw import TABLE_II, Scales
+from kinacc.synthetic.source import attitude, split
 from kinacc.synthetic.tracker import Run, calibration_run
-from kinacc.workflow import in_memory
-from kinacc.workflow.stages.measurements import attitude, split
 from research import arm_acceptance as acceptance
 from research.response import Response, linearise
 from research.tuning import Targets, targets_of, tuned

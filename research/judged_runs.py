@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pandas as pd
 
-from kinacc.artifacts.error_models import ALWAYS
+from kinacc.config.error_models import ALWAYS
 from kinacc.errors import InputError
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.workflow.code import config_hash

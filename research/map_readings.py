@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from kinacc.artifacts.error_models import ALWAYS
+from kinacc.config.error_models import ALWAYS
+from kinacc.study import in_memory
 from kinacc.study.claims.claim import verdict
 from kinacc.study.claims.map_sentences import map_claims
-from kinacc.workflow import in_memory
 from research import arm_search
 from research.open_choices import ORIENTATIONS_DEG
 

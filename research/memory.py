@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from kinacc.config.records import value_at
+from kinacc.study.in_memory import lean
 from kinacc.workflow.code import config_hash
-from kinacc.workflow.in_memory import lean
 
 _EVALUATION = tuple(
     f"evaluation.{key}"

@@ -9,37 +9,29 @@ from types import SimpleNamespace
 
 from kinacc.artifacts import store, sums
 from kinacc.artifacts.atomic import write_together
+from kinacc.calibration import error_model, excluded_rows, residual_tables
+from kinacc.checks import data_check
+from kinacc.deployment import summary
 from kinacc.errors import KinaccError
+from kinacc.study import evaluation, histories, monte_carlo
+from kinacc.study.claims.evaluate import table_of
+from kinacc.synthetic import source
 from kinacc.workflow.code import config_hash
 from kinacc.workflow.data_sets import read_data_sets
 from kinacc.workflow.outdated import CALIBRATION
-from kinacc.workflow.stages import (
-    accuracy_map,
-    assessment_points,
-    claims,
-    data_check,
-    error_model,
-    excluded_rows,
-    histories,
-    measurements,
-    residuals,
-    study,
-    study_chunk,
-    summary,
-)
 
 STAGES = {
-    "measurements": measurements.run,
+    "measurements": source.run,
     "data_check": data_check.run,
     **{kind: partial(error_model.run, kind=kind) for kind in ("vec", "compliance", "dh")},
-    "residuals": residuals.run,
+    "residuals": residual_tables.run,
     "excluded_rows": excluded_rows.run,
     "summary": summary.run,
-    "accuracy_map": accuracy_map.run,
-    "assessment_points": assessment_points.run,
-    "study": study.run,
+    "accuracy_map": evaluation.mapped,
+    "assessment_points": evaluation.points,
+    "study": monte_carlo.summed_up,
     "histories": histories.run,
-    "claims": claims.run,
+    "claims": table_of,
 }
 CALIBRATED = ("measurements", "vec", "dh", "residuals")
 
@@ -68,7 +60,7 @@ def perform(name: str, configs: list[str], results: Path, dataset: str | None = 
     folder.mkdir(parents=True, exist_ok=True)
     tables = {path.stem: store.read(path) for path in folder.glob("*.parquet")}
     if name == "study":
-        tables |= study_chunk.run(tables, settings)
+        tables |= monte_carlo.simulated(tables, settings)
     own = data.chosen(dataset, *CALIBRATION) if name == "summary" else settings
     marks = {"kinacc_version": "0", "config_hash": config_hash(own), "seed": settings["seed"]}
     contents = {

@@ -8,6 +8,7 @@ import pytest
 
 from kinacc.assess.model_invalidation import Invalidation
 from kinacc.config.records import of_section
+from kinacc.study import histories as stage
 from kinacc.study.histories import (
     FALLBACKS,
     KEPT,
@@ -19,7 +20,6 @@ from kinacc.study.histories import (
     histories,
 )
 from kinacc.study.monte_carlo import Visits, world_of
-from kinacc.workflow.stages import histories as stage
 
 SEED = 3
 STUDY = of_section(Visits, paper.study())

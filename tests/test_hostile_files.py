@@ -99,8 +99,8 @@ def test_numbers_too_large_for_an_arm_are_named(tmp_path):
 
 
 def test_a_whole_number_beyond_all_floats_is_out_of_range(tmp_path):
+    from kinacc.checks.contradictions import load
     from kinacc.errors import InputError
-    from kinacc.workflow.contradictions import load
 
     path = tmp_path / "own.yaml"
     path.write_text("datasets: {own: {robot: mh180}}\n")

@@ -7,10 +7,10 @@ import json
 import pytest
 from command_line import call
 
+from kinacc.checks.contradictions import load
 from kinacc.config.reading import read
 from kinacc.errors import InputError
 from kinacc.measurements.intake.write import plain_name
-from kinacc.workflow.contradictions import load
 
 ONE = """  arm_{0}:
     robot: ur10

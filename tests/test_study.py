@@ -9,8 +9,10 @@ import paper_settings as paper
 import pytest
 import yaml
 
+from kinacc.checks.contradictions import load
 from kinacc.config.records import of_section
 from kinacc.errors import InputError
+from kinacc.study import monte_carlo
 from kinacc.study.monte_carlo import (
     StudySettings,
     assessors,
@@ -21,9 +23,6 @@ from kinacc.study.monte_carlo import (
     summary,
     true_accuracy_mm,
 )
-from kinacc.workflow.contradictions import load
-from kinacc.workflow.stages import study as study_stage
-from kinacc.workflow.stages import study_chunk as chunk_stage
 
 ROOT = Path(__file__).parents[1]
 ERROR = np.random.default_rng(11).normal(size=(40, 3)) * 0.3
@@ -73,14 +72,14 @@ def test_every_noise_repetition_assessor_and_reading_has_one_row(rows):
 def test_parts_joined_in_any_order_give_the_same_bytes(rows):
     for of in (1, 2, 3, 4):
         parts = [
-            chunk_stage.run(
+            monte_carlo.simulated(
                 {"assessment_points": POINTS}, configured() | {"part": {"number": i, "of": of}}
             )["study_chunk"]
             for i in range(of, 0, -1)
         ]
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         inputs = {"assessment_points": POINTS, "study_chunk": joined}
-        made = study_stage.run(inputs, configured())
+        made = monte_carlo.summed_up(inputs, configured())
         assert equal(made["study"], default_reading(rows, SECTION))
         assert equal(made["study_summary"], summary(default_reading(rows, SECTION), TRUE))
         assert equal(made["readings"], readings(rows, TRUE))

@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from kinacc import synthetic
-from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.calibration import dh_fit
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import Errors, cross_validated, errors
 from kinacc.calibration.tables import frames_columns
+from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.config.schema import defaults
 from kinacc.deployment import handful, verify
 from kinacc.deployment.handful import BASE, TOOL, HeldOut

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 import shared_data
 
-from kinacc.calibration import models, selection
+from kinacc.calibration import delivered, models, selection
+from kinacc.checks.contradictions import load
 from kinacc.kinematics import robot
-from kinacc.workflow import calibration_settings
-from kinacc.workflow.contradictions import load
-from kinacc.workflow.stages import measurements
+from kinacc.synthetic import source
 
 SERIES = "ur10_tmac/series_D.csv"
 AXES = ("x_mm", "y_mm", "z_mm")
@@ -26,13 +25,13 @@ def read(path, arm, highest, orientation, folder):
         f"      vec: {{order: auto, prior: chosen, order_highest: {highest}}}\n"
     )
     settings = load([folder / "own.yaml"])["own"]
-    return settings, measurements.run({}, settings)["measurements"]
+    return settings, source.run({}, settings)["measurements"]
 
 
 def orders(settings, rows):
     """``vec_orders`` of these rows."""
     arm = robot.load(settings["robot"])
-    every, _ = calibration_settings.observed({"measurements": rows}, arm)
+    every, _ = delivered.observed({"measurements": rows}, arm)
     estimator = models.estimators(settings["calibration"], arm, every)["vec"]
     return estimator.choices(every)["vec_orders"]
 
@@ -107,7 +106,7 @@ def test_so_few_poses_that_a_fold_carries_less_than_all_of_them(tmp_path):
     table = orders(settings, rows)
     assert np.asarray(table["order"]).max() == 1
     arm_of_file = robot.load(settings["robot"])
-    every, _ = calibration_settings.observed({"measurements": rows}, arm_of_file)
+    every, _ = delivered.observed({"measurements": rows}, arm_of_file)
     estimator = models.estimators(settings["calibration"], arm_of_file, every)["vec"]
     for fold in np.unique(every.fold):
         of_fold = estimator.chosen({"vec_orders": table}, int(fold))

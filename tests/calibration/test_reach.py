@@ -12,8 +12,8 @@ from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.observations import from_columns
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh, robot
+from kinacc.synthetic import source
 from kinacc.workflow.data_sets import read_data_sets
-from kinacc.workflow.stages import measurements
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -24,7 +24,7 @@ def held_out_errors(dataset, monkeypatch):
     """Observations and position errors (n, 3) of rows by DH fits that have not seen them."""
     monkeypatch.chdir(ROOT)
     config = read_data_sets(["benchmarks/reach.yaml"]).settings[dataset]
-    table = measurements.run({}, config)
+    table = source.run({}, config)
     arm = robot.load(config["robot"])
     every = from_columns(table["measurements"], arm)
     estimator = DHEstimator.of(config["calibration"], arm, every)

@@ -8,11 +8,11 @@ import numpy as np
 import shared_data
 
 from kinacc.checks import check
+from kinacc.checks.contradictions import load
 from kinacc.checks.report import Report
 from kinacc.geometry import exp_so3, log_so3
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
-from kinacc.workflow.contradictions import load
 
 MEASURED = {
     "ur10_a": "ur10_tmac/series_A.csv",

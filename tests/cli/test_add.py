@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from command_line import call
 
+from kinacc.checks.contradictions import load
 from kinacc.config.series_text import with_line
-from kinacc.workflow.contradictions import load
 
 ROOT = Path(__file__).parents[2]
 MEASURED = ROOT / "examples" / "data" / "ur10_tmac" / "series_B.csv"

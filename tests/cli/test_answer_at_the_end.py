@@ -16,7 +16,7 @@ from stages_by_hand import run_stage
 from kinacc.artifacts import store
 from kinacc.calibration.summary_words import half_page
 from kinacc.kinematics import robot
-from kinacc.workflow import answer
+from kinacc.report import answer
 
 
 @pytest.fixture(scope="module")
@@ -419,7 +419,7 @@ def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(
     tried, folds, told, reflectors
 ):
     from kinacc.calibration.summary_words import half_page
-    from kinacc.workflow.answer import facts_of, read
+    from kinacc.report.answer import facts_of, read
 
     tables = read(reflectors)
     own = max(folds)
@@ -437,7 +437,7 @@ def test_a_model_of_the_highest_order_says_whether_settings_or_poses_set_it(
 
 
 def test_a_stated_base_and_tool_leave_all_readings_to_the_model(reflectors):
-    from kinacc.workflow.answer import facts_of, read
+    from kinacc.report.answer import facts_of, read
 
     tables = read(reflectors)
     pose, frames = tables["measurements"]["pose"], tables["frames"]
@@ -463,7 +463,7 @@ def test_a_stated_base_and_tool_leave_all_readings_to_the_model(reflectors):
 def test_what_other_poses_would_show_comes_with_its_cause_and_its_remedy(reflectors):
     from kinacc.calibration.blind_words import WEAK
     from kinacc.calibration.summary_words import half_page
-    from kinacc.workflow.answer import facts_of, read
+    from kinacc.report.answer import facts_of, read
 
     def page():
         return " ".join(" ".join(half_page(facts_of(tables), "kinacc fitted own --all")).split())

@@ -8,8 +8,8 @@ import yaml
 from click.testing import CliRunner
 from tracked_arm import table, tracked
 
+from kinacc.checks.contradictions import load
 from kinacc.cli.group import main
-from kinacc.workflow.contradictions import load
 
 
 def call(*words, code=0):

@@ -7,9 +7,9 @@ import pytest
 import shared_data
 from click.testing import CliRunner
 
+from kinacc.checks.contradictions import load
 from kinacc.cli.group import main
 from kinacc.kinematics import robot
-from kinacc.workflow.contradictions import load
 
 
 def call(*words, **more):

@@ -8,11 +8,11 @@ import yaml
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from kinacc.checks.contradictions import load
 from kinacc.cli.group import main
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
-from kinacc.workflow.contradictions import load
 
 ROWS = 14
 ARM = robot.load("ur10")

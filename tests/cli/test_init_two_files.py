@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from tracked_arm import assert_read, call, described, refused, table, tracked, written
 
+from kinacc.checks.contradictions import load
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
-from kinacc.workflow.contradictions import load
 
 IT = tracked(poses=20)
 COUNT = len(IT.q)

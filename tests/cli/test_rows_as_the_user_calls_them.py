@@ -94,7 +94,7 @@ def test_many_remarks_of_the_reader_are_counted_and_all_told_on_request(results)
     found["finding"][-more:], found["level"][-more:] = "left_out", "note"
     found["what"][-more:] = [f"remark {i}" for i in range(more)]
     from kinacc.calibration.summary_words import half_page
-    from kinacc.workflow.answer import facts_of, read
+    from kinacc.report.answer import facts_of, read
 
     facts = facts_of({**read(results), "data_check": found})
     assert sum("remark" in line for line in half_page(facts, "kinacc fitted m --all")) <= 3

@@ -17,7 +17,7 @@ from stages_by_hand import run_stage
 from kinacc.artifacts import store
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import JOURNAL
-from kinacc.workflow import answer
+from kinacc.report import answer
 
 COLUMNS = ("bound_mm", "confidence", "campaign", "campaign_date", "verdict")
 

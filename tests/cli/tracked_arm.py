@@ -7,10 +7,10 @@ import numpy as np
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from kinacc.checks.contradictions import load
 from kinacc.cli.group import main
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
-from kinacc.workflow.contradictions import load
 
 
 @dataclass(frozen=True)

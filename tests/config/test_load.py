@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults, settings, walk, without_execution_keys
 from kinacc.errors import InputError
-from kinacc.workflow.contradictions import load
 
 ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "config.yaml"
@@ -432,7 +432,7 @@ def test_every_default_passes_its_own_limits(config):
 
 def test_loading_needs_no_numerical_library():
     code = (
-        "import sys; from kinacc.workflow.contradictions import load; load(['config.yaml']); "
+        "import sys; from kinacc.checks.contradictions import load; load(['config.yaml']); "
         "print([m for m in ('numpy', 'pandas', 'pyarrow', 'scipy') if m in sys.modules])"
     )
     done = subprocess.run(

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from kinacc.checks.contradictions import load
 from kinacc.errors import InputError
-from kinacc.workflow.contradictions import load
 
 MARCH, MAY, JUNE = (f"tracker-2026-0{month}" for month in ("3-01", "5-04", "6-02"))
 SERIES = """\

@@ -24,21 +24,21 @@ from good_files import File, simulated  # noqa: E402
 from measurements.files_as_they_come import FILES  # noqa: E402
 
 from kinacc.artifacts import store  # noqa: E402
+from kinacc.calibration import (  # noqa: E402
+    error_model,
+    residual_tables,
+)
 from kinacc.campaign import folder as campaigns  # noqa: E402
 from kinacc.cli.group import main  # noqa: E402
-from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
-from kinacc.workflow.stages import (  # noqa: E402
-    accuracy_map,
-    assessment_points,
-    claims,
-    error_model,
+from kinacc.deployment import summary  # noqa: E402
+from kinacc.study import (  # noqa: E402
+    evaluation,
     histories,
-    measurements,
-    residuals,
-    study,
-    study_chunk,
-    summary,
+    monte_carlo,
 )
+from kinacc.study.claims.evaluate import table_of  # noqa: E402
+from kinacc.synthetic import source  # noqa: E402
+from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
 
 GOLDEN = Path(__file__).parent
 ROOT = GOLDEN.parents[1]
@@ -48,27 +48,27 @@ MODELS = ("vec_model", "dh_model", "frames")
 
 # Stages by name: the function, and the golden tables it reads.
 STAGES: dict[str, tuple[Callable, tuple[str, ...]]] = {
-    "measurements": (measurements.run, ()),
+    "measurements": (source.run, ()),
     "fit_vec": (partial(error_model.run, kind="vec"), ("measurements",)),
     "fit_dh": (
         partial(error_model.run, kind="dh"),
         ("measurements", "vec_model", "vec_frames"),
     ),
-    "residuals": (residuals.run, ("measurements", *MODELS, "vec_orders")),
+    "residuals": (residual_tables.run, ("measurements", *MODELS, "vec_orders")),
     "summary": (
         summary.run,
         ("measurements", "robot", *MODELS, "dh_identified", "pose_errors", "model_selection",
          "vec_fit", "vec_covariance", "dh_fit", "dh_covariance", "vec_orders"),
     ),
-    "accuracy_map": (accuracy_map.run, MODELS),
+    "accuracy_map": (evaluation.mapped, MODELS),
     "operating_points": (
-        assessment_points.run,
+        evaluation.points,
         ("measurements", *MODELS, "pose_errors"),
     ),
-    "study": (study.run, ("study_chunk", "assessment_points")),
+    "study": (monte_carlo.summed_up, ("study_chunk", "assessment_points")),
     "histories": (histories.run, ("assessment_points",)),
     "claims": (
-        claims.run,
+        table_of,
         ("residuals", "dh_model", "assessment_points", "study", "study_summary", "readings",
          "histories", "accuracy_map"),
     ),
@@ -109,7 +109,7 @@ def run_stage(data: DataSets, dataset: str, stage: str, folder: Path) -> dict[st
     }
     settings = dict(data.settings[dataset])
     if stage == "study":
-        tables |= study_chunk.run(tables, settings)
+        tables |= monte_carlo.simulated(tables, settings)
     return function(tables, settings)
 
 
@@ -193,7 +193,7 @@ def understanding(name: str, folder: Path) -> dict:
         return {"exit_code": done.exit_code}
     described = yaml.safe_load((folder / "n.yaml").read_text())["datasets"]["n"]
     read = read_data_sets([folder / "n.yaml"])
-    columns = measurements.run({}, read.settings["n"])["measurements"]
+    columns = source.run({}, read.settings["n"])["measurements"]
     kept = [key for key in columns if key[0] in "qxyz" and columns[key].dtype.kind == "f"]
     rows = {key: [round(float(each), 9) for each in columns[key][:3]] for key in kept}
     rows = {key: values for key, values in rows.items() if not np.isnan(values).any()}

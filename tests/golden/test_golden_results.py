@@ -8,11 +8,11 @@ import pytest
 
 from kinacc.artifacts import store
 from kinacc.artifacts.comparison import compare_tables
+from kinacc.calibration import delivered
 from kinacc.calibration.residuals import errors
 from kinacc.deployment.export.files import contents
 from kinacc.deployment.folder import recorded_robot
 from kinacc.kinematics import robot
-from kinacc.workflow import calibration_settings
 
 STAGES = [(name, stage) for name, stages in cases.DATA_SETS.items() for stage in stages]
 
@@ -38,8 +38,8 @@ def vec_errors(data, name, folder):
     arm = robot.load(settings["robot"])
     tables = {"measurements": store.read(cases.RESULTS / name / "measurements.parquet")}
     tables |= {each: store.read(folder / f"{each}.parquet") for each in VEC_PARTS}
-    every, _ = calibration_settings.observed(tables, arm)
-    found = errors(calibration_settings.delivered_fits(tables, arm, every), every)
+    every, _ = delivered.observed(tables, arm)
+    found = errors(delivered.delivered_fits(tables, arm, every), every)
     vec = found["vec_vs_measured"]
     return np.hstack([vec.position_mm, 1e3 * np.nan_to_num(vec.rotation_rad)])
 

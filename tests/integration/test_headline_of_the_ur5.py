@@ -12,13 +12,13 @@ import public_robots as runs
 import pytest
 import yaml
 
-from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.calibration.models import estimators, fit_all
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.residuals import errors, statistics
+from kinacc.checks.contradictions import load
+from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.kinematics import robot
-from kinacc.workflow.contradictions import load
-from kinacc.workflow.stages import measurements
+from kinacc.synthetic import source
 
 CHOSEN = {"fold": [np.nan], "chosen": [1], "prior_std_mm": [0.1], "prior_decay": [0.85]}
 COLUMNS = {f"q{i}": f"joint_{i}" for i in range(1, 7)}
@@ -39,7 +39,7 @@ def test_the_authors_test_poses_are_predicted_as_the_page_says(tmp_path):
         path.write_text(yaml.safe_dump({"datasets": {name: section}}), encoding="utf-8")
         configs[name] = load([path])[name]
         arm = robot.load(configs[name]["robot"])
-        columns = measurements.run({}, configs[name])["measurements"]
+        columns = source.run({}, configs[name])["measurements"]
         seen[name] = from_columns(columns, arm)
     told = {row.model: row for row in runs.read() if row.judged == "ur5_random"}
     (order,) = {row.order for row in runs.read() if row.fitted == "ur5_grid"} - {None}

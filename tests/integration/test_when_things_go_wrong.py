@@ -14,7 +14,7 @@ def test_a_stage_that_fails(project):
     before = project.digests()
     project.configure("histories: {noise_mm: 0.2}")
     project.append(
-        "src/kinacc/workflow/stages/histories.py",
+        "src/kinacc/study/histories.py",
         "def run(inputs, settings, progress):\n    raise ArithmeticError('the world ended')",
     )
     text = project.snakemake("results/mh180/histories.parquet", ok=False)

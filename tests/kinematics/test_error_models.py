@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.artifacts.error_models import ERROR_MODELS
 from kinacc.calibration.uncertainty import scale_of
+from kinacc.config.error_models import ERROR_MODELS
 from kinacc.geometry import log_so3
 from kinacc.kinematics import compliance, dh, robot, vec
 from kinacc.kinematics.model import JointState

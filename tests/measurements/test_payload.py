@@ -8,11 +8,11 @@ from command_line import call
 from stages_by_hand import run_stage
 
 from kinacc.artifacts import store
+from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
-from kinacc.workflow.contradictions import load
 
 ARM = robot.load("ur10")
 COUNT = 40

@@ -158,8 +158,8 @@ def test_uncertainties_are_read_once_it_is_said_how_many_sigma_they_are(tmp_path
 def test_how_many_sigma_is_asked_where_someone_is_there(tmp_path):
     from click.testing import CliRunner
 
+    from kinacc.checks.contradictions import load as configuration
     from kinacc.cli.group import main
-    from kinacc.workflow.contradictions import load as configuration
 
     rows = [[*row, "0.02", "0.04", "0.06"] for row in cells()]
     path = file(tmp_path, lines(rows, UNCERTAIN))

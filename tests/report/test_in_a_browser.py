@@ -358,15 +358,15 @@ def test_pages_of_campaigns_and_comparisons_do_what_they_say_as_well(chromium, t
 def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp_path):
     import numpy as np
 
+    from kinacc.report import results_page
+    from kinacc.report.answer import read
     from kinacc.report.page import html
-    from kinacc.workflow.answer import read
-    from kinacc.workflow.stages import report
 
     tables = dict(read(folder))
     targets = np.resize(np.array(HOSTILE, dtype=object), len(tables["measurements"]["target"]))
     tables["measurements"] = {**tables["measurements"], "target": targets}
     name = " ".join(HOSTILE)
-    made = report.run(tables, {"dataset": name, "folder": name})
+    made = results_page.run(tables, {"dataset": name, "folder": name})
     page_file = tmp_path / "hostile.html"
     page_file.write_text(html(made, {"seed": name}, {name: "0" * 64}), encoding="utf-8")
     with chromium.opened(page_file) as page:

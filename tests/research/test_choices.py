@@ -10,9 +10,8 @@ import pytest
 
 from kinacc.config.records import value_at
 from kinacc.config.schema import defaults
+from kinacc.study import in_memory, robustness
 from kinacc.study.claims.evaluate import all_claims, evaluate
-from kinacc.workflow import in_memory
-from kinacc.workflow.stages import robustness_chunk
 from research import design
 from research.judged_runs import alike, judged
 from research.open_choices import ALL, FIG_5, OPEN, STATED
@@ -59,7 +58,7 @@ def test_every_value_alone_every_arm_and_all_at_once(found):
 def test_a_choice_gets_the_verdicts_it_would_get_as_the_data_set(config, found, varied):
     """What runs share is made once, and no run takes what another has made differently."""
     run = [each for each in design.runs(config) if each.varied == varied][-1]
-    stages = ("measurements", *robustness_chunk.STAGES)
+    stages = ("measurements", *robustness.STAGES)
     whole = evaluate(in_memory.run(stages, run.configured(config), {}), paper_arm=True)
     ours = found["run"] == run.number
     assert found["verdict"][ours].tolist() == whole["verdict"].tolist()

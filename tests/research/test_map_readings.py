@@ -10,9 +10,8 @@ import pandas as pd
 import pytest
 
 from kinacc.config.schema import defaults
+from kinacc.study import in_memory, robustness
 from kinacc.synthetic import accepted
-from kinacc.workflow import in_memory
-from kinacc.workflow.stages import robustness_chunk
 from research import arm_search, fig3_readings
 from research.map_readings import READINGS, SENTENCES, judged_arms, shares
 
@@ -30,7 +29,7 @@ def test_the_reading_of_the_configuration_has_the_shipped_arm_and_its_verdicts(c
     (reading,) = [each for each in READINGS if each.of(config) == config]
     as_shipped = pd.DataFrame(judged_arms(reading, config, 1, 30))
     assert as_shipped["seed"].unique().tolist() == [int(accepted.rows()[0]["seed"])]
-    whole = robustness_chunk.claims_on(0, config)
+    whole = robustness.claims_on(0, config)
     verdicts = dict(zip(whole["claim"], whole["verdict"], strict=True))
     found = dict(zip(as_shipped["claim"], as_shipped["verdict"], strict=True))
     assert found == {name: verdicts[name] for name in SENTENCES}

@@ -7,8 +7,8 @@ import pytest
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
+from kinacc.study import in_memory
 from kinacc.synthetic import accepted, measure
-from kinacc.workflow import in_memory
 
 
 @pytest.fixture(scope="module")

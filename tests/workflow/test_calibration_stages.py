@@ -15,9 +15,10 @@ from kinacc.kinematics import dh as dh_kinematics
 from kinacc.kinematics import robot
 from kinacc.kinematics import vec as vec_kinematics
 from kinacc.kinematics.tables import frame, models
+from kinacc.study import evaluation
+from kinacc.study.in_memory import RUNS
+from kinacc.synthetic import source
 from kinacc.workflow.data_sets import read_data_sets
-from kinacc.workflow.in_memory import RUNS
-from kinacc.workflow.stages import assessment_points, measurements
 
 ROOT = Path(__file__).resolve().parents[2]
 POSES = 150
@@ -81,7 +82,7 @@ def chain(plan, split, **changes):
 
 @pytest.fixture(scope="module")
 def tables(plan):
-    return chain(plan, measurements.split(columns(), plan.settings["mh180"]))
+    return chain(plan, source.split(columns(), plan.settings["mh180"]))
 
 
 def row(table, **wanted):
@@ -180,7 +181,7 @@ def test_rank_of_the_vec_is_in_its_table(tables):
 def test_base_and_tool_estimated_and_fitted_to_measurements(plan):
     base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
     tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-    split = measurements.split(columns(base, tool), plan.settings["mh180"])
+    split = source.split(columns(base, tool), plan.settings["mh180"])
     found = chain(
         plan,
         split,
@@ -204,7 +205,7 @@ def test_base_and_tool_estimated_and_fitted_to_measurements(plan):
 def test_masks_priors_loss_and_hayati_angles_come_from_the_configuration(plan):
     base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
     tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-    split = measurements.split(columns(base, tool), plan.settings["mh180"])
+    split = source.split(columns(base, tool), plan.settings["mh180"])
     found = chain(
         plan,
         split,
@@ -239,7 +240,7 @@ def test_masks_priors_loss_and_hayati_angles_come_from_the_configuration(plan):
 def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(plan):
     base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
     tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-    split = measurements.split(columns(base, tool), plan.settings["mh180"])
+    split = source.split(columns(base, tool), plan.settings["mh180"])
     found = chain(
         plan,
         split,
@@ -258,7 +259,7 @@ def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(plan):
             "angle_deg": [-25.0, 25.0],
         },
     }
-    made = assessment_points.run(found, settings_of(plan, "assessment_points", **changes))
+    made = evaluation.points(found, settings_of(plan, "assessment_points", **changes))
     points = made["assessment_points"]
     q = np.stack([points[f"q{i}"] for i in range(1, 7)], axis=1)
     seen = {}
@@ -277,7 +278,7 @@ def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(plan):
 
 def test_a_base_all_of_which_is_fixed_is_held_in_every_model(plan):
     base = Pose(exp_so3(np.array([0.0, 0.0, 0.3])), np.array([1500.0, -700.0, 300.0]))
-    split = measurements.split(columns(base, Pose(np.eye(3), np.zeros(3))), plan.settings["mh180"])
+    split = source.split(columns(base, Pose(np.eye(3), np.zeros(3))), plan.settings["mh180"])
     stated = {f"base {axis}": {"value_mm": base.position_mm[i]} for i, axis in enumerate("xyz")}
     stated |= {"base rx": "fixed", "base ry": "fixed", "base rz": {"value_rad": 0.3}}
     found = chain(
@@ -297,7 +298,7 @@ def test_without_folds_there_is_nothing_to_cross_validate(plan):
     settings = settings_of(
         plan, "measurements", measurements__folds=None, measurements__validation_fold=None
     )
-    split = measurements.split(columns(), settings)
+    split = source.split(columns(), settings)
     assert np.isnan(split["fold"]).all()
     found = chain(plan, split)
     assert set(found["residuals"]["subset"]) == {"train"}
@@ -306,7 +307,7 @@ def test_without_folds_there_is_nothing_to_cross_validate(plan):
 
 def test_time_blocks_hold_out_runs_of_the_measurement(plan):
     settings = settings_of(plan, "measurements", measurements__fold_by="time_block")
-    split = measurements.split(columns(), settings)
+    split = source.split(columns(), settings)
     fresh = POSES - POSES // 10  # the rows after these visit the first ones again
     assert (np.diff(split["fold"][:fresh]) >= 0).all()
     np.testing.assert_array_equal(split["fold"][fresh:], split["fold"][: POSES // 10])
@@ -321,7 +322,7 @@ def test_a_session_that_one_fold_holds_alone_always_trains_and_is_named(plan):
     measured["session"] = session
     settings = settings_of(plan, "measurements", measurements__fold_by="time_block")
     with pytest.warns(UserWarning, match="session noon has fewer than 3 rows outside"):
-        split = measurements.split(measured, settings)
+        split = source.split(measured, settings)
     assert np.isnan(split["fold"][40:44]).all()
     assert (split["subset"][40:44] == "train").all()
     assert np.isfinite(np.delete(split["fold"], slice(40, 44))).all()
@@ -341,7 +342,7 @@ def test_a_target_seen_in_one_configuration_always_trains(plan):
     measured = {name: np.concatenate([values, values[:1]]) for name, values in columns().items()}
     measured["target"] = np.array(["tool"] * POSES + ["rare"], dtype=object)
     with pytest.warns(UserWarning, match="target rare has fewer than 3 rows"):
-        split = measurements.split(measured, plan.settings["mh180"])
+        split = source.split(measured, plan.settings["mh180"])
     again = POSES - POSES // 10  # the first configuration is visited again here
     assert np.isnan(split["fold"][[0, again, POSES]]).all()
     assert np.isnan(split["fold"]).sum() == 3
@@ -350,7 +351,7 @@ def test_a_target_seen_in_one_configuration_always_trains(plan):
 def test_order_and_prior_cannot_be_chosen_without_folds_that_hold_rows(plan):
     one = {name: values[:30] for name, values in columns().items()}
     one["pose"] = np.zeros(30, dtype=int)  # one configuration, in one fold
-    split = measurements.split(one, plan.settings["mh180"])
+    split = source.split(one, plan.settings["mh180"])
     given = settings_of(plan, "vec", calibration__vec__order="auto")
     with pytest.raises(InputError, match="no order or prior can be tried"):
         RUNS["vec"]({"measurements": split}, given)
@@ -358,7 +359,7 @@ def test_order_and_prior_cannot_be_chosen_without_folds_that_hold_rows(plan):
 
 def test_too_few_poses_for_the_order_is_bad_input(plan):
     few = {name: values[:20] for name, values in columns().items()}
-    split = measurements.split(few, plan.settings["mh180"])
+    split = source.split(few, plan.settings["mh180"])
     with pytest.raises(InputError, match=r"96 residual components .* 216 free parameters"):
         RUNS["vec"]({"measurements": split}, plan.settings["mh180"])
 

@@ -15,8 +15,7 @@ from kinacc.kinematics import dh, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import ERRORS
-from kinacc.workflow import evaluation
-from kinacc.workflow.stages import accuracy_map, assessment_points, measurements
+from kinacc.study import evaluation
 
 ARM = robot.load("mh180")
 PROVENANCE = {
@@ -129,14 +128,14 @@ def test_models_come_back_from_their_tables_in_any_row_order(travel):
 
 
 def test_the_map_fits_its_contract_and_keeps_the_slices_as_configured():
-    columns = accuracy_map.run(inputs(), settings())["accuracy_map"]
+    columns = evaluation.mapped(inputs(), settings())["accuracy_map"]
     table = to_table("accuracy_map", columns, PROVENANCE)
     assert table.num_rows == 3 * 5 * 3
     assert np.unique(columns["slice_deg"]).tolist() == [0.0, 15.0, 30.0]
 
 
 def test_the_worst_pose_of_a_cell_can_be_driven_to_and_shows_the_error_that_is_stated():
-    columns = accuracy_map.run(inputs(), settings())["accuracy_map"]
+    columns = evaluation.mapped(inputs(), settings())["accuracy_map"]
     q, model = joints(columns), vec_of(False)
     assert np.isfinite(q).all()
     seen = dh.forward(ARM.dh, q).position_mm
@@ -152,8 +151,8 @@ def test_the_joints_of_a_cell_are_those_the_controller_reports(tmp_path):
     text = shipped.read_text("utf-8").replace("[-60, 76]", "[-76, 60]")
     turned = np.diag([1, -1, 1, 1, 1, 1]).tolist()
     own.write_text(f"{text}joint_map: {turned}\n", encoding="utf-8")
-    reported = accuracy_map.run(inputs(), {**settings(), "robot": str(own)})["accuracy_map"]
-    plain = accuracy_map.run(inputs(), settings())["accuracy_map"]
+    reported = evaluation.mapped(inputs(), {**settings(), "robot": str(own)})["accuracy_map"]
+    plain = evaluation.mapped(inputs(), settings())["accuracy_map"]
     assert np.array_equal(reported["q2"], -plain["q2"])
     assert np.array_equal(reported["q3"], plain["q3"])
 
@@ -170,7 +169,7 @@ def test_the_joints_of_a_cell_are_those_the_controller_reports(tmp_path):
     ],
 )
 def test_points_fit_their_contract_and_state_the_error_of_their_joints(changed):
-    columns = assessment_points.run(inputs(True), settings(**changed))["assessment_points"]
+    columns = evaluation.points(inputs(True), settings(**changed))["assessment_points"]
     to_table("assessment_points", columns, PROVENANCE)
     q, s = joints(columns), joints(columns, "s")
     model = vec_of(True)
@@ -185,7 +184,7 @@ def test_points_fit_their_contract_and_state_the_error_of_their_joints(changed):
 def test_held_to_a_workpiece_the_tool_keeps_its_attitude_over_the_whole_space():
     euler_deg = [180.0, -20.0, 10.0]
     held = settings(reference_orientation_deg=euler_deg, reference_frame="base")
-    points = assessment_points.run(inputs(), held)["assessment_points"]
+    points = evaluation.points(inputs(), held)["assessment_points"]
     seen = dh.forward(ARM.dh, joints(points))
     angles = np.rad2deg(np.arctan2(seen.position_mm[:, 1], seen.position_mm[:, 0]))
     assert np.ptp(angles) > 50.0
@@ -197,9 +196,9 @@ def test_held_to_a_workpiece_the_tool_keeps_its_attitude_over_the_whole_space():
 @pytest.mark.parametrize("slice_deg", [0.0, 15.0, 30.0])
 def test_a_slice_of_the_map_held_to_a_workpiece_is_that_of_a_tool_turned_back(slice_deg):
     # Rz(-a) Rx(180) = Rx(180) Rz(a): in the frame of slice a the tool stands turned about itself.
-    held = accuracy_map.run(inputs(), settings(reference_frame="base"))["accuracy_map"]
+    held = evaluation.mapped(inputs(), settings(reference_frame="base"))["accuracy_map"]
     turned = settings(reference_orientation_deg=[180.0, 0.0, slice_deg])
-    wanted = accuracy_map.run(inputs(), turned)["accuracy_map"]
+    wanted = evaluation.mapped(inputs(), turned)["accuracy_map"]
     rows = held["slice_deg"] == slice_deg
     for name in ("position_max_mm", "orientation_max_mrad"):
         assert np.allclose(held[name][rows], wanted[name][rows], rtol=0.0, atol=1e-7)
@@ -213,7 +212,7 @@ def test_a_calibration_covers_the_attitudes_its_arm_is_judged_in(frame):
     arm = {"robot": "mh180", "seed": 1, "evaluation": section}
     synthetic = {"draw": 0, "poses": 200, "tracker_noise_mm": 0.0}
     source = {"source": "synthetic", "folds": None, "validation_fold": None}
-    seen = measurements.run({}, {**arm, "measurements": {**source, "synthetic": synthetic}})
+    seen = source.run({}, {**arm, "measurements": {**source, "synthetic": synthetic}})
     columns = seen["measurements"]
     quaternion = np.stack([columns[name] for name in ("qx", "qy", "qz", "qw")], axis=1)
     attitude = Rotation.from_euler("XYZ", euler_deg, degrees=True)
@@ -238,8 +237,8 @@ def test_a_joint_box_is_in_millimetres_where_a_joint_slides():
 def test_a_fitted_tool_carries_the_point_assessed():
     tool = (0.0, 0.0, 200.0)
     given = {**inputs(), "frames": frames(tool)}
-    columns = assessment_points.run(given, settings())["assessment_points"]
-    configured = assessment_points.run(inputs(), settings(tool_mm=list(tool)))["assessment_points"]
+    columns = evaluation.points(given, settings())["assessment_points"]
+    configured = evaluation.points(inputs(), settings(tool_mm=list(tool)))["assessment_points"]
     assert all(np.array_equal(columns[name], configured[name]) for name in columns)
     height = dh.forward(ARM.dh, joints(columns))
     tip = height.position_mm + height.rotation @ np.array(tool)
@@ -264,9 +263,7 @@ def test_measured_points_are_cross_validated_errors_averaged_over_readings():
     }
     errors |= {f"e{axis}_mm": rng.normal(size=8 * count) for axis in "xyz"}
     given = {"pose_errors": errors, "measurements": measurements}
-    columns = assessment_points.run(given, settings(space="measured", points=5))[
-        "assessment_points"
-    ]
+    columns = evaluation.points(given, settings(space="measured", points=5))["assessment_points"]
     to_table("assessment_points", columns, PROVENANCE)
     assert len(columns["point"]) == 5
     held_out = (comparison == "dh_vs_measured") & (estimate == "cross_validated")

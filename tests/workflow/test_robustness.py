@@ -9,9 +9,8 @@ import pytest
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
+from kinacc.study import in_memory, robustness
 from kinacc.study.claims.evaluate import all_claims, evaluate
-from kinacc.workflow import in_memory
-from kinacc.workflow.stages import robustness_chunk, robustness_table
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +26,7 @@ def config() -> dict:
 
 @pytest.fixture(scope="module")
 def rows(config):
-    return robustness_chunk.run({}, config)["robustness_chunk"]
+    return robustness.run({}, config)["robustness_chunk"]
 
 
 def test_every_claim_on_every_further_draw_and_not_on_the_shipped_one(rows):
@@ -40,7 +39,7 @@ def test_every_claim_on_every_further_draw_and_not_on_the_shipped_one(rows):
 def test_a_draw_gets_the_verdicts_it_would_get_as_the_data_set(config, rows):
     own = copy.deepcopy(config)
     own["measurements"]["synthetic"]["draw"] = 2
-    stages = ("measurements", *robustness_chunk.STAGES)
+    stages = ("measurements", *robustness.STAGES)
     whole = evaluate(in_memory.run(stages, own, {}), paper_arm=True)
     ours = rows["draw"] == 2
     assert rows["verdict"][ours].tolist() == whole["verdict"].tolist()
@@ -50,7 +49,7 @@ def test_a_draw_gets_the_verdicts_it_would_get_as_the_data_set(config, rows):
 def test_numbers_of_the_tables_agree_on_accepted_draws(config):
     # With the default points: the true accuracy belongs to the 200 of the paper.
     full = {**config, "evaluation": defaults()["evaluation"]}
-    found = robustness_chunk.claims_on(1, full)
+    found = robustness.claims_on(1, full)
     numbers = [
         verdict
         for claim, verdict in zip(found["claim"], found["verdict"], strict=True)
@@ -61,15 +60,15 @@ def test_numbers_of_the_tables_agree_on_accepted_draws(config):
 
 @pytest.mark.parametrize("parts", [2, 5])
 def test_parts_make_the_same_table(config, rows, parts):
-    whole = robustness_table.run({"robustness_chunk": rows}, {})["robustness"]
+    whole = robustness.gathered({"robustness_chunk": rows}, {})["robustness"]
     pieces = [
-        robustness_chunk.run({}, {**config, "part": {"number": number, "of": parts}})
+        robustness.run({}, {**config, "part": {"number": number, "of": parts}})
         for number in range(1, parts + 1)
     ]
     joined = {
         name: np.concatenate([piece["robustness_chunk"][name] for piece in pieces]) for name in rows
     }
-    again = robustness_table.run({"robustness_chunk": joined}, {})["robustness"]
+    again = robustness.gathered({"robustness_chunk": joined}, {})["robustness"]
     for name, column in whole.items():
         if name == "reproduced":
             assert np.array_equal(again[name], column, equal_nan=True)
@@ -79,4 +78,4 @@ def test_parts_make_the_same_table(config, rows, parts):
 
 def test_more_draws_than_were_accepted_is_refused(config):
     with pytest.raises(InputError, match=r"robustness\.draws"):
-        robustness_chunk.run({}, {**config, "robustness": {"draws": 5000}})
+        robustness.run({}, {**config, "robustness": {"draws": 5000}})

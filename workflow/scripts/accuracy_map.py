@@ -1,7 +1,7 @@
 """Map the largest error over the slices of the evaluation space (Fig. 3)."""
 
+from kinacc.study import evaluation
 from kinacc.workflow.script import stage
-from kinacc.workflow.stages import accuracy_map
 
 with stage(snakemake) as job:
-    job.write_tables(accuracy_map.run(job.inputs, job.settings))
+    job.write_tables(evaluation.mapped(job.inputs, job.settings))

@@ -1,7 +1,7 @@
 """Hold the paper's numbers and sentences to the results."""
 
+from kinacc.study.claims.evaluate import table_of
 from kinacc.workflow.script import stage
-from kinacc.workflow.stages import claims
 
 with stage(snakemake) as job:
-    job.write_tables(claims.run(job.inputs, job.settings))
+    job.write_tables(table_of(job.inputs, job.settings))

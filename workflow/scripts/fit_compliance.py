@@ -1,7 +1,7 @@
 """Fit the DH model with joints that bend under gravity."""
 
+from kinacc.calibration import error_model
 from kinacc.workflow.script import stage
-from kinacc.workflow.stages import error_model
 
 with stage(snakemake) as job:
     job.write_tables(

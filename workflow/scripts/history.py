@@ -1,9 +1,9 @@
 """Hold the calibrations of a series to one another, and draw what became of the arm."""
 
 from kinacc.artifacts import store
+from kinacc.campaign import history
 from kinacc.figures import history_over_time, save
 from kinacc.workflow.script import stage
-from kinacc.workflow.stages import history
 
 with stage(snakemake) as job:
     made = history.run(job.inputs, job.settings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts import error_models
+from kinacc.config import error_models
 
 MODELS = (*error_models.FITTED, error_models.NOMINAL)
 SELECTABLE = tuple(error_models.ERROR_MODELS)

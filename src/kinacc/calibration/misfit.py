@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import model_name
 from kinacc.calibration.noise import UNKNOWN, Noise, of_measurements
+from kinacc.config.error_models import model_name
 from kinacc.kinematics.robot import Robot
 
 GIVEN = "valid given the model"

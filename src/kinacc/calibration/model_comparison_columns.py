@@ -8,10 +8,10 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.artifacts.error_models import COMPARISONS, ERROR_MODELS, MEASURED, Comparison
 from kinacc.calibration import model_comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
+from kinacc.config.error_models import COMPARISONS, ERROR_MODELS, MEASURED, Comparison
 from kinacc.measurements import folds
 
 

@@ -8,9 +8,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from kinacc.artifacts import error_models
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import NOMINAL
 from kinacc.calibration import dh_fit
 from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
 from kinacc.calibration.constraints import frame_terms
@@ -18,7 +16,8 @@ from kinacc.calibration.frames import FrameCoordinates, Frames, known
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.solve import Solution
 from kinacc.calibration.uncertainty import Uncertainty
-from kinacc.config import parameter_rules
+from kinacc.config import error_models, parameter_rules
+from kinacc.config.error_models import NOMINAL
 from kinacc.config.parameter_rules import Rule
 from kinacc.geometry import IDENTITY, Pose
 from kinacc.kinematics.dh import DHModel

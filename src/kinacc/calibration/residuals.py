@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.artifacts.error_models import MEASURED, comparisons
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations
+from kinacc.config.error_models import MEASURED, comparisons
 from kinacc.distributions import gamma99
 from kinacc.geometry import Pose, compose, log_so3
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSETS
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
+from kinacc.config.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations

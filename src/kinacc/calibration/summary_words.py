@@ -6,10 +6,10 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
-from kinacc.artifacts.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.calibration.blind_words import weak
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, SETTINGS, Fact, of
+from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
 
 WIDTH = 100
 MARGIN = 17  # where the text of a paragraph begins

@@ -9,7 +9,6 @@ from typing import ClassVar, Self
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import NOMINAL
 from kinacc.calibration import selection, tables, vec_fit
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.frames import Frames
@@ -18,6 +17,7 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.selection import Choice, Grid
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.calibration.vec_fit import Prior, VECFit
+from kinacc.config.error_models import NOMINAL
 from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import model_name
 from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
 from kinacc.campaign import consistency, folder, instrument, words
 from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.campaign.state import State
+from kinacc.config.error_models import model_name
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError
 from kinacc.kinematics import robot

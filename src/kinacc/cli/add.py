@@ -14,7 +14,7 @@ from kinacc.config.series import FLAGS, MOVED, SAME, day_of
 from kinacc.errors import Problem, gathered, refuse
 
 if TYPE_CHECKING:
-    from kinacc.workflow.adding import Arm
+    from kinacc.deployment.adding import Arm
 
 _FLAG = click.Choice([SAME, MOVED])
 _DAY = "a day as 2026-06-02"
@@ -51,7 +51,7 @@ def add(
     Example:
       kinacc add june.csv --to tracker.yaml --date 2026-06-02 --base moved --tool same
     """
-    from kinacc.workflow import adding
+    from kinacc.deployment import adding
 
     ask = sys.stdin.isatty() and not out.as_json
     title = f"{measurement_file} was not added to {config}"
@@ -86,7 +86,7 @@ def _day(
     name: str, given: str | None, path: str, arm: Arm, ask: bool, problems: list[Problem]
 ) -> str | None:
     """A day as given, as the file says itself, or as a person answers."""
-    from kinacc.workflow import adding
+    from kinacc.deployment import adding
 
     if given is not None:
         if day_of(given) is None:

@@ -50,9 +50,9 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """
     from kinacc.cli.fitted import summary
     from kinacc.cli.report import written
-    from kinacc.workflow.answer import answer, read
+    from kinacc.report.answer import answer, read
+    from kinacc.report.fleet import FEW
     from kinacc.workflow.data_sets import RESULTS
-    from kinacc.workflow.fleet import FEW
 
     configs, data = carried_out("calibration", words, cores, default=None)
     if data is None:
@@ -75,7 +75,7 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
 def show_many(folders: Sequence[str], more: Sequence[str] = ()) -> None:
     """The table of many data sets, for half pages of all of them would not be read."""
     from kinacc.cli.summary import show
-    from kinacc.workflow.fleet import standings
+    from kinacc.report.fleet import standings
 
     found = standings([Path(folder) for folder in folders])
     one = shlex.quote(folders[0])

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import PLAINEST
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.binomial import binomial_interval
 from kinacc.campaign import known_noise, power, simulate, slips, words
 from kinacc.campaign.power import Aim, Row
 from kinacc.cli import campaign_options, rows
 from kinacc.cli.sheet import Field, Sheet
+from kinacc.config.error_models import PLAINEST
 from kinacc.deployment.record import default_point
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.table import numbers

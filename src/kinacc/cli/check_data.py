@@ -90,10 +90,10 @@ def report_on(
 
     ``stopped`` takes the commands to go on with after findings that stop the workflow.
     """
+    from kinacc.checks.data_check import examined
     from kinacc.checks.report import UNUSABLE, to_json
     from kinacc.errors import InputError
     from kinacc.progress import reporting
-    from kinacc.workflow.stages.data_check import examined
 
     worst, told = 0, []
     for name, settings in sections.items():
@@ -122,8 +122,8 @@ def report_on(
 
 def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict]:
     """The data sets to check: those asked for, or all that are read from a file."""
+    from kinacc.checks.contradictions import load
     from kinacc.errors import Problem, refuse
-    from kinacc.workflow.contradictions import load
 
     full = load(files)
     measured = [n for n, c in full.items() if c["measurements"]["source"] == "file"]

@@ -43,8 +43,8 @@ def exclude(file: str, lines: str, reason: str, dataset: str | None, as_json: bo
 
 def measured_data_set(file: str, dataset: str | None) -> tuple[str, dict]:
     """Name and settings of a measured data set; InputError where it is not clear which."""
+    from kinacc.checks.contradictions import load
     from kinacc.errors import InputError, Problem
-    from kinacc.workflow.contradictions import load
 
     full = load([file])
     names = [

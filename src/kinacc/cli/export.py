@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import click
 
-from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import answers
+from kinacc.config.error_models import ERROR_MODELS, PLAINEST
 
 FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, NOMINAL, PLAINEST
 from kinacc.cli import choice
 from kinacc.cli.output import Output, answers, plain
+from kinacc.config.error_models import ALWAYS, ERROR_MODELS, NOMINAL, PLAINEST
 
 if TYPE_CHECKING:
     from kinacc.measurements.row_names import RowNames
@@ -40,7 +40,7 @@ def fitted(folder: str, whole: bool, out: Output) -> None:
       kinacc fitted results/ur10_b --all
       kinacc fitted results/ur10_b --json
     """
-    from kinacc.workflow.answer import answer
+    from kinacc.report.answer import answer
 
     reason = choice.say_outdated(folder)
     if out.as_json:
@@ -57,7 +57,7 @@ def read(folder: Path | str, whole: bool = True) -> dict[str, dict]:
     Raises InputError naming all that are missing.
     """
     from kinacc.calibration.summary import TABLES
-    from kinacc.workflow import answer
+    from kinacc.report import answer
 
     return answer.read(folder, (*TABLES, *(_FURTHER if whole else ())))
 
@@ -69,7 +69,7 @@ def summary(folder: Path | str) -> dict:
     from kinacc.calibration.summary import bending, findings, left_out, of, selected
     from kinacc.deployment.folder import recorded_robot
     from kinacc.measurements.row_names import RowNames
-    from kinacc.workflow.answer import campaign_of, facts_of
+    from kinacc.report.answer import campaign_of, facts_of
 
     tables = read(folder)
     facts, bound = facts_of(tables), campaign_of(folder, tables).assessed
@@ -206,9 +206,9 @@ def _called(table: Mapping, i: int, names: RowNames) -> str:
 
 def _further(tables: Mapping[str, Mapping]) -> list[str]:
     """What does not stand on the half page."""
-    from kinacc.artifacts.error_models import model_name
     from kinacc.calibration.summary import selected
     from kinacc.calibration.summary_words import counted, paragraph
+    from kinacc.config.error_models import model_name
     from kinacc.measurements.row_names import RowNames
 
     best = selected(tables["model_selection"])

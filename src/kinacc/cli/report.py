@@ -49,10 +49,10 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     from kinacc.artifacts import sums
     from kinacc.artifacts.atomic import write_whole
     from kinacc.campaign.journal import of_results
+    from kinacc.report import results_page
+    from kinacc.report.answer import ON_PAGE, PAGE_TABLES, read
     from kinacc.report.page import html
-    from kinacc.workflow.answer import ON_PAGE, PAGE_TABLES, read
     from kinacc.workflow.data_sets import campaign_files
-    from kinacc.workflow.stages import report
 
     place = Path(folder)
     reason = choice.say_outdated(folder)
@@ -67,6 +67,6 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
         "reason": reason,
     }
     path = Path(out or place / _PAGE)
-    page = report.run({**shown, **campaigns}, settings)
+    page = results_page.run({**shown, **campaigns}, settings)
     write_whole(path, html(page, {"kinacc_version": __version__}).encode())
     return path

@@ -14,11 +14,11 @@ import numpy as np
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import SLIDES, Artefact, joint_count, texts
 from kinacc.artifacts.contract import ARTEFACTS
-from kinacc.artifacts.error_models import ERROR_MODELS
 from kinacc.calibration.misfit import in_words
 from kinacc.cli.output import plain
 from kinacc.cli.screen import decimals_of, number
 from kinacc.cli.sheet import Field, Sheet
+from kinacc.config.error_models import ERROR_MODELS
 from kinacc.config.values import nearest
 from kinacc.deployment.folder import misfit_of
 from kinacc.errors import InputError, Problem, first_few, refuse

@@ -63,7 +63,7 @@ def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:
 
 def _configured(evaluation: Mapping, robot: robots.Robot) -> tuple[Ends | None, Inside | None]:
     """Joint box and test of positions of a data set's evaluation space."""
-    from kinacc.workflow.evaluation import cylinder, joint_box
+    from kinacc.study.evaluation import cylinder, joint_box
 
     if evaluation["space"] == "joint_box":
         return joint_box(evaluation, robot), None

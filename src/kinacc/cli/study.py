@@ -26,9 +26,9 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study tracker.yaml
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
-    from kinacc.workflow.answer import answer, read
+    from kinacc.report.answer import answer, read
+    from kinacc.report.fleet import FEW
     from kinacc.workflow.data_sets import RESULTS
-    from kinacc.workflow.fleet import FEW
     from kinacc.workflow.start import SNAKEFILE
 
     paper = SNAKEFILE.parent / "config.yaml"

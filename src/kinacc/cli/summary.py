@@ -19,7 +19,7 @@ from kinacc.workflow.data_sets import RESULTS
 
 if TYPE_CHECKING:
     from kinacc.cli.sheet import Sheet
-    from kinacc.workflow.fleet import Standing, Verdict
+    from kinacc.report.fleet import Standing, Verdict
 
 _BOUND, _HELD_OUT = "bound", "held-out"
 # Columns of the terminal, by narrower names.
@@ -77,7 +77,7 @@ def summary(
       kinacc summary results --tolerance-mm 0.5 --out robots.xlsx
       kinacc summary line1/results line2/results --tolerance-mm 1.5 --by held-out
     """
-    from kinacc.workflow.fleet import data_sets, standings
+    from kinacc.report.fleet import data_sets, standings
 
     refuse(at_odds({"--csv": as_csv, "--json": out.as_json, "--out": out.table is not None}))
     found = standings(data_sets(folders or (Path(RESULTS),)))

@@ -62,7 +62,7 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     from kinacc.deployment.applicability import is_measured_there
     from kinacc.deployment.verify import BASE, OPEN, PASSES, TOOL, Verdict, trials, verdict
     from kinacc.progress import reporting
-    from kinacc.workflow.stages import measurements
+    from kinacc.synthetic import source
 
     _require_choices(folder, base, tool)
     moved = [name for name, kind in ((BASE, base), (TOOL, tool)) if kind == "moved"]
@@ -72,7 +72,7 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        columns = measurements.run({}, config)["measurements"]
+        columns = source.run({}, config)["measurements"]
         seen = from_columns(columns, arm)
         tried = trials(tables, arm, seen, moved, weight)
         selected = results.selected_model(tables)
@@ -213,8 +213,8 @@ def _next(
 
 def _section(files: Sequence[str], dataset: str | None) -> tuple[str, Mapping]:
     """Name and configuration of the data set that is meant. InputError where none or several is."""
+    from kinacc.checks.contradictions import load
     from kinacc.errors import InputError, Problem
-    from kinacc.workflow.contradictions import load
 
     full = load(files)
     if dataset is not None and dataset not in full:
@@ -241,9 +241,9 @@ def _sheet(facts: Mapping, trials: Sequence[Trial]) -> Sheet:
     """One row for each model and set of readings."""
     import numpy as np
 
-    from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL, model_name
     from kinacc.calibration.summary import LARGE_SHARE
     from kinacc.cli.sheet import Field, Sheet
+    from kinacc.config.error_models import ERROR_MODELS, NOMINAL, model_name
 
     order = (NOMINAL, *ERROR_MODELS)
     rows = []
@@ -314,7 +314,7 @@ def _worse_than_nominal(trials: Sequence[Trial]) -> Iterator[tuple[str, int, flo
 
     Name, number of readings, its mean and that of the nominal arm in mm.
     """
-    from kinacc.artifacts.error_models import NOMINAL, model_name
+    from kinacc.config.error_models import NOMINAL, model_name
 
     largest = {kind: each for each in trials for kind in each.errors}
     for kind, trial in largest.items():
@@ -331,7 +331,7 @@ def _in_words(
     units: Sequence[str],
 ) -> str:
     """Where the readings lie, whether the calibration holds there, and what to do next."""
-    from kinacc.artifacts.error_models import model_name
+    from kinacc.config.error_models import model_name
     from kinacc.deployment.verify_words import of_verdict
 
     count, selected = facts["readings"], facts["selected"]

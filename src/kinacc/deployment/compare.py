@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from kinacc.artifacts.error_models import model_name
 from kinacc.calibration.uncertainty import scale_of
+from kinacc.config.error_models import model_name
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts.error_models import model_name
 from kinacc.calibration.misfit import GIVEN, over_noise
 from kinacc.calibration.uncertainty import unit_of
+from kinacc.config.error_models import model_name
 from kinacc.deployment.compare import Difference, Parameters, Shift
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import SharedReadings

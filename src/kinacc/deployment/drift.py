@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.artifacts.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
 from kinacc.calibration.constraints import frame_terms
 from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.summary import LARGE_SHARE
+from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.deployment import drift_chance, drift_pairs, folder
 from kinacc.deployment.drift_joint import joint_of
 from kinacc.deployment.drift_pairs import Setup

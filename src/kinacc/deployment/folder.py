@@ -9,12 +9,12 @@ import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
 from kinacc.artifacts.columns import joint_count
-from kinacc.artifacts.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.calibration import blind_words
 from kinacc.calibration.misfit import Misfit, misfit
 from kinacc.calibration.noise import UNKNOWN
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
+from kinacc.config.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.deployment.record import MODELS, Calibration, Residual
 from kinacc.errors import InputError, Problem, first_few, gathered, refuse
 from kinacc.geometry import Pose

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from kinacc.artifacts.allowed import SUBSETS
-from kinacc.artifacts.error_models import ERROR_MODELS, NOMINAL
 from kinacc.calibration.misfit import Misfit
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
+from kinacc.config.error_models import ERROR_MODELS, NOMINAL
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
 from kinacc.kinematics.model import ErrorModel, JointState

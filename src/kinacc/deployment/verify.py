@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.calibration import dh_fit, robust
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.constraints import frame_terms
@@ -25,6 +24,7 @@ from kinacc.calibration.residuals import Errors, errors
 from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.calibration.system import FlangeModel
 from kinacc.calibration.tables import frames_of
+from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.deployment import handful
 from kinacc.deployment.handful import BASE, TOOL, Held, HeldOut, Places, Seen
 from kinacc.errors import InputError, Problem

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinacc.artifacts.error_models import model_name
+from kinacc.config.error_models import model_name
 from kinacc.deployment.handful import DOUBLED, LEAST_HELD_OUT, LEVEL
 from kinacc.deployment.verify import FAILS, FEW_HELD_OUT, OPEN, Level, Verdict
 

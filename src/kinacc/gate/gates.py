@@ -173,7 +173,7 @@ def _campaign(
     from kinacc.campaign import of_calibration
     from kinacc.campaign.folder import open_
     from kinacc.deployment import folder
-    from kinacc.workflow.fleet import BOUND, Standing
+    from kinacc.report.fleet import BOUND, Standing
 
     place = Path(gate["campaign"])
     open_(place)  # says what is wrong with it

@@ -9,8 +9,8 @@ import numpy as np
 
 from kinacc.artifacts import assessment_tables, store
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import MEASURED, Comparison
 from kinacc.calibration.summary import selected
+from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.errors import InputError, Problem
 
 SELECTED = "selected"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.artifacts import sums
-from kinacc.artifacts.error_models import model_name
+from kinacc.config.error_models import model_name
 from kinacc.config.gate_rules import COMPARED, units
 from kinacc.errors import Problem
 from kinacc.gate import chance

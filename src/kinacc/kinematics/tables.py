@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import MODELS, NOMINAL, loaded
+from kinacc.config.error_models import MODELS, NOMINAL, loaded
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from kinacc.artifacts.columns import Columns
+from kinacc.measurements.reader import UNCERTAINTY
+
+TIME_BLOCK = "time_block"
 LEAST_ROWS = 3  # that place a base or a target
 MOST_LOOKED_AT = 50  # pairs a row, alike in one joint
 SAME_CONFIGURATION_RAD = np.deg2rad(0.1)  # joints this close are one configuration visited again
@@ -176,3 +181,38 @@ def _by_appearance(labels: np.ndarray) -> np.ndarray:
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     return rank[inverse]
+
+
+def split(columns: Mapping, settings: Mapping) -> Columns:
+    """The columns with ``fold`` and ``subset``: whole configurations held out together.
+
+    ``settings``: seed and the ``measurements`` section. Fold null without folds, and for the
+    configurations of a session or target that could not be placed without them (with a warning
+    that names these); the rows of the validation fold are the validation subset.
+    """
+    section = settings["measurements"]
+    count = len(columns["pose"])
+    fold = np.full(count, np.nan)
+    if section["folds"] is not None:
+        same = configurations_of(columns)
+        if section["fold_by"] == TIME_BLOCK:
+            fold = blocks(same, int(section["folds"])).astype(float)
+        else:
+            fold = assign(same, int(section["folds"]), int(settings["seed"])).astype(float)
+        labels = {kind: columns[kind] for kind in ("session", "target") if kind in columns}
+        for kind, value, rows in always_trained(fold, labels, same):
+            fold[rows] = np.nan
+            warnings.warn(
+                f"{kind} {value} has fewer than {LEAST_ROWS} rows outside one of its folds: "
+                f"its {int(rows.sum())} rows always train and have no held-out error",
+                stacklevel=2,
+            )
+    held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])
+    subset = np.where(held_out, "validation", "train").astype(object)
+    return {**_not_stated(count), **columns, "subset": subset, "fold": fold}
+
+
+def _not_stated(count: int) -> Columns:
+    """Null columns of all that a source of measurements need not state."""
+    null = {name: np.full(count, np.nan) for name in ("row", "temperature_c", *UNCERTAINTY)}
+    return null | {"session": np.full(count, None, dtype=object)}

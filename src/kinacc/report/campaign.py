@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import model_name
 from kinacc.assess.conformity import ACCEPT, REJECT, decide
 from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, folder, nearness, words
@@ -16,6 +15,7 @@ from kinacc.campaign.folder import Opened
 from kinacc.campaign.reasons import ADVICE
 from kinacc.campaign.report import facts, grounds, made_of, read_above
 from kinacc.campaign.state import State
+from kinacc.config.error_models import model_name
 from kinacc.report.campaign_answers import against, answers, leading, sentence
 from kinacc.report.campaign_course import course, mm, scatter
 from kinacc.report.campaign_points import points, readings

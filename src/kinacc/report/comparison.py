@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinacc.artifacts.error_models import model_name
+from kinacc.config.error_models import model_name
 from kinacc.deployment.compare import Difference, Parameters
 from kinacc.deployment.compare_words import (
     AGAIN,

@@ -10,8 +10,8 @@ from bokeh.transform import log_cmap
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import model_name
 from kinacc.calibration import noise, summary
+from kinacc.config.error_models import model_name
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report import pictures

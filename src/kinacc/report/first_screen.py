@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import NOMINAL, model_name
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
+from kinacc.config.error_models import NOMINAL, model_name
 from kinacc.report.page import FirstScreen, Part, Text, printed
 
 _OF_THE_PAPER = {"claims": "CLAIMS", "differ": "DIFFER"}

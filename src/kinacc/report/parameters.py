@@ -9,12 +9,12 @@ from bokeh.models import ColumnDataSource
 
 from kinacc.artifacts.allowed import ERRORS
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import model_name
 from kinacc.calibration import summary
 from kinacc.calibration.blind_words import parameter_name, short_name
 from kinacc.calibration.identified import FIXED, IDENTIFIED, PRIOR, UNDETERMINED
 from kinacc.calibration.misfit import in_words, misfit, misfits
 from kinacc.calibration.uncertainty import Uncertainty, is_angle
+from kinacc.config.error_models import model_name
 from kinacc.deployment.folder import uncertainty
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot

@@ -9,8 +9,8 @@ import numpy as np
 from bokeh.models import ColumnDataSource
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import MEASURED, NOMINAL, Comparison, model_name
 from kinacc.calibration import summary
+from kinacc.config.error_models import MEASURED, NOMINAL, Comparison, model_name
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report import pictures

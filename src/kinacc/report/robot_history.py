@@ -8,8 +8,8 @@ import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, IndexFilter
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import model_name
 from kinacc.artifacts.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
+from kinacc.config.error_models import model_name
 from kinacc.deployment.history_words import sentence
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import PLAINEST, model_name
 from kinacc.calibration import summary_words
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import Fact
+from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, VERMILION

@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from kinacc.artifacts.error_models import MEASURED, PLAINEST, Comparison, model_name
 from kinacc.assess.error_effects import joint_errors
+from kinacc.config.error_models import MEASURED, PLAINEST, Comparison, model_name
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots

@@ -6,7 +6,7 @@ the rule of an example is shown.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.assess.model_invalidation import Invalidation, Step
 from kinacc.assess.world import World
+from kinacc.config.records import of_section
 from kinacc.study.monte_carlo import Visits, checked_errors, world_of
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
@@ -184,3 +185,19 @@ def _rows(
         }
         for place, step in enumerate(steps)
     ]
+
+
+def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+    """Return ``histories``."""
+    points = inputs["assessment_points"]
+    error_mm = np.stack([points["ex_mm"], points["ey_mm"], points["ez_mm"]], axis=1)
+    rows = histories(
+        error_mm,
+        of_section(HistorySettings, settings["histories"]),
+        of_section(Visits, settings["study"]),
+        of_section(Invalidation, settings["study"]),
+        settings["seed"],
+        points["point"],
+        progress,
+    )
+    return {"histories": rows}

@@ -232,3 +232,38 @@ def _statistics(rows: Columns, keys: Sequence[str], true_mm: float) -> list[dict
             }
         )
     return found
+
+
+def simulated(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+    """Return ``study_chunk`` for ``settings["part"]`` (default: all repetitions).
+
+    ``settings["all_readings"]`` false: the reading that ``study`` names alone;
+    ``settings["only"]``: the repetitions simulated.
+    """
+    points = inputs["assessment_points"]
+    study = of_section(StudySettings, settings["study"])
+    part = settings.get("part") or {"number": 1, "of": 1}
+    error_mm = np.stack([points["ex_mm"], points["ey_mm"], points["ez_mm"]], axis=1)
+    repetitions = settings.get("only") or part_of(study.repetitions, part["number"], part["of"])
+    rows = simulate(
+        error_mm,
+        study.noise_mm,
+        repetitions,
+        study,
+        settings["seed"],
+        assessors(settings["study"], settings.get("all_readings", True)),
+        progress,
+    )
+    return {"study_chunk": rows}
+
+
+def summed_up(inputs: Mapping, settings: Mapping) -> dict[str, dict]:
+    """Return ``study``, ``study_summary`` and ``readings``."""
+    true_mm = true_accuracy_mm(inputs["assessment_points"]["true_error_mm"])
+    rows = ordered(inputs["study_chunk"])
+    default = default_reading(rows, settings["study"])
+    return {
+        "study": default,
+        "study_summary": summary(default, true_mm),
+        "readings": readings(rows, true_mm),
+    }

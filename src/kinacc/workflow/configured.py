@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kinacc.artifacts.error_models import ERROR_MODELS, asked_for
+from kinacc.config.error_models import ERROR_MODELS, asked_for
 from kinacc.errors import InputError
 
 # Keys of files that tables of results do not know of where they are at their defaults.

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinacc.artifacts.error_models import asked_for
 from kinacc.campaign.journal import JOURNAL, PLAN
+from kinacc.config.error_models import asked_for
 from kinacc.errors import Problem, refuse
 from kinacc.workflow.boundary import leading_out
 from kinacc.workflow.code import file_digest
@@ -101,8 +101,8 @@ def read_data_sets(
 
     Raises InputError listing every problem in them.
     """
+    from kinacc.checks.contradictions import load
     from kinacc.config.schema import without_execution_keys
-    from kinacc.workflow.contradictions import load
 
     full = load([Path(path) for path in paths], words_read(overrides or {}))
     first = next(iter(full.values()))

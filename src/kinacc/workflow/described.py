@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from kinacc.checks.contradictions import load
 from kinacc.errors import InputError, Problem
-from kinacc.workflow.contradictions import load
 from kinacc.workflow.data_sets import DataSets, read_data_sets
 
 CONFIG = "config.yaml"

@@ -38,8 +38,8 @@ def _locked(results: str) -> TextIO:
 
 def answers(results: str, datasets: Sequence[str]) -> Iterator[str]:
     """What each data set's calibration is worth, after a run that made its summary."""
-    from kinacc.workflow.answer import answer, read
-    from kinacc.workflow.fleet import FEW
+    from kinacc.report.answer import answer, read
+    from kinacc.report.fleet import FEW
 
     folders = [Path(results, name) for name in datasets]
     began = _held[0][1]

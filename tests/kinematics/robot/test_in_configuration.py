@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from test_urdf import SCARA, UR10, text_of
 
+from kinacc.checks.contradictions import load
 from kinacc.errors import InputError
-from kinacc.workflow.contradictions import load
 from kinacc.workflow.data_sets import digests, read_data_sets
 
 PAPER = Path(__file__).parents[3] / "config.yaml"

@@ -9,11 +9,11 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.atomic import replacing
-from kinacc.artifacts.error_models import PLAINEST, model_name
 from kinacc.calibration import blind_words
 from kinacc.calibration.identified import FIXED
 from kinacc.calibration.misfit import misfit
 from kinacc.config import names
+from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.deployment import folder as results
 from kinacc.deployment.export import description, tables, urdf
 from kinacc.errors import InputError, Problem, refuse

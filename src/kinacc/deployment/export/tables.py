@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import ERROR_MODELS, MEASURED, Comparison, model_name
 from kinacc.calibration.misfit import GIVEN, Misfit, in_words
+from kinacc.config.error_models import ERROR_MODELS, MEASURED, Comparison, model_name
 from kinacc.config.names import in_markdown
 from kinacc.deployment.record import POSES
 from kinacc.kinematics.dh import PARAMETERS

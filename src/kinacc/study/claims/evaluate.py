@@ -64,3 +64,10 @@ def shares_of(robustness: Columns) -> dict[str, float]:
         if judged.size:
             shares[claim.id] = float(np.mean(judged == "agrees"))
     return shares
+
+
+def table_of(inputs: Mapping, settings: Mapping) -> dict[str, Mapping]:
+    """Return ``claims``; numbers of Tables I to III are compared on the paper's arm only."""
+    tables = {name: table for name, table in inputs.items() if name != "robustness"}
+    shares = shares_of(inputs["robustness"]) if "robustness" in inputs else None
+    return {"claims": evaluate(tables, paper_arm=settings["robot"] == "mh180", shares=shares)}

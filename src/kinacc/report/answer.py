@@ -11,13 +11,13 @@ import numpy as np
 
 from kinacc.artifacts import store
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import ERROR_MODELS, PLAINEST, model_name
 from kinacc.calibration import misfit, noise, summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
 from kinacc.campaign import journal, of_calibration, slips
 from kinacc.campaign.of_calibration import Sought
 from kinacc.campaign.words import one_of
+from kinacc.config.error_models import ERROR_MODELS, PLAINEST, model_name
 from kinacc.deployment import folder as results
 from kinacc.deployment.history_words import sentence
 from kinacc.deployment.record import Calibration

@@ -9,13 +9,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from kinacc.artifacts import store, sums
-from kinacc.artifacts.error_models import model_name
 from kinacc.assess.conformity import UNDECIDED
 from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.calibration.summary import Tolerance, facts_in, of
 from kinacc.calibration.summary import tolerance as tolerance_in
 from kinacc.campaign import journal, of_calibration, tolerance, words
 from kinacc.campaign.of_calibration import Sought
+from kinacc.config.error_models import model_name
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem
 

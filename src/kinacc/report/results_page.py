@@ -1,21 +1,23 @@
-"""The first screen of a data set's report, by the tables and the campaign that are there."""
+"""The page of a data set's results, by the tables and the campaign that are there."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from kinacc.calibration import summary
 from kinacc.calibration.summary import Fact, Tolerance, of
-from kinacc.campaign import tolerance
-from kinacc.campaign.of_calibration import Sought
+from kinacc.campaign import folder as campaigns
+from kinacc.campaign import of_calibration, report, tolerance
+from kinacc.campaign.of_calibration import Assessed, Sought
 from kinacc.deployment.history_words import first_words
 from kinacc.kinematics import robot
+from kinacc.report import campaign, dataset
+from kinacc.report.answer import Tables, Told, told
 from kinacc.report.campaign_answers import answers
 from kinacc.report.first_screen import Answers, remedies, screen
-from kinacc.report.page import FirstScreen
-from kinacc.workflow.answer import Tables, Told, told
+from kinacc.report.page import FirstScreen, Page, Section
 
 
 def first_screen(
@@ -61,3 +63,28 @@ def _kept(stated: Tolerance | None, facts: Sequence[Fact], bound: Sought) -> str
         known = of(facts, "held_out_error").get(best, {})
         judged = tolerance.by_held_out(stated, {name: each.value for name, each in known.items()})
     return tolerance.in_words(stated, tolerance.OF_CONFIGURATION, judged)
+
+
+def run(inputs: Mapping, settings: Mapping) -> Page:
+    """The page on the tables that are there, and on the campaign of their calibration.
+
+    ``settings``: ``dataset``; ``folder`` where the results are not in their usual place, and
+    ``outdated`` tables that are left out because they were made from others.
+    """
+    name = settings["dataset"]
+    files = {role: each for role, each in inputs.items() if isinstance(each, Path)}
+    tables = {role: each for role, each in inputs.items() if role not in files}
+    places = [each.parent for role, each in files.items() if role.startswith("campaign_")]
+    bound = of_calibration.sought(name, tables, places)
+    place = Path(settings.get("folder", f"results/{name}"))
+    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    outdated = settings.get("outdated", ())
+    reason = settings.get("reason", "")
+    first, found = first_screen(place, name, tables, bound, outdated, reason)
+    section = _campaign(bound.assessed) if bound.assessed else None
+    return dataset.page(first, tables, arm, found.facts, section)
+
+
+def _campaign(assessed: Assessed) -> Section:
+    state, tables = report.tables(campaigns.open_(assessed.place))
+    return campaign.section(state, tables, "campaign")

@@ -12,8 +12,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from kinacc.artifacts.error_models import ALWAYS, ESTIMATORS, asked_for, loaded
 from kinacc.config import load as configuration
+from kinacc.config.error_models import ALWAYS, ESTIMATORS, asked_for, loaded
 from kinacc.config.parameter_rules import JOINTS, rules, strangers
 from kinacc.config.validate import ROBOTS
 from kinacc.config.values import shown

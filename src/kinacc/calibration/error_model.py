@@ -7,10 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.error_models import FITTED, NOMINAL, PLAINEST
-from kinacc.calibration import models, tables, uncertainty
+from kinacc.calibration import delivered, models, tables, uncertainty
+from kinacc.config.error_models import FITTED, NOMINAL, PLAINEST
 from kinacc.kinematics import robot
-from kinacc.workflow import calibration_settings as shared
 
 
 def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[str, Columns]:
@@ -19,12 +18,12 @@ def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[st
     The plainest kind, which is fitted last, gathers the ``frames`` of all models.
     """
     arm = robot.load(settings["robot"])
-    every, train = shared.observed(inputs, arm)
+    every, train = delivered.observed(inputs, arm)
     estimator = models.estimators(settings["calibration"], arm, every)[kind]
     choices = estimator.choices(every, progress)
-    estimator = estimator.chosen(choices, shared.held_out_fold(every, train))
+    estimator = estimator.chosen(choices, delivered.held_out_fold(every, train))
     observations = every.select(train)
-    fitted = estimator.fit(observations, shared.delivered_fits(inputs, arm, every))
+    fitted = estimator.fit(observations, delivered.delivered_fits(inputs, arm, every))
     frames = {kind: fitted.frames}
     if kind == PLAINEST:
         frames[NOMINAL] = models.nominal_frames(observations, estimator.common)

@@ -1,4 +1,4 @@
-"""Stage: every claim on further accepted draws of the synthetic arm, one part of the draws."""
+"""Every claim on further accepted draws of the synthetic arm."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
-from kinacc.artifacts.error_models import ALWAYS
+from kinacc.config.error_models import ALWAYS
+from kinacc.study import in_memory
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.synthetic.accepted import further_draws
-from kinacc.workflow import in_memory
 
 STAGES = (
     *ALWAYS,
@@ -55,3 +55,10 @@ def claims_on(draw: int, config: Mapping) -> Columns:
     claims = evaluate(tables, paper_arm=True)
     rows = {name: claims[name] for name in ("claim", "reproduced", "verdict")}
     return {"draw": np.full(len(claims["claim"]), draw), **rows}
+
+
+def gathered(inputs: Mapping, settings: Mapping) -> dict[str, dict]:
+    """Return ``robustness``: by draw, then in the order of the claims."""
+    rows = inputs["robustness_chunk"]
+    order = np.argsort(rows["draw"], kind="stable")
+    return {"robustness": {name: np.asarray(column)[order] for name, column in rows.items()}}

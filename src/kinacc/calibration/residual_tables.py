@@ -9,11 +9,11 @@ import numpy as np
 from kinacc.artifacts.columns import Columns
 from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import model_comparison_columns
+from kinacc.calibration.delivered import delivered_fits, observed
 from kinacc.calibration.models import Fit, estimators, fit_all
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors, cross_validated, errors, statistics
 from kinacc.kinematics import robot
-from kinacc.workflow import calibration_settings as shared
 
 _QUANTITIES = (("position", "mm", 1.0), ("orientation", "mrad", 1e3))
 
@@ -25,8 +25,8 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
     """
     arm = robot.load(settings["robot"])
-    every, train = shared.observed(inputs, arm)
-    delivered = shared.delivered_fits(inputs, arm, every)
+    every, train = observed(inputs, arm)
+    delivered = delivered_fits(inputs, arm, every)
     fitted_by = {
         kind: each
         for kind, each in estimators(settings["calibration"], arm, every).items()

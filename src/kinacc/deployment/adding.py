@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.artifacts.atomic import write_whole
+from kinacc.calibration import delivered
+from kinacc.checks.contradictions import load
 from kinacc.config.reading import read
 from kinacc.config.series import FLAGS, MOVED, SAME
 from kinacc.config.series_text import as_text, with_line
@@ -19,10 +21,9 @@ from kinacc.errors import InputError, Problem, first_few, gathered, refuse
 from kinacc.kinematics import robot
 from kinacc.measurements import times
 from kinacc.measurements.files import load as loaded
+from kinacc.measurements.folds import split
+from kinacc.measurements.reader import read as read_measured
 from kinacc.measurements.written import Written
-from kinacc.workflow import calibration_settings
-from kinacc.workflow.contradictions import load
-from kinacc.workflow.stages import measurements
 
 _MARK = "\ufeff"  # with which some editors begin a file
 
@@ -103,9 +104,7 @@ def misfits(path: str, arm: Arm, tool: str | None) -> list[Problem]:
         given = {"measurements": own}
         section = arm.settings["calibration"]
         with gathered(problems):
-            calibration_settings.require_enough_rows(
-                given, robot.load(arm.settings["robot"]), section
-            )
+            delivered.require_enough_rows(given, robot.load(arm.settings["robot"]), section)
         other = None
         for member in arm.members:
             with suppress(InputError):
@@ -121,7 +120,8 @@ def _measured(path: str, arm: Arm) -> Mapping[str, Any]:
     section = arm.settings["measurements"]
     own = {**section, "file": {**section["file"], "path": path}}
     with warnings.catch_warnings(action="ignore"):  # said when it is calibrated
-        return measurements.run({}, {**arm.settings, "measurements": own})["measurements"]
+        seen = read_measured(own["file"], robot.load(arm.settings["robot"]))
+        return split(seen.columns, {**arm.settings, "measurements": own})
 
 
 def _of_targets(

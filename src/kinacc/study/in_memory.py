@@ -7,26 +7,19 @@ from functools import partial
 
 import numpy as np
 
-from kinacc.artifacts.error_models import ALWAYS
-from kinacc.workflow.stages import (
-    accuracy_map,
-    assessment_points,
-    error_model,
-    histories,
-    measurements,
-    residuals,
-    study,
-    study_chunk,
-)
+from kinacc.calibration import error_model, residual_tables
+from kinacc.config.error_models import ALWAYS
+from kinacc.study import evaluation, histories, monte_carlo
+from kinacc.synthetic import source
 
 RUNS = {
-    "measurements": measurements.run,
+    "measurements": source.run,
     **{kind: partial(error_model.run, kind=kind) for kind in ALWAYS},
-    "residuals": residuals.run,
-    "accuracy_map": accuracy_map.run,
-    "assessment_points": assessment_points.run,
-    "study_chunk": study_chunk.run,
-    "study": study.run,
+    "residuals": residual_tables.run,
+    "accuracy_map": evaluation.mapped,
+    "assessment_points": evaluation.points,
+    "study_chunk": monte_carlo.simulated,
+    "study": monte_carlo.summed_up,
     "histories": histories.run,
 }
 

@@ -1,0 +1,39 @@
+"""Read or synthesise the measured poses, deal them into folds, and write down the robot."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.artifacts.columns import Columns
+from kinacc.artifacts.contract import columns_of
+from kinacc.kinematics import region, robot
+from kinacc.measurements.folds import split
+from kinacc.measurements.reader import read
+from kinacc.synthetic import measure
+
+
+def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+    """``measurements`` of the configured source, with fold and subset, and ``robot``."""
+    arm, section = robot.load(settings["robot"]), settings["measurements"]
+    if section["source"] == "synthetic":
+        seen = measure(arm, section["synthetic"], attitude(settings["evaluation"]))
+    else:
+        reading = read(section["file"], arm)
+        for words in reading.left_out():
+            warnings.warn(words, stacklevel=1)
+        seen = reading.columns
+    return {"measurements": split(seen, settings), "robot": _robot(arm)}
+
+
+def attitude(evaluation: Mapping) -> region.Attitude:
+    """The flange's attitude in the ``evaluation`` settings, which a calibration has to cover."""
+    euler_rad = np.deg2rad(evaluation["reference_orientation_deg"])
+    return region.Attitude(region.reference_rotation(euler_rad), evaluation["reference_frame"])
+
+
+def _robot(arm: robot.Robot) -> Columns:
+    row = (arm.name, arm.source or None, arm.date or None, robot.as_yaml(arm))
+    return columns_of("robot", [row])
