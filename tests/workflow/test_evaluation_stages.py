@@ -211,8 +211,8 @@ def test_a_calibration_covers_the_attitudes_its_arm_is_judged_in(frame):
     section = {**EVALUATION, "reference_orientation_deg": euler_deg, "reference_frame": frame}
     arm = {"robot": "mh180", "seed": 1, "evaluation": section}
     synthetic = {"draw": 0, "poses": 200, "tracker_noise_mm": 0.0}
-    source = {"source": "synthetic", "folds": None, "validation_fold": None}
-    seen = source.run({}, {**arm, "measurements": {**source, "synthetic": synthetic}})
+    file_settings = {"source": "synthetic", "folds": None, "validation_fold": None}
+    seen = source.run({}, {**arm, "measurements": {**file_settings, "synthetic": synthetic}})
     columns = seen["measurements"]
     quaternion = np.stack([columns[name] for name in ("qx", "qy", "qz", "qw")], axis=1)
     attitude = Rotation.from_euler("XYZ", euler_deg, degrees=True)
