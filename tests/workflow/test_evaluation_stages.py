@@ -16,6 +16,7 @@ from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import ERRORS
 from kinacc.study import evaluation
+from kinacc.synthetic import source
 
 ARM = robot.load("mh180")
 PROVENANCE = {
