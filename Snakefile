@@ -12,6 +12,8 @@ synthetic arms. `snakemake -c2 --until fit_dh` stops after a stage, `-R fit_dh` 
 """
 
 import os
+import shlex
+import sys
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -26,6 +28,8 @@ from kinacc.workflow.outdated import CALIBRATION
 from kinacc.workflow.start import job_environment
 
 os.environ.update(job_environment(str(workflow.current_basedir)))
+if os.path.isfile(sys.executable):  # not quoted yet: Snakemake does not, in the commands of jobs
+    sys.executable = shlex.quote(sys.executable)
 
 if {*"{}"} & {*str(workflow.current_basedir)}:
     raise WorkflowError("the workflow's folder has braces in its name: rename the folder")

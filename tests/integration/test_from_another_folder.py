@@ -6,6 +6,8 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
+import venv
 from pathlib import Path
 
 import pytest
@@ -48,6 +50,17 @@ def test_the_papers_study_is_the_default_from_any_folder(project, cell):
     text = started(project, cell, snakemake(project, "-n", robot), ok=False)
     assert "results/mh180/robot.parquet" in text
     started(project, cell, snakemake(project, "-n", "results/here/robot.parquet"))
+
+
+def test_an_environment_in_a_folder_with_a_space_runs_the_rules(project, cell):
+    # As `make reproduce` does in a clone whose path has one.
+    venv.create(cell / "own env", symlinks=True)
+    packages = next((cell / "own env/lib").glob("python*/site-packages"))
+    (packages / "others.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    robot = "results/mh180/robot.parquet"
+    command = [str(cell / "own env/bin/python"), "-m", *snakemake(project, robot)]
+    started(project, cell, command)
+    assert (cell / robot).is_file()
 
 
 @pytest.mark.parametrize("by", ["folder", "--directory"])
