@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from kinacc.artifacts import store
 from kinacc.assess.adaptive import Campaign, Candidates
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of, points_bounded
 from kinacc.assess.random_numbers import key_of
@@ -29,6 +28,7 @@ from kinacc.assess.world import World, drawn_world
 from kinacc.config.records import of_section
 from kinacc.deployment.folder import recorded_robot
 from kinacc.study.fields import FAMILIES, ErrorField, of_measurements, of_points, synthetic
+from kinacc.tables import store
 from research import verdicts
 from research.assessors import ADAPTIVE, ASSESSORS, SLOW
 from research.conditions import CONDITIONS, STATED, Course

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinacc.artifacts.history_tables import FIRST, HISTORY, HOLDS, OPEN, RECALIBRATE
+from kinacc.tables.history_tables import FIRST, HISTORY, HOLDS, OPEN, RECALIBRATE
 
 
 def history(

@@ -7,8 +7,6 @@ from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
-from kinacc.artifacts import store, sums
-from kinacc.artifacts.atomic import write_together
 from kinacc.calibration import error_model, excluded_rows, residual_tables
 from kinacc.checks import data_check
 from kinacc.deployment import summary
@@ -16,6 +14,8 @@ from kinacc.errors import KinaccError
 from kinacc.study import evaluation, histories, monte_carlo
 from kinacc.study.claims.evaluate import table_of
 from kinacc.synthetic import source
+from kinacc.tables import store, sums
+from kinacc.tables.atomic import write_together
 from kinacc.workflow.code import config_hash
 from kinacc.workflow.data_sets import read_data_sets
 from kinacc.workflow.outdated import CALIBRATION

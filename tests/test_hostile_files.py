@@ -306,8 +306,8 @@ def test_a_line_of_units_that_does_not_fit_the_names_is_named(tmp_path):
 
 
 def test_a_damaged_results_table_is_no_traceback(tmp_path):
-    from kinacc.artifacts.store import read, read_metadata
     from kinacc.errors import InputError
+    from kinacc.tables.store import read, read_metadata
 
     names = pa.Array.from_buffers(
         pa.string(), 1, [None, pa.py_buffer(b"\0\0\0\0\2\0\0\0"), pa.py_buffer(b"\xff\xfe")]
@@ -321,8 +321,8 @@ def test_a_damaged_results_table_is_no_traceback(tmp_path):
 
 
 def test_long_texts_repeated_in_a_results_table_are_refused_before_they_are_unpacked(tmp_path):
-    from kinacc.artifacts.store import read
     from kinacc.errors import InputError
+    from kinacc.tables.store import read
 
     text = pa.DictionaryArray.from_arrays(
         pa.array(np.zeros(10_000, np.int32)), pa.array(["x" * 100_000])
@@ -334,8 +334,8 @@ def test_long_texts_repeated_in_a_results_table_are_refused_before_they_are_unpa
 
 
 def test_a_pipe_in_place_of_a_results_table_is_not_waited_for(tmp_path):
-    from kinacc.artifacts.store import read
     from kinacc.errors import InputError
+    from kinacc.tables.store import read
 
     os.mkfifo(tmp_path / "robot.parquet")
     with pytest.raises(InputError):
@@ -343,8 +343,8 @@ def test_a_pipe_in_place_of_a_results_table_is_not_waited_for(tmp_path):
 
 
 def test_a_results_table_of_a_billion_values_is_refused_before_it_is_unpacked(tmp_path):
-    from kinacc.artifacts.store import read
     from kinacc.errors import InputError
+    from kinacc.tables.store import read
 
     zeros = pa.array(np.zeros(3_000_000, np.int8))
     repeated(tmp_path / "much.parquet", dict.fromkeys(COLUMNS, zeros), 4)

@@ -7,7 +7,7 @@ Prints each column that differs beyond its tolerance. Exit code 0: the same; 1: 
 import sys
 from pathlib import Path
 
-from kinacc.artifacts.comparison import compare_folders
+from kinacc.tables.comparison import compare_folders
 
 if __name__ == "__main__":
     if len(sys.argv) != 3:

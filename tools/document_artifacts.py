@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kinacc.artifacts.columns import SAME_WITHIN, Artefact, Column
-from kinacc.artifacts.contract import ARTEFACTS, PROVENANCE_KEYS
+from kinacc.tables.columns import SAME_WITHIN, Artefact, Column
+from kinacc.tables.contract import ARTEFACTS, PROVENANCE_KEYS
 
 _HEAD = """\
 # Artefacts

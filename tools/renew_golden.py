@@ -18,9 +18,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "golden"))
 
 import cases
 
-from kinacc.artifacts.comparison import compare_folders
 from kinacc.deployment.export.files import contents
 from kinacc.deployment.folder import recorded_robot
+from kinacc.tables.comparison import compare_folders
 
 
 def renew_inputs() -> None:

@@ -10,8 +10,6 @@ import pytest
 from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
 from command_line import call
 
-from kinacc.artifacts import store
-from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.assess.registry import CHOOSING
 from kinacc.assess.simulate import conduct
 from kinacc.campaign import folder as campaigns
@@ -21,6 +19,8 @@ from kinacc.cli import campaigns_answers
 from kinacc.gate.conformity import check_file
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics.model import JointState
+from kinacc.tables import store
+from kinacc.tables.contract import ARTEFACTS
 
 
 def test_a_budget_below_the_candidates_is_told_what_more_would_bring(calibration, tmp_path):

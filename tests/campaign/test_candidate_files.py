@@ -9,8 +9,8 @@ import pytest
 from command_line import call, small_study
 from openpyxl import Workbook
 
-from kinacc.artifacts import store
 from kinacc.campaign import folder as campaigns
+from kinacc.tables import store
 
 COUNT = 12
 

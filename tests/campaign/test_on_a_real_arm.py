@@ -11,7 +11,6 @@ import shared_data
 from command_line import call
 from stages_by_hand import run_stage
 
-from kinacc.artifacts import store
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
@@ -21,6 +20,7 @@ from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
 from kinacc.cli.campaign_plans import field_of
 from kinacc.geometry import invert
+from kinacc.tables import store
 
 SERIES = "ur10_tmac/series_D.csv"
 DATA = shared_data.place(SERIES)

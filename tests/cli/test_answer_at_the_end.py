@@ -13,10 +13,10 @@ import pytest
 from command_line import call, small_study
 from stages_by_hand import run_stage
 
-from kinacc.artifacts import store
 from kinacc.calibration.summary_words import half_page
 from kinacc.kinematics import robot
 from kinacc.report import answer
+from kinacc.tables import store
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from command_line import call, small_study
 
-from kinacc.artifacts import store
+from kinacc.tables import store
 
 KINDS = ("csv", "json", "parquet")
 

@@ -7,7 +7,7 @@ import pytest
 from stages_by_hand import run_stage
 from tracked_arm import call, table, tracked, written
 
-from kinacc.artifacts import store
+from kinacc.tables import store
 
 COUNT = 60
 IT = tracked("ur10", COUNT, 11)

@@ -13,9 +13,9 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
-from kinacc.artifacts import store
-from kinacc.artifacts.contract import PROVENANCE_KEYS, columns_of
 from kinacc.cli.group import main
+from kinacc.tables import store
+from kinacc.tables.contract import PROVENANCE_KEYS, columns_of
 
 PROVENANCE = dict.fromkeys(PROVENANCE_KEYS, "1")
 

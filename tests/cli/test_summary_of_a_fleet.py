@@ -14,10 +14,10 @@ import yaml
 from command_line import call, small_study
 from stages_by_hand import run_stage
 
-from kinacc.artifacts import store
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import JOURNAL
 from kinacc.report import answer
+from kinacc.tables import store
 
 COLUMNS = ("bound_mm", "confidence", "campaign", "campaign_date", "verdict")
 

@@ -9,9 +9,9 @@ import document_configuration as document
 import pytest
 import yaml
 
-from kinacc.artifacts import allowed
 from kinacc.config.reading import read
 from kinacc.config.schema import NUMERIC, defaults, settings, walk
+from kinacc.tables import allowed
 
 ROOT = Path(__file__).parents[2]
 

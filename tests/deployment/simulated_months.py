@@ -10,8 +10,6 @@ from __future__ import annotations
 import numpy as np
 from oracles.kinematics import UR10, dh_link, rot_x, rot_y, rot_z, trans
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.history_tables import MOVED, SAME
 from kinacc.calibration import dh_fit
 from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
 from kinacc.calibration.frames import known
@@ -20,6 +18,8 @@ from kinacc.deployment import drift
 from kinacc.deployment.record import Calibration
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
+from kinacc.tables.columns import Columns
+from kinacc.tables.history_tables import MOVED, SAME
 
 WEIGHT_MM_PER_RAD = 500.0
 POSES = 50

@@ -11,12 +11,12 @@ from command_line import call
 from small_arms import calibrated, joints, measured, measured_at, results_of
 from stages_by_hand import run_stage
 
-from kinacc.artifacts import store
 from kinacc.deployment import folder
 from kinacc.deployment.applicability import is_measured_there, share_of_box
 from kinacc.deployment.folder import calibration
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
+from kinacc.tables import store
 
 SERIES = "ur10_tmac/series_D.csv"
 

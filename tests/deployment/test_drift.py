@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 import shared_data
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.history_tables import MOVED, SAME
 from kinacc.calibration import dh_fit
 from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
 from kinacc.calibration.frames import known
@@ -27,6 +25,8 @@ from kinacc.synthetic import plan, tracker
 from kinacc.synthetic.accepted import accepted_draw
 from kinacc.synthetic.draw import physical_robot
 from kinacc.synthetic.physical import Visits
+from kinacc.tables.columns import Columns
+from kinacc.tables.history_tables import MOVED, SAME
 
 WEIGHT = 500.0
 POSES = 60

@@ -10,7 +10,6 @@ import pytest
 from command_line import call, small_study
 from small_arms import BASE, TOOL, WEIGHT, joints, results, truth
 
-from kinacc.artifacts import store
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.summary import of_errors
 from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
@@ -19,6 +18,7 @@ from kinacc.deployment.predict import predict
 from kinacc.deployment.verify import trials
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
+from kinacc.tables import store
 
 ELSEWHERE = Pose(exp_so3(np.array([1.2, 0.3, -0.8])), np.array([-700.0, 3100.0, 250.0]))
 LONGER = Pose(exp_so3(np.array([0.1, 1.0, 0.2])), np.array([-60.0, 45.0, 310.0]))

@@ -15,8 +15,8 @@ from command_line import call
 from stages_by_hand import perform
 from whole_project import finished
 
-from kinacc.artifacts import store
 from kinacc.gate.accepted import compared
+from kinacc.tables import store
 
 __all__ = ["finished"]
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from kinacc.artifacts import store, sums
 from kinacc.config.load import load
 from kinacc.gate.gates import of_gate
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED
 from kinacc.gate.run_tables import RunTables
+from kinacc.tables import store, sums
 
 
 def gate(tmp_path, text, tolerance="{}"):

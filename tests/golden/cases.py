@@ -23,7 +23,6 @@ import yaml  # noqa: E402
 from good_files import File, simulated  # noqa: E402
 from measurements.files_as_they_come import FILES  # noqa: E402
 
-from kinacc.artifacts import store  # noqa: E402
 from kinacc.calibration import (  # noqa: E402
     error_model,
     residual_tables,
@@ -38,6 +37,7 @@ from kinacc.study import (  # noqa: E402
 )
 from kinacc.study.claims.evaluate import table_of  # noqa: E402
 from kinacc.synthetic import source  # noqa: E402
+from kinacc.tables import store  # noqa: E402
 from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
 
 GOLDEN = Path(__file__).parent

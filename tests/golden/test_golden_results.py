@@ -6,13 +6,13 @@ import cases
 import numpy as np
 import pytest
 
-from kinacc.artifacts import store
-from kinacc.artifacts.comparison import compare_tables
 from kinacc.calibration import delivered
 from kinacc.calibration.residuals import errors
 from kinacc.deployment.export.files import contents
 from kinacc.deployment.folder import recorded_robot
 from kinacc.kinematics import robot
+from kinacc.tables import store
+from kinacc.tables.comparison import compare_tables
 
 STAGES = [(name, stage) for name, stages in cases.DATA_SETS.items() for stage in stages]
 

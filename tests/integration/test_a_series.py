@@ -15,7 +15,7 @@ import pytest
 from command_line import call
 from shared_work import once
 
-from kinacc.artifacts.store import digest_of, read
+from kinacc.tables.store import digest_of, read
 
 MEASURED = Path(__file__).parents[2] / "examples" / "data" / "ur10_tmac"
 # Series D has another base and another tool than B.

@@ -20,7 +20,7 @@ from oracles.compliant_arm import Arm, Body, Described
 from scipy.stats import chi2
 from stages_by_hand import perform, run_stage
 
-from kinacc.artifacts.store import read
+from kinacc.tables.store import read
 
 POSES = 60
 NOISE_MM = 0.03

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from kinacc.artifacts import store
+from kinacc.tables import store
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ import pytest
 from command_line import call
 from stages_by_hand import run_stage
 
-from kinacc.artifacts import store
 from kinacc.calibration.misfit import misfit
 from kinacc.geometry import exp_so3
 from kinacc.kinematics import dh, robot
+from kinacc.tables import store
 
 NOISE_MM = np.array([0.02, 0.03, 0.04])  # along the instrument's axes
 POSES, TIMES, AGAIN = 150, 3, 40

@@ -22,7 +22,7 @@ import typed_commands
 from page_blocks import TYPED, blocks
 from typed_commands import ROOT, Shell
 
-from kinacc.artifacts import store
+from kinacc.tables import store
 
 
 def name_of(page: Path) -> str:

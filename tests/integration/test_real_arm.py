@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from kinacc.artifacts.store import read
+from kinacc.tables.store import read
 
 ROOT = Path(__file__).resolve().parents[2]
 REACH_RMS_MM = 0.43  # of an independent fit, at held-out poses

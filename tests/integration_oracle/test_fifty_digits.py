@@ -19,13 +19,13 @@ from oracles import fifty_tables as ft
 from oracles import inverse, kinematics, maps, small_study, tables
 
 from kinacc import distributions
-from kinacc.artifacts import store
 from kinacc.assess import binomial, ellipsoid, limits
 from kinacc.kinematics import dh
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import VECModel
+from kinacc.tables import store
 
 SEED = 4711
 ALPHA = fd.exact(0.6)

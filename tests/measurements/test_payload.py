@@ -7,12 +7,12 @@ import pytest
 from command_line import call
 from stages_by_hand import run_stage
 
-from kinacc.artifacts import store
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
+from kinacc.tables import store
 
 ARM = robot.load("ur10")
 COUNT = 40

@@ -10,7 +10,6 @@ import pytest
 import shared_data
 from scipy.spatial.transform import Rotation
 
-from kinacc.artifacts import store
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
@@ -18,6 +17,7 @@ from kinacc.geometry import exp_so3, log_so3, rotation_from_quaternion
 from kinacc.kinematics import dh, robot
 from kinacc.measurements.reader import UNCERTAINTY, read
 from kinacc.synthetic import source as stage
+from kinacc.tables import store
 
 ROOT = Path(__file__).parents[2]
 ARM = robot.load("ur10")

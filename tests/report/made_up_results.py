@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from parsed import read
 
-from kinacc.artifacts.allowed import ERRORS
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.report.page import Picture
+from kinacc.tables.allowed import ERRORS
 
 TRAVEL_RAD = np.pi / 2  # either way; of the sliding joint 100 mm
 SLIDES = np.array([False, False, False, True])

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinacc.artifacts import store
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, quaternion_from_rotation
 from kinacc.kinematics import dh as dh_kinematics
@@ -18,6 +17,7 @@ from kinacc.kinematics.tables import frame, models
 from kinacc.study import evaluation
 from kinacc.study.in_memory import RUNS
 from kinacc.synthetic import source
+from kinacc.tables import store
 from kinacc.workflow.data_sets import read_data_sets
 
 ROOT = Path(__file__).resolve().parents[2]

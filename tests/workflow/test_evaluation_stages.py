@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinacc.artifacts.store import to_table
 from kinacc.geometry import quaternion_from_rotation, rotation_z
 from kinacc.kinematics import dh, robot, vec
 from kinacc.kinematics.inverse import limits
@@ -17,6 +16,7 @@ from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import ERRORS
 from kinacc.study import evaluation
 from kinacc.synthetic import source
+from kinacc.tables.store import to_table
 
 ARM = robot.load("mh180")
 PROVENANCE = {

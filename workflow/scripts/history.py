@@ -1,8 +1,8 @@
 """Hold the calibrations of a series to one another, and draw what became of the arm."""
 
-from kinacc.artifacts import store
 from kinacc.campaign import history
 from kinacc.figures import history_over_time, save
+from kinacc.tables import store
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:

@@ -8,7 +8,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import dh_fit, tables
 from kinacc.calibration.constrained import ConstrainedFrames
 from kinacc.calibration.dh_estimator import DHEstimator
@@ -25,6 +24,7 @@ from kinacc.kinematics import compliance
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
+from kinacc.tables.columns import Columns
 
 _NO_MOMENT = 1e-6  # N m, or mm of lever: far above rounding, far below what bends a joint
 

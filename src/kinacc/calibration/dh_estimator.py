@@ -8,7 +8,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import dh_fit, identified, tables
 from kinacc.calibration.constraints import ArmTerms, arm_terms, free_parameters, parallel_joints
 from kinacc.calibration.dh_fit import DHFit
@@ -20,6 +19,7 @@ from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
 from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.kinematics.robot import Robot
+from kinacc.tables.columns import Columns
 
 _AUTO = "auto"
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import delivered, models, tables, uncertainty
 from kinacc.config.error_models import FITTED, NOMINAL, PLAINEST
 from kinacc.kinematics import robot
+from kinacc.tables.columns import Columns
 
 
 def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[str, Columns]:

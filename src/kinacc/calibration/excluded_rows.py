@@ -6,9 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
-from kinacc.artifacts.data_check_tables import EXCLUDED_ROWS
 from kinacc.calibration.delivered import delivered_fits
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.residuals import Errors, errors
@@ -16,6 +13,9 @@ from kinacc.config.error_models import comparisons
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, excluded_lines, read_excluded
 from kinacc.measurements.row_names import RowNames
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
+from kinacc.tables.data_check_tables import EXCLUDED_ROWS
 
 _STATED = tuple(each.name for each in EXCLUDED_ROWS.columns if not each.may_be_absent)
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration.noise import UNKNOWN, Noise, of_measurements
 from kinacc.config.error_models import model_name
 from kinacc.kinematics.robot import Robot
+from kinacc.tables.columns import Columns
 
 GIVEN = "valid given the model"
 

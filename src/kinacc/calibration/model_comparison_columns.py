@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import model_comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
 from kinacc.config.error_models import COMPARISONS, ERROR_MODELS, MEASURED, Comparison
 from kinacc.measurements import folds
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 
 def columns(

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import dh_fit
 from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
 from kinacc.calibration.constraints import frame_terms
@@ -23,6 +22,7 @@ from kinacc.geometry import IDENTITY, Pose
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
+from kinacc.tables.columns import Columns
 
 
 class Fit(NamedTuple):

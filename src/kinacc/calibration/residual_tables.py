@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import model_comparison_columns
 from kinacc.calibration.delivered import delivered_fits, observed
 from kinacc.calibration.models import Fit, estimators, fit_all
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors, cross_validated, errors, statistics
 from kinacc.kinematics import robot
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 _QUANTITIES = (("position", "mm", 1.0), ("orientation", "mrad", 1e3))
 

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSETS
-from kinacc.artifacts.columns import Columns
 from kinacc.config.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations
 from kinacc.measurements.row_names import RowNames
+from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT, SELECTABLE, SUBSETS
+from kinacc.tables.columns import Columns
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
 TABLES = ("measurements", "robot", "frames", "dh_identified", "pose_errors", "model_selection")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.calibration.blind_words import weak
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import LARGE_SHARE, SETTINGS, Fact, of
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
+from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT
 
 WIDTH = 100
 MARGIN = 17  # where the text of a paragraph begins

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.calibration.blind_groups import LeftOpen
 from kinacc.calibration.blind_words import reasons
 from kinacc.calibration.dh_fit import DHFit
@@ -19,6 +17,8 @@ from kinacc.calibration.uncertainty import Uncertainty, scaled_unit, unit_of
 from kinacc.calibration.vec_fit import Prior, VECFit
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 
 def frames_columns(

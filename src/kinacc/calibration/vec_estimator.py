@@ -8,7 +8,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import selection, tables, vec_fit
 from kinacc.calibration.constrained import FrameTerms
 from kinacc.calibration.frames import Frames
@@ -21,6 +20,7 @@ from kinacc.config.error_models import NOMINAL
 from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
+from kinacc.tables.columns import Columns
 
 _AUTO = "auto"
 

@@ -9,13 +9,13 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from kinacc import __version__
-from kinacc.artifacts.atomic import write_whole
 from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import LEAVE_OUT, READINGS, STRIKE, State
 from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
+from kinacc.tables.atomic import write_whole
 
 _CLOCKS_DIFFER = timedelta(minutes=10)  # of two computers that write to one campaign
 

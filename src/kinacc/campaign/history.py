@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts import store
-from kinacc.artifacts.columns import Columns
 from kinacc.campaign import of_calibration
 from kinacc.deployment import drift
+from kinacc.tables import store
+from kinacc.tables.columns import Columns
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:

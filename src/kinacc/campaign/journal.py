@@ -18,9 +18,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kinacc.artifacts.atomic import synchronise, taken
 from kinacc.config import json_files
 from kinacc.errors import InputError, MachineError, Problem, refused
+from kinacc.tables.atomic import synchronise, taken
 
 PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
 _PATIENCE_S = 5.0

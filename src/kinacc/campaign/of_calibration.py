@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
 from kinacc.campaign import consistency, folder, instrument, words
 from kinacc.campaign.journal import JOURNAL, PLAN
@@ -20,6 +19,7 @@ from kinacc.deployment import folder as results
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
+from kinacc.tables.columns import Columns
 
 _ORDER = (CANDIDATES, *(each for each in reversed(TARGETS) if each != CANDIDATES))
 _SAME_MM = 1e-6  # modelled positions that differ by less are of one model

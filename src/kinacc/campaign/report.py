@@ -8,8 +8,6 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from kinacc import __version__
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
 from kinacc.assess.future_visit import SHARE as FUTURE
@@ -21,6 +19,8 @@ from kinacc.campaign.journal import JOURNAL
 from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
 from kinacc.config.names import in_markdown
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 _STATEMENTS = 150  # stated at so many moments of a campaign, at most
 _LARGEST = 10

@@ -107,9 +107,9 @@ def noise_in_brief(known: Noise) -> str:
 
 def _noise_of(calibration: Path) -> Noise | None:
     """The noise of the readings in a results folder; None where it has no readings."""
-    from kinacc.artifacts import store
     from kinacc.calibration.noise import of_measurements
     from kinacc.kinematics import robot
+    from kinacc.tables import store
 
     paths = [calibration / f"{name}.parquet" for name in ("measurements", "robot")]
     if not all(path.is_file() for path in paths):

@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from kinacc.artifacts.columns import texts
 from kinacc.checks import tails
 from kinacc.geometry import rotation_from_quaternion
 from kinacc.measurements.row_names import RowNames
+from kinacc.tables.columns import texts
 
 
 @dataclass(frozen=True)

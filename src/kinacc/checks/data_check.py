@@ -6,8 +6,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.checks import check, few_poses
 from kinacc.checks.report import Report
 from kinacc.checks.suspicion import Suspicion
@@ -15,6 +13,8 @@ from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import read
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 Progress = Callable[[Iterable, str], Iterable]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinacc.artifacts.allowed import LEFT_OUT
 from kinacc.calibration.noise import Noise
 from kinacc.checks.cells import Cells
 from kinacc.checks.fitting import Fitted
@@ -12,6 +11,7 @@ from kinacc.checks.noise import Distance, Repeats
 from kinacc.checks.suspicion import NOTE, Suspicion
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.reader import MeasuredFile
+from kinacc.tables.allowed import LEFT_OUT
 
 _WEAK = 0.1  # of a joint's range
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.checks.suspicion import Suspicion, suspicion
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import folds
+from kinacc.tables.columns import Columns
 
 _PER_POSE = 6  # a rigid body has no more, however many targets it carries
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from kinacc.artifacts.allowed import LEFT_OUT
 from kinacc.measurements.row_names import RowNames
+from kinacc.tables.allowed import LEFT_OUT
 
 KINDS = {
     "outside_limits": "joints outside the robot's limits",

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.binomial import binomial_interval
 from kinacc.campaign import known_noise, power, simulate, slips, words
@@ -22,6 +21,7 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.table import numbers
 from kinacc.study import fields
 from kinacc.study.fields import ErrorField
+from kinacc.tables.columns import Columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -160,8 +160,8 @@ def field_of(name: str, point: str | None = None) -> ErrorField:
 
 
 def _of_folder(path: Path, point: str | None) -> ErrorField:
-    from kinacc.artifacts import store
     from kinacc.deployment.folder import recorded_robot
+    from kinacc.tables import store
 
     name, robot = path.resolve().name, recorded_robot(path)
     if measured := _measured(path):
@@ -181,7 +181,7 @@ def _of_folder(path: Path, point: str | None) -> ErrorField:
 
 def _measured(path: Path) -> dict[str, Columns]:
     """Tables of a results folder about what was measured; empty where it lacks one needed."""
-    from kinacc.artifacts import store
+    from kinacc.tables import store
 
     needed, wanted = ("pose_errors", "measurements"), ("model_selection", "frames")
     there = [each for each in (*needed, *wanted) if (path / f"{each}.parquet").is_file()]

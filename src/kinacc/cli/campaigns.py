@@ -11,7 +11,6 @@ import click
 import numpy as np
 
 from kinacc import __version__
-from kinacc.artifacts import store
 from kinacc.assess.conformity import decide
 from kinacc.calibration import summary
 from kinacc.campaign import folder as folders
@@ -24,6 +23,7 @@ from kinacc.cli import choice
 from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import Output
 from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.tables import store
 
 
 def start(given: Mapping, out: Output) -> None:
@@ -187,13 +187,13 @@ def status(
 
 def write_report(path: str, to: str | None, formats: Sequence[str], out: Output) -> None:
     """Write tables, picture, text and, where one is asked for, the page of a campaign."""
-    from kinacc.artifacts.atomic import write_together
-    from kinacc.artifacts.store import content_of, to_table
     from kinacc.campaign import nearness, report
     from kinacc.cli.output import require_writable
     from kinacc.figures import campaign as drawing
     from kinacc.figures.save import render
     from kinacc.progress import reporting
+    from kinacc.tables.atomic import write_together
+    from kinacc.tables.store import content_of, to_table
 
     opened = open_(path)
     say_doubts(opened)

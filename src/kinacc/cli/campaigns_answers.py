@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns, joint_count
-from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.assess.conformity import decide
 from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, instrument, words
@@ -19,6 +17,8 @@ from kinacc.campaign.state import State
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.cli.tables import joint_fields
 from kinacc.geometry import invert
+from kinacc.tables.columns import Columns, joint_count
+from kinacc.tables.contract import ARTEFACTS
 
 if TYPE_CHECKING:
     from kinacc.campaign.forecast import Forecast

@@ -65,10 +65,10 @@ def check_data(
 
 def _accept(files: tuple[str, ...], dataset: tuple[str, ...], kind: str, reason: str) -> None:
     """Write to the configuration that the workflow goes on with a finding."""
-    from kinacc.artifacts.atomic import write_whole
     from kinacc.cli.exclude import measured_data_set
     from kinacc.config.edit import with_added
     from kinacc.errors import Problem, refuse
+    from kinacc.tables.atomic import write_whole
 
     problems = [] if reason.strip() else [Problem("--reason", "is empty", "why, in words")]
     problems += [] if len(files) == 1 else [Problem("--accept", "needs one FILE.yaml")]

@@ -51,10 +51,10 @@ def check_results(
     Example:
       kinacc check-results results --config tracker.yaml --against accepted --out check.xml
     """
-    from kinacc.artifacts import sums
     from kinacc.checks.contradictions import load
     from kinacc.gate import accepted as runs
     from kinacc.gate import check, outputs
+    from kinacc.tables import sums
 
     if (results / sums.FOLDER).is_dir():  # one data set was named in place of the folder of all
         results, datasets = results.resolve().parent, (*datasets, results.resolve().name)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from kinacc.artifacts.allowed import SELECTABLE
 from kinacc.assess.statement import CONFIDENCE
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
+from kinacc.tables.allowed import SELECTABLE
 
 if TYPE_CHECKING:
     from kinacc.deployment.record import Calibration

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.cli import choice, rows
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.deployment import shared_readings
@@ -21,6 +20,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.region import points
 from kinacc.study.operating_points import spread_rows
+from kinacc.tables.columns import Columns
 
 
 def source(place: str, model: str, robot: str | None, config: tuple[str, ...]) -> Calibration:
@@ -61,7 +61,7 @@ def shared(places: Sequence[str]) -> SharedReadings:
     tables = [_measured(place) for place in places]
     if tables[0] is None or tables[1] is None:
         return NONE_SHARED
-    from kinacc.artifacts import sums
+    from kinacc.tables import sums
 
     origins = [sums.read_by(_file(place).parent, "measurements") for place in places]
     same_file = bool(origins[0]) and origins[0] == origins[1]
@@ -73,7 +73,7 @@ def _file(place: str) -> Path:
 
 
 def _measured(place: str) -> Columns | None:
-    from kinacc.artifacts import store
+    from kinacc.tables import store
 
     return store.read(_file(place)) if _file(place).is_file() else None
 

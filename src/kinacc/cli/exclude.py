@@ -21,10 +21,10 @@ def exclude(file: str, lines: str, reason: str, dataset: str | None, as_json: bo
     Example:
       kinacc exclude tracker.yaml --lines 12,15-18 --reason "reflector moved"
     """
-    from kinacc.artifacts.atomic import write_whole
     from kinacc.config.edit import with_added
     from kinacc.kinematics import robot
     from kinacc.measurements.reader import excluded_lines, read
+    from kinacc.tables.atomic import write_whole
 
     name, settings = measured_data_set(file, dataset)
     section = settings["measurements"]["file"]

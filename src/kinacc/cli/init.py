@@ -83,12 +83,12 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
       kinacc init log.csv --take actual_q_0 --take X
       kinacc init joints.csv points.csv --join Name=Point
     """
-    from kinacc.artifacts.atomic import replacing
     from kinacc.cli.first_poses import first_poses, poses_without_robot
     from kinacc.cli.init_questions import asked, looked, poses_to_ask_about
     from kinacc.cli.init_remarks import remarks_on, rounded
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
+    from kinacc.tables.atomic import replacing
 
     ask = not (options["yes"] or out.as_json)
     guess = _stated(looked(measurement_files, options, ask), options)

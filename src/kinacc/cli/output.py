@@ -63,8 +63,8 @@ class Output:
 
     def write_page(self, page: Page) -> None:
         """Write the page a person reads in a browser."""
-        from kinacc.artifacts.atomic import write_whole
         from kinacc.report.page import html
+        from kinacc.tables.atomic import write_whole
 
         write_whole(Path(self.page or ""), html(page).encode())
 

@@ -46,12 +46,12 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     ``without``: tables to leave out. Raises InputError naming all tables missing.
     """
     from kinacc import __version__
-    from kinacc.artifacts import sums
-    from kinacc.artifacts.atomic import write_whole
     from kinacc.campaign.journal import of_results
     from kinacc.report import results_page
     from kinacc.report.answer import ON_PAGE, PAGE_TABLES, read
     from kinacc.report.page import html
+    from kinacc.tables import sums
+    from kinacc.tables.atomic import write_whole
     from kinacc.workflow.data_sets import campaign_files
 
     place = Path(folder)

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts.atomic import write_whole
 from kinacc.cli.output import plain
 from kinacc.config.names import csv_text, in_csv
 from kinacc.errors import as_seen
+from kinacc.tables.atomic import write_whole
 
 _SHOWN_ROWS = 24
 _PLAIN_UNITS = ("mm", "mrad", "rad", "deg", "kg")

@@ -7,13 +7,13 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinacc.artifacts import assessment_tables, store, sums
-from kinacc.artifacts.columns import texts
-from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.campaign.journal import PLAN
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, first_few
+from kinacc.tables import assessment_tables, store, sums
+from kinacc.tables.columns import texts
+from kinacc.tables.contract import ARTEFACTS
 
 _CALIBRATED = {
     *("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors"),

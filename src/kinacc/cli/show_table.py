@@ -11,9 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.artifacts import store
-from kinacc.artifacts.columns import SLIDES, Artefact, joint_count, texts
-from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.calibration.misfit import in_words
 from kinacc.cli.output import plain
 from kinacc.cli.screen import decimals_of, number
@@ -22,6 +19,9 @@ from kinacc.config.error_models import ERROR_MODELS
 from kinacc.config.values import nearest
 from kinacc.deployment.folder import misfit_of
 from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.tables import store
+from kinacc.tables.columns import SLIDES, Artefact, joint_count, texts
+from kinacc.tables.contract import ARTEFACTS
 
 if TYPE_CHECKING:
     import pyarrow as pa

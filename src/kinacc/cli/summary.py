@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kinacc.artifacts.columns import texts
 from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import Output, answers
 from kinacc.cli.show import Answer, at_odds
 from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.tables.columns import texts
 from kinacc.workflow.data_sets import RESULTS
 
 if TYPE_CHECKING:

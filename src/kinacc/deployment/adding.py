@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinacc.artifacts.atomic import write_whole
 from kinacc.calibration import delivered
 from kinacc.checks.contradictions import load
 from kinacc.config.reading import read
@@ -24,6 +23,7 @@ from kinacc.measurements.files import load as loaded
 from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read as read_measured
 from kinacc.measurements.written import Written
+from kinacc.tables.atomic import write_whole
 
 _MARK = "\ufeff"  # with which some editors begin a file
 

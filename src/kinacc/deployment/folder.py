@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts.allowed import SUBSETS
-from kinacc.artifacts.columns import joint_count
 from kinacc.calibration import blind_words
 from kinacc.calibration.misfit import Misfit, misfit
 from kinacc.calibration.noise import UNKNOWN
@@ -22,6 +20,8 @@ from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
+from kinacc.tables.allowed import SUBSETS
+from kinacc.tables.columns import joint_count
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 
@@ -66,7 +66,7 @@ class _Table(dict[str, np.ndarray]):
     @classmethod
     def of(cls, name: str, path: Path) -> _Table:
         """The table of a file. InputError where it has no rows, or words in place of numbers."""
-        from kinacc.artifacts import store
+        from kinacc.tables import store
 
         table = cls(store.read(path))
         table.path = path
@@ -85,7 +85,7 @@ class _Table(dict[str, np.ndarray]):
         return table
 
     def __missing__(self, name: str) -> np.ndarray:
-        from kinacc.artifacts import store
+        from kinacc.tables import store
 
         raise InputError(
             Problem(str(self.path), f"has no column {name}", fix=store.remake(self.path))
@@ -107,7 +107,7 @@ def recorded_robot(folder: Path | str) -> Robot | None:
 
 def misfit_of(folder: Path | str, model: str) -> Misfit:
     """What the standard deviations of a model in a results folder are worth."""
-    from kinacc.artifacts import store
+    from kinacc.tables import store
 
     robot = recorded_robot(folder)
     if robot is None:

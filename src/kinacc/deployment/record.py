@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from kinacc.artifacts.allowed import SUBSETS
 from kinacc.calibration.misfit import Misfit
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.config.error_models import ERROR_MODELS, NOMINAL
@@ -16,6 +15,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
 from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.robot import Robot
+from kinacc.tables.allowed import SUBSETS
 
 MODELS = (*ERROR_MODELS, NOMINAL)
 FRAMES = ("base", "instrument")

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts.allowed import SUBSETS
 from kinacc.deployment.record import Calibration
 from kinacc.errors import Problem
+from kinacc.tables.allowed import SUBSETS
 
 _COINCIDENCE = 0.01  # of the smaller set: equal digits of so few readings may be chance
 _DIGITS = 6  # of mm; angles are held to as many and three more

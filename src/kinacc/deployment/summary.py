@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.calibration import summary
 from kinacc.deployment import applicability, folder
 from kinacc.kinematics import robot
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:

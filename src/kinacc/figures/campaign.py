@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.artifacts.columns import Columns
 from kinacc.figures import style
+from kinacc.tables.columns import Columns
 
 _TARGETS = {
     "measured": ("measured points", style.BLUE, "-"),

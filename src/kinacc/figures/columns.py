@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
+from kinacc.tables.columns import Columns
 
 
 def require(table: Columns, names: Iterable[str], where: str) -> None:

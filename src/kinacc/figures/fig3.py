@@ -14,10 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
 from kinacc.figures.columns import floats, require
+from kinacc.tables.columns import Columns
 
 COLUMNS = (
     "slice_deg",

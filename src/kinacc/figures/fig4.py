@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.artifacts.columns import Columns
 from kinacc.figures import style, truth
 from kinacc.figures.columns import floats, require, texts
+from kinacc.tables.columns import Columns
 
 COLUMNS = ("assessor", "noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm", "repetitions")
 UM_PER_MM = 1000.0

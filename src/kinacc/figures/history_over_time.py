@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
 from kinacc.figures import style
 from kinacc.figures.columns import floats, require, texts
+from kinacc.tables.columns import Columns
+from kinacc.tables.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
 
 COLUMNS = (
     *("date", "verdict", "joint", "moved_mm", "chance_mm", "temperature_c", "tolerance_mm"),

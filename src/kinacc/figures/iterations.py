@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from kinacc.artifacts.columns import Columns
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style, truth
 from kinacc.figures.columns import floats, require, rows, texts
+from kinacc.tables.columns import Columns
 
 COLUMNS = (
     "noise_mm",

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from kinacc.artifacts.atomic import write_together
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
+from kinacc.tables.atomic import write_together
 
 FORMATS = ("svg", "png", "pdf")
 PNG_DPI = 200

@@ -12,11 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from kinacc import __version__
-from kinacc.artifacts import store, sums
-from kinacc.artifacts.atomic import unfinished, write_whole
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.comparison import compare_tables
-from kinacc.artifacts.history_tables import MOVED, OPEN, RECALIBRATE, SAME
 from kinacc.calibration.summary import selected
 from kinacc.deployment import drift, folder
 from kinacc.errors import FitError, InputError, Problem, first_few, refuse
@@ -24,6 +19,11 @@ from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.run_tables import RunTables, errors_of
 from kinacc.measurements.folds import configurations_of
+from kinacc.tables import store, sums
+from kinacc.tables.atomic import unfinished, write_whole
+from kinacc.tables.columns import Columns
+from kinacc.tables.comparison import compare_tables
+from kinacc.tables.history_tables import MOVED, OPEN, RECALIBRATE, SAME
 
 NOTE = "accepted.json"
 CONFIDENCE = 0.99

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from kinacc.artifacts import campaign_tables, store, sums
-from kinacc.artifacts.contract import ARTEFACTS
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError, Problem, and_more
 from kinacc.gate.accepted import compared
 from kinacc.gate.conformity import check_file
 from kinacc.gate.gates import judged
 from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
+from kinacc.tables import campaign_tables, store, sums
+from kinacc.tables.contract import ARTEFACTS
 
 _NEEDED = ("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors")
 _SHOWN = 3

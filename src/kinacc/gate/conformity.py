@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts import store
-from kinacc.artifacts.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, Columns, joint_count
-from kinacc.artifacts.contract import PROVENANCE_KEYS
 from kinacc.errors import InputError, Problem
+from kinacc.tables import store
+from kinacc.tables.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, Columns, joint_count
+from kinacc.tables.contract import PROVENANCE_KEYS
 
 
 def check_file(path: Path, artefact: Artefact) -> tuple[Columns | None, list[Problem]]:

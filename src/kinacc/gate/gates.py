@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
-from kinacc.artifacts.history_tables import FIRST, HOLDS, RECALIBRATE
 from kinacc.assess.conformity import ACCEPT, REJECT
 from kinacc.assess.conformity import UNDECIDED as OPEN
 from kinacc.config.gate_rules import LIMITS, limit_key, limited
@@ -20,6 +18,8 @@ from kinacc.errors import InputError, first_few
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.run_tables import SELECTED, RunTables
 from kinacc.gate.values import Compared, Figure, change_of, figure
+from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT
+from kinacc.tables.history_tables import FIRST, HOLDS, RECALIBRATE
 
 Gate = Mapping[str, Any]
 _ROUNDING = 1e-9

@@ -10,9 +10,9 @@ from dataclasses import asdict
 from pathlib import Path
 from xml.etree import ElementTree
 
-from kinacc.artifacts.atomic import write_whole
 from kinacc.errors import InputError, Problem, as_seen
 from kinacc.gate.outcome import FAILED, PASSED, SCHEMA_VERSION, CheckReport, Outcome
+from kinacc.tables.atomic import write_whole
 
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts import assessment_tables, store
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration.summary import selected
 from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.errors import InputError, Problem
+from kinacc.tables import assessment_tables, store
+from kinacc.tables.columns import Columns
 
 SELECTED = "selected"
 

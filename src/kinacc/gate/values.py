@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.artifacts import sums
 from kinacc.config.error_models import model_name
 from kinacc.config.gate_rules import COMPARED, units
 from kinacc.errors import Problem
@@ -19,6 +18,7 @@ from kinacc.gate import chance
 from kinacc.gate.chance import STATISTICS
 from kinacc.gate.run_tables import Absent, RunTables, errors_of
 from kinacc.measurements.folds import configurations_of
+from kinacc.tables import sums
 
 _AT = {
     "held_out": "held out",

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.config.error_models import MODELS, NOMINAL, loaded
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
+from kinacc.tables.columns import Columns
 
 _ROUNDING = 1e-9
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.measurements.reader import UNCERTAINTY
+from kinacc.tables.columns import Columns
 
 TIME_BLOCK = "time_block"
 LEAST_ROWS = 3  # that place a base or a target

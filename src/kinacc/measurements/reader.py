@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns, texts
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
@@ -19,6 +18,7 @@ from kinacc.measurements.orientation import quaternions, rotation_std
 from kinacc.measurements.row_names import RowNames
 from kinacc.measurements.table import RawTable, numbers
 from kinacc.measurements.written import TABLE, Written
+from kinacc.tables.columns import Columns, texts
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 QUATERNION = ("qw", "qx", "qy", "qz")

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kinacc.artifacts.columns import texts
 from kinacc.errors import and_more
+from kinacc.tables.columns import texts
 
 _RANGES_SHOWN = 6
 

@@ -16,13 +16,13 @@ from bokeh.models import (
 from bokeh.models.renderers import GlyphRenderer
 from bokeh.plotting import figure as BokehFigure
 
-from kinacc.artifacts.columns import Columns
 from kinacc.figures.fig3 import colour_range
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.map_cells import Cells, cells, largest_of
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import GREY, VERMILION
+from kinacc.tables.columns import Columns
 
 _KEY = "map"
 _LARGEST = 10

@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.artifacts import store
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import misfit, noise, summary
 from kinacc.calibration.summary import Fact, of
 from kinacc.calibration.summary_words import half_page, paragraph
@@ -27,6 +25,8 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 from kinacc.study.summary import claims_counted, claims_that_differ, differences
+from kinacc.tables import store
+from kinacc.tables.columns import Columns
 
 IF_THERE = (
     *(f"{kind}_model" for kind in ERROR_MODELS),

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.assess.conformity import ACCEPT, REJECT, decide
 from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, folder, nearness, words
@@ -20,6 +19,7 @@ from kinacc.report.campaign_answers import against, answers, leading, sentence
 from kinacc.report.campaign_course import course, mm, scatter
 from kinacc.report.campaign_points import points, readings
 from kinacc.report.page import ROBOT_ITSELF, FirstScreen, Page, Section, Table, Text
+from kinacc.tables.columns import Columns
 
 _MODEL_ERROR = f"This is the error of the model at these poses: {ROBOT_ITSELF}."
 _VERDICTS = {ACCEPT: "MODEL WITHIN", REJECT: "MODEL BEYOND"}

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, HoverTool, IndexFilter
 
-from kinacc.artifacts.columns import Columns
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION
 from kinacc.campaign import consistency, instrument, words
 from kinacc.campaign.state import State
 from kinacc.report import pictures
 from kinacc.report.page import Block, Picture, Table, Text
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
+from kinacc.tables.columns import Columns
 
 _MOMENTS = 25  # of the course, in its table
 _LOOKS = {

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, HoverTool, IndexFilter
 
-from kinacc.artifacts.columns import Columns
 from kinacc.campaign import instrument
 from kinacc.campaign.report import beyond_limits, largest_read
 from kinacc.campaign.state import State
@@ -16,6 +15,7 @@ from kinacc.report import pictures
 from kinacc.report.campaign_course import mm, of_tolerance, tolerance
 from kinacc.report.page import Block, Picture, Table, Text
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION
+from kinacc.tables.columns import Columns
 
 _MOST_POINTS = 4_000  # drawn one by one; of more every n-th is, and all of the largest
 _MOST_ROWS = 300  # of a folded table

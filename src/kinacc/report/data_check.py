@@ -8,14 +8,14 @@ import numpy as np
 from bokeh.palettes import Viridis256
 from bokeh.transform import log_cmap
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import noise, summary
 from kinacc.config.error_models import model_name
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report import pictures
 from kinacc.report.page import Part, Picture, records
+from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS
+from kinacc.tables.columns import Columns
 
 _BINS = 60  # of a joint's travel
 _ROW_PX, _FRAME_PX = 34, 110

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration.summary import Fact
 from kinacc.kinematics.robot import Robot
 from kinacc.report import (
@@ -20,6 +19,7 @@ from kinacc.report import (
     study,
 )
 from kinacc.report.page import FirstScreen, Page, Part, Section
+from kinacc.tables.columns import Columns
 
 # In the order of the page: what a section reads, and how it is made.
 _OF_THE_FIT: tuple[tuple[str, Callable[..., Part]], ...] = (

@@ -7,12 +7,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from kinacc.artifacts.allowed import FINDING_LEVELS, LEFT_OUT
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration.summary import LARGE_SHARE, Fact, of
 from kinacc.calibration.summary_words import counted, model_called, texts_of
 from kinacc.config.error_models import NOMINAL, model_name
 from kinacc.report.page import FirstScreen, Part, Text, printed
+from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT
+from kinacc.tables.columns import Columns
 
 _OF_THE_PAPER = {"claims": "CLAIMS", "differ": "DIFFER"}
 _ACCEPTED = "; accepted: "  # in front of the reason, where a finding was accepted

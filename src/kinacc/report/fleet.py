@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from kinacc.artifacts import store, sums
 from kinacc.assess.conformity import UNDECIDED
 from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.calibration.summary import Tolerance, facts_in, of
@@ -18,6 +17,7 @@ from kinacc.campaign.of_calibration import Sought
 from kinacc.config.error_models import model_name
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem
+from kinacc.tables import store, sums
 
 FEW = 4  # data sets of which each is told of at the end of a run
 BOUND, HELD_OUT = "bound", "held-out"

@@ -8,12 +8,12 @@ import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, GroupFilter
 from bokeh.plotting import figure as BokehFigure
 
-from kinacc.artifacts.columns import Columns
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, GREY, ORANGE, VERMILION
 from kinacc.report.study import TRUE, Truth, truth
+from kinacc.tables.columns import Columns
 
 _CALLED = {
     "rejected": "Fig. 5: the bound is rejected",

@@ -8,7 +8,6 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 from bokeh.transform import linear_cmap
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import blind_words, summary
 from kinacc.calibration.blind_groups import of_arm
 from kinacc.calibration.blind_words import parameter_name, short_name
@@ -18,6 +17,7 @@ from kinacc.calibration.uncertainty import is_angle
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.page import Part, Picture, records
+from kinacc.tables.columns import Columns
 
 _MOST = 50  # parameters of the picture; of more, those of base and targets are left out
 _CLOSE = 0.95  # |correlation| at which two parameters are hardly told apart

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
+from kinacc.tables.columns import Columns
 
 MOST_CELLS = 6_000  # drawn one by one
 _ALONE_MM = 25.0  # width of a cell that has no neighbour

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc import __version__
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration.summary_words import counted
+from kinacc.tables.columns import Columns
 
 if TYPE_CHECKING:
     from bokeh.models import Plot

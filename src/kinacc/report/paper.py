@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from kinacc.artifacts.allowed import VERDICTS
-from kinacc.artifacts.columns import Columns
 from kinacc.kinematics.robot import Robot
 from kinacc.report.page import Part, records
 from kinacc.study.summary import claims_counted
+from kinacc.tables.allowed import VERDICTS
+from kinacc.tables.columns import Columns
 
 _DIFFERS = VERDICTS[1]
 _STATISTICS = {"mean": "mean", "max": "largest", "gamma99": "99 % gamma"}

@@ -7,8 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from bokeh.models import ColumnDataSource
 
-from kinacc.artifacts.allowed import ERRORS
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import summary
 from kinacc.calibration.blind_words import parameter_name, short_name
 from kinacc.calibration.identified import FIXED, IDENTIFIED, PRIOR, UNDETERMINED
@@ -22,6 +20,8 @@ from kinacc.kinematics.vec import VECModel
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
+from kinacc.tables.allowed import ERRORS
+from kinacc.tables.columns import Columns
 
 _WIDE = 2.0  # standard deviations either way that bars and bands reach
 _LOOK = {

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from bokeh.models import ColumnDataSource
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import summary
 from kinacc.config.error_models import MEASURED, NOMINAL, Comparison, model_name
 from kinacc.kinematics.robot import Robot
@@ -16,6 +15,7 @@ from kinacc.measurements.row_names import RowNames
 from kinacc.report import pictures
 from kinacc.report.page import Part, Picture
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE
+from kinacc.tables.columns import Columns
 
 _MOST_POINTS = 12_000  # drawn one by one; of more rows every n-th is, and all of the largest
 _WORST = 10

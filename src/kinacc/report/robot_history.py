@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 from bokeh.models import CDSView, ColumnDataSource, IndexFilter
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
 from kinacc.config.error_models import model_name
 from kinacc.deployment.history_words import sentence
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.page import Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
+from kinacc.tables.columns import Columns
+from kinacc.tables.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
 
 _LOOKS = {
     FIRST: ("square", BLUE),

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration import summary_words
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.summary import Fact
@@ -15,6 +14,7 @@ from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, VERMILION
+from kinacc.tables.columns import Columns
 
 _SHOWN = {
     "held_out_rms_mm": "held-out rms, mm",

@@ -9,12 +9,12 @@ import numpy as np
 from bokeh.models import CDSView, FixedTicker, GroupFilter
 from bokeh.models.annotations import Label
 
-from kinacc.artifacts.columns import Columns
 from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION
 from kinacc.study.summary import are_measured
+from kinacc.tables.columns import Columns
 
 _UM = 1e3
 _MOST_RUNS = 6_000  # drawn one by one

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.config.error_models import PLAINEST
 from kinacc.config.records import of_section
 from kinacc.geometry import Pose, compose, invert
@@ -19,6 +18,7 @@ from kinacc.kinematics.robot import Robot
 from kinacc.study import operating_points
 from kinacc.study.accuracy_map import Equipped, Models, PosesWanted, accuracy_map
 from kinacc.study.operating_points import OperatingPoints
+from kinacc.tables.columns import Columns
 
 
 def joint_box(evaluation: Mapping, arm: Robot) -> tuple[np.ndarray, np.ndarray] | None:

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.assess.model_invalidation import Invalidation, Step
 from kinacc.assess.world import World
 from kinacc.config.records import of_section
 from kinacc.study.monte_carlo import Visits, checked_errors, world_of
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
 

@@ -16,8 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.assess.assessor import Assessor, every_reading
 from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
@@ -25,6 +23,8 @@ from kinacc.assess.outlier_rejection import OutlierRejection
 from kinacc.assess.world import World, draw
 from kinacc.config.records import of_section
 from kinacc.errors import InputError, Problem
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 # The paper's three by class: a registry would make the study depend on whatever joins it.
 ASSESSORS: dict[str, type[Assessor]] = {

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.config.error_models import ALWAYS
 from kinacc.study import in_memory
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.synthetic.accepted import further_draws
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 STAGES = (
     *ALWAYS,

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinacc.artifacts.allowed import VERDICTS
 from kinacc.calibration.observations import TOOL
+from kinacc.tables.allowed import VERDICTS
 
 _VERDICTS = dict(zip(VERDICTS, ("agree", "differ", "cannot be compared"), strict=True))
 

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.kinematics import region, robot
 from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read
 from kinacc.synthetic import measure
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kinacc.artifacts import store, sums
 from kinacc.errors import InputError, first_few
+from kinacc.tables import store, sums
 from kinacc.workflow.code import config_hash
 from kinacc.workflow.described import beside
 

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from kinacc import __version__
-from kinacc.artifacts import store, sums
-from kinacc.artifacts.atomic import write_together
-from kinacc.artifacts.columns import Columns
 from kinacc.errors import KinaccError, Problem, gathered, refuse, refused
 from kinacc.progress import reporting
+from kinacc.tables import store, sums
+from kinacc.tables.atomic import write_together
+from kinacc.tables.columns import Columns
 from kinacc.workflow.code import config_hash
 
 Progress = Callable[..., Iterable]

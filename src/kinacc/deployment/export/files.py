@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.artifacts import store
-from kinacc.artifacts.atomic import replacing
 from kinacc.calibration import blind_words
 from kinacc.calibration.identified import FIXED
 from kinacc.calibration.misfit import misfit
@@ -19,6 +17,8 @@ from kinacc.deployment.export import description, tables, urdf
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
+from kinacc.tables import store
+from kinacc.tables.atomic import replacing
 
 CARRY_ALL = ("json",)  # formats for models that are no table of DH parameters
 _ENDINGS = {

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.calibration.misfit import GIVEN, Misfit, in_words
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, Comparison, model_name
 from kinacc.config.names import in_markdown
 from kinacc.deployment.record import POSES
 from kinacc.kinematics.dh import PARAMETERS
+from kinacc.tables.columns import Columns
 
 _FIGURES = (("mean", "mean"), ("max", "max"), ("rms", "rms"), ("gamma99", "99 % gamma"))
 _DIGITS_OF_STD = 2

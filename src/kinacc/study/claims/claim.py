@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from kinacc.artifacts.columns import Columns
+from kinacc.tables.columns import Columns
 
 Tables = Mapping[str, Columns]
 

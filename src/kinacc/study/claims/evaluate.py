@@ -7,13 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
-from kinacc.artifacts.contract import columns_of
 from kinacc.study.claims.claim import Claim, Finding, Tables, verdict
 from kinacc.study.claims.history_sentences import history_claims
 from kinacc.study.claims.map_sentences import map_claims
 from kinacc.study.claims.numbers import number_claims
 from kinacc.study.claims.study_sentences import study_claims
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
 
 def all_claims() -> list[Claim]:

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from kinacc.artifacts.columns import Columns
 from kinacc.study.claims.claim import Claim, Finding, Tables, above
+from kinacc.tables.columns import Columns
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
 

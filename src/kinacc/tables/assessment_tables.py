@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kinacc.artifacts.allowed import (
+from kinacc.tables.allowed import (
     ASSESSOR_PATTERN,
     COVARIANCES,
     DISTANCES,
@@ -14,7 +14,7 @@ from kinacc.artifacts.allowed import (
     SEARCHES,
     VERDICTS,
 )
-from kinacc.artifacts.columns import (
+from kinacc.tables.columns import (
     ERROR_MM,
     ERROR_MRAD,
     JOINTS,

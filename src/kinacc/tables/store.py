@@ -13,9 +13,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kinacc.artifacts import sums
-from kinacc.artifacts.atomic import write_together
-from kinacc.artifacts.columns import (
+from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.tables import sums
+from kinacc.tables.atomic import write_together
+from kinacc.tables.columns import (
     JOINTS_MAX,
     JOINTS_MIN,
     Artefact,
@@ -24,11 +25,10 @@ from kinacc.artifacts.columns import (
     joint_count,
     texts,
 )
-from kinacc.artifacts.contract import (
+from kinacc.tables.contract import (
     ARTEFACTS,
     PROVENANCE_KEYS,
 )
-from kinacc.errors import InputError, Problem, first_few, refuse
 
 _ARROW_TYPES = {
     "float": pa.float64(),

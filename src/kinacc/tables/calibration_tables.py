@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.allowed import (
+from kinacc.tables.allowed import (
     COMPARISONS,
     ERRORS,
     ESTIMATES,
@@ -12,7 +12,7 @@ from kinacc.artifacts.allowed import (
     SUBSETS,
     UNITS_OF_RESIDUALS,
 )
-from kinacc.artifacts.columns import (
+from kinacc.tables.columns import (
     BY_POSES,
     BY_ROW,
     ERROR_MRAD,
@@ -35,7 +35,7 @@ from kinacc.artifacts.columns import (
     unstated,
     whole,
 )
-from kinacc.artifacts.covariance_tables import DH_COVARIANCE, DH_IDENTIFIED, VEC_COVARIANCE
+from kinacc.tables.covariance_tables import DH_COVARIANCE, DH_IDENTIFIED, VEC_COVARIANCE
 
 
 def _position(of: str, nullable: bool = False) -> tuple[Column, ...]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.allowed import SELECTABLE
-from kinacc.artifacts.columns import (
+from kinacc.tables.allowed import SELECTABLE
+from kinacc.tables.columns import (
     ERROR_MM,
     JOINTS_MAX,
     Artefact,

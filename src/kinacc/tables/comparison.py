@@ -1,7 +1,7 @@
 """Two results compared table by table, within the tolerances of their columns.
 
 Counts, codes, verdicts and words are compared exactly, numbers within the tolerance of their unit
-(:data:`kinacc.artifacts.columns.SAME_WITHIN`), rows by the key of their table.
+(:data:`kinacc.tables.columns.SAME_WITHIN`), rows by the key of their table.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from kinacc.artifacts import store
-from kinacc.artifacts.columns import (
+from kinacc.errors import InputError, Problem
+from kinacc.tables import store
+from kinacc.tables.columns import (
     BY_POSES,
     BY_ROW,
     BY_STD,
@@ -24,8 +25,7 @@ from kinacc.artifacts.columns import (
     Column,
     joint_count,
 )
-from kinacc.artifacts.contract import ARTEFACTS
-from kinacc.errors import InputError, Problem
+from kinacc.tables.contract import ARTEFACTS
 
 _RELATIVE = 1e-6  # of variances, which have the units of both parameters
 _KEY_DIGITS = 9

@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinacc.artifacts import store
-from kinacc.artifacts.atomic import replacing, sweep
-from kinacc.artifacts.contract import PROVENANCE_KEYS, columns_of
 from kinacc.errors import InputError
+from kinacc.tables import store
+from kinacc.tables.atomic import replacing, sweep
+from kinacc.tables.contract import PROVENANCE_KEYS, columns_of
 
 PROVENANCE = {
     "kinacc_version": "0.1.0",
@@ -173,7 +173,7 @@ def test_what_a_killed_process_began_is_removed_and_what_is_being_written_is_not
     path.parent.mkdir()
     begun = f"""
 import os, signal
-from kinacc.artifacts.atomic import replacing
+from kinacc.tables.atomic import replacing
 with replacing([{str(path)!r}]) as (part,):
     part.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)

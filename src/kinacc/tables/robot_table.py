@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.columns import Artefact, text
+from kinacc.tables.columns import Artefact, text
 
 ROBOT = Artefact(
     "robot",

@@ -7,9 +7,9 @@ from pathlib import Path
 import document_artifacts as document
 import pytest
 
-from kinacc.artifacts import store
-from kinacc.artifacts.columns import Column, joint_count
-from kinacc.artifacts.contract import ARTEFACTS
+from kinacc.tables import store
+from kinacc.tables.columns import Column, joint_count
+from kinacc.tables.contract import ARTEFACTS
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 
-from kinacc.artifacts import sums
 from kinacc.errors import InputError
+from kinacc.tables import sums
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from kinacc.artifacts import (
+from kinacc.tables import (
     assessment_tables,
     calibration_tables,
     campaign_tables,
@@ -23,7 +23,7 @@ from kinacc.artifacts import (
     robot_table,
     summary_table,
 )
-from kinacc.artifacts.columns import Artefact, Columns, joint_count, texts
+from kinacc.tables.columns import Artefact, Columns, joint_count, texts
 
 # What all tables of a stage are marked with.
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "seed")

@@ -4,9 +4,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from kinacc.artifacts import store
-from kinacc.artifacts.comparison import compare_folders, compare_tables
 from kinacc.errors import InputError
+from kinacc.tables import store
+from kinacc.tables.comparison import compare_folders, compare_tables
 
 MARKS = {"kinacc_version": "0", "config_hash": "c", "seed": 1}
 ROWS = 12

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.columns import BY_STD, Artefact, magnitude, real, same, text
+from kinacc.tables.columns import BY_STD, Artefact, magnitude, real, same, text
 
 _NAMES = (
     "base.x_mm .. base.rz_rad (base in the instrument's frame), tool.x_mm .. (target in the flange "

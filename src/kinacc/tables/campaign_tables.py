@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kinacc.artifacts.columns import (
+from kinacc.errors import Problem
+from kinacc.tables.columns import (
     ERROR_MM,
     JOINTS,
     REACH_MM,
@@ -18,7 +19,6 @@ from kinacc.artifacts.columns import (
     unstated,
     whole,
 )
-from kinacc.errors import Problem
 
 TARGETS = ("measured", "candidates", "region")
 CAMPAIGN_POINTS = Artefact(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.columns import Artefact, real, text
+from kinacc.tables.columns import Artefact, real, text
 
 # What a fact is about; errors of different populations are different topics.
 TOPICS = (

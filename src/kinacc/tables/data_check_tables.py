@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kinacc.artifacts.allowed import COMPARISONS, FINDING_LEVELS, IDENTIFIER_PATTERN
-from kinacc.artifacts.columns import (
+from kinacc.tables.allowed import COMPARISONS, FINDING_LEVELS, IDENTIFIER_PATTERN
+from kinacc.tables.columns import (
     ERROR_MRAD,
     REACH_MM,
     ROW_NAME,
