@@ -5,7 +5,7 @@ from __future__ import annotations
 from kinacc.assess.registry import ASSESSORS
 from kinacc.config.records import of_section
 from kinacc.config.schema import defaults
-from kinacc.deployment.planning.information import Experiment
+from kinacc.deployment.planning import Experiment
 from kinacc.geometry import Pose
 
 

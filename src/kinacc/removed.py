@@ -21,6 +21,10 @@ OPTIONS = {
         "--expect": "keep results/SHA256SUMS elsewhere and run sha256sum -c on it",
     },
     "show": {"--plot": "pictures are in the folder figures and on the page: kinacc report RESULTS"},
+    "plan-poses": {
+        "--index": "poses are D-optimal (O1)",
+        "--metric": "travel is that of the joint that moves most",
+    },
     "plan-campaign": _CAMPAIGN,
     "campaign": _CAMPAIGN | {"--head": "now --sha256 with --readings, as a report gives them"},
 }

@@ -11,7 +11,7 @@ from kinacc.assess.world import drawn_world
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, Plan, assessor_of
-from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.kinematics import robot as robots
 

@@ -11,7 +11,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits
-from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot

@@ -11,7 +11,7 @@ from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.prediction_check import unsure
-from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.planning import spread
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import Residual
 from kinacc.kinematics.model import JointState

@@ -14,7 +14,7 @@ from kinacc.config import schema
 from kinacc.deployment.applicability import measured_by_all
 from kinacc.deployment.compare import compare
 from kinacc.deployment.compare_words import in_words
-from kinacc.deployment.planning.candidates import spread
+from kinacc.deployment.planning import spread
 from kinacc.deployment.record import Residual, nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
 from kinacc.kinematics import dh

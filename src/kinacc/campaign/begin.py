@@ -11,7 +11,7 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.campaign.instrument import INSTRUMENT, Instrument
 from kinacc.campaign.plan import Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
-from kinacc.deployment.planning import travel
+from kinacc.deployment.planning import distances, shortest_path
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, compose, invert
@@ -125,7 +125,7 @@ def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Rows (n,) of places (n, k) in an order with little travel from ``start`` (k,)."""
     whole = np.concatenate([start[None], places])
     if len(places) <= _ROUTED:
-        return travel.order(travel.distances(whole))[1:] - 1
+        return shortest_path(distances(whole))[1:] - 1
     # Improving a path takes time with the cube of its length: go by nearest neighbour first.
     left, path, here = list(range(len(places))), [], start
     while left:

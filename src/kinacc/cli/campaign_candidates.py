@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.cli import rows, spaces
 from kinacc.cli.choice import CONFIG
 from kinacc.deployment.applicability import is_measured_there
-from kinacc.deployment.planning.candidates import between, spread, tool_positions
+from kinacc.deployment.planning import between, spread, tool_positions
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics.inverse import limits

@@ -12,13 +12,11 @@ from kinacc.config import schema
 
 MOST_CANDIDATES = 100_000
 TRUNCATION = "calibration.dh.truncation"
-INDICES = ("O1", "O2", "O3", "O4", "O5")
 
 
 @click.command("plan-poses")
 @click.argument("robot", required=False)
 @option("--poses", "count", default=40, type=click.IntRange(1, 2000), help="Poses chosen.")
-@option("--index", type=click.Choice(INDICES), default="O1", help="What is best.")
 @option("--candidates", type=click.Path(), help="File of joints to choose from.")
 @joint_file_options
 @option("--drawn", default=1000, type=click.IntRange(10, MOST_CANDIDATES), help="Candidates drawn.")
@@ -32,12 +30,10 @@ INDICES = ("O1", "O2", "O3", "O4", "O5")
 @option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
 @option("--threshold", default=schema.key(TRUNCATION).default, type=choice.values_of(TRUNCATION),
         help="Directions seen less than this share of the best are left out.")  # fmt: skip
-@option("--metric", type=click.Choice(["largest", "sum"]), default="largest",
-        help="Travel between poses: of the joint that moves most, or of all.")  # fmt: skip
 @option("--from-deg", help="Joints the arm starts at. [zero]")
 @answers(table=True, picture="Draw index against poses: .svg, .png, .pdf.")
 def plan_poses(out, **given) -> None:
-    """Choose poses that tell most of an arm, in an order with little travel.
+    """Choose a D-optimal set of poses, in an order with little travel.
 
     ROBOT is a shipped name or a robot file (not needed with --dataset). Poses come from a file in
     any form that `kinacc init` reads, or are drawn evenly over the joints and kept where the tool
@@ -45,16 +41,9 @@ def plan_poses(out, **given) -> None:
     candidates.
 
     \b
-    O1  geometric mean of the singular values / sqrt(poses)  (D-optimal; Borm, Menq)
-    O2  least / largest singular value                       (Driels, Pathre)
-    O3  least singular value                                 (E-optimal; Nahvi)
-    O4  least squared / largest                              (Nahvi, Hollerbach)
-    O5  inverse of the sum of inverses                       (Sun, Hollerbach)
-
-    \b
     Example:
       kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv --picture index.svg
-      kinacc plan-poses --dataset mh180 --poses 60 --index O4 --json
+      kinacc plan-poses --dataset mh180 --poses 60 --json
       kinacc plan-poses my_robot.yaml --candidates reachable.csv --position-only -o my_plan.csv
     """
     from kinacc.cli import planned
@@ -64,5 +53,7 @@ def plan_poses(out, **given) -> None:
     with reporting("plan-poses", bar=True) as progress:
         found = planned.answer(asked, progress)
         if out.picture is not None:
-            out.draw(planned.drawn(asked, found, progress))
-    out.deliver(planned.as_sheet(asked, found), planned.in_words(asked, found))
+            from kinacc.figures import planned_poses
+
+            out.draw(planned_poses.draw(found.index, asked.robot.name))
+    out.deliver(planned.as_sheet(asked, found), planned.in_words(found))

@@ -1,0 +1,302 @@
+"""Which poses to measure: candidates, what each shows of the parameters, D-optimal exchange, order
+of travel.
+
+The arm is linearised at its nominal parameters. Displacements count in mm and mrad; a rotation of
+one radian weighs as much as ``rotation_weight_mm_per_rad`` in position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinacc.calibration import frames
+from kinacc.calibration.blind_groups import LeftOpen, groups, of_arm
+from kinacc.calibration.dh_fit import joints_anywhere
+from kinacc.calibration.identified import STRUCTURAL
+from kinacc.calibration.uncertainty import Uncertainty
+from kinacc.deployment.predict import BLOCK, sensitivity
+from kinacc.deployment.record import TOOL, Calibration, nominal
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.geometry import Pose, compose
+from kinacc.kinematics import dh
+from kinacc.kinematics.inverse.limits import travel_unit
+from kinacc.kinematics.model import JointState
+from kinacc.kinematics.region import points
+from kinacc.kinematics.robot import Robot
+
+_MOST_DRAWS_PER_POSE = 400
+_NEIGHBOURS = 10  # of a measured pose, between which and the pose others are drawn
+_REGULAR = 1e-9  # of the mean eigenvalue: makes sets comparable that do not show every direction
+_TIE = 1e-6  # of the log determinant: less may be rounding
+_MOST_SWEEPS = 100
+_SHORTER_RAD = 1e-9
+
+Progress = Callable[[Iterable[int], str], Iterable[int]]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is measured and fitted.
+
+    ``tool`` is the measured point or frame in the last DH frame; ``orientation``: a full pose is
+    measured, not a position alone; ``frames_estimated``: base and tool are fitted as well;
+    ``hayati_joints`` (1-based) have a beta. ``threshold``: a direction seen with less than this
+    share of the best-seen one counts as undetermined.
+    """
+
+    tool: Pose
+    orientation: bool
+    frames_estimated: bool
+    hayati_joints: tuple[int, ...]
+    rotation_weight_mm_per_rad: float
+    threshold: float
+
+
+@dataclass(frozen=True)
+class Information:
+    """Rows (n, m, r) that n candidate poses add to the normal equations of r directions.
+
+    The r directions are those at least one candidate shows; the others are ``left_open``.
+    ``values`` (P,) are the singular values of all candidates together, falling, of the parameters
+    ``names`` (P,); ``rank`` of them count.
+    """
+
+    rows: np.ndarray
+    names: tuple[str, ...]
+    values: np.ndarray
+    rank: int
+    left_open: LeftOpen
+
+
+@dataclass(frozen=True)
+class PosePlan:
+    """Poses in driving order: rows ``chosen`` (N,) of the candidates, and ``moves_rad`` (N,) that
+    lead to each.
+
+    ``index`` (N,): observability index O1, the geometric mean of the singular values over the root
+    of the number of poses (Borm and Menq, Int. J. Robotics Research 10, 1991), after each addition,
+    the last one after ``swaps`` swaps. ``candidate_travel_rad``: travel in the order of the
+    candidates.
+    """
+
+    chosen: np.ndarray
+    moves_rad: np.ndarray
+    index: np.ndarray
+    swaps: int
+    candidate_travel_rad: float
+    information: Information
+
+
+def plan_poses(
+    robot: Robot,
+    q_rad: np.ndarray,
+    experiment: Experiment,
+    count: int,
+    start_rad: np.ndarray,
+    progress: Progress | None = None,
+) -> PosePlan:
+    """Choose ``count`` of the candidates ``q_rad`` (n, k), reported joints, and the order from
+    ``start_rad`` (k,).
+
+    Raises InputError where so many poses cannot be chosen, or no candidate shows anything.
+    """
+    shown = information(robot, q_rad, experiment)
+    if shown.rank == 0:
+        raise InputError(Problem("candidates", "show no direction at all"))
+    chosen, index, swaps = choose(shown.rows, count, progress)
+    chosen = np.sort(chosen)
+    distance = distances(np.concatenate([start_rad[None], q_rad[chosen]]) / travel_unit(robot))
+    path = shortest_path(distance)
+    unordered = float(np.trace(distance, offset=1))
+    return PosePlan(
+        chosen[path[1:] - 1], distance[path[:-1], path[1:]], index, swaps, unordered, shown
+    )
+
+
+def spread(
+    robot: Robot,
+    count: int,
+    box_rad: tuple[np.ndarray, np.ndarray] | None = None,
+    inside: Callable[[np.ndarray], np.ndarray] | None = None,
+    tool: Pose | None = None,
+) -> np.ndarray:
+    """``count`` reported joints (count, k) from a Sobol sequence over ``box_rad`` (the limits).
+
+    ``inside`` takes tool positions (m, 3) mm in the robot's base and returns which are allowed.
+    Raises InputError where too few are, or the box lies outside the limits.
+    """
+    low, high = (robot.q_min_rad, robot.q_max_rad) if box_rad is None else box_rad
+    low, high = np.maximum(low, robot.q_min_rad), np.minimum(high, robot.q_max_rad)
+    outside = [f"joint {joint + 1}" for joint in np.flatnonzero(low >= high)]
+    refuse(
+        [Problem(joint, "its range lies outside the limits") for joint in outside],
+        "There are no poses to choose from",
+    )
+    found: list[np.ndarray] = []
+    first, block = 1, max(count, 1024)
+    while sum(map(len, found)) < count:
+        if first > _MOST_DRAWS_PER_POSE * block:
+            what = f"only {sum(map(len, found))} of {first - 1} joint values put the tool there"
+            raise InputError(Problem("region", what, f"{count} candidates", "enlarge the region"))
+        joints = low + points("sobol", block, len(low), first) * (high - low)
+        if inside is not None:
+            joints = joints[inside(tool_positions(robot, joints, tool))]
+        found.append(joints)
+        first += block
+    return np.concatenate(found)[:count]
+
+
+def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """``count`` joints (count, k) on the way from one of ``measured`` (n, k) to a neighbour.
+
+    ``unit`` (k,): movements of the joints that count alike. Raises InputError where all of
+    ``measured`` are the same.
+    """
+    from scipy.spatial import cKDTree
+
+    different = np.unique(measured, axis=0)
+    if len(different) < 2:
+        what = "all measured poses are at the same joints"
+        raise InputError(Problem("region", what, "at least 2 different poses"))
+    random = np.random.default_rng(seed)
+    near = cKDTree(different / unit).query(different / unit, min(_NEIGHBOURS + 1, len(different)))
+    start = random.integers(len(different), size=count)
+    end = near[1][start, random.integers(1, near[1].shape[1], size=count)]
+    share = random.random((count, 1))
+    return different[start] + share * (different[end] - different[start])
+
+
+def tool_positions(robot: Robot, joints: np.ndarray, tool: Pose | None) -> np.ndarray:
+    """Where the nominal arm puts the tool (m, 3) in its base at reported joints (m, k)."""
+    end = compose(robot.base, dh.forward(robot.dh, robot.dh_joints(joints)))
+    return end.position_mm if tool is None else compose(end, tool).position_mm
+
+
+def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Information:
+    """Information of poses at reported joints (n, k), rad and mm."""
+    beta = {f"j{joint}.beta_rad" for joint in experiment.hayati_joints}
+    names = tuple(
+        each for each in robot.dh.parameter_names if not each.endswith("beta_rad") or each in beta
+    )
+    if experiment.frames_estimated:
+        motions = frames.MOTIONS if experiment.orientation else frames.MOTIONS[:3]
+        base = [f"{frames.BASE}.{motion}" for motion in frames.MOTIONS]
+        names = (*base, *(f"{TOOL}.{motion}" for motion in motions), *names)
+    blank = Uncertainty(names, np.eye(len(names)), np.zeros((0, len(names))))
+    arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
+    slopes = _slopes(arm, robot.dh_joints(np.atleast_2d(q_rad)), experiment)
+    flat = slopes.reshape(-1, len(names))
+    _, values, right = np.linalg.svd(flat, full_matrices=len(flat) < len(names))
+    rank = int(np.sum(values > experiment.threshold * values[0]))
+    lost, known = right[rank:], frames.known(arm.base, experiment.tool)
+    if not len(lost):
+        return Information(slopes @ right.T, names, values, rank, LeftOpen((), names, known))
+    anywhere = _slopes(arm, joints_anywhere(arm.robot.dh), experiment).reshape(-1, len(names))
+    _, everywhere, axes = np.linalg.svd(anywhere)
+    hidden = axes[int(np.sum(everywhere > STRUCTURAL * everywhere[0])) :]
+    left_open = LeftOpen(groups(hidden, lost, of_arm(names)), names, known)
+    return Information(slopes @ right[:rank].T, names, values, rank, left_open)
+
+
+def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:
+    """Movement (n, m, P) of what is measured at DH joints (n, k), per mm or mrad."""
+    weight = np.array([1.0, 1.0, 1.0, *[experiment.rotation_weight_mm_per_rad] * 3])
+    seen = 6 if experiment.orientation else 3
+    slopes = np.empty((len(q_dh), seen, len(arm.known.names)))
+    for begin in range(0, len(q_dh), BLOCK):
+        block = slice(begin, begin + BLOCK)
+        part = sensitivity(arm, JointState(q_dh[block]), "instrument", TOOL)
+        slopes[block] = (part * weight[:, None])[:, :seen] * arm.units
+    return slopes
+
+
+def choose(
+    rows: np.ndarray, count: int, progress: Progress | None = None
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """A D-optimal set by exchange (Fedorov 1972): candidates (count,), index O1 after each
+    (count,), swaps.
+
+    Of candidates with ``rows`` (n, m, r) the best one is added until there are ``count``; then
+    every chosen one in turn is swapped for the best in its place, until a whole round finds nothing
+    better. Deterministic: of equals the first. Raises InputError for too few candidates, or poses
+    that cannot determine r directions.
+    """
+    _, components, directions = rows.shape
+    least, problems = -(-directions // components), []
+    if count > len(rows):
+        what = f"{count} of {len(rows)} candidates are wanted"
+        problems.append(Problem("poses", what, "at most as many as there are candidates"))
+    if count < least:
+        what = f"{count} poses of {components} components cannot tell {directions} directions"
+        problems.append(Problem("poses", what, f"at least {least}"))
+    refuse(problems, "Poses cannot be chosen")
+    floor = _REGULAR * float(np.sum(rows**2)) / (len(rows) * directions) * np.eye(directions)
+    chosen: list[int] = []
+    index = np.zeros(count)
+    for number in progress(range(count), "poses added") if progress else range(count):
+        chosen.append(_best_addition(rows, chosen, floor))
+        index[number] = observability(rows[chosen])
+    swaps, rounds = 0, range(_MOST_SWEEPS)
+    for _ in progress(rounds, "rounds of swaps at most") if progress else rounds:
+        before = swaps
+        for place in range(count):
+            others = chosen[:place] + chosen[place + 1 :]
+            changed = [*others[:place], _best_addition(rows, others, floor), *others[place:]]
+            value = observability(rows[changed])
+            if value > index[-1] * (1.0 + _TIE):
+                chosen, index[-1], swaps = changed, value, swaps + 1
+        if swaps == before:
+            break
+    return np.array(chosen), index, swaps
+
+
+def observability(rows: np.ndarray) -> float:
+    """Index O1 of poses with ``rows`` (N, m, r); 0 where they do not show every direction."""
+    values = np.linalg.svd(rows.reshape(-1, rows.shape[2]), compute_uv=False)
+    if len(values) < rows.shape[2] or values[-1] <= 0.0:
+        return 0.0
+    return float(np.exp(np.mean(np.log(values))) / np.sqrt(len(rows)))
+
+
+def _best_addition(rows: np.ndarray, chosen: list[int], floor: np.ndarray) -> int:
+    """The candidate that makes the determinant of the normal matrix of ``chosen`` largest."""
+    flat = rows[chosen].reshape(-1, rows.shape[2])
+    inverse = np.linalg.inv(flat.T @ flat + floor)
+    gains = np.linalg.slogdet(np.eye(rows.shape[1]) + rows @ inverse @ np.swapaxes(rows, 1, 2))[1]
+    gains[chosen] = -np.inf
+    return int(np.argmax(gains >= gains.max() - _TIE))
+
+
+def distances(places: np.ndarray) -> np.ndarray:
+    """Distances (n, n) between ``places`` (n, k): the largest movement of a joint, which sets the
+    time of a move.
+    """
+    return np.abs(places[:, None] - places[None]).max(axis=2)
+
+
+def shortest_path(distance: np.ndarray) -> np.ndarray:
+    """A short open path (n,) from the first point of ``distance`` (n, n): nearest neighbour, then
+    2-opt.
+    """
+    count = len(distance)
+    left, path = np.ones(count, dtype=bool), [0]
+    left[0] = False
+    while left.any():
+        path.append(int(np.argmin(np.where(left, distance[path[-1]], np.inf))))
+        left[path[-1]] = False
+    order = np.array(path)
+    first, last = np.triu_indices(count, 1)
+    first, last = first[first >= 1], last[first >= 1]
+    after, is_end = np.minimum(last + 1, count - 1), last == count - 1
+    while len(first):
+        ordered = distance[np.ix_(order, order)]
+        gain = ordered[first - 1, first] - ordered[first - 1, last]
+        gain += np.where(is_end, 0.0, ordered[last, after] - ordered[first, after])
+        best = int(np.argmax(gain))
+        if gain[best] <= _SHORTER_RAD:
+            break
+        order[first[best] : last[best] + 1] = order[first[best] : last[best] + 1][::-1]
+    return order

@@ -1,1 +1,0 @@
-"""Which poses to measure: observability of the kinematic parameters, exchange, order of travel."""

@@ -1,0 +1,143 @@
+"""Planned poses: what they show is that of a fit, sets beat random ones, paths are near the
+shortest.
+"""
+
+from itertools import combinations, permutations
+
+import numpy as np
+import paper_settings as paper
+import pytest
+
+from kinacc.calibration import dh_fit
+from kinacc.calibration.blind_words import sentences
+from kinacc.calibration.observations import full_poses
+from kinacc.deployment.planning import (
+    choose,
+    distances,
+    information,
+    observability,
+    plan_poses,
+    shortest_path,
+    spread,
+)
+from kinacc.errors import InputError
+from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.kinematics import dh, robot
+
+TOOL = Pose(exp_so3(np.array([0.1, -0.3, 0.2])), np.array([40.0, 15.0, 120.0]))
+
+
+@pytest.mark.parametrize(("name", "hayati"), [("mh180", ()), ("ur10", (2, 3)), ("irb120", ())])
+def test_the_rank_is_that_of_a_fit_to_the_same_poses(name, hayati):
+    arm = robot.load(name)
+    joints = spread(arm, 120)
+    shown = information(arm, joints, paper.experiment(TOOL, hayati_joints=hayati))
+    q_dh = joints @ arm.joint_map.T
+    fit = dh_fit.fit(
+        full_poses(q_dh, compose(dh.forward(arm.dh, q_dh), TOOL)),
+        arm.dh,
+        free=dh_fit.free_parameters(6, hayati),
+        rotation_weight_mm_per_rad=500.0,
+        threshold=1e-3,
+    )
+    assert shown.rank == 12 + fit.solution.spectrum.rank
+    assert shown.rows.shape == (120, 6, shown.rank)
+
+
+def test_what_no_candidate_shows_is_said_as_of_a_fit():
+    arm = robot.load("mh180")
+    joints = spread(arm, 100)
+    assert set(sentences(information(arm, joints, paper.experiment(TOOL)).left_open)) >= {
+        "theta of joint 1 cannot be told from a turn of the base about the axis of joint 1",
+        "d of joint 2 and d of joint 3 appear only as their difference",
+        "alpha of joint 6 cannot be told from a turn of the tool about x of the last frame",
+    }
+    joints[:, 3] = 0.3
+    left_open = sentences(information(arm, joints, paper.experiment(TOOL)).left_open)
+    weak = [words for words in left_open if "others may" in words]
+    assert weak
+    assert all("joint 3" in words or "joint 4" in words for words in weak)
+    on_axis = Pose(np.eye(3), np.array([0.0, 0.0, 100.0]))
+    ur10 = robot.load("ur10")
+    shown = information(ur10, spread(ur10, 100), paper.experiment(on_axis, orientation=False))
+    assert "theta of joint 6 changes no measured pose" in sentences(shown.left_open)
+
+
+def test_candidates_are_where_they_were_asked_to_be():
+    arm = robot.load("mh180")
+
+    def inside(position_mm):
+        return (position_mm[:, 2] > 0.0) & (position_mm[:, 0] > 800.0)
+
+    joints = spread(arm, 60, None, inside, TOOL)
+    assert inside(compose(dh.forward(arm.dh, joints), TOOL).position_mm).all()
+    assert ((joints >= arm.q_min_rad) & (joints <= arm.q_max_rad)).all()
+    assert len(np.unique(joints, axis=0)) == 60
+    with pytest.raises(InputError, match="only 0 of"):
+        spread(arm, 10, None, lambda position_mm: position_mm[:, 0] > 9000.0)
+    low, high = arm.q_min_rad.copy(), arm.q_max_rad.copy()
+    low[2], high[2] = 4.0, 5.0
+    with pytest.raises(InputError, match="joint 3"):
+        spread(arm, 10, (low, high))
+
+
+def test_no_single_swap_improves_and_the_best_set_is_near():
+    shares = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        rows = rng.normal(size=(11, 2, 4)) * rng.uniform(0.3, 3.0, 4)
+        chosen, index, _ = choose(rows, 4)
+        assert index[-1] == pytest.approx(observability(rows[chosen]), rel=1e-12)
+        values = np.linalg.svd(rows[chosen].reshape(-1, 4), compute_uv=False)
+        assert index[-1] == pytest.approx(np.prod(values) ** 0.25 / 2.0, rel=1e-12)
+        for place in range(4):
+            for other in set(range(11)) - set(chosen.tolist()):
+                swapped = chosen.copy()
+                swapped[place] = other
+                assert observability(rows[swapped]) <= index[-1] * (1 + 2e-6)
+        best = max(observability(rows[[*each]]) for each in combinations(range(11), 4))
+        shares.append(index[-1] / best)
+    assert np.median(shares) > 0.97
+    assert 0.8 < min(shares) <= max(shares) <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("seed", range(20, 32))
+def test_the_fewest_poses_that_tell_everything(seed):
+    """Without any one of them a direction is lost, which rounding may hide or not."""
+    rows = np.random.default_rng(seed).integers(-2, 3, (30, 3, 7)).astype(float)
+    chosen, _, _ = choose(rows, 3)
+    assert np.linalg.matrix_rank(rows[chosen].reshape(-1, 7)) == 7
+
+
+def test_planned_poses_of_an_arm_beat_random_ones_and_are_driven_on_a_short_way():
+    arm = robot.load("ur10")
+    joints = spread(arm, 200)
+    asked = paper.experiment(robot.carried(arm), hayati_joints=(2, 3))
+    plan = plan_poses(arm, joints, asked, 15, np.zeros(6))
+    rows, rng = plan.information.rows, np.random.default_rng(0)
+    random = [observability(rows[rng.permutation(200)[:15]]) for _ in range(100)]
+    assert plan.index[-1] > max(random)
+    assert (plan.index[:4] == 0.0).all()  # four full poses cannot tell thirty directions
+    assert len(set(plan.chosen.tolist())) == 15
+    assert plan.moves_rad.sum() < plan.candidate_travel_rad
+    with pytest.raises(InputError, match="at most"):
+        choose(rows, 201)
+    with pytest.raises(InputError, match="at least"):
+        choose(rows, 1)
+
+
+def test_paths_are_near_the_shortest_of_all():
+    shares = []
+    for seed in range(15):
+        distance = distances(np.random.default_rng(seed).uniform(-2, 2, (7, 6)))
+
+        def length(path, distance=distance):
+            return distance[path[:-1], path[1:]].sum()
+
+        path = shortest_path(distance)
+        assert path[0] == 0
+        assert sorted(path.tolist()) == list(range(7))
+        best = min(length(np.array([0, *rest])) for rest in permutations(range(1, 7)))
+        shares.append(length(path) / best)
+    assert min(shares) >= 1.0 - 1e-12
+    assert np.mean(shares) < 1.05
