@@ -329,7 +329,7 @@ def test_long_texts_repeated_in_a_results_table_are_refused_before_they_are_unpa
     )
     repeated(tmp_path / "texts.parquet", {"name": text}, 1)
     assert (tmp_path / "texts.parquet").stat().st_size < 1_000_000
-    with pytest.raises(InputError, match="column name: texts of more than 500 MB"):
+    with pytest.raises(InputError, match="holds more than 400 MB"):
         read(tmp_path / "texts.parquet")
 
 
@@ -348,5 +348,5 @@ def test_a_results_table_of_a_billion_values_is_refused_before_it_is_unpacked(tm
 
     zeros = pa.array(np.zeros(3_000_000, np.int8))
     repeated(tmp_path / "much.parquet", dict.fromkeys(COLUMNS, zeros), 4)
-    with pytest.raises(InputError, match="12000000 rows of 9 columns"):
+    with pytest.raises(InputError, match="holds more than 400 MB"):
         read(tmp_path / "much.parquet")

@@ -18,7 +18,7 @@ from kinacc.tables.contract import PROVENANCE_KEYS
 def check_file(path: Path, artefact: Artefact) -> tuple[Columns | None, list[Problem]]:
     """Columns of a file and what is wrong with it; None for columns no rule could be held to."""
     try:
-        table = store.read_table(path)
+        table = store.read_arrow(path)
         columns, schema = store.columns_in(table), table.schema
     except InputError as error:
         return None, [replace(problem, fix="") for problem in error.problems]

@@ -89,7 +89,7 @@ def compare_tables(
     """
     name = before.stem if before.stem in ARTEFACTS else before.parent.name
     artefact = ARTEFACTS.get(name)
-    tables = [store.columns_in(store.read_table(path, any_type=True)) for path in (before, now)]
+    tables = [store.columns_in(store.read_arrow(path, any_type=True)) for path in (before, now)]
     old, new = (pd.DataFrame(table) for table in tables)
     for column in [*old.columns.difference(new.columns), *new.columns.difference(old.columns)]:
         which = "missing" if column in old else "new"

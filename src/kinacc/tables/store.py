@@ -1,21 +1,22 @@
-"""Reading and writing the tables: cast to the contract, provenance, all or nothing."""
+"""Tables in files: DataFrames in and out, held to their schema, whole or not at all."""
 
 from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.tables import sums
-from kinacc.tables.atomic import write_together
+from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import (
     JOINTS_MAX,
     JOINTS_MIN,
@@ -25,10 +26,7 @@ from kinacc.tables.columns import (
     joint_count,
     texts,
 )
-from kinacc.tables.contract import (
-    ARTEFACTS,
-    PROVENANCE_KEYS,
-)
+from kinacc.tables.contract import ARTEFACTS, PROVENANCE_KEYS
 
 _ARROW_TYPES = {
     "float": pa.float64(),
@@ -37,18 +35,33 @@ _ARROW_TYPES = {
     "bool": pa.bool_(),
     "text": pa.string(),
 }
-_MOST_VALUES = 100_000_000
-_MOST_BYTES = 500_000_000  # of the texts of a column
+_MOST_BYTES = 400_000_000  # of a table in memory: a file of few bytes may unpack to many
 Read = TypeVar("Read")
 
 
-class TableToWrite(NamedTuple):
-    """One table for :func:`write_all`: where, which artefact, its columns, its provenance."""
+def read_table(path: Path | str) -> pd.DataFrame:
+    """The table in a file; null is NaN, and numbers of a column with nulls are float64.
 
-    path: Path | str
-    artefact: str
-    columns: Mapping[str, Any]
-    provenance: Mapping[str, object]
+    Raises InputError where the file is absent, damaged, no Parquet or too large.
+    """
+    return read_arrow(path).to_pandas()
+
+
+def write_table(
+    path: Path | str,
+    artefact: str,
+    table: pd.DataFrame | Mapping[str, Any],
+    provenance: Mapping[str, object],
+) -> None:
+    """Hold a table to the schema of an artefact and write it whole, or leave what was there.
+
+    ``provenance`` becomes the metadata of the file: ``PROVENANCE_KEYS``. Errors as of
+    :func:`to_table`.
+    """
+    write_whole(path, content_of(to_table(artefact, table, provenance)))
+
+
+write = write_table
 
 
 def artefact_named(name: str) -> Artefact:
@@ -79,85 +92,84 @@ def arrow_schema(
         )
         for column in columns
     ]
-    if provenance is None:
-        return pa.schema(fields)
-    return pa.schema(fields, {key: str(provenance[key]) for key in PROVENANCE_KEYS})
+    return pa.schema(fields, provenance and {key: str(provenance[key]) for key in PROVENANCE_KEYS})
 
 
 def to_table(
-    artefact: str, columns: Mapping[str, Any], provenance: Mapping[str, object]
+    artefact: str, columns: pd.DataFrame | Mapping[str, Any], provenance: Mapping[str, object]
 ) -> pa.Table:
-    """Cast columns (each of shape (rows,)) to the artefact's Arrow table.
+    """A table as an Arrow table of the artefact's schema, with ``provenance`` as its metadata.
 
-    NaN and None become null where the contract allows null; so do optional columns not given. Its
-    metadata are the provenance. Raises InputError naming every missing or unknown column,
-    null where none may be, number that is not finite, and value of a wrong type.
+    NaN and None become null; optional columns that are not given are null throughout. Raises
+    InputError naming every column that is missing, unknown or of another length, null where none
+    may be, number that is not finite, and value of a wrong type.
     """
     contract = artefact_named(artefact)
     where = f"table {artefact}"
-    problems = _provenance_problems(where, provenance)
+    problems = [
+        Problem(where, f"provenance lacks {key} or has one too many", ", ".join(PROVENANCE_KEYS))
+        for key in sorted({*provenance} ^ {*PROVENANCE_KEYS})
+    ]
     joints = joint_count(contract, columns)
     if contract.has_joints and not JOINTS_MIN <= joints <= JOINTS_MAX:
-        problems.append(
-            Problem(where, f"speaks of {joints} joints", f"q1.. of {JOINTS_MIN} to {JOINTS_MAX}")
-        )
+        allowed = f"q1.. of {JOINTS_MIN} to {JOINTS_MAX}"
+        problems.append(Problem(where, f"has columns of {joints} joints", allowed))
     names = [column.name for column in contract.for_joints(joints)]
-    wanted = contract.in_file(joints, columns)
     problems += [
         Problem(f"{where}, column {name}", "not in the contract", ", ".join(names))
         for name in columns
         if name not in names
     ]
+    rows = max((len(columns[name]) for name in columns), default=0)
     arrays = []
-    for column in wanted:
+    for column in contract.in_file(joints, columns):
         place = f"{where}, column {column.name}"
         if column.name not in columns and not column.optional:
             problems.append(Problem(place, "missing"))
             continue
-        values = columns.get(column.name)
-        if values is None:
-            values = [None] * len(next(iter(columns.values())))
-        array, found = _to_arrow(place, column, values)
-        problems += found
+        values = columns[column.name] if column.name in columns else [None] * rows
+        array, wrong = _to_arrow(column, values)
+        if not wrong and len(array) != rows:
+            wrong = ("columns of different lengths", f"{rows} rows")
+        problems += [Problem(place, *wrong)] if wrong else []
         arrays.append(array)
-    lengths = {c.name: len(a) for c, a in zip(wanted, arrays, strict=False) if a is not None}
-    if not problems and len(set(lengths.values())) > 1:
-        problems.append(Problem(where, f"columns of different lengths: {lengths}"))
     refuse(problems, f"{artefact} does not fit its contract")
-    schema = arrow_schema(artefact, joints, provenance, columns)
-    return pa.Table.from_arrays(arrays, schema=schema)
+    return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance, columns))
 
 
-def digest_of(artefact: str, columns: Mapping[str, Any]) -> str:
+def _to_arrow(column: Column, values: Any) -> tuple[pa.Array, tuple[str, str] | None]:
+    """Values in the type of a column; and what is wrong with them, beside what is allowed."""
+    kind = _ARROW_TYPES[column.kind]
+    is_text = column.kind == "text"
+    if isinstance(values, pd.Series):
+        values = values.to_numpy(object if is_text else None)
+    try:
+        array = pa.array(values, kind if is_text else None, from_pandas=True)
+        if pa.types.is_string(array.type) and not is_text:
+            return None, ("text in place of numbers", column.kind)
+        array = array.cast(kind)
+    except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
+        return None, (str(error).split("\n")[0], column.kind)
+    if array.null_count and not column.nullable:
+        where = rows(array.is_null().to_numpy(zero_copy_only=False))
+        return None, (f"null or NaN in {where}", "a value in every row")
+    if column.kind == "float":
+        numbers = array.to_numpy(zero_copy_only=False)
+        if np.isinf(numbers).any():
+            return None, (f"infinite in {rows(np.isinf(numbers))}", "finite numbers")
+    if array.null_count and not is_text:  # the same bytes below every null: digests depend on them
+        null = array.is_null().to_numpy(zero_copy_only=False)
+        array = pa.array(array.fill_null(0).to_numpy(zero_copy_only=False), kind, mask=null)
+    return array, None
+
+
+def digest_of(artefact: str, columns: pd.DataFrame | Mapping[str, Any]) -> str:
     """Digest of the columns of an artefact, whatever made them."""
     table = to_table(artefact, columns, dict.fromkeys(PROVENANCE_KEYS, "-"))
     written = pa.BufferOutputStream()
     with pa.ipc.new_stream(written, table.schema) as stream:
         stream.write_table(table)
     return sums.digest(written.getvalue())
-
-
-def write(
-    path: Path | str,
-    artefact: str,
-    columns: Mapping[str, Any],
-    provenance: Mapping[str, object],
-) -> None:
-    """Write one table, or leave what was there untouched; see :func:`to_table` for errors."""
-    write_all([TableToWrite(path, artefact, columns, provenance)])
-
-
-def write_all(tables: Sequence[TableToWrite]) -> None:
-    """Write several tables so that either all of them appear or none.
-
-    Every table is cast and written under a temporary name before the first one is renamed.
-    """
-    write_together(
-        {
-            table.path: content_of(to_table(table.artefact, table.columns, table.provenance))
-            for table in tables
-        }
-    )
 
 
 def content_of(table: pa.Table) -> bytes:
@@ -168,65 +180,62 @@ def content_of(table: pa.Table) -> bytes:
 
 
 def read(path: Path | str, any_type: bool = False) -> Columns:
-    """Columns of a table: float64 and whole numbers as numpy, text as object arrays.
+    """Columns of a table as arrays: see :func:`columns_in`; errors as of :func:`read_table`.
 
-    Null numbers are NaN (a nullable whole number is therefore float64), null text is None. Columns
-    of other types are refused, or object arrays where ``any_type`` says so. Raises InputError if
-    the file is absent or not Parquet, or if its columns are not those that it was written with.
+    Columns of other types than numbers and text are object arrays where ``any_type`` allows them.
     """
     try:
-        return columns_in(read_table(path, any_type=any_type))
-    except (OverflowError, ValueError) as error:  # no UTF-8, or a day that no calendar has
+        return columns_in(read_arrow(path, any_type=any_type))
+    except (OverflowError, ValueError) as error:  # a day that no calendar has
         what = f"not a readable Parquet file: {error}"
         raise InputError(Problem(str(path), what, fix=remake(path))) from None
-    except InputError as error:
-        raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
 
 
-def read_table(path: Path | str, content: bytes | None = None, any_type: bool = False) -> pa.Table:
-    """The table in a file, or in its ``content`` where that has been read already.
+def columns_in(table: pa.Table) -> Columns:
+    """Columns as arrays: a null number is NaN (a nullable column is float64), a null text None."""
+    names = zip(table.schema, table.columns, strict=True)
+    return {field.name: _to_numpy(field, column) for field, column in names}
+
+
+def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
+    if pa.types.is_boolean(field.type):
+        return np.array(column.to_numpy(zero_copy_only=False))
+    if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
+        return texts(column.to_pylist())
+    if field.nullable or column.null_count:
+        return column.cast(pa.float64()).to_numpy().astype(np.float64)
+    return np.array(column.to_numpy())
+
+
+def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = False) -> pa.Table:
+    """The Arrow table in a file, or in its ``content`` where that has been read already.
 
     Checksums of pages are held to the pages. ``any_type`` and errors as of :func:`read`.
     """
-    return _open(path, lambda file: _unpacked(file, path, any_type), content)
 
-
-def _unpacked(file: pq.ParquetFile, path: Path | str, any_type: bool) -> pa.Table:
-    """All of a file, if its footer says that it can be held: few bytes may unpack to many."""
-    rows, columns = file.metadata.num_rows, file.metadata.num_columns
-    if rows * columns > _MOST_VALUES:
-        allowed = f"at most {_MOST_VALUES} values"
-        raise InputError(Problem(str(path), f"{rows} rows of {columns} columns", allowed))
-    refuse(
-        Problem(f"{path}, column {field.name}", f"is of type {field.type}", "numbers, text")
-        for field in file.schema_arrow
-        if not (any_type or pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
-        and field.type not in (pa.string(), pa.large_string(), pa.bool_(), pa.null())
-    )
-    _refuse_long_texts(file, path)
-    return file.read(use_threads=False)
-
-
-def _refuse_long_texts(file: pq.ParquetFile, path: Path | str) -> None:
-    """Raise InputError where texts, each held once in the file, are too much when repeated.
-
-    No text is longer than what all of a group's take, so that most files need no second look.
-    """
-    footer = file.metadata
-    for place, field in enumerate(file.schema_arrow):
-        if field.type not in (pa.string(), pa.large_string()):
-            continue
-        chunks = [footer.row_group(each).column(place) for each in range(footer.num_row_groups)]
-        longest = max((each.total_uncompressed_size for each in chunks), default=0)
-        if footer.num_rows * longest <= _MOST_BYTES:
-            continue
-        held = 0
-        rows = max(_MOST_BYTES // (10 * longest), 1)
-        for batch in file.iter_batches(rows, columns=[field.name], use_threads=False):
-            held += batch.nbytes
+    def unpacked(file: pq.ParquetFile) -> pa.Table:
+        schema, footer = file.schema_arrow, file.metadata
+        known = {pa.string(), pa.large_string(), pa.bool_(), pa.null()}
+        refuse(
+            Problem(f"{path}, column {field.name}", f"is of type {field.type}", "numbers, text")
+            for field in (() if any_type else schema)
+            if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
+            and field.type not in known
+        )
+        groups = [footer.row_group(each) for each in range(footer.num_row_groups)]
+        # No text is longer than all of a group; one that is held once may stand in every row.
+        longest = max((each.total_byte_size for each in groups), default=0)
+        at_once = _MOST_BYTES // (10 * (longest + 16 * max(len(schema), 1)))
+        batches, held = [], 0
+        for batch in file.iter_batches(min(at_once, 65_536) or 1, use_threads=False):
+            batches.append(batch)
+            held += max(batch.nbytes, 8 * batch.num_rows * len(schema))
             if held > _MOST_BYTES:
-                what = f"texts of more than {_MOST_BYTES // 1_000_000} MB"
-                raise InputError(Problem(f"{path}, column {field.name}", what, "short texts"))
+                what = f"holds more than {_MOST_BYTES // 1_000_000} MB"
+                raise InputError(Problem(str(path), what, "a smaller table", remake(path)))
+        return pa.Table.from_batches(batches, schema)
+
+    return _open(path, unpacked, content)
 
 
 def remake(path: Path | str) -> str:
@@ -257,103 +266,17 @@ def _open(
         source = path if content is None else pa.BufferReader(content)
         with pq.ParquetFile(source, page_checksum_verification=True) as file:
             return opening(file)
+    except InputError as error:
+        raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
     except FileNotFoundError:
-        raise InputError(Problem(str(path), "no such file")) from None
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        raise InputError(Problem(str(path), "no such file", fix=remake(path))) from None
+    except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(Problem(str(path), f"not a readable Parquet file: {reason}")) from None
-
-
-def columns_in(table: pa.Table) -> Columns:
-    """The columns of a table as :func:`read` gives them."""
-    names = zip(table.schema, table.columns, strict=True)
-    return {field.name: _to_numpy(field, column) for field, column in names}
-
-
-def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
-    if pa.types.is_boolean(field.type):
-        return np.array(column.to_numpy(zero_copy_only=False))
-    if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
-        return texts(column.to_pylist())
-    if field.nullable or column.null_count:
-        return column.cast(pa.float64()).to_numpy().astype(np.float64)
-    return np.array(column.to_numpy())
-
-
-def _provenance_problems(where: str, provenance: Mapping[str, object]) -> list[Problem]:
-    missing = [key for key in PROVENANCE_KEYS if key not in provenance]
-    unknown = [key for key in provenance if key not in PROVENANCE_KEYS]
-    allowed = ", ".join(PROVENANCE_KEYS)
-    return [Problem(where, f"provenance lacks {key}", allowed) for key in missing] + [
-        Problem(where, f"provenance has an unknown key {key!r}", allowed) for key in unknown
-    ]
-
-
-def _to_arrow(place: str, column: Column, values: Any) -> tuple[pa.Array | None, list[Problem]]:
-    if column.kind == "text":
-        return _text_to_arrow(place, column, values)
-    try:
-        numbers = np.asarray(
-            [np.nan if value is None else value for value in values]
-            if not isinstance(values, np.ndarray) or values.dtype == object
-            else values
-        )
-        exact = numbers if numbers.dtype.kind in "iu" else None
-        numbers = numbers.astype(np.float64)
-    except (TypeError, ValueError):
-        return None, [Problem(place, "holds something that is not a number", column.kind)]
-    if numbers.ndim != 1:
-        return None, [Problem(place, f"has shape {numbers.shape}", "one value per row")]
-    null = np.isnan(numbers)
-    problems = []
-    if null.any() and not column.nullable:
-        problems.append(Problem(place, f"null or NaN in {rows(null)}", "a number in every row"))
-    if np.isinf(numbers).any():
-        problems.append(Problem(place, f"infinite in {rows(np.isinf(numbers))}", "finite numbers"))
-    if column.kind == "float":
-        return (None if problems else _array(numbers, null, pa.float64())), problems
-    whole = null | (numbers == np.round(numbers))
-    if not whole.all():
-        first = numbers[~whole][0]
-        problems.append(Problem(place, f"{first:g} in {rows(~whole)}", "whole numbers"))
-    limits = {"int8": (-128, 127), "bool": (0, 1), "int": (-(2.0**63), 2.0**63 - 1025)}
-    low, high = limits[column.kind]
-    beyond = ~null & ((numbers < low) | (numbers > high))
-    if beyond.any() and not problems:
-        problems.append(Problem(place, f"too large for {column.kind} in {rows(beyond)}"))
-    if problems:
-        return None, problems
-    integers = exact if exact is not None else np.where(null, 0, numbers)
-    return _array(integers, null, _ARROW_TYPES[column.kind]), []
-
-
-def _array(values: np.ndarray, null: np.ndarray, kind: pa.DataType) -> pa.Array:
-    """Arrow array of numbers."""
-    return pa.array(np.where(null, 0, values).astype(kind.to_pandas_dtype()), kind, mask=null)
-
-
-def _text_to_arrow(
-    place: str, column: Column, values: Any
-) -> tuple[pa.Array | None, list[Problem]]:
-    texts = [_as_text(value) for value in values]
-    wrong = np.array([not (value is None or isinstance(value, str)) for value in texts], dtype=bool)
-    null = np.array([value is None for value in texts], dtype=bool)
-    if wrong.any():
-        first = texts[int(np.argmax(wrong))]
-        return None, [Problem(place, f"{first!r} in {rows(wrong)}", "text")]
-    if null.any() and not column.nullable:
-        return None, [Problem(place, f"null in {rows(null)}", "text in every row")]
-    return pa.array(texts, pa.string()), []
-
-
-def _as_text(value: Any) -> Any:
-    """A text as str, None and NaN as None, anything else unchanged."""
-    if value is None or isinstance(value, str):
-        return None if value is None else str(value)
-    return None if isinstance(value, float) and np.isnan(value) else value
+        what = f"not a readable Parquet file: {reason}"
+        raise InputError(Problem(str(path), what, fix=remake(path))) from None
 
 
 def rows(mask: np.ndarray) -> str:
     """The first rows (from 0) a mask marks, in words."""
-    rows = np.flatnonzero(mask)
-    return f"row{'s' if rows.size > 1 else ''} {first_few(rows.tolist())}"
+    found = np.flatnonzero(mask)
+    return f"row{'s' if found.size > 1 else ''} {first_few(found.tolist())}"

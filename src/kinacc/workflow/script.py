@@ -140,7 +140,7 @@ def _read(
             parts = []
             for path, content in zip(listed, contents, strict=True):
                 sums.hold(path, content)
-                parts.append(store.columns_in(store.read_table(path, content)))
+                parts.append(store.columns_in(store.read_arrow(path, content)))
             inputs[role] = parts[0] if isinstance(given, str) else _joined(parts)
     refuse(problems)
     return inputs, read
