@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from kinacc.calibration import error_model, excluded_rows, residual_tables
-from kinacc.checks import data_check
+from kinacc.checks import check
 from kinacc.deployment import summary
 from kinacc.errors import KinaccError
 from kinacc.study import evaluation, histories, monte_carlo
@@ -22,7 +22,7 @@ from kinacc.workflow.outdated import CALIBRATION
 
 STAGES = {
     "measurements": source.run,
-    "data_check": data_check.run,
+    "data_check": check.run,
     **{kind: partial(error_model.run, kind=kind) for kind in ("vec", "compliance", "dh")},
     "residuals": residual_tables.run,
     "excluded_rows": excluded_rows.run,

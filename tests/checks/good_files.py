@@ -13,6 +13,8 @@ from kinacc.checks.report import Report
 from kinacc.geometry import exp_so3, log_so3
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
+from kinacc.measurements.layout import Layout
+from kinacc.measurements.reader import read
 
 MEASURED = {
     "ur10_a": "ur10_tmac/series_A.csv",
@@ -63,7 +65,11 @@ class File:
         """What check-data says of it."""
         config = load((self.write(folder),))["file"]
         arm = robots.load(config["robot"])
-        return check.check_file(config["measurements"]["file"], arm, "file", lambda each, _: each)
+        section = config["measurements"]["file"]
+        reading = read(section, arm, strict=False)
+        return check.check(
+            reading, Layout.of(section), arm, "file", section["path"], lambda each, _: each
+        )
 
 
 def measured(name: str) -> File:

@@ -60,7 +60,7 @@ def of_kind(text, kind):
 def left_mm(line):
     """What is left per axis as written, and as it is meant."""
     number = r"([-+.\de]+) mm"
-    found = re.search(rf"\({number} per axis left as written, {number} so", line)
+    found = re.search(rf"\({number} per axis as written, {number} so", line)
     return float(found[1]), float(found[2])
 
 

@@ -10,7 +10,7 @@ import plants
 import pytest
 from good_files import File, measured, simulated
 
-from kinacc.checks.suspicion import STOPPING
+from kinacc.checks.findings import STOPPING
 from kinacc.config.schema import settings
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward

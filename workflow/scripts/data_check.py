@@ -1,7 +1,7 @@
 """What is wrong with a measured file."""
 
-from kinacc.checks import data_check
+from kinacc.checks import check
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
-    job.write_tables(data_check.run(job.inputs, job.settings, progress=job.progress))
+    job.write_tables(check.run(job.inputs, job.settings, progress=job.progress))

@@ -44,7 +44,7 @@ class Cells:
         """True (n,) where the orientation was measured."""
         return np.isfinite(self.rotation[:, 0, 0])
 
-    def lines(self, rows: np.ndarray) -> list[int]:
+    def lines(self, rows: np.ndarray | slice = slice(None)) -> list[int]:
         """All lines of the file the cells ``rows`` were read from, each once, in order."""
         return sorted({line for lines in self.drawn[rows] for line in lines})
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.checks import robust_fit, tails
-from kinacc.checks.changes import Meaning
+from kinacc.checks.findings import Finding, finding
 from kinacc.checks.fitting import Fitted
-from kinacc.checks.suspicion import Suspicion, suspicion
+from kinacc.checks.meanings import Meaning
 
 _GRIDS_DEG = (1.0, 0.5, 0.1, 0.05, 0.01)
 _FINER = 10.0  # a read-back value has digits well below the grid of a commanded one
@@ -19,7 +19,7 @@ _FITTED_AWAY = 0.3  # of the errors that rounding makes: what a fit of few poses
 
 def compared(
     fitted: Fitted, q: np.ndarray, commanded: np.ndarray, meaning: Meaning
-) -> list[Suspicion]:
+) -> list[Finding]:
     """Rows in which commanded and read-back joints (n, k) part further than elsewhere.
 
     Judged by how far apart they put the target, against the errors of the fit.
@@ -40,34 +40,25 @@ def compared(
     suspicions = []
     if rows.size:
         error = np.linalg.norm(places[1].position_mm, axis=1)
-        nearer = float(np.mean(error[rows] < fitted.left_mm[rows]))
-        which = "the commanded" if nearer > 0.5 else "those read back"
+        nearer = float(np.mean(error[rows] < fitted.left_mm[rows])) > 0.5
+        lines = seen.cells.lines(rows)
         suspicions.append(
-            suspicion(
-                "commanded_joints",
-                f"in {len(seen.cells.lines(rows))} rows the joints read back are not "
-                f"those commanded, by up to {apart[rows].max():.3g} mm at the target; {which} fit "
-                "better",
-                seen.cells.lines(rows),
-                "the arm was not where it was sent, or the two belong to different rows",
+            finding(
+                "commanded_joints/apart",
+                lines,
+                count=len(lines),
+                better="the commanded" if nearer else "those read back",
                 largest_mm=float(apart[rows].max()),
             )
         )
     every = robust_fit.sigma_of(places[1].position_mm[both])
     if every < 0.7 * robust_fit.sigma_of(places[0].position_mm[both]):
-        suspicions.append(
-            suspicion(
-                "commanded_joints",
-                f"the commanded joints fit better than those read back ({every:.3g} mm per axis): "
-                "the two may be exchanged",
-                seen.cells.lines(both),
-                "exchange the columns",
-            )
-        )
+        lines = seen.cells.lines(both)
+        suspicions.append(finding("commanded_joints/exchanged", lines, sigma=f"{every:.3g}"))
     return suspicions
 
 
-def coarse(fitted: Fitted, q: np.ndarray, prismatic: np.ndarray) -> list[Suspicion]:
+def coarse(fitted: Fitted, q: np.ndarray, prismatic: np.ndarray) -> list[Finding]:
     """Rows whose joints are round numbers while the others' are not, and which fit worse."""
     q_deg = np.rad2deg(q[:, ~prismatic])
     moving = np.ptp(q_deg, axis=0) > 0.0
@@ -82,21 +73,15 @@ def coarse(fitted: Fitted, q: np.ndarray, prismatic: np.ndarray) -> list[Suspici
             continue
         worse = float(np.median(fitted.left_mm[on]) / np.median(fitted.left_mm[fine]))
         if worse > _WORSE and _ranked_worse(fitted.left_mm[on], fitted.left_mm[fine]):
+            lines = fitted.seen.cells.lines(rows)
+            times = f"{worse:.2g}"
             return [
-                suspicion(
-                    "commanded_joints",
-                    f"{len(fitted.seen.cells.lines(rows))} rows have joints on whole "
-                    f"{grid:g} deg, which the others have not, and fit {worse:.2g} times worse: "
-                    "commanded joints, not those read back",
-                    fitted.seen.cells.lines(rows),
-                    "take the joints read back",
-                    grid_deg=grid,
-                )
+                finding("commanded_joints", lines, grid_deg=grid, count=len(lines), times=times)
             ]
     return _all_coarse(fitted, q_deg)
 
 
-def _all_coarse(fitted: Fitted, q_deg: np.ndarray) -> list[Suspicion]:
+def _all_coarse(fitted: Fitted, q_deg: np.ndarray) -> list[Finding]:
     """The whole file on a coarse grid, and errors as large as its rounding makes them."""
     for grid in _GRIDS_DEG[:4]:
         if not _on(q_deg, grid).all():
@@ -105,13 +90,12 @@ def _all_coarse(fitted: Fitted, q_deg: np.ndarray) -> list[Suspicion]:
         seen = float(np.sqrt(np.median(fitted.left_mm**2)))
         if _FITTED_AWAY < seen / rounding < 1.5:
             return [
-                suspicion(
-                    "commanded_joints",
-                    f"all joints are on whole {grid:g} deg, and the errors of {seen:.3g} mm are "
-                    f"what such rounding makes ({rounding:.3g} mm): commanded or rounded joints",
+                finding(
+                    "commanded_joints/all",
                     fitted.seen.cells.lines(np.arange(len(q_deg))),
-                    "take the joints read back, with all their digits",
                     grid_deg=grid,
+                    error=f"{seen:.3g}",
+                    rounding=f"{rounding:.3g}",
                 )
             ]
         break

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.checks.cells import Cells
-from kinacc.checks.suspicion import Suspicion, suspicion
+from kinacc.checks.findings import Finding, finding
 from kinacc.errors import first_few
 
 _CHANCE = 0.01  # expected number of coincidences above which equal readings say nothing
 
 
-def found(cells: Cells, noise_mm: float) -> list[Suspicion]:
+def found(cells: Cells, noise_mm: float) -> list[Finding]:
     """Rows equal to an earlier one in every joint and reading.
 
     Readings are written to a limited number of digits: where repeats scatter by ``noise_mm`` per
@@ -25,19 +25,13 @@ def found(cells: Cells, noise_mm: float) -> list[Suspicion]:
         return []
     line = cells.line[rows]
     first = int(line[twice[again[0]]])
+    row = cells.row_names.one(first)
     return [
-        suspicion(
-            "duplicate_rows",
-            f"{again.size} row{'s are' if again.size > 1 else ' is'} equal to an earlier one in "
-            f"every joint and reading, the first of them to {cells.row_names.one(first)}",
-            line[again],
-            "take the copies out: they count as measurements that were never made",
-            first_copied_line=first,
-        )
+        finding("duplicate_rows", line[again], count=again.size, row=row, first_copied_line=first)
     ]
 
 
-def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Suspicion]:
+def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Finding]:
     """Rows whose readings are those of an earlier row of other joints, to the last digit.
 
     ``equal`` (n,) as ``earlier`` gives it; ``noise_mm`` as for ``found``.
@@ -50,15 +44,7 @@ def stale(cells: Cells, equal: np.ndarray, noise_mm: float) -> list[Suspicion]:
     called = cells.row_names
     pairs = zip(again.tolist(), first.tolist(), strict=True)
     told = [f"{called.one(line)} repeats {called.number(of)}" for line, of in pairs]
-    return [
-        suspicion(
-            "repeated_reading",
-            f"{again.size} row{'s hold' if again.size > 1 else ' holds'} the reading of an earlier "
-            f"row, equal in every digit, at other joints: {first_few(told, 4)}",
-            again,
-            "the instrument was not read anew: measure them again, or exclude the rows",
-        )
-    ]
+    return [finding("repeated_reading", again, pairs=first_few(told, 4))]
 
 
 def earlier(cells: Cells) -> np.ndarray:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinacc.checks import hand_eye, robust_fit, steps, tails
+from kinacc.checks.findings import Finding, finding
 from kinacc.checks.robust_fit import Residuals, Seen, Trial
 from kinacc.geometry import log_so3
 from kinacc.kinematics.dh import DHModel
@@ -321,3 +322,30 @@ def drift_mm(fitted: Fitted, session: float) -> np.ndarray | None:
 def _before(base: np.ndarray, row: int, session: np.ndarray) -> int:
     same = np.flatnonzero(session[:row] == session[row])
     return int(base[same[-1]])
+
+
+def moved_frames(fitted: Fitted) -> Iterator[Finding]:
+    """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
+    seen = fitted.seen.cells
+    drifts = {session: drift_mm(fitted, session) for session in np.unique(seen.session)}
+    for session, drifted in drifts.items():
+        if drifted is not None:
+            own = seen.line[seen.session == session]
+            yield finding("drift", own, by=_signed(drifted), drift_mm=drifted.tolist())
+    for jump in fitted.jumps:
+        base, line = jump.target is None, int(seen.line[jump.row])
+        if not base or drifts[seen.session[jump.row]] is None:
+            yield finding(
+                "base_jump" if base else "target_moved",
+                seen.lines(jump.rows),
+                row=seen.row_names.one(line),
+                target="" if base else seen.target_names[seen.target[jump.row]],
+                by=_signed(jump.shift_mm),
+                first_line=line,
+                shift_mm=jump.shift_mm.tolist(),
+                turn_mrad=1e3 * jump.turn_rad,
+            )
+
+
+def _signed(vector: np.ndarray) -> str:
+    return ", ".join(f"{value:+.3g}" for value in vector)

@@ -6,13 +6,13 @@ import numpy as np
 
 from kinacc.checks import tails
 from kinacc.checks.cells import Cells
+from kinacc.checks.findings import Finding, finding
 from kinacc.checks.noise import Distance
-from kinacc.checks.suspicion import Suspicion, suspicion
 
 _FEWEST = 4  # rows on either side of a move
 
 
-def found(cells: Cells, distances: list[Distance]) -> tuple[list[Suspicion], np.ndarray]:
+def found(cells: Cells, distances: list[Distance]) -> tuple[list[Finding], np.ndarray]:
     """Suspicions, and how each cell's target is numbered when a moved one counts as another."""
     numbers = cells.target.copy()
     moves = [(distance, *_move(distance)) for distance in distances]
@@ -23,7 +23,6 @@ def found(cells: Cells, distances: list[Distance]) -> tuple[list[Suspicion], np.
         mine = [step for step in steps if target in (step[0].one, step[0].other)]
         first = int(mine[0][0].rows[mine[0][1]][0])
         line = int(cells.line[first])
-        called = cells.row_names.one(line)
         rows = (cells.target == target) & (cells.line >= line)
         numbers[rows] = numbers.max() + 1
         name = cells.target_names[target]
@@ -31,14 +30,14 @@ def found(cells: Cells, distances: list[Distance]) -> tuple[list[Suspicion], np.
             f"{size:+.3g} mm to {cells.target_names[d.other if d.one == target else d.one]}"
             for d, _, size in mine
         )
-        sure = "" if len(cells.target_names) > 2 else " (or the other of the two)"
         suspicions.append(
-            suspicion(
-                "target_moved",
-                f"target {name}{sure} moved before {called}: its distances change by {sizes}",
+            finding(
+                "target_moved/distances",
                 cells.line[rows],
-                "give the target another name from there on",
                 target=name,
+                sure="" if len(cells.target_names) > 2 else " (or the other of the two)",
+                row=cells.row_names.one(line),
+                by=sizes,
                 first_line=line,
                 largest_change_mm=max(abs(size) for _, _, size in mine),
             )
@@ -83,7 +82,7 @@ def _culprit(steps, targets: int) -> int:
     return int(np.argmax(counts))
 
 
-def _singles(cells: Cells, distances: list[Distance], moves) -> list[Suspicion]:
+def _singles(cells: Cells, distances: list[Distance], moves) -> list[Finding]:
     """Readings in which a target is not where the other targets have it."""
     off: dict[int, set[int]] = {}
     largest = 0.0
@@ -99,13 +98,4 @@ def _singles(cells: Cells, distances: list[Distance], moves) -> list[Suspicion]:
             largest = max(largest, float(away[row]))
     if not off:
         return []
-    return [
-        suspicion(
-            "outliers",
-            f"in {len(off)} row{'s' if len(off) > 1 else ''} the targets are not as far apart as "
-            f"in all others, by up to {largest:.3g} mm",
-            off,
-            "a target was exchanged, hidden or touched: measure the rows again, or take them out",
-            largest_mm=largest,
-        )
-    ]
+    return [finding("outliers/distances", off, count=len(off), largest_mm=largest)]

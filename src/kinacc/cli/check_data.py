@@ -90,7 +90,7 @@ def report_on(
 
     ``stopped`` takes the commands to go on with after findings that stop the workflow.
     """
-    from kinacc.checks.data_check import examined
+    from kinacc.checks.check import examined
     from kinacc.checks.report import UNUSABLE, to_json
     from kinacc.errors import InputError
     from kinacc.progress import reporting

@@ -15,8 +15,8 @@ from kinacc.cli.file_options import file_options
 from kinacc.cli.output import Output, answers
 
 if TYPE_CHECKING:
+    from kinacc.checks.findings import Finding
     from kinacc.checks.report import Report
-    from kinacc.checks.suspicion import Suspicion
     from kinacc.kinematics.robot import Robot
     from kinacc.measurements.intake.guess import Guess
     from kinacc.measurements.reader import MeasuredFile
@@ -269,12 +269,12 @@ def _contradicted(guess: Guess, report: Report) -> dict:
     return settings
 
 
-def _coupling(report: Report) -> Suspicion | None:
+def _coupling(report: Report) -> Finding | None:
     """The coupling of two joints that alone explains the readings, where there is one."""
     return next((each for each in report.suspicions if "joint_map" in each.values), None)
 
 
-def _coupled(text: str, arm: Robot, guess: Guess, coupling: Suspicion) -> tuple:
+def _coupled(text: str, arm: Robot, guess: Guess, coupling: Finding) -> tuple:
     """The robot file's text, the arm and the guess, with the joint_map that the readings show."""
     import numpy as np
 

@@ -189,7 +189,7 @@ def _by_person(guess: Guess) -> Guess:
 
 def orientation_of(word: str) -> dict:
     """The settings that an answer or ``--orientation`` stands for; InputError for no such word."""
-    from kinacc.checks.turns import CONVENTIONS
+    from kinacc.checks.orientations import CONVENTIONS
 
     if word in ("none", "quaternion", "rotation_vector"):
         return {"kind": word}

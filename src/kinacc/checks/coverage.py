@@ -1,0 +1,141 @@
+"""What is in a file: poses, targets, noise, coverage of the joints; and where it is too little."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinacc.calibration.noise import Noise
+from kinacc.calibration.observations import from_columns
+from kinacc.calibration.vec_estimator import VECEstimator
+from kinacc.checks.cells import Cells
+from kinacc.checks.findings import Finding, finding
+from kinacc.checks.fitting import Fitted
+from kinacc.checks.noise import Distance, Repeats
+from kinacc.kinematics.robot import Robot
+from kinacc.measurements import folds
+from kinacc.tables.columns import Columns
+
+_WEAK = 0.1  # of a joint's range
+_PER_POSE = 6  # independent numbers of a rigid body, however many targets it carries
+
+
+def facts_of(
+    every: Cells, robot: Robot, noise: Noise, distances: list[Distance], fitted: Fitted | None
+) -> dict[str, object]:
+    """What is there, by name; units stand in the names."""
+    facts: dict[str, object] = {
+        "robot": robot.name,
+        "rows": int(np.unique(every.line).size),
+        "poses": int(np.unique(every.pose).size),
+        "readings": len(every),
+        "orientations": int(every.turned.sum()),
+        "targets": _counts(every.target_names, every.target),
+    }
+    if len(every.session_names) > 1:
+        facts["sessions"] = _counts(every.session_names, every.session)
+    facts["joint_coverage"] = [_covered(every.q[:, i], robot, i) for i in range(robot.dh.joints)]
+    if noise.freedom:
+        facts["noise"] = {
+            "std_mm": noise.std_mm.tolist(),
+            "per_axis_mm": noise.per_axis_mm,
+            "readings": noise.readings,
+            "configurations": noise.configurations,
+            "degrees_of_freedom": noise.freedom,
+        }
+    if distances:
+        facts["target_distances"] = [
+            {
+                "from": every.target_names[each.one],
+                "to": every.target_names[each.other],
+                "mm": each.middle_mm,
+                "std_mm": each.std_mm,
+                "noise_per_target_mm": each.std_mm / np.sqrt(2.0),
+            }
+            for each in distances
+        ]
+    if fitted is not None:
+        facts["quick_fit"] = {
+            "left_per_axis_mm": fitted.trial.sigma_mm,
+            "most_expected_mm": fitted.limit_mm,
+        }
+        if np.isfinite(fitted.trial.sigma_rad):
+            facts["quick_fit"]["left_per_axis_mrad"] = 1e3 * fitted.trial.sigma_rad
+    return facts
+
+
+def _counts(names: tuple[str, ...], number: np.ndarray) -> dict[str, str]:
+    return {name: f"{np.sum(number == i)} readings" for i, name in enumerate(names)}
+
+
+def _covered(q: np.ndarray, robot: Robot, joint: int) -> dict[str, object]:
+    """What a joint went through, ``q`` (n,), and may go through."""
+    factor, unit = (1.0, "mm") if robot.dh.prismatic[joint] else (np.pi / 180.0, "deg")
+    low, high, least, most = (
+        float(each / factor)
+        for each in (q.min(), q.max(), robot.q_min_rad[joint], robot.q_max_rad[joint])
+    )
+    share = (high - low) / (most - least)
+    ends = {"low": low, "high": high, "least": least, "most": most}
+    return {"joint": joint + 1, **ends, "unit": unit, "share": share}
+
+
+def remarks_of(
+    every: Cells, repeats: Repeats, noise: Noise, distances: list[Distance]
+) -> tuple[str, ...]:
+    """What else to know about the file, in words."""
+    remarks = []
+    if len(every.target_names) > 1:
+        how = f" (their repeats correlate by {repeats.common:.2f})"
+        remarks.append(
+            "targets of one pose share the arm's error and are no independent samples"
+            f"{how if np.isfinite(repeats.common) else ''}"
+        )
+    if repeats.groups and distances:
+        between = float(np.median([each.std_mm for each in distances])) / np.sqrt(2.0)
+        if between < 0.5 * noise.per_axis_mm:
+            remarks.append(
+                f"repeats scatter by {noise.per_axis_mm:.3g} mm per axis, targets against each "
+                f"other by only {between:.3g} mm: the scatter is the arm's or the set-up's, not "
+                "the instrument's"
+            )
+    return tuple(remarks)
+
+
+def thin(coverage: list[dict]) -> list[Finding]:
+    """A note on every joint that hardly moves."""
+    return [
+        finding(
+            "thin_coverage",
+            joint=each["joint"],
+            share=each["share"],
+            percent=f"{100.0 * each['share']:.2g}",
+        )
+        for each in coverage
+        if each["share"] < _WEAK
+    ]
+
+
+def few_poses(columns: Columns, robot: Robot, calibration: Mapping) -> list[Finding]:
+    """Whether the VEC model has more coefficients than the poses give independent numbers."""
+    seen = from_columns({**columns, "fold": np.full(len(columns["pose"]), np.nan)}, robot)
+    fit = VECEstimator.of(calibration, robot, seen)
+    same = folds.configurations_of(columns)
+    # A target adds three components to a pose, an orientation three; repeats add none.
+    pairs, first = np.unique(np.stack([same, seen.target]), axis=1, return_index=True)
+    turned = np.zeros(same.max() + 1)
+    np.maximum.at(turned, pairs[0], 3.0 * seen.has_rotation[first])
+    components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
+    frames = int(fit.common.terms(seen).free.sum()) if fit.common.frames_estimated else 0
+    if components.sum() >= fit.size + frames:
+        return []
+    few = finding(
+        "few_poses",
+        poses=len(components),
+        numbers=int(components.sum()),
+        coefficients=fit.size,
+        order=fit.order,
+        frames=f" and {frames} of base and targets" if frames else "",
+    )
+    return [few.held_to(())]

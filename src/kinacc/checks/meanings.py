@@ -1,0 +1,335 @@
+"""What the numbers of a file mean: units, hand, signs, couplings, zeros and order, by trying.
+
+A meaning is tried by base and target alone on a few configurations. Those that do better than the
+file as written are fitted with corrections of the arm, where only a meaning that leaves less than
+half is believed: errors of an arm that is far from its description do not hide so much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations
+
+import numpy as np
+
+from kinacc.checks import hand_eye, orientations, robust_fit
+from kinacc.checks.cells import Cells
+from kinacc.checks.findings import Finding, finding
+from kinacc.checks.robust_fit import Seen, Trial
+from kinacc.kinematics import dh
+from kinacc.kinematics.robot import Robot
+
+FAR = 0.02  # of the points' spread: what leaves more explains nothing, of this arm
+BAD_RAD = 0.02  # scatter of orientations that no arm as described leaves, calibrated or not
+MIRROR = np.array([1.0, -1.0, 1.0])  # any mirror will do: the base frame takes up the rest
+_SCALES = (("metres", 1e3), ("centimetres", 10.0), ("inches", 25.4), ("", 1e-3))
+_WITHIN = 5.0  # times the spread of the flange, or a fifth: what points of this arm spread over
+_TRIED = "ways to read the columns tried (units, angles, signs)"
+_TRIED_ROWS, _TURNED_ROWS, _FITTED_ROWS = 80, 120, 360
+_GOOD = 0.01  # of the points' spread: what an arm as described may leave, uncalibrated
+_SURE = 0.003  # of the spread: what leaves no more than this needs no rival
+_SHOWN = 0.005  # of the spread: misfits below are the arm's own
+_BETTER = 0.5  # of what the file as written leaves: more than errors of an arm can hide
+_PROMISING = 0.7
+_AS_GOOD = 1.5  # times the least misfit
+_MAJORITY = 0.7  # share of the readings a meaning must explain
+_FITTED = 4  # meanings that are fitted in full
+_FRONT = 4  # meanings that are changed further
+_FEWEST = 8  # configurations
+_MOST_TURNS_RAD = 4.0 * np.pi
+_COMMON = (
+    *("joint_units", "length_units", "joint_sign", "left_handed"),
+    *("joint_coupling", "joint_zero", "joint_order"),
+)
+
+Progress = Callable[[Iterable, str], Iterable]
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What the numbers of a file mean: DH joints are ``matrix @ (unit * q) + zero``.
+
+    ``matrix`` (k, k), ``unit`` and ``zero`` (k,) act on joints as read; positions are multiplied by
+    ``scale`` and, where ``mirrored``, by ``MIRROR``. ``changes`` are its findings.
+    """
+
+    matrix: np.ndarray
+    unit: np.ndarray
+    zero: np.ndarray
+    scale: float = 1.0
+    mirrored: bool = False
+    changes: tuple[Finding, ...] = ()
+
+    def joints(self, q: np.ndarray) -> np.ndarray:
+        """DH joint values (n, k) of joints as read (n, k)."""
+        return (q * self.unit) @ self.matrix.T + self.zero
+
+    def rotations(self, rotation: np.ndarray) -> np.ndarray:
+        """Orientations (n, 3, 3) in right-handed coordinates."""
+        return rotation * np.outer(MIRROR, MIRROR) if self.mirrored else rotation
+
+    def seen(self, cells: Cells) -> Seen:
+        """The cells as this meaning has them."""
+        position_mm = cells.position_mm * self.scale * (MIRROR if self.mirrored else 1.0)
+        known = replace(cells, position_mm=position_mm, rotation=self.rotations(cells.rotation))
+        return Seen(known, self.joints(cells.q), cells.session, cells.target)
+
+    def changed(self, change: Finding, **values) -> Meaning:
+        """This meaning with one more change."""
+        return replace(self, changes=(*self.changes, change), **values)
+
+
+def as_written(joint_map: np.ndarray) -> Meaning:
+    """The file means what it says."""
+    joints = len(joint_map)
+    return Meaning(np.array(joint_map, dtype=float), np.ones(joints), np.zeros(joints))
+
+
+def of_units(meaning: Meaning, q: np.ndarray, slides: np.ndarray) -> Iterator[Meaning]:
+    """The meaning, and those with joints (n, k) in another unit that stays within two turns."""
+    yield meaning
+    largest = float(np.abs(q[:, ~slides]).max(initial=0.0))
+    for unit, stated, short, factor, may_be in (
+        ("radians", "degrees", "rad", 180.0 / np.pi, np.rad2deg(largest) <= _MOST_TURNS_RAD),
+        ("degrees", "radians", "deg", np.pi / 180.0, largest > _MOST_TURNS_RAD),
+    ):
+        if may_be and not slides.all():
+            setting = {"joint_unit": short}
+            change = finding("joint_units", unit=unit, stated=stated, short=short, setting=setting)
+            yield meaning.changed(change, unit=np.where(slides, 1.0, factor))
+    for unit, factor in (("metres", 1e3), ("millimetres", 1e-3)) if slides.any() else ():
+        change = finding("joint_units/sliding", unit=unit)
+        yield meaning.changed(change, unit=np.where(slides, factor, 1.0))
+
+
+def of_scale(meaning: Meaning, ratio: float) -> Iterator[Meaning]:
+    """Positions in a unit that brings their spread, now ``ratio`` times the arm's, within reach."""
+    if 1.0 / _WITHIN < ratio < _WITHIN:
+        yield meaning
+    for unit, factor in _SCALES:
+        if 1.0 / _WITHIN < ratio * factor < _WITHIN:
+            yield meaning.changed(of_length(unit), scale=factor)
+
+
+def of_length(unit: str) -> Finding:
+    """The finding that positions are in ``unit``, a thousandth of the stated one where empty."""
+    if unit == "metres":
+        return finding("length_units", unit=unit, short="m", setting={"length_unit": "m"})
+    if not unit:
+        return finding("length_units/small", setting={"length_unit": "mm"})
+    return finding("length_units/other", unit=unit)
+
+
+def of_signs(meaning: Meaning, joints: Iterable[int]) -> Meaning:
+    """The meaning with the joints (0-based) counting the other way."""
+    signs = np.where(np.isin(np.arange(len(meaning.unit)), list(joints)), -1.0, 1.0)
+    changes = [finding("joint_sign", joint=joint + 1) for joint in joints]
+    return replace(meaning, matrix=meaning.matrix * signs, changes=(*meaning.changes, *changes))
+
+
+def coupled(meaning: Meaning, joint: int, other: int, sign: float) -> Meaning:
+    """The meaning with a joint of the file counted from another one (0-based)."""
+    coupling = np.eye(len(meaning.unit))
+    coupling[joint, other] = sign
+    matrix = meaning.matrix @ coupling + 0.0
+    rows = (f"[{', '.join(f'{value:g}' for value in row)}]" for row in matrix)
+    change = finding(
+        "joint_coupling",
+        joint=joint + 1,
+        other=other + 1,
+        sign="plus" if sign > 0 else "minus",
+        map=f"[{', '.join(rows)}]",
+    )
+    return meaning.changed(change, matrix=matrix)
+
+
+def single(meaning: Meaning, slides: np.ndarray) -> Iterator[Meaning]:
+    """Every meaning one change of the joints away: signs, couplings, zeros, order."""
+    joints = range(len(slides))
+    signed = {each.values["joint"] for each in meaning.changes if each.kind == "joint_sign"}
+    yield from (of_signs(meaning, (joint,)) for joint in joints if joint + 1 not in signed)
+    for joint, other in permutations(joints, 2):
+        if not slides[[joint, other]].any():
+            yield from (coupled(meaning, joint, other, sign) for sign in (1.0, -1.0))
+    for joint in joints[1:-1]:  # of the first and last, base and tool take it up
+        for zero_deg in () if slides[joint] else (90.0, -90.0, 180.0):
+            zero = meaning.zero + np.deg2rad(zero_deg) * (np.array(joints) == joint)
+            change = finding("joint_zero", joint=joint + 1, zero_deg=zero_deg)
+            yield meaning.changed(change, zero=zero)
+    for joint, other in combinations(joints, 2):
+        if slides[joint] == slides[other]:
+            order = np.array(joints)
+            order[[joint, other]] = other, joint
+            change = finding("joint_order", joint=joint + 1, other=other + 1)
+            yield meaning.changed(change, matrix=meaning.matrix[:, order])
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Misfit of base and target alone, as a share of the points' spread."""
+
+    cells: Cells
+    robot: Robot
+
+    def __call__(self, meaning: Meaning) -> float:
+        left = np.linalg.norm(self._left(meaning).position_mm, axis=1)
+        points = meaning.seen(self.cells).cells.position_mm
+        return float(np.quantile(left, _MAJORITY)) / max(spread_mm(points), 1e-12)
+
+    def turns(self, meaning: Meaning) -> float:
+        """Scatter of the orientations seen from the flange, placed by the positions alone, rad."""
+        rotation = meaning.seen(self.cells).cells.rotation
+        return orientations.scatter(self._left(meaning).flange, rotation, self.cells.target)
+
+    def ratio(self, meaning: Meaning) -> float:
+        """Spread of the measured points over that of the flange."""
+        seen = meaning.seen(self.cells)
+        flange = dh.forward(self.robot.dh, seen.q).position_mm
+        return spread_mm(seen.cells.position_mm) / max(spread_mm(flange), 1e-12)
+
+    def _left(self, meaning: Meaning) -> robust_fit.Residuals:
+        seen = meaning.seen(self.cells)
+        points = replace(seen.cells, rotation=np.full_like(seen.cells.rotation, np.nan))
+        one = Seen(points, seen.q, np.zeros_like(seen.base), seen.target)
+        return robust_fit.residuals(hand_eye.found(one, self.robot.dh, draws=0, stretches=()), one)
+
+
+def find(
+    cells: Cells, robot: Robot, written: Trial, progress: Progress
+) -> tuple[Meaning, tuple[Finding, ...]]:
+    """The meaning of merged ``cells``, and its changes as findings of all lines.
+
+    ``written`` is the fit of the cells as they stand.
+    """
+    spread = spread_mm(cells.position_mm)
+    here = as_written(robot.joint_map)
+    if len(np.unique(cells.pose)) < _FEWEST or spread == 0.0:
+        return here, ()
+    # One session: each has its own base, and a meaning holds for all of them.
+    part = cells.select(np.flatnonzero(cells.session == np.argmax(np.bincount(cells.session))))
+    misfit = Misfit(part.select(hand_eye.thinned(np.arange(len(part)), _TRIED_ROWS)), robot)
+    least, tried = misfit(here), {}
+    for value, each in _searched(misfit, here, written.sigma_mm < _GOOD * spread, progress):
+        # A meaning that is found again is kept with the fewest changes.
+        numbers = (each.matrix.tobytes(), each.unit.tobytes(), each.zero.tobytes())
+        tried.setdefault((*numbers, each.scale, each.mirrored), (value, each))
+    better = [(value, each) for value, each in tried.values() if value < _PROMISING * least]
+    if not better:
+        return here, ()
+    best = min(value for value, _ in better)
+    close = [pair for pair in better if pair[0] < _AS_GOOD * best]
+    # Of meanings that do equally well, the one that changes least comes first.
+    close.sort(key=lambda pair: (*_simplicity(pair[1]), pair[0]))
+    many = part.select(hand_eye.thinned(np.arange(len(part)), _FITTED_ROWS))
+    fitted = [
+        (_left_mm(many, robot, each), each)
+        for _, each in progress(close[:_FITTED], "likely ways to read the columns fitted")
+    ]
+    smallest = min(value for value, _ in fitted)
+    if smallest >= _BETTER * _left_mm(many, robot, here) or smallest > FAR * spread:
+        return here, ()
+    left, found = next((value, each) for value, each in fitted if value < _AS_GOOD * smallest)
+    own = {change.what for change in found.changes}
+    others = [[change.what for change in e.changes] for v, e in fitted if v < _AS_GOOD * smallest]
+    rivals = [" and ".join(w for w in e if w not in own) for e in others if not own <= set(e)]
+    rivals = list(dict.fromkeys(filter(None, rivals)))[:3]
+    detail = " ({as_written_mm:.3g} mm per axis as written, {found_mm:.3g} mm so{equal})"
+    equal = f"; as well explained by: {', or '.join(rivals)}" if rivals else ""
+    alone = len(found.changes) == 1 and found.changes[0].kind == "joint_coupling" and not rivals
+    more = {"joint_map": found.matrix.tolist()} if alone else {}
+    findings = [
+        change.at(
+            cells.lines(),
+            detail,
+            as_written_mm=written.sigma_mm,
+            found_mm=left * found.scale,
+            equal=equal,
+            **more,
+        )
+        for change in found.changes
+    ]
+    return found, tuple(findings)
+
+
+def find_by_turns(
+    cells: Cells, robot: Robot, here: Meaning, least_rad: float
+) -> tuple[Meaning, Finding] | None:
+    """One change of the joints that brings the orientations together; None where none does.
+
+    A joint near the target turns it without moving it much. ``least_rad`` is what other readings
+    of the orientations leave: a change of the joints is preferred where it does about as well.
+    """
+    largest = np.argmax(np.bincount(cells.session[cells.turned]))
+    rows = np.flatnonzero(cells.turned & (cells.session == largest))
+    misfit = Misfit(cells.select(hand_eye.thinned(rows, _TURNED_ROWS)), robot)
+    limit = _AS_GOOD * max(misfit(here), _SHOWN)
+    rivals = [each for each in single(here, robot.dh.prismatic) if misfit(each) < limit]
+    tried = [(misfit.turns(each), each) for each in rivals]
+    least = min((value for value, _ in tried), default=np.inf)
+    if not least <= min(orientations.BETTER * misfit.turns(here), _AS_GOOD * least_rad):
+        return None
+    # The common changes come first: of those that do about as well, the first.
+    value, found = next(pair for pair in tried if pair[0] < _AS_GOOD * least)
+    told = orientations.told(found.changes[-1], cells, cells.turned, misfit.turns(here), value)
+    return found, told
+
+
+def _simplicity(meaning: Meaning) -> tuple[int, int]:
+    """Few changes before many, common ones before rare ones."""
+    return len(meaning.changes), sum(_COMMON.index(change.kind) for change in meaning.changes)
+
+
+def _searched(
+    misfit: Misfit, here: Meaning, good: bool, progress: Progress
+) -> Iterator[tuple[float, Meaning]]:
+    """Meanings tried with their misfits, ever further from the file as written until one fits.
+
+    Only single changes of the joints where the file as written is ``good``.
+    """
+    slides, tried = misfit.robot.dh.prismatic, []
+    rounds = [single(here, slides)] if good else _rounds(misfit, here, tried)
+    for rivals in rounds:
+        found = [(misfit(each), each) for each in progress(list(rivals), _TRIED)]
+        yield from found
+        tried += found
+        if not good and min((value for value, _ in tried), default=np.inf) < _SURE:
+            return
+
+
+def _rounds(misfit: Misfit, here: Meaning, tried: list) -> Iterator[Iterable[Meaning]]:
+    """Meanings by the number of their changes; ``tried`` has those of the rounds before."""
+    slides = misfit.robot.dh.prismatic
+    units = [
+        scaled
+        for each in of_units(here, misfit.cells.q, slides)
+        for scaled in of_scale(each, misfit.ratio(each))
+    ]
+    left = finding("left_handed")
+    yield units + [each.changed(left, mirrored=True) for each in units]
+    roots = (units or [here])[:3]
+    yield [each for root in roots for each in single(root, slides)]
+    joints = range(len(slides))
+    signs = [some for count in joints[1:] for some in combinations(joints, count + 1)]
+    yield [of_signs(root, some) for root in roots for some in signs]
+    for _ in range(2):
+        front: list[tuple[float, Meaning]] = []
+        for value, each in sorted(tried, key=lambda pair: pair[0]):
+            # Meanings that cannot be told apart count once.
+            apart = all(value > 1.02 * other for other, _ in front)
+            if apart and not each.mirrored and len(front) < _FRONT:
+                front.append((value, each))
+        yield [each for _, root in front for each in single(root, slides)]
+
+
+def _left_mm(cells: Cells, robot: Robot, meaning: Meaning) -> float:
+    """Standard deviation per axis left by the corrected arm, in the file's own lengths."""
+    seen = meaning.seen(cells)
+    seen = Seen(seen.cells, seen.q, np.zeros_like(seen.base), seen.target)
+    return robust_fit.best(seen, hand_eye.found(seen, robot.dh)).sigma_mm / meaning.scale
+
+
+def spread_mm(points: np.ndarray) -> float:
+    """Root of the median squared distance of points (n, 3) from their middle."""
+    centred = points - np.median(points, axis=0)
+    return float(np.sqrt(np.median(np.sum(centred**2, axis=1))))

@@ -1,0 +1,165 @@
+"""How the orientations of a file are meant, by trying, once positions tell where the arm is.
+
+A target is rigidly on the flange: seen from the flange every orientation of it is the same. How far
+they scatter tells the right reading of the numbers from a wrong one, without any fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinacc.checks.cells import Cells, nearest_rotation
+from kinacc.checks.findings import Finding, finding
+from kinacc.measurements.layout import ANGLES, Layout, in_order_of
+from kinacc.measurements.orientation import rotations
+
+CONVENTIONS = tuple(
+    order if intrinsic else order.lower()
+    for intrinsic in (True, False)
+    for order in (
+        *("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"),
+        *("XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ"),
+    )
+)
+BETTER = 0.5  # of the scatter as written
+_LARGEST_RAD = 0.35  # scatter of a right reading, the arm being off by what it may be
+_MAJORITY = 0.7
+_ROWS = 300
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A way to read orientations: ``read`` turns raw numbers (n, 3 or 4) into (n, 3, 3)."""
+
+    change: Finding | None
+    read: Callable[[np.ndarray], np.ndarray]
+
+
+def scatter(flange: np.ndarray, rotation: np.ndarray, target: np.ndarray) -> float:
+    """Angle within which most orientations agree, seen from the flange, each target by itself.
+
+    ``flange`` and ``rotation`` (n, 3, 3) in the instrument's frame, none of them missing.
+    """
+    turns = np.swapaxes(flange, 1, 2) @ rotation
+    angles = [_angles(turns[target == each]) for each in np.unique(target)]
+    return float(np.quantile(np.concatenate(angles), _MAJORITY))
+
+
+def find(
+    raw: np.ndarray, layout: Layout, flange: np.ndarray, target: np.ndarray
+) -> tuple[Turn, float, float]:
+    """The best way to read the raw orientations (n, 3 or 4), and its scatter and that as written.
+
+    As written unless another way scatters less than half, and little.
+    """
+    written = Turn(None, lambda raw: rotations(raw, layout))
+    step = max(len(raw) // _ROWS, 1)
+    raw, flange, target = raw[::step], flange[::step], target[::step]
+    here = scatter(flange, written.read(raw), target)
+    for ways in (simple(layout, raw), combined(layout)):
+        tried = [(scatter(flange, way.read(raw), target), way) for way in ways]
+        least = min(value for value, _ in tried)
+        if least < BETTER * here and least < _LARGEST_RAD:
+            return next((w, value, here) for value, w in tried if value < 1.5 * least)
+    return written, here, here
+
+
+def told(change: Finding, cells: Cells, there: np.ndarray, before: float, least: float) -> Finding:
+    """The finding of a change that brings orientations (mask ``there``) together; scatters, rad."""
+    detail = " (seen from the flange they scatter by {as_written_deg:.3g} deg as written, by "
+    detail += "{found_deg:.3g} deg so)"
+    degrees = {"as_written_deg": float(np.rad2deg(before)), "found_deg": float(np.rad2deg(least))}
+    return change.at(cells.lines(there), detail, **degrees)
+
+
+def simple(layout: Layout, raw: np.ndarray) -> Iterator[Turn]:
+    """Ways one change away from what is stated, likely ones first."""
+    yield from _backwards(Turn(None, lambda raw: rotations(raw, layout)))
+    largest = np.nanmax(np.abs(raw), initial=0.0)
+    for unit, stated, short, factor, may_be in (
+        ("radians", "degrees", "rad", 180.0 / np.pi, np.rad2deg(largest) <= 4.0 * np.pi),
+        ("degrees", "radians", "deg", np.pi / 180.0, largest > 2.0 * np.pi),
+    ):
+        if may_be and layout.orientation != "quaternion":
+            setting = {"orientation": {"unit": short}}
+            change = finding("angle_units", unit=unit, stated=stated, short=short, setting=setting)
+            yield Turn(change, lambda raw, factor=factor: rotations(raw * factor, layout))
+    yield from _readings(layout)
+
+
+def combined(layout: Layout) -> Iterator[Turn]:
+    """Other conventions, read the wrong way round or in left-handed coordinates."""
+    for turn in _readings(layout):
+        yield from _backwards(turn)
+
+
+def _backwards(turn: Turn) -> Iterator[Turn]:
+    def joined(change: Finding) -> Finding:
+        before = turn.change
+        if before is None:
+            return change
+        what, fix = f"{before.what}, and {change.what}", f"{before.fix}; {change.fix}"
+        return replace(before, what=what, fix=fix, values={})
+
+    change = finding("transposed_rotation")
+    yield Turn(joined(change), lambda raw: np.swapaxes(turn.read(raw), 1, 2))
+    for axis, name in enumerate("xyz"):
+        mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
+        change = finding("left_handed/turns", axis=name)
+        both = np.outer(mirror, mirror)
+        yield Turn(joined(change), lambda raw, both=both: turn.read(raw) * both)
+
+
+def _readings(layout: Layout) -> Iterator[Turn]:
+    if layout.orientation == "quaternion":
+        for columns, order in (([3, 0, 1, 2], "xyzw"), ([1, 2, 3, 0], "wxyz")):
+            setting = {"orientation": {"order": order}}
+            change = finding("euler_convention/quaternion", order=order, setting=setting)
+            yield Turn(change, lambda raw, columns=columns: rotations(raw[:, columns], layout))
+        return
+    euler = layout.orientation == "euler"
+    names = in_order_of(layout.convention) if euler else ANGLES
+    if euler and len(set(layout.convention.lower())) == 3:
+        # Angles about x, y, z as named, taken in another sequence.
+        for convention in CONVENTIONS[:6]:
+            if convention not in (layout.convention, layout.convention[::-1].upper()):
+                order = [names.index(name) for name in in_order_of(convention)]
+                yield _euler(layout, convention, order, f" (or {convention[::-1].lower()})")
+    for convention in CONVENTIONS:
+        if not (euler and convention == layout.convention):
+            yield _euler(layout, convention, [0, 1, 2], " in the columns' order")
+    if euler:
+        order = [names.index(name) for name in ANGLES]
+        vector = replace(layout, orientation="rotation_vector")
+        setting = {"orientation": {"kind": "rotation_vector"}}
+        change = finding("euler_convention/vector", setting=setting)
+        yield Turn(change, lambda raw: rotations(raw[:, order], vector))
+
+
+def _euler(layout: Layout, convention: str, order: list[int], words: str) -> Turn:
+    """Euler angles of a convention, of which ``order`` are the raw columns."""
+    euler = layout.orientation == "euler"
+    here = in_order_of(layout.convention) if euler else ANGLES
+    columns = [here[number] for number in order]
+    setting: dict[str, object] = {"orientation": {"kind": "euler", "convention": convention}}
+    setting |= {} if columns == list(in_order_of(convention)) else {"e": columns}
+    stated = f"of convention {layout.convention}" if euler else "rotation vectors"
+    change = finding(
+        "euler_convention", convention=convention, order=words, stated=stated, setting=setting
+    )
+    other = replace(layout, orientation="euler", convention=convention)
+    return Turn(change, lambda raw: rotations(raw[:, order], other))
+
+
+def _angles(turns: np.ndarray) -> np.ndarray:
+    """Angles (n,) of rotations (n, 3, 3) to their robust mean."""
+    rows = np.arange(len(turns))
+    for _ in range(5):
+        mean = nearest_rotation(turns[rows].sum(axis=0))
+        cosine = 0.5 * (np.einsum("nij,ij->n", turns, mean) - 1.0)
+        angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+        rows = np.argsort(angle)[: max(int(_MAJORITY * len(angle)), 1)]
+    return angle
