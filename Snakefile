@@ -94,5 +94,6 @@ onstart:
 
 onsuccess:
     if workflow.is_main_process:
-        for line in running.answers(RESULTS, data.told):
-            logger.info(line)
+        from kinacc.report.terminal import print_summaries
+
+        print_summaries(running.calibrated(RESULTS, data.told))

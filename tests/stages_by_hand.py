@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 from kinacc.calibration import error_model, excluded_rows, residual_tables
 from kinacc.checks import check
-from kinacc.deployment import summary
 from kinacc.errors import KinaccError
+from kinacc.report import summary
 from kinacc.study import evaluation, histories, monte_carlo
 from kinacc.study.claims.evaluate import table_of
 from kinacc.synthetic import source

@@ -91,7 +91,7 @@ def test_an_option_that_is_none_is_told_the_nearest():
 
 
 @pytest.mark.parametrize(
-    "words", [("predict", "nowhere"), ("fitted", "nowhere"), ("nonsense",), ("init", "--robto")]
+    "words", [("predict", "nowhere"), ("summary", "nowhere"), ("nonsense",), ("init", "--robto")]
 )
 def test_what_is_wrong_is_said_as_json_where_the_answer_is_wanted_so(words):
     done = call(*words, "--json")

@@ -7,6 +7,7 @@ COMMANDS = {
     "tournament": f"{_RESEARCH} tournament",
     "draw-robots": f"{_RESEARCH} arms",
     "run": "now Snakemake's own: snakemake -c1 --until fit_dh, or -R fit_dh for a stage anew",
+    "fitted": "now kinacc summary RESULTS (--verbose in place of --all)",
     "gate": "now kinacc check-results RESULTS --config FILE --against FOLDER",
     "accept": 'now kinacc check-results RESULTS --accept FOLDER --reason ".."',
 }

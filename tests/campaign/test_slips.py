@@ -15,7 +15,7 @@ from command_line import call, small_study
 from kinacc.calibration import noise
 from kinacc.calibration.observations import full_poses
 from kinacc.campaign import folder as folders
-from kinacc.campaign import of_calibration, slips
+from kinacc.campaign import slips
 from kinacc.campaign.instrument import instruments
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot
@@ -231,7 +231,7 @@ def test_a_campaign_without_noise_is_told_what_its_calibration_knows_of_it(start
 
 
 def test_a_campaign_is_no_results_folder_and_the_command_for_it_is_named(visited):
-    done = call("fitted", visited[0])
+    done = call("summary", visited[0])
     assert done.exit_code == 2
     assert "kinacc campaign status" in done.output
 
@@ -253,9 +253,6 @@ def test_what_a_campaign_was_begun_against_stands_beside_every_bound(start, tmp_
     assert report.index("begun against") < report.index("## What was measured")
     told = json.loads(call("campaign", "status", folder, "--json").stdout)["begun_against"]
     assert [f"begun against: {each}" for each in told] == said
-    assessed = of_calibration.Assessed(folder, folders.open_(folder).state(), None)
-    assert set(said) <= set(assessed.in_words())  # the half page of kinacc fitted
-    assert assessed.as_facts()["begun_against"] == told
 
 
 def test_a_campaign_begun_against_nothing_is_written_and_opens_as_before(visited, tmp_path):

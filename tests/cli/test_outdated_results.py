@@ -46,7 +46,7 @@ def commands(cell):
         "predict": ("predict", "results/seen", "--joints-deg", JOINTS, "--json"),
         "compensate": ("compensate", "results/seen", "--pose", "500,-400,600,0,1,0,0", "--json"),
         "export": ("export", "results/seen", "--out", "out", "--force", "--json"),
-        "fitted": ("fitted", "results/seen", "--json"),
+        "summary": ("summary", "results/seen", "--json"),
         "report": ("report", "results/seen"),
     }
 
@@ -57,11 +57,12 @@ def said(cell, name):
     assert done.exit_code in (0, 1), done.output  # 1: a row without joints
     lines = [line for line in done.stderr.splitlines() if "outdated" in line]
     if "--json" in words:
-        assert ("outdated" in json.loads(done.stdout)) == bool(lines)
+        answer = json.loads(done.stdout)
+        assert bool(answer.get("seen", answer).get("outdated")) == bool(lines)
     return lines
 
 
-NAMES = ("predict", "compensate", "export", "fitted", "report")
+NAMES = ("predict", "compensate", "export", "summary", "report")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -81,16 +82,16 @@ def test_a_changed_setting_or_robot_file_is_named_and_a_comment_is_not(cell):
     path = cell / "seen.yaml"
     text = path.read_text()
     path.write_text(f"# looked at again\n{text}")
-    assert said(cell, "fitted") == []
+    assert said(cell, "summary") == []
     path.write_text(
         text.replace("folds: 5", "folds: 4") if "folds: 5" in text else text + "seed: 3\n"
     )
-    (line,) = said(cell, "fitted")
+    (line,) = said(cell, "summary")
     assert "seen.yaml" in line
     path.write_text(text)
     robot = cell / "seen.robot.yaml"
     robot.write_text(f"{robot.read_text()}# another\n")
-    (line,) = said(cell, "fitted")
+    (line,) = said(cell, "summary")
     assert "seen.robot.yaml" in line
 
 

@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from stages_by_hand import run_stage
 from tracked_arm import call, table, tracked, written
@@ -69,37 +68,18 @@ def test_a_suspicion_names_the_pose_and_the_file_of_its_line(two_files):
     assert NAMES[WRONG] in found["where"]
 
 
-def test_the_half_page_names_rows_as_the_file_does(results):
-    page = call("fitted", results).output
-    assert " ".join(page.split()).count(f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv") == 1
-    assert f"line {AWAY + 2} ({NAMES[AWAY]}) of tracker.csv, " in page
-    worst = call("fitted", results, "--all").output.split("worst rows")[1]
-    assert f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv, tool: " in worst
+def test_the_summary_names_rows_as_the_file_does(results):
+    found = json.loads(call("summary", results, "--json").stdout)["m"]
+    assert found["excluded"][0]["where"] == f"line {AWAY + 2} ({NAMES[AWAY]}) of tracker.csv"
+    places = [each["text"] + each["lines"] for each in found["findings"]]
+    assert any(f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv" in each for each in places)
 
 
-def test_nothing_is_left_out_without_a_word_on_the_half_page(results):
-    page = call("fitted", results).output
-    data = " ".join(page.split("check  ")[0].split())
-    assert f"1 row holds no reading: line {EMPTY + 2} ({NAMES[EMPTY]}) of tracker.csv" in data
+def test_nothing_is_left_out_without_a_word(results):
     table = store.read(results / "summary.parquet")
     told = [str(text) for text in table["text"][table["topic"] == "left_out"]]
     assert any(NAMES[EMPTY] in text for text in told)
-    assert json.loads(call("fitted", results, "--json").stdout)["left_out"] == told
-
-
-def test_many_remarks_of_the_reader_are_counted_and_all_told_on_request(results):
-    found = dict(store.read(results / "data_check.parquet"))
-    more = 7
-    found = {name: np.concatenate([v, np.repeat(v[-1:], more)]) for name, v in found.items()}
-    found["finding"][-more:], found["level"][-more:] = "left_out", "note"
-    found["what"][-more:] = [f"remark {i}" for i in range(more)]
-    from kinacc.calibration.summary_words import half_page
-    from kinacc.report.answer import facts_of, read
-
-    facts = facts_of({**read(results), "data_check": found})
-    assert sum("remark" in line for line in half_page(facts, "kinacc fitted m --all")) <= 3
-    assert "more: kinacc fitted m --all" in "\n".join(half_page(facts, "kinacc fitted m --all"))
-    assert sum("remark" in line for line in half_page(facts, "", whole=True)) == more
+    assert json.loads(call("summary", results, "--json").stdout)["m"]["left_out"] == told
 
 
 def test_the_rows_of_a_workbook_are_called_rows_in_every_answer(tmp_path):
@@ -124,9 +104,6 @@ def test_the_rows_of_a_workbook_are_called_rows_in_every_answer(tmp_path):
     for stage in _STAGES:
         done = run_stage(stage, *_options((tmp_path / "m.yaml", quick)), "--results", tmp_path)
         assert done.exit_code == 0, done.output
-    whole = call("fitted", tmp_path / "m", "--all").output
-    before, worst = whole.split("worst rows")
-    assert f"row {COUNT + 3}: statistics of the rows" in before
-    assert f"row {WRONG + 3}, " in worst
-    assert "row 35, " in before
-    assert "line" not in whole
+    whole = call("summary", tmp_path / "m", "--verbose").output
+    for row in (COUNT + 3, WRONG + 3, 35):
+        assert f"row {row}" in whole

@@ -29,8 +29,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "calibrate": ("calibrate", "--help"),
     "study": ("study", "--help"),
     "add": ("add", "--help"),
-    "fitted": ("fitted", FIT),
-    "summary": ("summary", "results"),
+    "summary": ("summary", FIT),
+    "summary of many": ("summary", "results"),
     "show folder": ("show", FIT),
     "show": ("show", FIT, "residuals"),
     "show --describe": ("show", FIT, "residuals", "--describe"),
@@ -48,7 +48,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "a word that is no command": ("fit", "arm.yaml"),
     "a command that is gone": ("gate", "results"),
     "a file that is not there": ("check-data", "absent.yaml"),
-    "a folder without results": ("fitted", "nowhere"),
+    "a folder without results": ("summary", "nowhere"),
     "a wrong key": ("check-data", "wrong.yaml"),
 }  # fmt: skip
 

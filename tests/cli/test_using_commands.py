@@ -12,7 +12,7 @@ from command_line import call, small_study
 
 from kinacc.kinematics import robot
 
-HELP = ("predict", "compensate", "export", "verify", "compare", "plan-poses", "fitted")
+HELP = ("predict", "compensate", "export", "verify", "compare", "plan-poses", "summary")
 
 
 @pytest.fixture(scope="module")
@@ -28,31 +28,6 @@ def test_help_has_an_example(name):
     assert "Example:" in shown.output
     assert f"kinacc {name} " in shown.output
     assert "--json" in shown.output
-
-
-def test_fitted_says_what_the_fits_are_worth(folder, tmp_path):
-    shown = call("fitted", folder)
-    assert shown.exit_code == 0, shown.output
-    assert "d of joint 2 and d of joint 3 appear only as their difference" in shown.output
-    answer = json.loads(call("fitted", folder, "--json").output)
-    table = pq.read_table(folder / "residuals.parquet").to_pydict()
-    for model, of in answer["position_error_mm"].items():
-        rows = [
-            i
-            for i, name in enumerate(table["comparison"])
-            if name == f"{model}_vs_measured"
-            and table["quantity"][i] == "position"
-            and table["fold"][i] is None
-        ]
-        got = {table["subset"][i]: table["rms"][i] for i in rows}
-        assert {subset: figures["rms"] for subset, figures in of.items()} == got
-    assert answer["selected"] in ("dh", "vec")
-    assert answer["vec_order"] == 1
-    assert "j2.d_mm" in answer["parameters"]["undetermined"]
-    assert len(answer["worst_rows"]) == 5
-    missing = call("fitted", tmp_path)
-    assert missing.exit_code == 2
-    assert missing.output.count("no such file") == 6
 
 
 def test_predict_and_compensate_undo_each_other(folder, tmp_path):
@@ -152,7 +127,8 @@ def test_export_writes_every_form(folder, tmp_path):
     assert files == ["mh180.yaml", "mh180.json", "mh180.csv", "mh180.urdf", "mh180_tables.md",
                      "mh180_tables.tex"]  # fmt: skip
     left_open = json.loads((tmp_path / "mh180.json").read_text())["undetermined"]
-    assert left_open == json.loads(call("fitted", folder, "--json").output)["undetermined"]
+    (known,) = json.loads(call("summary", folder, "--json").output).values()
+    assert sorted(left_open) == sorted(known["unidentifiable"] + known["poorly_determined"])
     assert f"Left open by the poses: {left_open[0]}" in (tmp_path / "mh180_tables.md").read_text()
     compared = call("compare", tmp_path / "mh180.yaml", folder, "--robot", "mh180", "--json")
     assert compared.exit_code == 0, compared.output

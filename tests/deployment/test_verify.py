@@ -11,7 +11,7 @@ from command_line import call, small_study
 from small_arms import BASE, TOOL, WEIGHT, joints, results, truth
 
 from kinacc.calibration.observations import full_poses
-from kinacc.calibration.summary import of_errors
+from kinacc.calibration.summary import error_statistics
 from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
 from kinacc.deployment.handful import HeldOut, Places, held_to
 from kinacc.deployment.predict import predict
@@ -215,11 +215,12 @@ def test_the_held_out_error_is_that_which_fitted_states(folder, later):
     _, found = folder
     said = json.loads(asked(found, later(1.0, 12), "--json"))
     tables = {"pose_errors": store.read(found / "pose_errors.parquet")}
-    stated = {
-        fact.statistic: fact.value
-        for fact in of_errors(tables["pose_errors"])
-        if fact.topic == "held_out_error" and fact.item == said["selected"]
-    }
+    known = error_statistics(tables["pose_errors"])
+    (stated,) = known[
+        (known["comparison"] == f"{said['selected']}_vs_measured")
+        & (known["estimate"] == "cross_validated")
+        & (known["quantity"] == "position")
+    ].to_dict("records")
     for name in ("mean", "quantile_99"):
         assert said["held_out"][f"{name}_mm"] == pytest.approx(stated[name], rel=1e-12)
     assert said["held_out"]["readings"] == stated["n"]

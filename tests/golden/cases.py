@@ -29,7 +29,7 @@ from kinacc.calibration import (  # noqa: E402
 )
 from kinacc.campaign import folder as campaigns  # noqa: E402
 from kinacc.cli.group import main  # noqa: E402
-from kinacc.deployment import summary  # noqa: E402
+from kinacc.report import summary  # noqa: E402
 from kinacc.study import (  # noqa: E402
     evaluation,
     histories,

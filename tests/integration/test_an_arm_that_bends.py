@@ -20,6 +20,7 @@ from oracles.compliant_arm import Arm, Body, Described
 from scipy.stats import chi2
 from stages_by_hand import perform, run_stage
 
+from kinacc.report.summary import summarise
 from kinacc.tables.store import read
 
 POSES = 60
@@ -236,7 +237,7 @@ def test_one_payload_for_all_rows_is_carried_by_the_lever_and_fitted_fits_say_so
     assert spread < chi2.ppf(0.999, 2)
     for name in ("compliance_rad_per_nm", "std_compliance_rad_per_nm", "link_mass_kg"):
         assert np.isnan(found[name]).all(), name
-    said = call("fitted", done)
+    said = call("summary", done)
     assert said.exit_code == 0, said.output
     told = " ".join(said.output.split())
     for word in ("product", "compliance", "payload"):
@@ -341,11 +342,9 @@ def test_an_arm_that_bends_is_told_from_held_out_poses(finished):
 
 
 def test_the_answer_on_the_fits_shows_the_model_beside_the_others(finished):
-    told = call("fitted", finished[1], "--json")
-    assert told.exit_code == 0, told.output
-    answer = yaml.safe_load(told.output)
-    assert answer["selected"] == "compliance"
-    held_out = {name: of["validation"]["rms"] for name, of in answer["position_error_mm"].items()}
+    known = summarise(finished[1])
+    assert known.selected == "compliance"
+    held_out = {name: each.mean for name, each in known.position_errors().items()}
     assert set(held_out) == {"nominal", "dh", "compliance", "vec"}
     assert held_out["compliance"] == min(held_out.values())
 

@@ -14,6 +14,7 @@ from stages_by_hand import run_stage
 from kinacc.calibration.misfit import misfit
 from kinacc.geometry import exp_so3
 from kinacc.kinematics import dh, robot
+from kinacc.report.summary import summarise
 from kinacc.tables import store
 
 NOISE_MM = np.array([0.02, 0.03, 0.04])  # along the instrument's axes
@@ -85,7 +86,7 @@ def checked(config):
 
 
 def worth(folder):
-    return told("fitted", folder)["standard_deviations"]["dh"]
+    return summarise(folder)
 
 
 def test_check_calibration_page_and_campaign_print_one_noise_of_a_file(eccentric, tmp_path):
@@ -96,13 +97,12 @@ def test_check_calibration_page_and_campaign_print_one_noise_of_a_file(eccentric
     assert found["configurations"] == AGAIN
     off = np.array(found["std_mm"]) / NOISE_MM - 1.0
     assert np.all(np.abs(off) < 4.0 / np.sqrt(2.0 * freedom))
-    assert worth(results)["noise_per_axis_mm"] == pytest.approx(found["per_axis_mm"], rel=1e-9)
+    assert worth(results).noise_mm == pytest.approx(found["per_axis_mm"], rel=1e-9)
     shown = [f"{each:.2g}" for each in found["std_mm"]]
     page = tmp_path / "page.html"
     printed("report", results, "--out", page)
     begun = call("campaign", "start", tmp_path / "c", "--calibration", results, "--budget", 300)
     texts = {
-        "fitted": (printed("fitted", results), r"scatter by ([\d.,]+) mm"),
         "campaign": (begun.output, r"scatter by ([\d.,]+) mm"),
         "report": (page.read_text("utf-8"), r"deviation x ([\d.]+), y ([\d.]+), z ([\d.]+) mm"),
     }
@@ -136,17 +136,15 @@ def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric
     found, errors = worth(results), store.read(results / "pose_errors.parquet")
     rows = (errors["comparison"] == "dh_vs_measured") & (errors["estimate"] == "cross_validated")
     error_mm = np.sqrt(np.mean([errors[f"e{axis}_mm"][rows] ** 2 for axis in "xyz"]))
-    assert found["valid"] == "given the model"
-    assert found["held_out_rms_per_axis_mm"] == pytest.approx(error_mm, rel=1e-6)
-    ratio = found["held_out_over_noise"]
-    assert ratio == pytest.approx(error_mm / found["noise_per_axis_mm"], rel=1e-9)
+    ratio = found.held_out_over_noise["dh"]
+    assert ratio == pytest.approx(error_mm / found.noise_mm, rel=1e-6)
     assert ratio > 3.0
     printed("export", results, "--out", tmp_path, "--format", "json", "--format", "csv",
             "--format", "markdown", "--format", "latex")  # fmt: skip
     page, compared = tmp_path / "page.html", tmp_path / "compared.html"
     printed("report", results, "--out", page)
     marked = [
-        printed("fitted", results),
+        printed("summary", results),
         *(printed("show", results, table) for table in ("dh_model", "dh_identified")),
         *(next(tmp_path.glob(each)).read_text("utf-8") for each in ("*.csv", "*.md", "*.tex")),
         page.read_text("utf-8"),
@@ -162,12 +160,12 @@ def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric
         json.loads(next(tmp_path.glob("*.json")).read_text())["standard_deviations"],
         *told("compare", results, results)["standard_deviations"],
     ):
-        assert each == found
+        assert each["held_out_over_noise"] == pytest.approx(ratio)
 
 
 def test_an_arm_that_the_model_fits_has_errors_of_the_size_of_the_noise(tmp_path):
     _, results = calibrated(tmp_path, 0.0)
-    assert worth(results)["held_out_over_noise"] == pytest.approx(1.0, abs=0.25)
+    assert worth(results).held_out_over_noise["dh"] == pytest.approx(1.0, abs=0.25)
 
 
 def test_deviations_without_repeated_readings_say_that_the_noise_is_unknown(eccentric, tmp_path):

@@ -357,9 +357,9 @@ def test_pages_of_campaigns_and_comparisons_do_what_they_say_as_well(chromium, t
 
 def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp_path):
     import numpy as np
+    from kinacc.report.answer import read
 
     from kinacc.report import results_page
-    from kinacc.report.answer import read
     from kinacc.report.page import html
 
     tables = dict(read(folder))

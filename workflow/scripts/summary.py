@@ -1,6 +1,6 @@
 """Sum up what the calibration is worth."""
 
-from kinacc.deployment import summary
+from kinacc.report import summary
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:

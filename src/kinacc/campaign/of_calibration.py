@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
-from kinacc.campaign import consistency, folder, instrument, words
+from kinacc.campaign import folder
 from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.campaign.state import State
-from kinacc.config.error_models import model_name
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
@@ -42,38 +41,6 @@ class Assessed:
         """What goes on with the campaign, or ends it."""
         going = self.state.asked is not None
         return shlex.join(["kinacc", "campaign", "next" if going else "report", str(self.place)])
-
-    def in_words(self) -> list[str]:
-        """The bound, what it is about, and from what."""
-        plan, state = self.state.plan, self.state
-        noise = ", ".join(f"{each.name} {instrument.noise(each)}" for each in plan.instruments)
-        budget = plan.assessor.measurements
-        about, points = plan.about, len(plan.points) - len(state.left_out)
-        return [
-            words.statement(self.said, state) if self.said else "Nothing can be said yet.",
-            *consistency.contradicted(state),
-            *words.begun_against(plan),
-            f"campaign {self.place}: {about['point']} by the {model_name(about['model'])} model, "
-            f"{points} candidates ({about['candidates']}), "
-            f"noise {noise}, {state.taken} of {budget} readings",
-        ]
-
-    def as_facts(self) -> dict[str, object]:
-        """The same for a machine; None where nothing is said."""
-        plan, said = self.state.plan, self.said or Statement(CANDIDATES)
-        numbers = {"lower_mm": said.lower_mm, "upper_mm": said.upper_mm}
-        numbers |= {"confidence": said.confidence, "excepted": said.excepted}
-        return {
-            "campaign": str(self.place),
-            "model": plan.about["model"],
-            "target": said.target,
-            **{name: None if value != value else value for name, value in numbers.items()},
-            "candidates": len(plan.points) - len(self.state.left_out),
-            "readings": self.state.taken,
-            "noise": {each.name: instrument.noise(each) for each in plan.instruments},
-            "noise_contradicted": consistency.contradicted(self.state),
-            "begun_against": list(plan.overruled),
-        }
 
 
 @dataclass(frozen=True)

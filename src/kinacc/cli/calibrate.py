@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,39 +47,25 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc calibrate robots
       kinacc calibrate tracker.yaml -- --dry-run
     """
-    from kinacc.cli.fitted import summary
     from kinacc.cli.report import written
-    from kinacc.report.answer import answer, read
-    from kinacc.report.fleet import FEW
+    from kinacc.cli.summary import as_plain
+    from kinacc.report.summary import summarise_all
+    from kinacc.report.terminal import FEW, print_summaries
     from kinacc.workflow.data_sets import RESULTS
 
     configs, data = carried_out("calibration", words, cores, default=None)
     if data is None:
         return
-    folders = {name: f"{RESULTS}/{name}" for name in data.told}
+    folders = [Path(RESULTS, name) for name in data.told]
     if as_json:
-        answers = {name: summary(folder) for name, folder in folders.items()}
-        click.echo(json.dumps(answers, indent=2))
+        found = summarise_all(folders)
+        click.echo(json.dumps(as_plain(found), indent=2))
         return
-    if len(folders) > FEW:
-        show_many([*folders.values()])
-        return
-    more = shlex.join(["kinacc", "study", *configs])
-    for folder in folders.values():
-        written(folder, without=STUDIED)
-        tables = {name: table for name, table in read(folder).items() if name not in STUDIED}
-        click.echo("\n".join(["", *answer(folder, tables, following=[more])]))
-
-
-def show_many(folders: Sequence[str], more: Sequence[str] = ()) -> None:
-    """The table of many data sets, for half pages of all of them would not be read."""
-    from kinacc.cli.summary import show
-    from kinacc.report.fleet import standings
-
-    found = standings([Path(folder) for folder in folders])
-    one = shlex.quote(folders[0])
-    words = f"kinacc fitted {one} says half a page on one, kinacc report {one} writes its page"
-    show(found, [None] * len(found), "", ["", words, *more])
+    pages = [written(str(each), without=STUDIED) for each in folders if len(folders) <= FEW]
+    print_summaries(folders, without=STUDIED)
+    if pages:
+        click.echo(f"Page: {', '.join(map(str, pages))}")
+    click.echo(f"Accuracy map, study and claims: {shlex.join(['kinacc', 'study', *configs])}")
 
 
 def carried_out(

@@ -12,7 +12,6 @@ import numpy as np
 
 from kinacc import __version__
 from kinacc.assess.conformity import decide
-from kinacc.calibration import summary
 from kinacc.campaign import folder as folders
 from kinacc.campaign import words
 from kinacc.campaign.folder import open_
@@ -112,7 +111,9 @@ def _tolerance_mm(given: float | None, results: Path) -> tuple[float | None, lis
     path = results / "summary.parquet"
     if given is not None or not path.is_file():
         return given, []
-    stated = summary.tolerance(summary.facts_in(store.read(path)))
+    from kinacc.report.summary import tolerance_of
+
+    stated = tolerance_of({"summary": store.read(path)})
     if stated is None or stated.of != "bound":
         return None, []
     words = f"tolerance {stated.mm:g} mm: that of the configuration of {results}"

@@ -56,7 +56,7 @@ _MEANT = {
     "remove": "strike",
     "noise": "repeatability",
     "reproduce": "study",
-    "results": "fitted",
+    "results": "summary",
     "cat": "show",
     "head": "show",
     "list": "show",
@@ -241,8 +241,7 @@ SECTIONS = {
         "check-results": "hold a results folder to its contract",
     },
     "A calibrated arm": {
-        "fitted": "what the fits are worth, and what the poses leave open",
-        "summary": "what many calibrations are worth, a row each",
+        "summary": "what a calibration is worth, or a table of many",
         "report": "one page of it all, to read, mail and keep",
         "predict": "joints to the pose of the tool, with uncertainty",
         "compensate": "poses to the joints that put the tool there",

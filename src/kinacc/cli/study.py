@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import shlex
+from pathlib import Path
 
 import click
 
-from kinacc.cli.calibrate import CORES, JSON, TARGETS, WORDS, carried_out, show_many
+from kinacc.cli.calibrate import CORES, JSON, TARGETS, WORDS, carried_out
 
 
 @click.command("study", context_settings=WORDS)
@@ -26,8 +27,7 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study tracker.yaml
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
-    from kinacc.report.answer import answer, read
-    from kinacc.report.fleet import FEW
+    from kinacc.report.terminal import print_summaries
     from kinacc.workflow.data_sets import RESULTS
     from kinacc.workflow.start import SNAKEFILE
 
@@ -35,15 +35,11 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     configs, data = carried_out("all", words, cores, default=paper)
     if data is None:
         return
+    folders = [Path(RESULTS, name) for name in data.told]
     if as_json:
-        click.echo(json.dumps({"results": [f"{RESULTS}/{name}" for name in data.told]}))
+        click.echo(json.dumps({"results": [str(each) for each in folders]}))
         return
+    print_summaries(folders)
     options = [word for name in configs for word in ("--config", name)]
     check = shlex.join(["kinacc", "check-results", RESULTS, *options])
-    if len(data.told) > FEW:
-        show_many([f"{RESULTS}/{name}" for name in data.told], [check])
-        return
-    for dataset in data.told:
-        folder = f"{RESULTS}/{dataset}"
-        lines = answer(folder, read(folder), following=[check])
-        click.echo("\n".join(["", *lines, f"tables and figures are in {folder}"]))
+    click.echo(f"Tables and figures: {', '.join(map(str, folders))}. Check them: {check}")

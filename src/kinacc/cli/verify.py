@@ -192,7 +192,7 @@ def _next(
     words = ["kinacc", "verify", readings, "--calibration", folder]
     words += [] if dataset is None else ["--dataset", dataset]
     anew = shlex.join([*words, "--base", "moved", "--tool", "moved"])
-    fitted = shlex.join(["kinacc", "fitted", folder])
+    fitted = shlex.join(["kinacc", "summary", folder])
     poses = shlex.join(["kinacc", "show", f"{folder}/measurements", "--columns", "pose,q*"])
     if found.says == PASSES:
         return "the calibration can be used on", fitted

@@ -89,7 +89,7 @@ def session_of(
 
 
 def _held_out_mm(errors: Mapping, model: str) -> np.ndarray:
-    """Position errors (m,) of a model where every one was tried, as ``kinacc fitted`` has them."""
+    """Position errors (m,) of a model where every one was tried, as ``kinacc summary`` has them."""
     held = np.asarray(errors["estimate"]) == "cross_validated"
     kind, row = np.asarray(errors["comparison"])[held], np.asarray(errors["row"])[held]
     tried = [row[kind == each] for each in dict.fromkeys(kind)]

@@ -157,7 +157,7 @@ def _held_out(
 ) -> HeldOut | None:
     """Held-out errors of configurations with as many targets as ``seen``; None where none are.
 
-    At poses where every model was held out, as ``kinacc fitted`` states them. Orientations take
+    At poses where every model was held out, as ``kinacc summary`` states them. Orientations take
     part where they were measured there and are ``seen``, and something is fitted to them.
     """
     if not {"pose_errors", "measurements"} <= set(tables):

@@ -16,7 +16,7 @@ from kinacc.config.values import nearest
 from kinacc.deployment.history_words import sentence
 from kinacc.errors import InputError, first_few
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
-from kinacc.gate.run_tables import SELECTED, RunTables
+from kinacc.gate.run_tables import RunTables
 from kinacc.gate.values import Compared, Figure, change_of, figure
 from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT
 from kinacc.tables.history_tables import FIRST, HOLDS, RECALIBRATE
@@ -170,41 +170,38 @@ def _at_least(now: Figure, found: Compared) -> str:
 def _campaign(
     gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[str, Any], _: object
 ) -> Outcome:
-    from kinacc.campaign import of_calibration
     from kinacc.campaign.folder import open_
-    from kinacc.deployment import folder
-    from kinacc.report.fleet import BOUND, Standing
+    from kinacc.report.summary import BOUND, summarise
 
     place = Path(gate["campaign"])
     open_(place)  # says what is wrong with it
-    known = folder.read_tables(tables.folder, "robot")
-    sought = of_calibration.sought(dataset, known, [place])
-    if sought.assessed is None:
-        says = "; ".join(sought.remarks)
+    summary = summarise(tables.folder, campaigns=[place])
+    known = summary.largest_error
+    if known is None:
         fix = f"begin one on it: kinacc campaign start FOLDER --calibration {tables.folder}"
-        return _outcome(gate, dataset, FAILED, says, fix)
+        return _outcome(gate, dataset, FAILED, "; ".join(summary.remarks), fix)
     allowed = tolerance["mm"] if gate["tolerance_mm"] is None else gate["tolerance_mm"]
-    standing = Standing(tables.folder, model=tables.model(SELECTED), campaigns=sought)
-    judged_as, bound = standing.verdict(BOUND, allowed), standing.bound()
+    judged_as = summary.verdict(BOUND, allowed)
     assert judged_as is not None  # a tolerance is given
-    figures = {"tolerance_mm": allowed, **bound}
-    says = f"campaign {place}: {judged_as.says}, {judged_as.because}"
-    if "bound_mm" in bound:
+    figures = {"tolerance_mm": allowed, "campaign": known.campaign, "readings": known.readings}
+    says = f"campaign {place}: {judged_as.verdict}, {judged_as.reason}"
+    fix = f"kinacc campaign status {place}"
+    if np.isfinite(known.upper_mm):
+        figures |= {name: getattr(known, name) for name in ("lower_mm", "confidence")}
+        figures["bound_mm"] = known.upper_mm
         says += (
-            f"; the largest error is at most {bound['bound_mm']:.3f} mm with "
-            f"{bound['confidence']:.0%} confidence, {allowed:g} mm allowed"
+            f"; the largest error is at most {known.upper_mm:.3f} mm with "
+            f"{known.confidence:.0%} confidence, {allowed:g} mm allowed"
         )
-        if gate["confidence"] is not None and bound["confidence"] < gate["confidence"] - _ROUNDING:
+        if gate["confidence"] is not None and known.confidence < gate["confidence"] - _ROUNDING:
             says = (
-                f"campaign {place} bounds with {bound['confidence']:.0%} confidence, and "
+                f"campaign {place} bounds with {known.confidence:.0%} confidence, and "
                 f"{gate['confidence']:.0%} is asked for"
             )
             fix = "begin a campaign with that confidence, or ask for what this one has"
             return _outcome(gate, dataset, FAILED, says, fix, figures)
-    more = standing.doubts() if "bound_mm" in bound else sought.remarks
-    says = "; ".join([says, *more])
-    fix = f"kinacc campaign status {place}"
-    return _outcome(gate, dataset, _DECIDED[judged_as.says], says, fix, figures)
+    says = "; ".join([says, *summary.remarks, *known.against])
+    return _outcome(gate, dataset, _DECIDED[judged_as.verdict], says, fix, figures)
 
 
 def _claims(gate: Gate, dataset: str, tables: RunTables, *_: object) -> Outcome:

@@ -54,7 +54,7 @@ def errors_of(
 
     ``at``: held_out, every row by a fit that has not seen it; validation, those of them in the
     fold kept for it; training, rows that were fitted. Of rows held out those that every model was
-    tried on, as ``kinacc fitted`` has them. Absent where there are none.
+    tried on, as ``kinacc summary`` has them. Absent where there are none.
     """
     table = tables["pose_errors"]
     estimate, row = np.asarray(table["estimate"]), np.asarray(table["row"])

@@ -125,7 +125,7 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
     """The page of a campaign, by the state and the tables of ``campaign.report.tables``."""
     about, plan = state.plan.about, state.plan
     said = words.distinct(state)
-    lead, told = leading(state, said), answers(state, None)
+    lead, told = leading(state, said), answers(state)
     estimates = (words.of_the_estimate(each, state) for each in said)
     low = [each for each in estimates if each not in " ".join(told)]  # none is in every text
     visited = len({each.reading.point for each in state.told})

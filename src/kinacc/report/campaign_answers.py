@@ -12,14 +12,11 @@ from kinacc.campaign import tolerance, words
 from kinacc.campaign.state import State
 
 
-def answers(state: State, stated: Tolerance | None) -> tuple[str, ...]:
-    """What may be said of the largest error, the most important sentence first.
-
-    ``stated``: the tolerance of the configuration, if it has one.
-    """
+def answers(state: State) -> tuple[str, ...]:
+    """What may be said of the largest error, the most important sentence first."""
     said = words.distinct(state)
     lead, lines = leading(state, said), against(state, said)
-    kept = _kept(state, lead, bool(lines), stated)
+    kept = _kept(state, lead, bool(lines))
     if lines and np.isnan(lead.upper_mm):
         return (*lines, "So no bound is stated.", *kept)
     if lines:
@@ -36,19 +33,13 @@ def answers(state: State, stated: Tolerance | None) -> tuple[str, ...]:
     return (*lines, *kept)
 
 
-def _kept(state: State, lead: Statement, in_doubt: bool, stated: Tolerance | None) -> list[str]:
-    """Whether the campaign's tolerance is kept, and the configuration's where it is of a bound."""
-    limits, own = {}, state.plan.limits.tolerance_mm
-    if own is not None:
-        limits[own] = tolerance.OF_CAMPAIGN
-    if stated is not None and stated.of == tolerance.BOUND:
-        limits[stated.mm] = tolerance.OF_BOTH if stated.mm == own else tolerance.OF_CONFIGURATION
-    return [
-        tolerance.in_words(
-            Tolerance(mm, tolerance.BOUND), whose, tolerance.by_bound(mm, lead, in_doubt)
-        )
-        for mm, whose in limits.items()
-    ]
+def _kept(state: State, lead: Statement, in_doubt: bool) -> list[str]:
+    """Whether the campaign's tolerance is kept."""
+    mm = state.plan.limits.tolerance_mm
+    if mm is None:
+        return []
+    judged = tolerance.by_bound(mm, lead, in_doubt)
+    return [tolerance.in_words(Tolerance(mm, tolerance.BOUND), tolerance.OF_CAMPAIGN, judged)]
 
 
 def leading(state: State, said: Sequence[Statement]) -> Statement:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
-from kinacc.calibration.summary import Fact
 from kinacc.kinematics.robot import Robot
 from kinacc.report import (
     accuracy_map,
@@ -17,8 +16,10 @@ from kinacc.report import (
     robot_history,
     selection,
     study,
+    terminal,
 )
 from kinacc.report.page import FirstScreen, Page, Part, Section
+from kinacc.report.summary import CalibrationSummary
 from kinacc.tables.columns import Columns
 
 # In the order of the page: what a section reads, and how it is made.
@@ -42,7 +43,7 @@ def page(
     first: FirstScreen,
     tables: Mapping[str, Columns],
     robot: Robot,
-    facts: Sequence[Fact],
+    summary: CalibrationSummary,
     campaign: Section | None,
 ) -> Page:
     """The page on the tables of a data set; each section where there is what it reads."""
@@ -50,7 +51,7 @@ def page(
         first,
         (
             *(make(tables, robot) for needed, make in _OF_THE_FIT if needed in tables),
-            selection.section(tables, facts),
+            selection.section(tables, terminal.selection(summary)),
             *([campaign] if campaign else []),
             *(make(tables, robot) for needed, make in _OF_THE_STUDY if needed in tables),
         ),

@@ -42,7 +42,7 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Part:
         "counts": {words: status.count(each) for each, words in _STATUSES.items()},
         "weak": weak,
         "always": [text for text in open_ if not text.endswith(blind_words.WEAK)],
-        "pointing": list(summary.of_pointing(tables["measurements"], robot)) if weak else [],
+        "spread_deg": summary.flange_spread_deg(tables["measurements"], robot) if weak else None,
         "rank": _rank(tables.get("dh_fit")),
         "pairs": pairs.closest(),
         "close": pairs.close,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc import __version__
-from kinacc.calibration.summary_words import counted
+from kinacc.report.terminal import counted
 from kinacc.tables.columns import Columns
 
 if TYPE_CHECKING:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+import numpy as np
+
 from kinacc.kinematics.robot import Robot
 from kinacc.report.page import Part, records
-from kinacc.study.summary import claims_counted
 from kinacc.tables.allowed import VERDICTS
 from kinacc.tables.columns import Columns
 
@@ -54,4 +55,10 @@ def _row(first: object, known: Mapping[str, dict], pattern: str, names: Iterable
 def claims_section(tables: Mapping[str, Columns], robot: Robot) -> Part:
     """The section of a page on every row of ``claims``, those that differ first."""
     claims = tables["claims"]
-    return Part("claims", {"claims": records(claims), "counted": claims_counted(claims)})
+    chose = np.asarray(claims["used_to_choose"], dtype=bool)
+    verdicts = list(claims["verdict"][~chose])
+    counts = ", ".join(f"{verdicts.count(name)} {name}" for name in VERDICTS)
+    counted = f"{len(verdicts)} claims: {counts}"
+    if chose.any():
+        counted += f" ({chose.sum()} that chose a reading are not counted)"
+    return Part("claims", {"claims": records(claims), "counted": counted})

@@ -20,6 +20,7 @@ from kinacc.kinematics.vec import VECModel
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
+from kinacc.report.summary import compliance
 from kinacc.tables.allowed import ERRORS
 from kinacc.tables.columns import Columns
 
@@ -47,7 +48,7 @@ def section(tables: Mapping[str, Columns], robot: Robot) -> Part:
         "deviations": in_words(misfits(tables, robot)),
         "deviations_dh": in_words([misfit(tables, robot, "dh")]),
         "parameters": found,
-        "bending": summary.bending(tables.get("compliance_model")),
+        "bending": list(compliance(tables.get("compliance_model"))),
         "order": curves.model.order,
         "banded": bool(np.isfinite(curves.std).any()),
         "errors": {name: _KINDS[name.partition("_")[0]][1] for name in ERRORS},

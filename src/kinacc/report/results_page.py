@@ -2,89 +2,93 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from kinacc.calibration import summary
-from kinacc.calibration.summary import Fact, Tolerance, of
+from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.campaign import folder as campaigns
-from kinacc.campaign import of_calibration, report, tolerance
-from kinacc.campaign.of_calibration import Assessed, Sought
-from kinacc.deployment.history_words import first_words
+from kinacc.campaign import of_calibration, report
 from kinacc.kinematics import robot
-from kinacc.report import campaign, dataset
-from kinacc.report.answer import Tables, Told, told
-from kinacc.report.campaign_answers import answers
-from kinacc.report.first_screen import Answers, remedies, screen
-from kinacc.report.page import FirstScreen, Page, Section
+from kinacc.report import campaign, dataset, terminal
+from kinacc.report.page import FirstScreen, Page, Table, Text
+from kinacc.report.summary import CalibrationSummary, summarise
 
 
-def first_screen(
-    folder: Path,
-    name: str,
-    tables: Tables,
-    bound: Sought,
-    outdated: Sequence[str],
-    reason: str = "",
-) -> tuple[FirstScreen, Told]:
-    """The first screen of the results in ``folder``, and what else there is to tell of them.
+def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> FirstScreen:
+    """The answer, the errors before and after, and what is open.
 
-    ``outdated`` tables were made from others than are there, and are not among ``tables``.
+    ``left_out``: tables made from others than those now there.
     """
-    found = told(folder, tables, bound, False, f"check_{name}", f"exported_{name}")
-    stated = summary.tolerance(found.facts)
-    said = Answers(
-        claims=found.claims,
-        other=found.other,
-        largest=found.largest,
-        campaign=answers(bound.assessed.state, stated) if bound.assessed else (),
-        following=found.following,
-        outdated=outdated,
-        reason=reason,
-        more=shlex.join(["kinacc", "fitted", str(folder), "--all"]),
-        tolerance=_kept(stated, found.facts, bound),
-        history=first_words(tables["history"]) if "history" in tables else "",
+    position, turned = summary.position_errors(), summary.orientation_errors()
+    units = ["mm", "mrad"] if turned else ["mm"]
+    statistics = ("mean", f"{LARGE_SHARE:.0%}", "largest")
+    heads = ("model", *(f"{name}, {unit}" for unit in units for name in statistics))
+    rows = []
+    for model, errors in position.items():
+        parts = [errors, turned.get(model)] if turned else [errors]
+        sizes = [(part.mean, part.quantile_99, part.largest) if part else () for part in parts]
+        cells = [terminal.size(each) for three in sizes for each in three]
+        rows.append((summary.label(model), *cells, *[""] * (len(heads) - 1 - len(cells))))
+    where = "held-out" if summary.is_held_out else "fitted"
+    count = terminal.counted(summary.best.n, "reading")
+    table = Table(
+        f"Errors at the same {count} ({where}) for every model",
+        heads,
+        tuple(rows),
+        numeric=frozenset(range(1, len(heads))),
+        marked={list(position).index(summary.selected): "selected"},
     )
-    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    to_do = remedies(tables.get("data_check"))
-    return screen(name, arm.name, found.facts, to_do, said), found
+    notes = [(topic, texts) for topic, texts in terminal.notes(summary, None).items()]
+    if left_out:
+        made = f"{', '.join(left_out)}: made from other tables than those here, so not shown"
+        notes.append(("Left out", [made, "kinacc check-results names the command to run."]))
+    steps: list[Text] = []
+    for step in summary.next_steps:
+        steps += [Text(f"{step.purpose}:"), Text(step.command, code=True)]
+    return FirstScreen(
+        summary.name,
+        terminal.about(summary),
+        _badge(summary),
+        answers=tuple(terminal.headline(summary)),
+        tables=(table,),
+        notes=(
+            ("Next", tuple(steps)),
+            *((topic, tuple(Text(each) for each in texts)) for topic, texts in notes),
+        ),
+    )
 
 
-def _kept(stated: Tolerance | None, facts: Sequence[Fact], bound: Sought) -> str:
-    """Whether the tolerance of the configuration is kept; empty where its campaign says so."""
-    if stated is None or (stated.of == tolerance.BOUND and bound.assessed):
-        return ""
-    if stated.of == tolerance.BOUND:
-        judged = tolerance.by_bound(stated.mm, None, False)
-    else:
-        chosen = of(facts, "selection").items()
-        best = next(model for model, known in chosen if known["selected"].value)
-        known = of(facts, "held_out_error").get(best, {})
-        judged = tolerance.by_held_out(stated, {name: each.value for name, each in known.items()})
-    return tolerance.in_words(stated, tolerance.OF_CONFIGURATION, judged)
+def _badge(summary: CalibrationSummary) -> tuple[str, bool]:
+    """The result of the data check in two or three words, and whether it is a warning."""
+    if summary.synthetic:
+        return "SYNTHETIC ARM", False
+    if not summary.checked:
+        return "DATA: not checked", True
+    count = sum(each.is_open for each in summary.findings)
+    return (
+        (f"DATA: {terminal.counted(count, 'problem')}", True)
+        if count
+        else ("DATA: no open problem", False)
+    )
 
 
 def run(inputs: Mapping, settings: Mapping) -> Page:
     """The page on the tables that are there, and on the campaign of their calibration.
 
-    ``settings``: ``dataset``; ``folder`` where the results are not in their usual place, and
-    ``outdated`` tables that are left out because they were made from others.
+    ``settings``: ``dataset``; ``folder`` where the results are not in their usual place,
+    ``outdated`` tables that are left out, and ``reason``, why all results are outdated.
     """
     name = settings["dataset"]
     files = {role: each for role, each in inputs.items() if isinstance(each, Path)}
     tables = {role: each for role, each in inputs.items() if role not in files}
     places = [each.parent for role, each in files.items() if role.startswith("campaign_")]
-    bound = of_calibration.sought(name, tables, places)
     place = Path(settings.get("folder", f"results/{name}"))
+    summary = summarise(place, tables, places, settings.get("reason", ""))
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    outdated = settings.get("outdated", ())
-    reason = settings.get("reason", "")
-    first, found = first_screen(place, name, tables, bound, outdated, reason)
-    section = _campaign(bound.assessed) if bound.assessed else None
-    return dataset.page(first, tables, arm, found.facts, section)
-
-
-def _campaign(assessed: Assessed) -> Section:
-    state, tables = report.tables(campaigns.open_(assessed.place))
-    return campaign.section(state, tables, "campaign")
+    assessed = of_calibration.sought(name, tables, places).assessed
+    section = None
+    if assessed is not None:
+        state, found = report.tables(campaigns.open_(assessed.place))
+        section = campaign.section(state, found, "campaign")
+    first = first_screen(summary, settings.get("outdated", ()))
+    return dataset.page(first, tables, arm, summary, section)

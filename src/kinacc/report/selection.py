@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.calibration import summary_words
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
-from kinacc.calibration.summary import Fact
 from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
@@ -22,8 +20,8 @@ _SHOWN = {
 }
 
 
-def section(tables: Mapping[str, Columns], facts: Sequence[Fact]) -> Part:
-    """The section of a page on ``model_selection`` and ``vec_orders``; ``facts`` of ``summary``."""
+def section(tables: Mapping[str, Columns], why: str) -> Part:
+    """The section of a page on ``model_selection`` and ``vec_orders``; ``why`` one is selected."""
     choice = tables["model_selection"]
     chosen = [each for each in records(tables.get("vec_orders", {})) if each["chosen"] == 1]
     tried = [
@@ -34,7 +32,7 @@ def section(tables: Mapping[str, Columns], facts: Sequence[Fact]) -> Part:
     tried.sort(key=lambda each: each["order"])
     values = {
         "configurations": np.nanmax(np.asarray(choice["configurations"], float), initial=0.0),
-        "why": summary_words.selected(facts),
+        "why": why,
         "standard_errors": STANDARD_ERRORS,
         "plainest": model_name(PLAINEST),
         "models": [_model(each, tables) for each in records(choice)],

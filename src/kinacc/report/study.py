@@ -13,7 +13,6 @@ from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION
-from kinacc.study.summary import are_measured
 from kinacc.tables.columns import Columns
 
 _UM = 1e3
@@ -181,3 +180,11 @@ def _runs(study: Columns, held_to: Truth) -> Picture:
         "study-runs", plot, controls=(Control("Noise", options),), details=details,
         names={"assessor": tuple(labels.values())},
     )  # fmt: skip
+
+
+def are_measured(points: Mapping, measurements: Mapping) -> bool:
+    """Whether every operating point is at joints that were measured."""
+    names = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
+    measured = set(zip(*(np.asarray(measurements[name]).tolist() for name in names), strict=True))
+    wanted = zip(*(np.asarray(points[name]).tolist() for name in names), strict=True)
+    return all(each in measured for each in wanted)

@@ -20,13 +20,14 @@ TOPICS = (
     "range",
     "like_measured",
     "one_way",
-    "undetermined",
+    "unidentifiable",
+    "poorly_determined",
     "bending",
     "tolerance",
 )
 SUMMARY = Artefact(
     "summary",
-    "What the calibration of a data set is worth, one fact a row: what `kinacc fitted` says.",
+    "What the calibration of a data set is worth, one fact a row; `kinacc summary` prints it.",
     (
         text("topic", "what the fact is about; each population of errors is one", TOPICS),
         text("item", "of what: a model, a comparison, a joint, a kind of finding, a line"),

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from kinacc.errors import InputError
-
 _held: list[tuple[TextIO, float]] = []  # until the process ends, however it ends; since when
 
 
@@ -36,20 +34,8 @@ def _locked(results: str) -> TextIO:
     return file
 
 
-def answers(results: str, datasets: Sequence[str]) -> Iterator[str]:
-    """What each data set's calibration is worth, after a run that made its summary."""
-    from kinacc.report.answer import answer, read
-    from kinacc.report.fleet import FEW
-
-    folders = [Path(results, name) for name in datasets]
+def calibrated(results: str, datasets: Sequence[str]) -> list[Path]:
+    """Results folders whose summary this run made."""
+    tables = [Path(results, name, "summary.parquet") for name in datasets]
     began = _held[0][1]
-    tables = [folder / "summary.parquet" for folder in folders]
-    made = [each.parent for each in tables if each.is_file() and each.stat().st_mtime >= began]
-    if len(made) > FEW:
-        yield f"\n{len(made):,} data sets: kinacc summary {results} shows what each is worth"
-        return
-    for folder in made:
-        try:
-            yield from ["", *answer(folder, read(folder))]
-        except InputError as error:
-            yield str(error)
+    return [each.parent for each in tables if each.is_file() and each.stat().st_mtime >= began]

@@ -1,0 +1,229 @@
+"""The summary of one calibration and the table of many, as ``kinacc summary`` gives them."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from command_line import call, small_study
+from stages_by_hand import run_stage
+
+from kinacc.campaign import of_calibration
+from kinacc.campaign.journal import JOURNAL
+from kinacc.report import summary
+from kinacc.report.terminal import size
+from kinacc.tables import store
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Results of a small synthetic study, up to its summary."""
+    base = tmp_path_factory.mktemp("study")
+    folder = small_study(base)
+    done = run_stage("summary", "--config", base / "small.yaml", "--results", folder.parent)
+    assert done.exit_code == 0, done.output
+    return folder
+
+
+@pytest.fixture
+def fleet(study, tmp_path, monkeypatch):
+    """Results of two robots, line_a and line_b, in the current folder."""
+    for name in ("line_a", "line_b"):
+        shutil.copytree(study, tmp_path / "results" / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "results"
+
+
+def campaign(name, readings=8, noise=0.05, model="dh", more=(), off_mm=0.0):
+    """A campaign of five candidates on a robot that is off, so many of its readings taken."""
+    words = ("--model", model, "--drawn", 5, "--budget", 8, "--noise-mm", noise, *more)
+    folder, place = f"results/{name}", f"check_{name}"
+    begun = call("campaign", "start", place, "--calibration", folder, *words)
+    assert begun.exit_code == 0, begun.output
+    for number in range(readings):
+        row = json.loads(call("campaign", "next", place, "--json").stdout)["rows"][0]
+        at = ",".join(str(row[f"expected_{axis}_mm"] + off_mm + 0.01 * number) for axis in "xyz")
+        assert call("campaign", "record", place, f"--position-mm={at}").exit_code == 0
+
+
+def told(*words, code=0):
+    done = call("summary", *words, "--json")
+    assert done.exit_code == code, done.output
+    return json.loads(done.stdout)
+
+
+def verdicts(*words, code=0):
+    found = told(*words, code=code).items()
+    return {name: (each["verdict"] or {}).get("verdict") for name, each in found}
+
+
+def test_errors_are_those_of_the_pose_errors_of_the_selected_model(fleet):
+    table = pd.read_parquet(fleet / "line_a" / "pose_errors.parquet")
+    (known,) = told("results/line_a").values()
+    mine = table[
+        (table["comparison"] == f"{known['selected']}_vs_measured")
+        & (table["estimate"] == "cross_validated")
+    ]
+    sizes = np.linalg.norm(mine[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
+    (errors,) = [
+        each
+        for each in known["errors"]
+        if (each["model"], each["reference"]) == (known["selected"], "measured")
+        and (each["estimate"], each["quantity"]) == ("held_out", "position")
+    ]
+    assert errors["n"] == len(sizes)
+    assert errors["mean"] == pytest.approx(sizes.mean(), rel=1e-12)
+    assert errors["largest"] == pytest.approx(sizes.max(), rel=1e-12)
+    assert errors["quantile_99"] == pytest.approx(np.quantile(sizes, 0.99), rel=1e-12)
+    assert known["synthetic"] is True
+    assert known["robot"] == "mh180"
+
+
+def test_the_first_lines_hold_the_errors_before_and_after(fleet):
+    found = summary.summarise("results/line_a")
+    lines = call("summary", "results/line_a").output.splitlines()
+    assert size(found.best.mean) in lines[1]
+    assert size(found.position_errors()["nominal"].mean) in lines[1]
+    assert len(lines) < 45
+
+
+def test_the_table_of_many_holds_the_same_figures(fleet):
+    found = summary.summarise("results/line_a").best
+    assert call("summary", "-o", "fleet.csv").exit_code == 0
+    assert call("summary", "-o", "fleet.xlsx").exit_code == 0
+    assert call("summary", "-o", "fleet.xlsx").exit_code == 2  # it is there
+    for table in (pd.read_csv("fleet.csv"), pd.read_excel("fleet.xlsx")):
+        assert list(table["data_set"]) == ["line_a", "line_b"]
+        assert table["held_out_mean_mm"][0] == pytest.approx(found.mean, rel=1e-11)
+        assert table["bound_mm"].isna().all()
+
+
+def test_a_campaign_bounds_the_robot_it_is_about_and_no_other(fleet):
+    campaign("line_b")
+    found = told()
+    bound = found["line_b"]["largest_error"]
+    assert 0.0 <= bound["lower_mm"] <= bound["upper_mm"]
+    assert (bound["confidence"], bound["candidates"], bound["readings"]) == (0.95, 5, 8)
+    entry = json.loads(Path("check_line_b/readings.jsonl").read_text().splitlines()[-1])
+    assert entry["entry"]["at"].startswith(bound["recorded"])
+    assert found["line_a"]["largest_error"] is None
+    assert call("summary", "results/line_b").exit_code == 0
+
+
+def test_nothing_is_accepted_by_a_bound_that_is_not_there(fleet):
+    campaign("line_a")
+    assert verdicts("--tolerance-mm", 1, code=1) == {"line_a": "accept", "line_b": "undecided"}
+
+
+def test_a_tolerance_below_the_lower_bound_rejects(fleet):
+    campaign("line_a", off_mm=0.4)
+    assert verdicts("--tolerance-mm", 0.1, code=1)["line_a"] == "reject"
+
+
+def test_readings_that_contradict_the_noise_accept_nothing(fleet):
+    campaign("line_a", readings=7, noise=1.0)
+    assert verdicts("--tolerance-mm", 50, code=1)["line_a"] == "undecided"
+
+
+def test_the_tolerance_of_a_campaign_counts_where_no_other_is_given(fleet):
+    campaign("line_a", more=("--tolerance-mm", 2))
+    found = told()
+    assert found["line_a"]["verdict"]["tolerance_mm"] == 2.0
+    assert found["line_a"]["verdict"]["verdict"] == "accept"
+    assert found["line_b"]["verdict"] is None
+
+
+def test_held_out_errors_are_judged_by_a_tolerance_that_has_to_be_given(fleet):
+    found = summary.summarise("results/line_a").best
+    few = found.n < 100
+    above = verdicts("--by", "held-out", "--tolerance-mm", found.quantile_99 + 1, code=int(few))
+    assert above["line_a"] == ("undecided" if few else "accept")
+    below = verdicts("--by", "held-out", "--tolerance-mm", found.quantile_99 / 2, code=1)
+    assert below["line_a"] == "reject"
+    assert call("summary", "--by", "held-out").exit_code == 2
+
+
+def test_a_history_takes_the_bound_of_a_campaign_that_came_to_its_end(fleet):
+    tables = summary.read_tables("results/line_a")
+    campaign("line_a")
+    campaign("line_b", readings=7)
+    ended, going = (Path(f"check_{name}") for name in ("line_a", "line_b"))
+    # Both have the same tables: a campaign is known by the model it judges, not by a name.
+    bound_mm = told()["line_a"]["largest_error"]["upper_mm"]
+    assert of_calibration.finished(tables, "dh", [going, ended]) == bound_mm
+    assert math.isnan(of_calibration.finished(tables, "dh", [going]))
+    assert math.isnan(of_calibration.finished(tables, "vec", [ended]))
+    (ended / JOURNAL).write_text("no journal")
+    assert math.isnan(of_calibration.finished(tables, "dh", [ended]))
+
+
+def test_results_without_a_calibration_are_named_and_the_others_summarised(fleet):
+    (fleet / "line_c" / "logs").mkdir(parents=True)
+    shutil.copytree(fleet / "line_a", fleet / "line_d")
+    (fleet / "line_d" / "summary.parquet").write_bytes(b"half of one")
+    found = told(code=1)
+    assert "line_c" in found["line_c"]["problem"]
+    assert "summary.parquet" in found["line_d"]["problem"]
+    assert found["line_a"]["selected"]
+    printed = call("summary")
+    assert printed.exit_code == 1
+    assert "4 calibrations" in printed.output
+    assert call("summary", "nowhere").exit_code == 2
+
+
+def test_the_order_of_findings_and_what_is_open(study):
+    tables = dict(summary.read_tables(study))
+    names = ("finding", "level", "what", "lines", "fix", "accepted", "rows")
+    rows = [
+        ("sparse", "note", "few poses near the limits", "", "", "", 0),
+        ("jump", "warning", "an error of 5 mm", "row 12", "read it again", "", 1),
+        ("outlier", "warning", "rows far off", "row 1", "", "the lamp was hit", 2),
+        ("left_out", "note", "column 3 is not used", "", "", "", 0),
+    ]
+    tables["data_check"] = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+    found = summary.summarise(study, tables, ())
+    assert [each.finding for each in found.findings] == ["jump", "outlier", "sparse"]
+    assert [each.is_open for each in found.findings] == [True, False, False]
+    assert found.left_out == ("column 3 is not used",)
+
+
+def test_a_joint_bends_where_either_of_its_coefficients_was_fitted():
+    nan = np.nan
+    table = {
+        "joint": np.array([1, 2, 3]),
+        "compliance_rad_per_nm": np.array([nan, 1e-6, nan]),
+        "std_compliance_rad_per_nm": np.array([nan, nan, nan]),
+        "lever_coefficient_rad_per_mm": np.array([nan, nan, 2e-6]),
+        "std_lever_coefficient_rad_per_mm": np.array([nan, nan, 1e-7]),
+    }
+    two, three = summary.compliance(table)
+    assert (two.joint, two.compliance_rad_per_nm) == (2, 1e-6)
+    assert np.isnan(two.lever_coefficient_rad_per_mm)
+    assert (three.joint, three.lever_coefficient_rad_per_mm) == (3, 2e-6)
+    assert list(summary.compliance(None)) == []
+
+
+def test_the_stage_writes_the_figures_of_the_record(study):
+    known = summary.summarise(study)
+    table = pd.DataFrame(dict(store.read(study / "summary.parquet")))
+    found = table.set_index(["topic", "item", "statistic"])["value"]
+    assert found["held_out_error", known.selected, "mean"] == known.best.mean
+    assert found["range", "joint 2", "low"] == known.joint_ranges[1].low
+    assert found["like_measured", "ranges of all joints", "share"] == known.share_measured
+    assert 0.0 <= known.share_measured <= 1.0
+
+
+def test_a_folder_that_is_a_campaign_is_named_as_one(fleet):
+    campaign("line_a", readings=0)
+    done = call("summary", "check_line_a")
+    assert done.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.30734, "0.307"), (12.34, "12.3"), (4680.0, "4680"), (0.0, "0")]
+)
+def test_three_significant_digits_without_an_exponent(value, text):
+    assert size(value) == text
