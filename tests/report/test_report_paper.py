@@ -80,7 +80,7 @@ def test_claims_that_differ_come_first_and_are_open():
     assert (uncompared.folded, agree.folded) == (True, True)
     tables = (differ, uncompared, agree, chose)
     assert [len(each.rows) for each in tables] == [1, 1, len(all_claims()) - 9, 7]
-    assert "63 agree, 1 differ, 1 cannot be compared" in read(section).shows
+    assert "63 agrees, 1 differs, 1 not comparable" in read(section).shows
 
 
 def test_where_none_differs_it_is_said():
