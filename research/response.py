@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.kinematics import dh, vec
+from kinacc.kinematics import dh
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import VECModel
 
 _DH_UNITS = np.tile([1e-3, 1.0, 1.0, 1e-3], 6)  # one mrad counts as much as one mm
@@ -64,7 +65,7 @@ def linearise(
     """
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
     size = prior_std.size
-    vec_all = vec.parameter_jacobian(empty, q_rad[train], s[train])
+    vec_all = empty.linearised(JointState(q_rad[train], s[train]))[1]
     vec_train = (vec_all * weights[:, None]).reshape(-1, size)
     gram = vec_train.T @ vec_train / noise_mm**2
     gram[np.diag_indices(size)] += prior_std**-2
@@ -72,7 +73,9 @@ def linearise(
     dh_train = (dh_all * weights[:, None]).reshape(-1, 24)
     # At rest between both directions: the mean of what each of them gives.
     one_way = np.ones(points_rad.shape)
-    vec_points = sum(vec.parameter_jacobian(empty, points_rad, s) for s in (-one_way, one_way)) / 2
+    vec_points = (
+        sum(empty.linearised(JointState(points_rad, s))[1] for s in (-one_way, one_way)) / 2
+    )
     dh_points = dh.parameter_jacobian(empty.dh, points_rad)[:, :3, :, :4]
     return Response(
         train=train,

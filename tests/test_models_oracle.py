@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 from oracles import kinematics as oracle
 
 from kinacc.kinematics import dh, robot, vec
+from kinacc.kinematics.model import JointState
 
 EXACT_MM = 1e-9
 EXACT = 1e-12  # elements of rotations
@@ -249,7 +250,7 @@ def test_vec_forward_agrees_with_fifty_digits():
 @given(case=vec_cases())
 def test_vec_joint_jacobian_of_the_projected_pose_equals_differences(case):
     *parameters, q, s = case
-    analytic = vec.joint_jacobian(vec_model(*parameters), q[None], s[None])[0]
+    analytic = vec_model(*parameters).joint_jacobian(JointState(q[None], s[None]))[0]
     numeric = oracle.difference_jacobian(
         lambda x: oracle.projected(oracle.vec_forward(*parameters, x, s)), q, 2e-4
     )
@@ -262,7 +263,7 @@ def test_vec_joint_jacobian_of_the_projected_pose_equals_differences(case):
 def test_vec_parameter_jacobian_equals_differences(case):
     table, series, low, high, offsets, q, s = case
     model = vec_model(table, series, low, high, offsets)
-    analytic = vec.parameter_jacobian(model, q[None], s[None])[0]
+    analytic = model.linearised(JointState(q[None], s[None]))[1][0]
     vector = vec.to_vector(model)
     assert analytic.shape == (6, vector.size)
     size = series.size

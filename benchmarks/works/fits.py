@@ -5,8 +5,8 @@ A fit with standard deviations and what it could not determine.
 Data sets are simulated: an arm that differs from its description, 0.05 mm and 0.1 mrad of noise.
 
 DH fits have 500 full poses, base and tool known, and 29 free parameters, five directions of which
-nothing shows. scipy's ``least_squares`` gets the same whitened residual, with the same compiled or
-plain kinematics, and neither truncates, finds ranks nor judges standard deviations; "2-point" is
+nothing shows. scipy's ``least_squares`` gets the same whitened residual, and
+neither truncates, finds ranks nor judges standard deviations; "2-point" is
 its default Jacobian, "analytic" that of kinacc. Its ``lm`` is taken, which is faster here than
 ``trf``. pybotics fits its parameters to positions alone; to 30 of them, as 500
 take it minutes.
@@ -33,23 +33,20 @@ def works(smoke: bool) -> list[Work]:
     """DH fits beside scipy and pybotics, VEC fits and choices of order beside matrix products."""
     poses = 60 if smoke else 500
     own, scipy = version("kinacc"), version("scipy")
-    fitted = [
-        Work(
-            f"DH fit, {poses} full poses, {name}", "fit", 1,
-            (
-                Contender("kinacc", own, _dh(smoke, plain)),
-                Contender("scipy 2-point", scipy, _scipy(smoke, plain, analytic=False)),
-                Contender("scipy analytic", scipy, _scipy(smoke, plain, analytic=True)),
-            ),
-            _same_cost, {"scipy 2-point": wanted},
-        )
-        for name, plain, wanted in (("compiled", False, 10.0), ("numpy", True, 4.0))
-    ]  # fmt: skip
+    fitted = Work(
+        f"DH fit, {poses} full poses", "fit", 1,
+        (
+            Contender("kinacc", own, _dh(smoke)),
+            Contender("scipy 2-point", scipy, _scipy(smoke, analytic=False)),
+            Contender("scipy analytic", scipy, _scipy(smoke, analytic=True)),
+        ),
+        _same_cost, {"scipy 2-point": 4.0},
+    )  # fmt: skip
     count, order = (120, 2) if smoke else (1000, 5)
     rows = np.random.default_rng(0).normal(size=(6 * count, 36 * (order + 1)))
     product = Contender(GRAM, np.__version__, lambda: rows.T @ rows)
     return [
-        *fitted,
+        fitted,
         Work(
             "DH fit, 30 positions", "fit", 1,
             (Contender("kinacc", own, dh_positions()), *_pybotics()), _same_rms,
@@ -67,7 +64,6 @@ def dh_positions() -> Callable[[], float]:
     """A DH fit to positions: the rms of its residuals."""
     from kinacc.calibration import dh_fit
 
-    _compile(False)
     nominal, free, seen, frames = _positions()
 
     def run() -> float:
@@ -99,10 +95,9 @@ def vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
     return run
 
 
-def _dh(smoke: bool, plain: bool) -> Callable[[], tuple[float, int]]:
+def _dh(smoke: bool) -> Callable[[], tuple[float, int]]:
     from kinacc.calibration import dh_fit
 
-    _compile(plain)
     nominal, free, seen, frames = _full_poses(60 if smoke else 500)
 
     def run() -> tuple[float, int]:
@@ -115,7 +110,7 @@ def _dh(smoke: bool, plain: bool) -> Callable[[], tuple[float, int]]:
     return run
 
 
-def _scipy(smoke: bool, plain: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
+def _scipy(smoke: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
     from scipy.optimize import least_squares
 
     from kinacc.calibration import dh_fit, held
@@ -130,7 +125,6 @@ def _scipy(smoke: bool, plain: bool, analytic: bool) -> Callable[[], tuple[float
         return np.concatenate([each for _, each in system.blocks(start + scale * z)]) * scale
 
     def run() -> tuple[float, None]:
-        _compile(plain)
         found = least_squares(
             lambda z: system.residual(start + scale * z), np.zeros(start.size), method="lm",
             jac=jacobian if analytic else "2-point",
@@ -240,13 +234,6 @@ def _noisy(poses, rng: np.random.Generator):
     count = len(poses.position_mm)
     turn = exp_so3(NOISE_RAD * rng.normal(size=(count, 3)))
     return Pose(turn @ poses.rotation, poses.position_mm + NOISE_MM * rng.normal(size=(count, 3)))
-
-
-def _compile(plain: bool) -> None:
-    """Settle whether kinematics are compiled, which else hangs on what a process has computed."""
-    from kinacc.kinematics import dh
-
-    dh.WORTH_NUMBA = np.inf if plain else 0
 
 
 def _same_cost(outputs: Sequence[tuple[float, int | None]]) -> None:

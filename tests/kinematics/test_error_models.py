@@ -11,7 +11,7 @@ from kinacc.calibration.uncertainty import scale_of
 from kinacc.config.error_models import ERROR_MODELS
 from kinacc.geometry import log_so3
 from kinacc.kinematics import compliance, dh, robot, vec
-from kinacc.kinematics.model import JointState
+from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.tables import of_kind
 
 ARM = robot.load("mh180")
@@ -52,7 +52,6 @@ def compliance_example():
 
 
 EXAMPLES = {"dh": dh_example, "vec": vec_example, "compliance": compliance_example}
-VECTORS = {"dh": dh, "vec": vec, "compliance": compliance}
 
 
 @pytest.fixture(params=ERROR_MODELS)
@@ -85,20 +84,30 @@ def test_slopes_in_the_joints_are_those_of_the_pose(model, at):
 
 
 def test_every_parameter_has_a_name_a_slope_and_a_place_in_the_table(model, at):
-    names, slopes, step = model.parameter_names, model.parameter_jacobian(at), 1e-5
+    names, slopes, step = model.names, model.linearised(at)[1], 1e-5
     assert len(set(names)) == len(names)
     assert slopes.shape == (COUNT, 6, len(names))
-    of = VECTORS[model.kind]
-    x, unit = of.to_vector(model), np.array([scale_of(name) for name in names])
+    assert len(model.units) == len(model.prior_std) == len(names)
+    x, unit = model.start, np.array([scale_of(name) for name in names])
     unit = np.where(unit < 1e-3, unit, 1.0)
     for direction in np.random.default_rng(3).normal(size=(3, len(names))) * unit:
-        ends = (of.with_vector(model, x + way * direction).pose(at) for way in (-step, step))
+        ends = (model.with_parameters(x + way * direction).pose(at) for way in (-step, step))
         moved = movement(*ends) / (2.0 * step)
         np.testing.assert_allclose(slopes @ direction, moved, rtol=1e-5, atol=1e-3)
 
 
+def test_slopes_by_differences_serve_a_model_that_has_no_others(model, at):
+    pose, slopes = ErrorModel.linearised(model, at)
+    exact = model.linearised(at)
+    unit = np.array([scale_of(name) for name in model.names])
+    np.testing.assert_array_equal(pose.position_mm, exact[0].position_mm)
+    np.testing.assert_allclose(slopes * unit, exact[1] * unit, atol=1e-5)
+    joints = ErrorModel.joint_jacobian(model, at)
+    np.testing.assert_allclose(joints, model.joint_jacobian(at), rtol=1e-5, atol=1e-3)
+
+
 def test_a_model_comes_back_from_its_table_bit_by_bit(model, at):
-    columns = model.to_columns(np.ones(len(model.parameter_names)))
+    columns = model.to_columns(np.ones(len(model.names)))
     again = of_kind(model.kind).from_columns(columns, ARM.dh.prismatic)
     for one, other in zip(model.pose(at), again.pose(at), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -109,3 +118,14 @@ def test_a_model_that_is_a_table_of_parameters_says_so_truly(model, at):
     plain = model.dh if model.table is None else model.table
     apart = np.abs(movement(plain.pose(at), model.pose(at))).max()
     assert apart > 1e-3 if model.table is None else apart == 0.0
+
+
+def test_a_pose_does_not_depend_on_the_batch_it_is_in():
+    q = np.random.default_rng(5).uniform(-7.0, 7.0, (9000, 6))
+    q[17] = np.nan
+    model, rows = dh_example(), [0, 18, 4095, 4096, 8999]
+    pose = dh.forward(model, q)
+    for row in rows:
+        alone = dh.forward(model, q[row])
+        np.testing.assert_allclose(pose.position_mm[row], alone.position_mm[0], atol=1e-9)
+        np.testing.assert_allclose(pose.rotation[row], alone.rotation[0], atol=1e-14)

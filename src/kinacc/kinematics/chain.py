@@ -1,37 +1,23 @@
-"""Moving a batch of frames along a kinematic chain, one elementary motion at a time.
+"""One walk along a serial chain: its poses, and how every elementary motion moves the flange.
 
-Frames are held as their columns, each ``(3, n)``: a rotation about a frame's own axis mixes two
-columns and a translation adds one to the origin, which is several times faster than 4x4 products.
+A joint is a product of elementary motions: the six errors of a VEC model (eq. 6), then
+``Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)`` (eq. 4). Frames are held as columns ``(3, n)``: a
+rotation about a frame's own axis mixes two columns, several times faster than 4x4 products.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from kinacc.geometry import Pose
+from kinacc.geometry import Pose, project_so3
 
-# Half pi in parts; the first two have 33 bits: their products with small numbers are exact.
-HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
-# Polynomials of sine and cosine within pi/4, highest power first (those of FreeBSD's libm).
-SINE = (
-    1.58969099521155010221e-10,
-    -2.50507602534068634195e-08,
-    2.75573137070700676789e-06,
-    -1.98412698298579493134e-04,
-    8.33333333332248946124e-03,
-    -1.66666666666666324348e-01,
-)
-COSINE = (
-    -1.13596475577881948265e-11,
-    2.08757232129817482790e-09,
-    -2.75573143513906633035e-07,
-    2.48015872894767294178e-05,
-    -1.38888888888741095749e-03,
-    4.16666666666666019037e-02,
-)
-LARGEST_RAD = 1e5  # angles further out, and those not finite, are left to libm
+if TYPE_CHECKING:
+    from kinacc.kinematics.dh import DHModel
+
+X, Y, Z = 0, 1, 2
 
 
 class Columns(NamedTuple):
@@ -43,68 +29,6 @@ class Columns(NamedTuple):
     p_mm: np.ndarray
 
 
-def sincos(angle_rad: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """Sine and cosine of angles, within a unit in the last place.
-
-    Sums and products in an order that ``kernels.sincos`` repeats, so that both have the same bits,
-    which hang on neither processor nor libm.
-    """
-    angle = np.atleast_1d(np.asarray(angle_rad, dtype=float))
-    far = ~(np.abs(angle) <= LARGEST_RAD)
-    some_far = far.any()
-    x = np.where(far, 0.0, angle) if some_far else angle
-    quadrant = np.rint(x * (2.0 / np.pi))
-    near = x - quadrant * HALF_PI[0]
-    less = quadrant * HALF_PI[1]
-    y = near - less
-    near -= y
-    near -= less
-    less = quadrant * HALF_PI[2]
-    less -= near
-    near, y = y, y - less
-    near -= y
-    near -= less  # what y has lost by rounding
-    z = y * y
-    odd, even = z * SINE[0], z * COSINE[0]
-    for one, other in zip(SINE[1:-2], COSINE[1:-2], strict=True):
-        odd += one
-        odd *= z
-        even += other
-        even *= z
-    odd += SINE[-2]
-    even += COSINE[-2]
-    even *= z
-    even += COSINE[-1]
-    even *= z
-    cube = z * y
-    odd *= cube
-    np.subtract(0.5 * near, odd, out=odd)
-    odd *= z
-    odd -= near
-    cube *= SINE[-1]
-    odd -= cube
-    s = y - odd
-    even *= z
-    y *= near
-    even -= y
-    z *= 0.5
-    c = 1.0 - z
-    np.subtract(1.0 - c, z, out=z)
-    z += even
-    c += z
-    # They change places in odd quadrants, and signs in two each: as bits, the fastest way.
-    sine, cosine, number = s.view(np.int64), c.view(np.int64), quadrant.astype(np.int64)
-    other = sine ^ cosine
-    other &= -(number & 1)
-    sine ^= other
-    cosine ^= other
-    sine ^= (number & 2) << 62
-    cosine ^= ((number + 1) & 2) << 62
-    if some_far:
-        s[far], c[far] = np.sin(angle[far]), np.cos(angle[far])
-    return s.reshape(np.shape(angle_rad)), c.reshape(np.shape(angle_rad))
-
-
 def start(count: int) -> Columns:
     """``count`` frames at the robot base."""
     axes = np.zeros((4, 3, count))
@@ -112,61 +36,151 @@ def start(count: int) -> Columns:
     return Columns(*axes)
 
 
-def rotate_z(frames: Columns, s: np.ndarray | float, c: np.ndarray | float) -> Columns:
-    """Turn every frame about its own z axis by the angle of sine ``s`` and cosine ``c``."""
-    x, y, z, p_mm = frames
-    return Columns(c * x + s * y, c * y - s * x, z, p_mm)
-
-
-def rotate_x(frames: Columns, s: np.ndarray | float, c: np.ndarray | float) -> Columns:
-    """Turn every frame about its own x axis."""
-    x, y, z, p_mm = frames
-    return Columns(x, c * y + s * z, c * z - s * y, p_mm)
-
-
-def rotate_y(frames: Columns, s: np.ndarray | float, c: np.ndarray | float) -> Columns:
-    """Turn every frame about its own y axis."""
-    x, y, z, p_mm = frames
-    return Columns(c * x - s * z, y, c * z + s * x, p_mm)
-
-
-def shift(frames: Columns, axis: np.ndarray, distance_mm: np.ndarray | float) -> Columns:
-    """Move every origin along ``axis`` (one of the frames' own columns)."""
-    x, y, z, p_mm = frames
-    return Columns(x, y, z, p_mm + distance_mm * axis)
-
-
-def disturb(frames: Columns, errors: np.ndarray) -> Columns:
-    """Apply the first-order error matrix of eq. 6; ``errors`` (6, n) in mm and rad.
+def disturbed(frames: Columns, errors: np.ndarray) -> Columns:
+    """Frames behind the first-order error matrix of eq. 6; ``errors`` (6, n) in mm and rad.
 
     The axes are no longer orthonormal afterwards; eq. 6 is kept as printed.
     """
     dx, dy, dz, ex, ey, ez = errors
     x, y, z, p_mm = frames
-    return Columns(
-        x + ez * y - ey * z,
-        y - ez * x + ex * z,
-        z + ey * x - ex * y,
-        p_mm + dx * x + dy * y + dz * z,
-    )
+    moved = p_mm + dx * x + dy * y + dz * z
+    return Columns(x + ez * y - ey * z, y - ez * x + ex * z, z + ey * x - ex * y, moved)
 
 
-def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Cross products (3, n) of columns (3, n), with the bits of ``np.cross`` in less time."""
-    (a, b, c), (u, v, w) = one, other
-    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
+def across(dh: DHModel, joint: int, frames: Columns, q_rad: np.ndarray) -> Iterator[Columns]:
+    """The frames that a, alpha act on, those that beta acts on, and those behind the joint.
+
+    ``frames`` are those in front of it, ``q_rad`` (n,) its values (mm where it slides).
+    """
+    slides = dh.prismatic[joint]
+    angle = dh.theta_offset_rad[joint] + (np.zeros(1) if slides else q_rad)
+    s, c = np.sin(angle), np.cos(angle)
+    x, y, z, p_mm = frames
+    x, y = c * x + s * y, c * y - s * x
+    p_mm = p_mm + (dh.d_mm[joint] + (q_rad if slides else 0.0)) * z
+    yield Columns(x, y, z, p_mm)
+    p_mm = p_mm + dh.a_mm[joint] * x
+    s, c = np.sin(dh.alpha_rad[joint]), np.cos(dh.alpha_rad[joint])
+    y, z = c * y + s * z, c * z - s * y
+    yield Columns(x, y, z, p_mm)
+    if dh.beta_rad[joint] != 0.0:
+        s, c = np.sin(dh.beta_rad[joint]), np.cos(dh.beta_rad[joint])
+        x, z = c * x - s * z, c * z + s * x
+    yield Columns(x, y, z, p_mm)
 
 
 def to_pose(frames: Columns) -> Pose:
     """The frames as ``Pose`` with leading axis n."""
-    count = frames.x.shape[1]
-    pose = Pose(np.empty((count, 3, 3)), np.empty((count, 3)))
-    write(frames, *pose)
-    return pose
+    return Pose(np.stack(frames[:3]).transpose(2, 1, 0), frames.p_mm.T)
 
 
-def write(frames: Columns, rotation: np.ndarray, position_mm: np.ndarray) -> None:
-    """Fill ``rotation`` (n, 3, 3) and ``position_mm`` (n, 3) with the frames."""
-    for column, axis in enumerate(frames[:3]):
-        rotation[:, :, column] = axis.T
-    position_mm[:] = frames.p_mm.T
+class Walk:
+    """n poses of an arm, and the frames that its elementary motions act on.
+
+    ``before`` [k]: in front of the errors; ``frames`` [k][3]: those theta and d, a and alpha, beta
+    act on; ``end``: the flange as eqs. 5-6 print it; ``pose`` with its rotation projected to SO(3).
+    """
+
+    def __init__(self, dh: DHModel, q_rad: np.ndarray, errors: np.ndarray | None = None) -> None:
+        """``q_rad`` (n, k); ``errors`` (k, 6, n) in mm and rad, none when not given."""
+        here = start(len(q_rad))
+        self.dh, self.before, self.frames = dh, [], []
+        for joint in range(dh.joints):
+            self.before.append(here)
+            if errors is not None:
+                here = disturbed(here, errors[joint])
+            ahead, twisted, behind = across(dh, joint, here, q_rad[:, joint])
+            self.frames.append((here, ahead, twisted))
+            here = behind
+        self.end = here
+        self.pose, self.stretch = to_pose(here), None
+        if errors is not None:
+            self.pose = Pose(project_so3(self.pose.rotation), self.pose.position_mm)
+            rotation = np.ascontiguousarray(self.pose.rotation.transpose(1, 2, 0))
+            raw = np.stack(here[:3], axis=1)
+            # raw = P Q, P symmetric; a small turn w of Q: (tr(P) - P) w = skew part of d(raw) Q'.
+            self.stretch = np.einsum("ikn,jkn->ijn", raw, rotation)
+            trace = self.stretch[0, 0] + self.stretch[1, 1] + self.stretch[2, 2]
+            self.rate = _inverse(trace * np.eye(3)[..., None] - self.stretch)
+
+    def shift(self, at: Columns, axis: int, into: np.ndarray) -> None:
+        """Motion (6, n) of the flange per mm along an axis of the frames ``at``."""
+        into[:3], into[3:] = at[axis], 0.0
+
+    def turn(
+        self,
+        at: Columns,
+        axis: int,
+        into: np.ndarray,
+        behind: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> None:
+        """Motion (6, n) of the flange per rad about an axis of the frames ``at``: mm, then rad.
+
+        ``behind``: ``inverse`` of the frames that follow, where frames are not quite orthonormal.
+        """
+        if behind is None:
+            into[:3], into[3:] = cross(at[axis], self.end.p_mm - at.p_mm), at[axis]
+            return
+        # F [e] G^-1 of frames F and, behind, G, as v r_u' - u r_v' of axes of F and rows of G^-1.
+        pushed, reach = behind
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        into[:3] = at[v] * reach[u] - at[u] * reach[v]
+        into[3:] = _times(self.rate, cross(pushed[u], at[v]) - cross(pushed[v], at[u]))
+
+    def inverse(self, frames: Columns) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the inverse axes (3, 3, n), stretched, and the flange (3, n) seen from there."""
+        rows = _inverse(np.stack(frames[:3], axis=1))
+        reach = self.end.p_mm - frames.p_mm
+        pushed = [_times(self.stretch, row) for row in rows]
+        return np.stack(pushed), np.stack([_dot(row, reach) for row in rows])
+
+    def by_joint(self, joint: int, into: np.ndarray) -> None:
+        """Motion (6, n) of the flange per rad, or mm, of a joint."""
+        here = self.frames[joint][0]
+        if self.dh.prismatic[joint]:
+            self.shift(here, Z, into)
+        else:
+            self.turn(here, Z, into, None if self.stretch is None else self.inverse(here))
+
+    def by_parameters(self) -> np.ndarray:
+        """Motions (k, 5, 6, n) of the flange by theta, d, a, alpha, beta of every joint."""
+        moved = np.empty((self.dh.joints, 5, 6, self.end.x.shape[1]))
+        for into, (here, ahead, twisted) in zip(moved, self.frames, strict=True):
+            self.turn(here, Z, into[0])
+            self.shift(here, Z, into[1])
+            self.shift(ahead, X, into[2])
+            self.turn(ahead, X, into[3])
+            self.turn(twisted, Y, into[4])
+        return moved
+
+    def by_errors(self) -> np.ndarray:
+        """Motions (k, 6, 6, n) of the flange by the six errors in front of every joint."""
+        moved = np.empty((self.dh.joints, 6, 6, self.end.x.shape[1]))
+        for into, here, (following, *_) in zip(moved, self.before, self.frames, strict=True):
+            behind = self.inverse(following)
+            for axis in range(3):
+                self.shift(here, axis, into[axis])
+                self.turn(here, axis, into[3 + axis], behind)
+        return moved
+
+
+def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Cross products (3, n) of columns (3, n), in less time than ``np.cross``."""
+    (a, b, c), (u, v, w) = one, other
+    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
+
+
+def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Matrices (3, 3, n) times vectors (3, n)."""
+    return matrix[:, 0] * vector[0] + matrix[:, 1] * vector[1] + matrix[:, 2] * vector[2]
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverses of matrices (3, 3, n), from the cross products of their columns."""
+    x, y, z = matrix.transpose(1, 0, 2)
+    rows = np.stack([cross(y, z), cross(z, x), cross(x, y)])
+    return rows / _dot(x, rows[0])

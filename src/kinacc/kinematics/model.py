@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
-from kinacc.geometry import Pose
+from kinacc.geometry import Pose, log_so3
 
 if TYPE_CHECKING:
     from kinacc.kinematics.dh import DHModel
@@ -43,64 +43,117 @@ class JointState:
 
     def moved(self, q_rad: np.ndarray) -> JointState:
         """These directions and payloads at joints (n, k); those of one state at all of them."""
-        count = len(q_rad)
         return JointState(
             q_rad,
             None if self.s is None else np.broadcast_to(self.s, q_rad.shape),
-            None if self.payload is None else np.broadcast_to(self.payload, (count, 4)),
+            None if self.payload is None else np.broadcast_to(self.payload, (len(q_rad), 4)),
         )
 
 
-class ErrorModel(Protocol):
-    """An arm of k joints, as its maker states it or as it was fitted.
+class ErrorModel:
+    """An arm of k joints with P parameters, as its maker states it or as it was fitted.
 
-    Poses are of the last DH frame in the first one.
+    A model of one's own is a frozen dataclass that inherits this class and states ``kind``, ``dh``,
+    ``names``, ``units``, ``start``, ``prior_std``, ``with_parameters`` and ``pose``; the Jacobians
+    here are by central differences. Poses are of the last DH frame in the first one. Rows of a
+    Jacobian: position (mm), then the rotation vector w (rad) with R(x + dx) = exp(w) R(x).
     """
 
     kind: ClassVar[str]  # names its tables: ``<kind>_model``, ``<kind>_covariance``
 
+    if TYPE_CHECKING:  # fields or properties of the model itself
+
+        @property
+        def dh(self) -> DHModel:
+            """The DH arm the errors act on, from which inverse kinematics starts."""
+
+        @property
+        def names(self) -> tuple[str, ...]:
+            """Names (P,) of the parameters: j1.d_mm, j1.delta_x.0 and the like."""
+
+        @property
+        def units(self) -> tuple[str, ...]:
+            """Units (P,) of the parameters: mm, rad and the like."""
+
+        @property
+        def start(self) -> np.ndarray:
+            """Parameters (P,) of this model, where a fit starts."""
+
+        @property
+        def prior_std(self) -> np.ndarray:
+            """Usual size (P,) of the parameters' errors, in ``units``; inf: nothing is known."""
+
+    def with_parameters(self, x: np.ndarray) -> Self:
+        """The model with parameters (P,)."""
+        raise NotImplementedError
+
+    def pose(self, at: JointState) -> Pose:
+        """Poses (n, ...)."""
+        raise NotImplementedError
+
+    def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
+        """Poses (n, ...) and their Jacobian (n, 6, P) in the parameters."""
+        poses = self.pose(at)
+        step = np.array([1e-6 if unit == "rad" else 1e-4 for unit in self.units])
+        return poses, _differences(lambda x: self.with_parameters(x).pose(at), self.start, step)
+
+    def joint_jacobian(self, at: JointState) -> np.ndarray:
+        """Jacobian (n, 6, k) of ``pose`` in the joints."""
+        step = np.where(self.dh.prismatic, 1e-3, 1e-6)
+        return _differences(lambda x: self.pose(at.moved(at.q_rad + x)), np.zeros(step.size), step)
+
+    def parameter_jacobian(self, at: JointState) -> np.ndarray:
+        """The Jacobian of ``linearised``."""
+        return self.linearised(at)[1]
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """``names``."""
+        return self.names
+
     @property
     def joints(self) -> int:
         """Number of joints k."""
-
-    @property
-    def dh(self) -> DHModel:
-        """The DH arm the errors act on, from which inverse kinematics starts."""
+        return self.dh.joints
 
     @property
     def table(self) -> DHModel | None:
         """The model as a table of DH parameters, None where no such table says the same."""
+        return None
 
     @property
     def domain(self) -> tuple[np.ndarray, np.ndarray] | None:
         """DH joints (k,), (k,) beyond which the model says nothing; None: it may extrapolate."""
+        return None
 
     @property
     def knows_loads(self) -> bool:
         """Whether poses depend on the payload of a state."""
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names (P,) in the order of ``parameter_jacobian``: j1.d_mm, j1.delta_x.0 and the like."""
+        return False
 
     @property
     def comparable(self) -> np.ndarray | None:
-        """Values (P,) by ``parameter_names`` that two fits may be compared by, if there are."""
-
-    def pose(self, at: JointState) -> Pose:
-        """Poses (n, ...)."""
-
-    def joint_jacobian(self, at: JointState) -> np.ndarray:
-        """Jacobian (n, 6, k) of ``pose``, position (mm) and small turn (rad), in the joints."""
-
-    def parameter_jacobian(self, at: JointState) -> np.ndarray:
-        """Jacobian (n, 6, P) of ``pose`` in the parameters, rows as in ``joint_jacobian``."""
+        """Values (P,) by ``names`` that two fits may be compared by, if there are."""
+        return None
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``<kind>_model``; ``std`` (P,), NaN where undetermined."""
+        raise NotImplementedError
 
     @classmethod
     def from_columns(
         cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
     ) -> Self:
         """The model of such a table; ``prismatic`` (k,): joints that slide, the robot's to say."""
+        raise NotImplementedError
+
+
+def _differences(pose: Callable[[np.ndarray], Pose], x: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Jacobian (n, 6, P) of poses (n, ...) in ``x`` (P,) by central differences."""
+    columns = []
+    for shift in np.diag(step):
+        ahead, behind = pose(x + shift), pose(x - shift)
+        turn = log_so3(ahead.rotation @ np.swapaxes(behind.rotation, 1, 2))
+        moved = np.concatenate([ahead.position_mm - behind.position_mm, turn], axis=1)
+        columns.append(moved / (2.0 * shift.max()))
+    return np.stack(columns, axis=2)

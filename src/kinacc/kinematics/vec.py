@@ -13,20 +13,19 @@ from dataclasses import dataclass, fields, replace
 from typing import ClassVar, Self
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
-from kinacc.geometry import Pose, project_so3
+from kinacc.geometry import Pose
 from kinacc.kinematics import chain as _chain
-from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
-from kinacc.kinematics.model import JointState
-from kinacc.kinematics.vec_motions import Motions
+from kinacc.kinematics.model import ErrorModel, JointState
 
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
 _DIRECTIONS = np.array([-1, 1])
 
 
 @dataclass(frozen=True)
-class VECModel:
+class VECModel(ErrorModel):
     """Errors of k joints acting on ``dh``.
 
     ``coefficients`` (k, 6, order + 1) in mm (delta) and rad (eps); ``direction_offsets_rad`` (k, 2)
@@ -40,8 +39,6 @@ class VECModel:
     direction_offsets_rad: np.ndarray
 
     kind: ClassVar[str] = "vec"
-    table: ClassVar[None] = None
-    knows_loads: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         for field in fields(self)[1:]:
@@ -55,38 +52,68 @@ class VECModel:
         return self.coefficients.shape[-1] - 1
 
     @property
-    def joints(self) -> int:
-        """Number of joints k."""
-        return self.dh.joints
-
-    @property
     def domain(self) -> tuple[np.ndarray, np.ndarray]:
         """The fitted range of the DH joints (k,), (k,): a polynomial says nothing beyond it."""
         return self.q_min_rad, self.q_max_rad
 
     @property
-    def comparable(self) -> None:
-        """None: constants of neighbouring joints can take each other's place."""
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names (P,) of the coefficients, ordered as ``to_vector``: j1.delta_x.0, ..."""
+    def names(self) -> tuple[str, ...]:
+        """Names (P,) of the coefficients, then of the direction offsets: j1.delta_x.0, ..."""
         joints, orders = range(1, self.joints + 1), range(self.order + 1)
         coefficients = [f"j{i}.{error}.{n}" for i in joints for error in ERRORS for n in orders]
         offsets = [f"j{i}.eps_z.{direction}" for i in joints for direction in ("minus", "plus")]
         return (*coefficients, *offsets)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units (P,): mm of delta, rad of eps."""
+        return tuple("mm" if ".delta" in name else "rad" for name in self.names)
+
+    @property
+    def start(self) -> np.ndarray:
+        """Coefficients (P,): joint, error, order; then the direction offsets: joint, direction."""
+        return np.concatenate([self.coefficients.ravel(), self.direction_offsets_rad.ravel()])
+
+    @property
+    def prior_std(self) -> np.ndarray:
+        """Usual size (P,) of the coefficients: 1 mm and 1 mrad."""
+        return np.where(np.array(self.units) == "mm", 1.0, 1e-3)
+
+    def with_parameters(self, x: np.ndarray) -> Self:
+        """The model with the coefficients and offsets of (P,), ordered as ``start``."""
+        split = self.coefficients.size
+        return replace(
+            self,
+            coefficients=np.reshape(x[:split], self.coefficients.shape),
+            direction_offsets_rad=np.reshape(x[split:], self.direction_offsets_rad.shape),
+        )
 
     def pose(self, at: JointState) -> Pose:
         """Poses (n, ...) with the rotation projected to SO(3)."""
         return pose(self, at.q_rad, at.s)
 
     def joint_jacobian(self, at: JointState) -> np.ndarray:
-        """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        return joint_jacobian(self, at.q_rad, at.s)
+        """Jacobian (n, 6, k) of ``pose`` in the joints. Exact."""
+        walk = _walk(self, at.q_rad, at.s)
+        slopes = _slopes(self, at.q_rad)
+        moved = np.empty((self.joints, 6, len(at)))
+        for joint, (into, by_errors) in enumerate(zip(moved, walk.by_errors(), strict=True)):
+            walk.by_joint(joint, into)
+            into += np.einsum("ern,ne->rn", by_errors, slopes[:, joint])
+        return np.ascontiguousarray(moved.transpose(2, 1, 0))
 
-    def parameter_jacobian(self, at: JointState) -> np.ndarray:
-        """Jacobian (n, 6, P) of ``pose`` in the coefficients."""
-        return parameter_jacobian(self, at.q_rad, at.s)
+    def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
+        """Poses (n, ...) and their Jacobian (n, 6, P) in the coefficients. Exact."""
+        walk, count, cut = _walk(self, at.q_rad, at.s), len(at), self.coefficients.size
+        jacobian = np.zeros((count, 6, cut + self.direction_offsets_rad.size))
+        expanded = jacobian[:, :, :cut].reshape(count, 6, *self.coefficients.shape)
+        elementary = walk.by_errors().transpose(3, 2, 0, 1)
+        basis = chebyshev_basis(self, at.q_rad)
+        np.multiply(elementary[..., None], basis[:, None, :, None, :], out=expanded)
+        if at.s is not None:
+            offsets = jacobian[:, :, cut:].reshape(count, 6, self.joints, 2)
+            np.multiply(elementary[..., 5, None], direction_basis(at.s)[:, None], out=offsets)
+        return walk.pose, jacobian
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``vec_model``: coefficients of both directions, then offsets that have a std.
@@ -149,18 +176,13 @@ def without_errors(
 
 
 def to_vector(model: VECModel) -> np.ndarray:
-    """Coefficients (P,): joint, error, order; then the direction offsets: joint, direction."""
-    return np.concatenate([model.coefficients.ravel(), model.direction_offsets_rad.ravel()])
+    """``model.start``."""
+    return model.start
 
 
 def with_vector(model: VECModel, vector: np.ndarray) -> VECModel:
-    """The model with the coefficients of ``vector`` (P,), ordered as ``to_vector``."""
-    split = model.coefficients.size
-    return replace(
-        model,
-        coefficients=np.reshape(vector[:split], model.coefficients.shape),
-        direction_offsets_rad=np.reshape(vector[split:], model.direction_offsets_rad.shape),
-    )
+    """``model.with_parameters(vector)``."""
+    return model.with_parameters(vector)
 
 
 def mapped_joints(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
@@ -171,61 +193,7 @@ def mapped_joints(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
 
 def chebyshev_basis(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
     """Chebyshev polynomials of the first kind (n, k, order + 1) at joints (n, k)."""
-    return _basis(mapped_joints(model, q_rad), model.order)
-
-
-def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
-    """Joint errors (n, k, 6) in mm and rad at joints (n, k) and travel directions s (n, k)."""
-    return _errors(model, chebyshev_basis(model, np.atleast_2d(q_rad)), s)
-
-
-def forward(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
-    """Flange poses (n, ...) as eqs. 5-6 print them: the rotation is not quite orthonormal."""
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    joint_errors = errors(model, q_rad, s)
-    frames = _chain.start(len(q_rad))
-    for joint in range(model.joints):
-        frames = _chain.disturb(frames, joint_errors[:, joint].T)
-        frames = _dh.across_joint(model.dh, joint, frames, q_rad[:, joint])
-    return _chain.to_pose(frames)
-
-
-def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
-    """Flange poses (n, ...) with the rotation projected to SO(3)."""
-    raw = forward(model, q_rad, s)
-    return Pose(project_so3(raw.rotation), raw.position_mm)
-
-
-def joint_jacobian(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
-    """Jacobian (n, 6, k) of ``pose`` in the joints; rows as in ``dh.joint_jacobian``. Exact."""
-    moved = motions(model, q_rad, s).in_joints(_slopes(model, q_rad))
-    return np.ascontiguousarray(moved.transpose(2, 1, 0))
-
-
-def motions(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Motions:
-    """Poses (n, ...) as ``pose``, and how the joints' errors move them."""
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    return Motions(model.dh, q_rad, errors(model, q_rad, s))
-
-
-def parameter_jacobian(
-    model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None
-) -> np.ndarray:
-    """Jacobian (n, 6, P) of ``pose`` in the coefficients, ordered as ``to_vector``. Exact."""
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    count, cut = len(q_rad), model.coefficients.size
-    moved = motions(model, q_rad, s).jacobian().reshape(model.joints, len(ERRORS), 6, count)
-    elementary, basis = moved.transpose(3, 2, 0, 1), chebyshev_basis(model, q_rad)
-    jacobian = np.empty((count, 6, cut + model.direction_offsets_rad.size))
-    expanded = jacobian[:, :, :cut].reshape(count, 6, *model.coefficients.shape)
-    np.multiply(elementary[..., None], basis[:, None, :, None, :], out=expanded)
-    offsets = jacobian[:, :, cut:].reshape(count, 6, model.joints, 2)
-    if s is None:
-        offsets[:] = 0.0
-    else:
-        chosen = direction_basis(s)[:, None]
-        np.multiply(elementary[..., ERRORS.index("eps_z"), None], chosen, out=offsets)
-    return jacobian
+    return chebyshev.chebvander(mapped_joints(model, q_rad), model.order)
 
 
 def direction_basis(s: np.ndarray) -> np.ndarray:
@@ -233,35 +201,50 @@ def direction_basis(s: np.ndarray) -> np.ndarray:
     return (np.asarray(s)[..., None] == _DIRECTIONS).astype(float)
 
 
-def _basis(x: np.ndarray, order: int) -> np.ndarray:
-    basis = np.empty((*x.shape, order + 1))
-    basis[..., 0] = 1.0
-    if order >= 1:
-        basis[..., 1] = x
-    for n in range(2, order + 1):
-        basis[..., n] = 2.0 * x * basis[..., n - 1] - basis[..., n - 2]
-    return basis
-
-
-def _errors(model: VECModel, basis: np.ndarray, s: np.ndarray | None) -> np.ndarray:
-    values = np.matmul(basis.transpose(1, 0, 2), model.coefficients.transpose(0, 2, 1))
-    values = np.ascontiguousarray(values.transpose(1, 0, 2))
+def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
+    """Joint errors (n, k, 6) in mm and rad at joints (n, k) and travel directions s (n, k)."""
+    basis = chebyshev_basis(model, np.atleast_2d(q_rad))
+    values = np.einsum("nkt,ket->nke", basis, model.coefficients)
     if s is not None:
-        s = np.asarray(s)
-        values[..., 5] += np.where(s == -1, model.direction_offsets_rad[:, 0], 0.0)
-        values[..., 5] += np.where(s == 1, model.direction_offsets_rad[:, 1], 0.0)
+        values[..., 5] += np.sum(direction_basis(s) * model.direction_offsets_rad, axis=-1)
     return values
+
+
+def forward(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+    """Flange poses (n, ...) as eqs. 5-6 print them: the rotation is not quite orthonormal."""
+    return _chain.to_pose(_walk(model, q_rad, s).end)
+
+
+def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
+    """Flange poses (n, ...) with the rotation projected to SO(3)."""
+    return _walk(model, q_rad, s).pose
+
+
+class motions:
+    """Poses (n, ...) as ``pose``, and how the joints' errors move them."""
+
+    def __init__(self, model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> None:
+        walk = _walk(model, q_rad, s)
+        self.pose, self.moved = walk.pose, walk.by_errors().reshape(6 * model.joints, 6, -1)
+
+    def jacobian(self) -> np.ndarray:
+        """Motions (6k, 6, n) by the errors, joint by joint: position and rotation vector."""
+        return self.moved
+
+    def pulled(self, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+        """``jacobian`` (6k, n) times a force and a moment (3, n) on every flange."""
+        return np.einsum("ern,rn->en", self.moved, np.concatenate([force, moment]))
+
+
+def _walk(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None) -> _chain.Walk:
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    made = errors(model, q_rad, s).transpose(1, 2, 0)
+    return _chain.Walk(model.dh, q_rad, np.ascontiguousarray(made))
 
 
 def _slopes(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
     """Derivatives (n, k, 6) of the joint errors in their own joint, per rad."""
-    x = mapped_joints(model, np.atleast_2d(q_rad))
-    slope = np.zeros((*x.shape, model.order + 1))
-    # T_n' = n U_{n-1}, with U by the same recurrence.
-    second = np.ones_like(x)
-    previous = np.zeros_like(x)
-    for n in range(1, model.order + 1):
-        slope[..., n] = n * second
-        second, previous = 2.0 * x * second - previous, second
-    values = np.einsum("nkt,ket->nke", slope, model.coefficients)
+    coefficients = chebyshev.chebder(model.coefficients, axis=-1)
+    basis = chebyshev.chebvander(mapped_joints(model, q_rad), coefficients.shape[-1] - 1)
+    values = np.einsum("nkt,ket->nke", basis, coefficients)
     return values * (2.0 / (model.q_max_rad - model.q_min_rad))[:, None]

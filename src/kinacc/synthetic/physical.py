@@ -96,7 +96,8 @@ def chain(geometry: DHModel, q_rad: np.ndarray, joint_errors: np.ndarray) -> Pos
         )
         dx, dy, dz = joint_errors[:, joint, :3].T
         p_mm = frames.p_mm + dx * frames.x + dy * frames.y + dz * frames.z
-        frames = dh.across_joint(geometry, joint, frames_of.Columns(x, y, z, p_mm), q_rad[:, joint])
+        moved = frames_of.Columns(x, y, z, p_mm)
+        *_, frames = frames_of.across(geometry, joint, moved, q_rad[:, joint])
     return frames_of.to_pose(frames)
 
 

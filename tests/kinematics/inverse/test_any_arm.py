@@ -12,7 +12,7 @@ from kinacc.errors import InputError
 from kinacc.geometry import Pose
 from kinacc.kinematics import dh, inverse, robot, vec
 from kinacc.kinematics.inverse import Status, kernels, limits, numeric, search
-from kinacc.kinematics.inverse.chain_rows import targets_of
+from kinacc.kinematics.inverse.chain_rows import rows_of, targets_of
 
 UR10, IIWA = robot.load("ur10"), robot.load("iiwa14")
 SEARCHED = [
@@ -63,7 +63,7 @@ def test_a_dense_multistart_finds_nothing_more(arm):
     q = arms.joints_within(arm, 6, seed=3)
     pose = dh.forward(arm.dh, q)
     solved = inverse.solve(arm, arm.dh, pose)
-    rows, targets = arm.dh.rows, targets_of(pose)
+    rows, targets = rows_of(arm.dh), targets_of(pose)
     for row in range(len(q)):
         start = np.random.default_rng(row).uniform(-np.pi, np.pi, (2000, 6))
         goal = np.repeat(targets[[row]], len(start), axis=0)
@@ -201,7 +201,7 @@ def test_compiled_steps_are_those_of_the_models():
     for arm in (arms.GENERAL, arms.STANFORD):
         q = arms.joints_within(arm, 5)
         frames = dh.chain(arm.dh, q)
-        rows = arm.dh.rows
+        rows = rows_of(arm.dh)
         axes, origins, end = np.empty((6, 3)), np.empty((6, 3)), np.empty((3, 4))
         for row in range(5):
             kernels.end_of(rows, q[row], axes, origins, end)
@@ -214,7 +214,7 @@ def test_compiled_steps_are_those_of_the_models():
 def test_compiled_refinement_is_the_plain_one():
     arm = arms.STANFORD
     q = arms.joints_within(arm, 3)
-    targets, rows = targets_of(dh.forward(arm.dh, q)), arm.dh.rows
+    targets, rows = targets_of(dh.forward(arm.dh, q)), rows_of(arm.dh)
     fast, plain = q + 0.05, q + 0.05
     kernels.refine(rows, targets, fast, 40, 1e-9)
     kernels.refine.py_func(rows, targets, plain, 40, 1e-9)

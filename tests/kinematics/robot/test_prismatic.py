@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from kinacc.geometry import Pose, log_so3
 from kinacc.kinematics import dh, vec
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import JointState
 
 # The Stanford arm, and a six-axis arm on a track.
 STANFORD = DHModel(
@@ -113,12 +114,12 @@ def test_vec_errors_over_a_travel_in_mm_have_exact_slopes(model):
     noise = np.random.default_rng(3).normal(size=plain.coefficients.shape)
     arm = replace(plain, coefficients=noise * np.array([0.3] * 3 + [1e-3] * 3)[:, None])
     q = joints(model, 4, 5)
-    jacobian = vec.joint_jacobian(arm, q)
+    jacobian = arm.joint_jacobian(JointState(q))
     for joint in range(model.joints):
         step = 1e-2 if model.prismatic[joint] else 1e-5
         expected = slope(lambda x: vec.pose(arm, x), q, joint, step)
         assert np.abs(jacobian[:, :, joint] - expected).max() < 1e-5
-    parameters = vec.parameter_jacobian(arm, q)
+    parameters = arm.linearised(JointState(q))[1]
     direction = np.random.default_rng(5).normal(size=parameters.shape[2])
     ahead = vec.pose(vec.with_vector(arm, vec.to_vector(arm) + 1e-6 * direction), q)
     behind = vec.pose(vec.with_vector(arm, vec.to_vector(arm) - 1e-6 * direction), q)

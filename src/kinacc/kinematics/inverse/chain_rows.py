@@ -9,6 +9,15 @@ from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
 
 
+def rows_of(model: DHModel) -> np.ndarray:
+    """A row (k, 8) a joint: theta, d, a, cos and sin of alpha and of beta, 1 where it slides."""
+    turns = [
+        part(angle) for angle in (model.alpha_rad, model.beta_rad) for part in (np.cos, np.sin)
+    ]
+    first = model.theta_offset_rad, model.d_mm, model.a_mm
+    return np.stack([*first, *turns, model.prismatic], axis=1, dtype=float)
+
+
 def targets_of(pose: Pose) -> np.ndarray:
     """Poses (n, ...) as (n, 3, 4): rotation and position (mm)."""
     return np.concatenate([pose.rotation, pose.position_mm[..., None]], axis=2)

@@ -11,8 +11,8 @@ import numpy as np
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.inverse import newton, quick
-from kinacc.kinematics.inverse.chain_rows import behind_first, targets_of
+from kinacc.kinematics.inverse import newton
+from kinacc.kinematics.inverse.chain_rows import behind_first, rows_of, targets_of
 from kinacc.kinematics.model import ErrorModel, JointState
 
 SAME_POSTURE_RAD = 1e-6
@@ -72,14 +72,7 @@ def _in_metres(functions: Functions) -> Functions:
 
 
 def _refine(functions: Functions, goal: Pose, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (m, k) and convergence (m,): quick steps, then cheap slopes, then exact ones."""
-    if functions.first is None and quick.suits(functions.dh):
-        q_rad, converged = quick.refine(functions.dh, goal, first)
-        left = np.flatnonzero(~converged)
-        if len(left):
-            part = Pose(goal.rotation[left], goal.position_mm[left])
-            q_rad[left], converged[left] = _patiently(functions, part, first[left])
-        return q_rad, converged
+    """Joints (m, k) and convergence (m,): cheap slopes, then exact ones."""
     if functions.prismatic.any():
         unit = np.where(functions.prismatic, 1e3, 1.0)
         q_rad, converged = _refine(_in_metres(functions), goal, first / unit)
@@ -120,7 +113,7 @@ def _compiled(functions: Functions, goal: Pose, q_rad: np.ndarray) -> np.ndarray
     """Joints (m, k) after many steps of the compiled refinement."""
     from kinacc.kinematics.inverse import kernels
 
-    rows, q_rad = functions.dh.rows, np.ascontiguousarray(q_rad)
+    rows, q_rad = rows_of(functions.dh), np.ascontiguousarray(q_rad)
     if functions.first is not None:
         rows = rows[1:]
         goal = compose(invert(behind_first(functions.dh, functions.first)), goal)

@@ -18,7 +18,7 @@ import numpy as np
 from kinacc.geometry import Pose, compose, invert, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.inverse.chain_rows import targets_of
+from kinacc.kinematics.inverse.chain_rows import rows_of, targets_of
 
 # Entries per number of joints between the first and the last.
 _ENTRIES = {2: 4_000, 3: 20_000, 4: 60_000, 5: 400_000}
@@ -86,7 +86,7 @@ def _table(columns: tuple[tuple[float, ...], ...], prismatic: tuple[bool, ...]) 
         change = _features_inside(model, joints + step, reach_mm)
         change -= _features_inside(model, joints - step, reach_mm)
         slopes[:, :, joint] = change / 2e-5
-    return Table(model, model.rows, joints, features, slopes, unit, reach_mm, cKDTree(features))
+    return Table(model, rows_of(model), joints, features, slopes, unit, reach_mm, cKDTree(features))
 
 
 def search(table: Table, pose: Pose, near_miss_mm: float = 0.0) -> Postures:
