@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kinacc.gate.chance import Sample, change, statistic_of
+from kinacc.gate.chance import STATISTICS, Sample, change
 
 CONFIDENCE = 0.99
 _MANY = 2_000_000
@@ -64,7 +64,7 @@ def share_failed(world: str, statistic: str, count: int, runs: int, seed: int) -
     """Share of ``runs`` in which the gate fails, of ``count`` poses."""
     of, paired = WORLDS[world]
     draw = np.random.default_rng(seed)
-    truth = [statistic_of(statistic, each) for each in of(draw, _MANY)]
+    truth = [STATISTICS[statistic][0](each) for each in of(draw, _MANY)]
     allowed, poses, failed = truth[1] - truth[0], np.arange(count), 0
     for _ in range(runs):
         before, now = (Sample(each, poses) for each in of(draw, count))

@@ -6,7 +6,7 @@ from kinacc.config.load import load
 from kinacc.config.schema import key
 from kinacc.errors import InputError
 from kinacc.gate import values
-from kinacc.gate.run_tables import RunTables
+from kinacc.gate.values import RunTables
 
 END = "datasets: {mh180: {robot: mh180}, other: {robot: mh180}}\n"
 
@@ -129,5 +129,5 @@ def test_every_figure_of_the_schema_can_be_asked_for(tmp_path):
     names = next(each for each in of_value.entries if each.name == "value").choices
     gate = {"model": "dh", "at": "held_out"}
     for name in names:
-        with pytest.raises(InputError, match=r"is not there|no such file|no calibration"):
+        with pytest.raises(InputError, match=r"missing|no such file|no calibration"):
             values.figure(name, RunTables(tmp_path), gate)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.config.schema import defaults
-from kinacc.errors import InputError, Problem, and_more
+from kinacc.errors import InputError, Problem, first_few
 from kinacc.gate.accepted import compared
 from kinacc.gate.conformity import check_file
 from kinacc.gate.gates import judged
@@ -74,7 +74,7 @@ def check_campaign(folder: Path) -> Outcome:
     tables: dict[str, Any] = {}
     marks = []
     for artefact in campaign_tables.ALL:
-        path = folder / f"{artefact.name}.parquet"
+        path = folder / artefact.file_name
         if not path.is_file():
             problems.append(Problem(str(path), "missing"))
             continue
@@ -85,27 +85,29 @@ def check_campaign(folder: Path) -> Outcome:
     if any(each != marks[0] for each in marks):
         problems.append(Problem(str(folder), "tables of different states of a campaign"))
     problems = problems or campaign_tables.contradictions(tables)
-    if problems:
-        says = "; ".join(map(str, problems[:_SHOWN])) + and_more(len(problems) - _SHOWN)
-        fix = "run `kinacc campaign report` again"
-        return Outcome(folder.name, "files", "files", FAILED, says, fix)
     says = "tables fit their schemas and each other"
-    return Outcome(folder.name, "files", "files", PASSED, says, figures={"files": len(tables)})
+    return _files(folder, problems, says, len(tables), "run `kinacc campaign report` again")
 
 
 def check_files(folder: Path) -> Outcome:
     """Whether every file of a data set is there, as its stage left it, and fits its schema."""
     problems = list(_problems(folder))
-    name = folder.name
-    if problems:
-        says = "; ".join(map(str, problems[:_SHOWN])) + and_more(len(problems) - _SHOWN)
-        return Outcome(name, "files", "files", FAILED, says, figures={"problems": len(problems)})
-    count = len(sums.stated(folder))
-    if old := sums.outdated(folder):
-        says = f"{len(old)} files were made from files that have changed since: {', '.join(old)}"
-        return Outcome(name, "files", "files", WARNED, says, "run the workflow again")
+    if not problems and (old := sums.outdated(folder)):
+        says = f"{len(old)} files were made from files that have changed since: {first_few(old)}"
+        return Outcome(folder.name, "files", "files", WARNED, says, "run the workflow again")
+    count = 0 if problems else len(sums.stated(folder))
     says = f"{count} files are as their stages left them, and tables fit their schemas"
-    return Outcome(name, "files", "files", PASSED, says, figures={"files": count})
+    return _files(folder, problems, says, count)
+
+
+def _files(
+    folder: Path, problems: Sequence[Problem], says: str, count: int, fix: str = ""
+) -> Outcome:
+    if problems:
+        says = first_few(problems, _SHOWN)
+    figures = {"problems": len(problems)} if problems else {"files": count}
+    verdict = FAILED if problems else PASSED
+    return Outcome(folder.name, "files", "files", verdict, says, fix if problems else "", figures)
 
 
 def _problems(folder: Path) -> Iterator[Problem]:

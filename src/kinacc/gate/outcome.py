@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-SCHEMA_VERSION = 1
 # "undecided": the data do not suffice; the setting `undecided` of a gate decides what follows.
 PASSED, WARNED, FAILED, UNDECIDED = "passed", "warned", "failed", "undecided"
 
@@ -14,8 +13,8 @@ PASSED, WARNED, FAILED, UNDECIDED = "passed", "warned", "failed", "undecided"
 class Outcome:
     """One check of one data set.
 
-    ``kind``: files, configuration, value, change, campaign, claims, suspicions, history, accepted.
-    ``figures`` are numbers by name with unit (``mean_mm``).
+    ``kind``: files, value, change, campaign, claims, suspicions, history, accepted. ``figures`` are
+    numbers and words by name with unit (``mean_mm``).
     """
 
     dataset: str
@@ -29,13 +28,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """All outcomes of a check of results; ``against`` is the accepted run, empty without one."""
+    """All outcomes of a check of results, as its JSON has them.
 
+    ``against`` is the accepted run, empty without one; ``passed``: nothing failed.
+    """
+
+    schema_version: int = field(init=False, default=1)
+    passed: bool = field(init=False)
     results: str
     against: str
     outcomes: tuple[Outcome, ...]
 
-    @property
-    def passed(self) -> bool:
-        """Whether nothing failed."""
-        return all(each.verdict != FAILED for each in self.outcomes)
+    def __post_init__(self) -> None:
+        failed = any(each.verdict == FAILED for each in self.outcomes)
+        object.__setattr__(self, "passed", not failed)

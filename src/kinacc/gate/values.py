@@ -1,4 +1,4 @@
-"""The figures that a gate may name: how each is read from the tables of a run, and its words.
+"""The figures that a gate may name, read from the tables of a run.
 
 Their names, units and meanings stand in the schema of the configuration.
 """
@@ -7,35 +7,102 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from kinacc.config.error_models import model_name
+from kinacc.calibration.summary import selected
+from kinacc.config.error_models import MEASURED, Comparison, model_name
 from kinacc.config.gate_rules import COMPARED, units
-from kinacc.errors import Problem
-from kinacc.gate import chance
-from kinacc.gate.chance import STATISTICS
-from kinacc.gate.run_tables import Absent, RunTables, errors_of
+from kinacc.errors import InputError, Problem
+from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
-from kinacc.tables import sums
+from kinacc.tables import assessment_tables, store
 
+SELECTED = "selected"
+FEWEST_OF_QUANTILE = 100  # rows of which 1 % is one: with fewer, the 99 % quantile is the largest
 _AT = {
     "held_out": "held out",
     "validation": "of the fold kept for validation",
     "training": "at rows that were fitted",
 }
+_HISTORY = {  # column of the table and meaning
+    "moved": ("moved_mm", "rms movement of the arm since the calibration in force"),
+    "beyond_chance": ("beyond_mm", "movement since the calibration in force beyond chance"),
+    "in_force_mean": (
+        "in_force_mean_mm",
+        "mean position error of the calibration in force at the newest readings",
+    ),
+    "in_force_p99": (
+        "in_force_quantile_99_mm",
+        "empirical 99 % quantile of the position errors of the calibration in force at the newest "
+        "readings",
+    ),
+}
 
 
-FEWEST_OF_QUANTILE = 100  # rows of which 1 % is one: with fewer, the 99 % quantile is the largest
+class Absent(InputError):
+    """A table that a gate needs is missing; its problem names the command that makes it."""
+
+
+class RunTables(dict[str, pd.DataFrame]):
+    """Tables of one data set by artefact, read once.
+
+    Raises Absent for a table that is missing, InputError for a file that is no table.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self.folder = folder
+
+    def __missing__(self, artefact: str) -> pd.DataFrame:
+        path = self.folder / f"{artefact}.parquet"
+        if not path.is_file():
+            studied = any(artefact == each.name for each in assessment_tables.ALL)
+            fix = f"kinacc {'study' if studied else 'calibrate'} FILE.yaml makes it"
+            if artefact == "history":
+                fix = "give the data set a series (docs/history.md) and calibrate it"
+            raise Absent(Problem(str(path), "missing", fix=fix))
+        self[artefact] = store.read_table(path)
+        return self[artefact]
+
+    def model(self, named: str) -> str:
+        """The error model of a gate; the selected one for ``selected``."""
+        return selected(self["model_selection"]) if named == SELECTED else named
+
+    def errors(self, model: str, at: str, quantity: str) -> Sample:
+        """Sizes of a model's errors, mm or mrad, at the rows at which every model was tried.
+
+        ``at``: held_out, every row by a fit without it; validation, the rows of the fold kept for
+        it; training, rows that were fitted. Raises Absent where there are none.
+        """
+        table = self["pose_errors"]
+        table = table[table["estimate"] == ("train" if at == "training" else "cross_validated")]
+        if at == "validation":
+            table = table[table["subset"] == "validation"]
+        tried = table.groupby("row")["comparison"].nunique()
+        common = tried.index[tried == table["comparison"].nunique()]
+        table = table[table["comparison"] == Comparison(MEASURED, model).name]
+        table = table[table["row"].isin(common)]
+        names = [f"e{axis}_mm" if quantity == "position" else f"r{axis}_mrad" for axis in "xyz"]
+        sizes = np.linalg.norm(table[names], axis=1)
+        known = np.isfinite(sizes)
+        if not known.any():
+            what = f"has no {quantity} errors of model {model} at rows {at.replace('_', ' ')}"
+            fix = "name another model or other rows"
+            raise Absent(Problem("pose_errors.parquet", what, fix=fix))
+        rows = table["row"].to_numpy()[known]
+        return Sample(sizes[known], configurations_of(self["measurements"])[rows])
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a run, NaN where it cannot be told; ``unit`` is 1 of what is counted.
+    """A figure of a run, NaN where it is not defined; ``unit`` is 1 for counts.
 
-    ``called`` names it within a sentence; ``about`` are further facts by name with unit, ``open``
-    is why no limit can be told of it though it has a size; empty where it can.
+    ``called`` names it within a sentence; ``about`` are further facts by name with unit; ``open``
+    is the reason why it cannot pass a limit, empty where it can.
     """
 
     size: float
@@ -50,101 +117,47 @@ class Figure:
         return "" if self.unit == "1" else f"_{self.unit}"
 
     def worded(self, size: float) -> str:
-        """A size in the figure's unit, as it is told."""
+        """A size with the figure's unit."""
         return f"{size:.10g}" if self.unit == "1" else f"{size:.3f} {self.unit}"
 
 
+def sample(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Sample:
+    """The errors behind a figure of errors."""
+    return tables.errors(tables.model(gate["model"]), gate["at"], name.split(".")[1])
+
+
 def figure(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Figure:
-    """The figure of a name. Absent where the table it stands in is not there."""
+    """The figure of a name. Raises Absent where its table is missing."""
+    unit, (topic, _, word) = units()[name], name.partition(".")
     if name.startswith(COMPARED):
-        return _of_errors(name, tables, gate)
-    topic, _, word = name.partition(".")
-    return _OTHERS[topic](word, tables, units()[name])
-
-
-def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Figure:
-    _, quantity, statistic = name.split(".")
-    model = tables.model(gate["model"])
-    sizes, rows = errors_of(tables, model, gate["at"], quantity)
-    of, words = STATISTICS[statistic]
-    called = f"{words} of the {quantity} errors {_AT[gate['at']]}"
-    about = {"model": model, "statistic": words, "at": gate["at"], "rows": len(rows)}
-    size, why = of(sizes), ""
-    if statistic == "p99" and len(rows) < FEWEST_OF_QUANTILE:
-        why = f"{len(rows)} rows are too few to tell of 1 % of them"
-    if np.isnan(size):
-        why = "an error is exactly zero, to which no gamma distribution can be fitted"
-    return Figure(size, units()[name], f"{called} ({model_name(model)} model)", about, why)
-
-
-@dataclass(frozen=True)
-class Compared:
-    """How a figure of errors differs from that of another run: see :class:`chance.Change`.
-
-    ``paired``: both were held out at the same measurements; ``drawn`` says what was resampled.
-    """
-
-    difference: float
-    least: float
-    paired: bool
-    drawn: str
-    open: str
-
-
-def change_of(
-    name: str, now: RunTables, before: RunTables, gate: Mapping[str, Any], confidence: float
-) -> Compared:
-    """How a figure of errors in one run differs from that in another, and what chance makes."""
-    statistic = name.rpartition(".")[2]
-    samples = [_sample(each, name, gate) for each in (now, before)]
-    paired = _digest(now) == _digest(before) is not None
-    found = chance.change(statistic, samples[0], samples[1], paired, confidence)
-    one, other = (each.count for each in samples)
-    drawn = f"by resampling {one} poses of the same measurements"
-    if not paired:
-        drawn = f"by resampling {one} poses and the accepted run's {other}"
-    return Compared(found.difference, found.least, paired, drawn, found.open)
-
-
-def _digest(tables: RunTables) -> str | None:
-    return sums.stated(tables.folder).get("measurements.parquet")
-
-
-def _sample(tables: RunTables, name: str, gate: Mapping[str, Any]) -> chance.Sample:
-    quantity = name.split(".")[1]
-    sizes, rows = errors_of(tables, tables.model(gate["model"]), gate["at"], quantity)
-    return chance.Sample(sizes, configurations_of(tables["measurements"])[rows])
-
-
-def _of_data(word: str, tables: RunTables, unit: str) -> Figure:
+        return _of_errors(name, tables, gate, unit)
+    if topic == "bound":
+        return _of_bound(tables, unit, word)
+    if topic == "history":
+        column, called = _HISTORY[word]
+        size = float(tables["history"][column].iloc[-1])
+        why = "the history has no earlier calibration in force" if np.isnan(size) else ""
+        return Figure(size, unit, called, open=why)
     pose = tables["measurements"]["pose"]
-    count = len(pose) if word == "readings" else len(np.unique(pose))
-    return Figure(float(count), unit, f"number of {word}")
+    return Figure(float(len(pose) if word == "readings" else pose.nunique()), unit,
+                  f"number of {word}")  # fmt: skip
 
 
-_HISTORY = {
-    "moved": ("moved_mm", "rms by which the arm moved since the calibration in force"),
-    "beyond_chance": ("beyond_mm", "movement since the calibration in force beyond chance"),
-    "in_force_mean": (
-        "in_force_mean_mm",
-        "mean position error of the calibration in force at the newest readings",
-    ),
-    "in_force_p99": (
-        "in_force_quantile_99_mm",
-        "empirical 99 % quantile of the position errors of the calibration in force at the newest "
-        "readings",
-    ),
-}
+def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
+    _, quantity, statistic = name.split(".")
+    sizes, model = sample(name, tables, gate).sizes, tables.model(gate["model"])
+    of, words = STATISTICS[statistic]
+    called = f"{words} of the {quantity} errors {_AT[gate['at']]} ({model_name(model)} model)"
+    about = {"model": model, "statistic": words, "at": gate["at"], "rows": len(sizes)}
+    size, why = of(sizes), ""
+    if statistic == "p99" and len(sizes) < FEWEST_OF_QUANTILE:
+        why = f"{len(sizes)} rows are fewer than {FEWEST_OF_QUANTILE}"
+    if np.isnan(size):
+        why = "an error is exactly zero: no gamma distribution fits"
+    return Figure(size, unit, called, about, why)
 
 
-def _of_history(word: str, tables: RunTables, unit: str) -> Figure:
-    column, called = _HISTORY[word]
-    size = float(tables["history"][column][-1])
-    why = "the history has no earlier calibration in force" if np.isnan(size) else ""
-    return Figure(size, unit, called, open=why)
-
-
-def _of_bound(word: str, tables: RunTables, unit: str) -> Figure:
+def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
     from kinacc.campaign import journal, of_calibration
     from kinacc.deployment import folder
 
@@ -153,18 +166,16 @@ def _of_bound(word: str, tables: RunTables, unit: str) -> Figure:
     sought = of_calibration.sought(name, known, places)
     found = sought.assessed
     if found is None:
-        what = "; ".join(sought.remarks) or "there is no campaign on this calibration"
-        fix = f"kinacc campaign start FOLDER --calibration {tables.folder} begins one"
+        what = "; ".join(sought.remarks) or "no campaign on this calibration"
+        fix = f"kinacc campaign start FOLDER --calibration {tables.folder}"
         raise Absent(Problem(str(tables.folder), what, fix=fix))
-    size = found.said.upper_mm if found.said else float("nan")
-    why = "its campaign states no upper bound so far" if np.isnan(size) else ""
-    if found.said and found.said.excepted:
-        why = f"its upper bound leaves {found.said.excepted} candidates out"
-    called = f"{word} bound on the largest error, by campaign {found.place}"
+    size, why = np.nan, "its campaign has no upper bound so far"
     about: dict[str, Any] = {"campaign": str(found.place)}
     if found.said:
-        about |= {"confidence": found.said.confidence}
+        size = found.said.upper_mm
+        about["confidence"] = found.said.confidence
+        why = why if np.isnan(size) else ""
+        if found.said.excepted:
+            why = f"its upper bound leaves {found.said.excepted} candidates out"
+    called = f"{word} bound on the largest error, by campaign {found.place}"
     return Figure(size, unit, called, about, why)
-
-
-_OTHERS = {"data": _of_data, "history": _of_history, "bound": _of_bound}
