@@ -179,6 +179,8 @@ RIGHT = {
         (by_axis("B2_{a}_mm"), IT.measured + IT.turn.apply([0, 90, 0])),
     ],
     "axes by letters": [(list("SLURBT"), IT.q), X],
+    "centimetres": [Q, (by_axis("{A} [cm]"), IT.measured / 10)],
+    "inches": [Q, (by_axis("{a}_in"), IT.measured / 25.4)],
 }
 
 
@@ -356,8 +358,6 @@ REFUSED = {
     ),
     "only nominal points": ([Q, (by_axis("soll_{a}"), IT.nominal)], "nominal"),
     "only deviations": ([Q, (by_axis("d{A} [mm]"), IT.deviation)], "a deviation"),
-    "centimetres": ([Q, (by_axis("{A} [cm]"), IT.measured / 10)], "cm"),
-    "inches": ([Q, (by_axis("{a}_in"), IT.measured / 25.4)], "inch"),
     "milliradians": ([(numbered("q{} [mrad]"), 1e3 * np.deg2rad(IT.q)), X], "mrad"),
     "joints in millimetres": ([(numbered("J{} [mm]"), IT.q), X], "joints in mm"),
     "thousands of metres": ([Q, (by_axis("{a}_m"), IT.measured)], "at most 50 m"),

@@ -171,8 +171,7 @@ def inches(folder: Path) -> Measured:
     names = [f"J{i} (deg)" for i in range(1, 7)] + ["X (in)", "Y (in)", "Z (in)"]
     lines = joined([names, *beside(cells(done.joints_deg, 3), cells(written, 5))], ",")
     path = save(folder / "imperial.csv", lines)
-    asked = frozenset({"inches"})
-    return truth(path, FANUC, done.joints_deg, written * 25.4, questions=asked, readable=False)
+    return truth(path, FANUC, done.joints_deg, written * 25.4)
 
 
 def typographic_minus(folder: Path) -> Measured:

@@ -248,7 +248,7 @@ def test_a_report_whose_features_stand_in_lines_of_their_own(tmp_path):
     padded = "\n".join(f"{x};;;;" if x.startswith("Point") else x for x in padded.split("\n"))
     for content in (blocks, padded):
         table = text.look(file(tmp_path, content)).table
-        named = next(iter(table.columns.values()))
+        named = table.columns.iloc[:, 0]
         assert [name.replace(" ", "_") for name in named[:2]] == ["Point_1", "Point_2"]
         np.testing.assert_allclose([float(c) for c in table.columns["Actual Y"]], POINT_MM[:, 1])
         assert table.line[1] == 7

@@ -252,10 +252,10 @@ def _joints(name: str, joints: Mapping[str, Any], place, folder: Path) -> Iterat
 def _quoted(folder: Path, file: Mapping[str, Any]) -> bool:
     """Whether the delimiter may stand within numbers: in quotes, or in cells of a workbook."""
     from kinacc.measurements.files import quotes_numbers
-    from kinacc.measurements.written import Written
+    from kinacc.measurements.layout import Layout
 
     path = file["path"] and folder / file["path"]
-    return bool(path) and os.path.isfile(path) and quotes_numbers(path, Written.of(file))
+    return bool(path) and os.path.isfile(path) and quotes_numbers(path, Layout.of(file))
 
 
 def _file(name: str, file: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:

@@ -26,13 +26,13 @@ from kinacc.measurements.layout import (
     PURE,
     ROUNDED_MM,
     ROUNDED_RAD,
+    Layout,
     Place,
     columns_of_quantity,
     listed,
     names_of,
 )
 from kinacc.measurements.table import RawTable, numbers, numbers_of
-from kinacc.measurements.written import Written
 
 if TYPE_CHECKING:
     from kinacc.deployment.record import Calibration
@@ -109,8 +109,7 @@ def _answered(table: RawTable, names: list[str], what: str) -> RawTable:
     rows = table.rows_in_words(np.flatnonzero(none))
     click.echo(f"left out, without {what} by their status: {rows}", err=True)
     kept = np.flatnonzero(~none)
-    cells = {name: [own[row] for row in kept] for name, own in table.columns.items()}
-    return replace(table, columns=cells, line=table.line[kept])
+    return table.select(kept)
 
 
 def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -> np.ndarray:
@@ -315,9 +314,8 @@ def open_table(path: str | Path) -> RawTable:
         decimal = "," if "," in first and "." not in first else "."
     elif "\t" in head:
         delimiter = "\t"
-    table = load(path, Written(delimiter, decimal))
-    columns = {name: [of_csv(cell) for cell in cells] for name, cells in table.columns.items()}
-    return replace(table, columns=columns)
+    table = load(path, Layout(delimiter, decimal))
+    return replace(table, columns=table.columns.map(of_csv))
 
 
 def _of_json(path: Path) -> RawTable:
@@ -330,7 +328,7 @@ def _of_json(path: Path) -> RawTable:
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
         what, allowed = "holds no rows", "a table of rows, as commands write with -o NAME.json"
         raise InputError(Problem(str(path), what, allowed)) from None
-    return RawTable(str(path), columns, np.arange(1, len(rows) + 1), ".")
+    return RawTable.of(str(path), columns, np.arange(1, len(rows) + 1))
 
 
 def _whole(digits: str) -> int | float:
@@ -350,7 +348,7 @@ def _with_units(table: RawTable) -> RawTable:
         is_joint = re.fullmatch(r"q\d+", name) and unit in (*ANGLE, *LENGTH)
         return whole if is_joint and whole not in table.columns else name
 
-    return replace(table, columns={called(name): each for name, each in table.columns.items()})
+    return replace(table, columns=table.columns.rename(columns=called))
 
 
 def say_unused(given: Rows, calibration: Calibration) -> None:

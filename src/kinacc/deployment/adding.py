@@ -21,8 +21,8 @@ from kinacc.kinematics import robot
 from kinacc.measurements import times
 from kinacc.measurements.files import load as loaded
 from kinacc.measurements.folds import split
+from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import read as read_measured
-from kinacc.measurements.written import Written
 from kinacc.tables.atomic import write_whole
 
 _MARK = "\ufeff"  # with which some editors begin a file
@@ -139,7 +139,7 @@ def _of_targets(
 def days(path: str, arm: Arm) -> list[str]:
     """Days that a file itself says it was measured on."""
     with suppress(InputError):
-        return times.days(loaded(path, Written.of(arm.settings["measurements"]["file"])))
+        return times.days(loaded(path, Layout.of(arm.settings["measurements"]["file"])))
     return []
 
 

@@ -1,38 +1,39 @@
-"""How a file states its measurements: which column holds which quantity, in which unit.
+"""How a file is written and which column holds which quantity, in which unit.
 
 A quantity of a row is ``q1``, ``q1_cmd`` (as commanded), ``s1``, ``pose``, ``repeat``, ``target``,
 ``session``, ``temperature``, ``payload`` or ``payload_x``. A quantity of a target is ``x``, ``rx``,
 ``qw``, ``std_x``, ``cov_xy`` and the like, alone or behind the target's name (``mA_x``). A column
-of the file carries
-the unit in its name (``q1_deg``, ``mA_x_mm``), or is mapped to our name and then has the layout's
-unit. A name that says another unit than the layout is refused, and a point that its name calls
-nominal, a deviation or an uncertainty is read only where ``targets`` or ``columns`` name it.
+of the file carries the unit in its name (``q1_deg``, ``mA_x_mm``), or is mapped to our name and
+then has the layout's unit. A name that says another unit than the layout is refused, and a point
+that its name calls nominal, a deviation or an uncertainty is read only where ``targets`` or
+``columns`` name it.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
 from kinacc.errors import Problem
 from kinacc.measurements import column_names
-from kinacc.measurements.column_names import name_of
-from kinacc.measurements.table import RawTable, numbers
+from kinacc.measurements.column_names import KNOWN, name_of
+from kinacc.measurements.table import RawTable
 
 TOOL = "tool"  # name of the target whose columns carry no name
+TABLE, FEATURES, SPHERICAL = "table", "features", "spherical"
 
 ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
-LENGTH = {"mm": 1.0, "m": 1000.0}
+LENGTH = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "inch": 25.4}
 # By so much may a quantity given in two units differ: rounding to the digits commands show.
 ROUNDED_RAD, ROUNDED_MM = 1e-6, 1e-3
-AREA = {"mm2": 1.0, "m2": 1.0e6}
-CELSIUS = {"c": 1.0, "C": 1.0}
-MASS = {"kg": 1.0}
-PURE = {"": 1.0}
+AREA = {f"{unit}2": factor**2 for unit, factor in LENGTH.items()}
+PURE, MASS = {"": 1.0}, {"kg": 1.0}
+_CELSIUS = ({"c": 1.0, "C": 1.0}, "C", "")
+_SINGLE = {"temperature": _CELSIUS, "temp": _CELSIUS, "payload": (MASS, "kg", "")}
 
 POSITION = ("x", "y", "z")
 PAYLOAD = ("payload", "payload_x", "payload_y", "payload_z")
@@ -43,40 +44,59 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 QUATERNION_IN_ORDER = ("quat1", "quat2", "quat3", "quat4")
 ANGLES = ("rx", "ry", "rz")
 ANGLES_IN_ORDER = ("e1", "e2", "e3")
-_TARGET_QUANTITIES = (
-    *POSITION,
-    *STD,
-    *STD_TURN,
-    *COVARIANCE,
-    *QUATERNION,
-    *QUATERNION_IN_ORDER,
-    *ANGLES,
-    *ANGLES_IN_ORDER,
-)
-_POINT = re.compile(r"(?P<name>.+_x)_(?:mm|m)")
+_TURNS = (*ANGLES, *ANGLES_IN_ORDER, *STD_TURN)
+_OF_TARGETS = (*POSITION, *STD, *COVARIANCE, *QUATERNION, *QUATERNION_IN_ORDER, *_TURNS)
+_JOINT = re.compile(r"q(\d)(?:_cmd)?")
 _READ = (column_names.MEASURED, column_names.REPORTED, column_names.PLAIN)
+_DEFAULT = {"joint_unit": "deg", "length_unit": "mm", "orientation.unit": "deg"}
+
+
+@dataclass(frozen=True)
+class Directions:
+    """How a spherical reading states its angles; ``unit`` deg, gon or rad.
+
+    ``vertical`` is counted from the zenith or from the horizon; ``horizontal`` is clockwise or
+    counterclockwise, seen from above.
+    """
+
+    unit: str = "deg"
+    vertical: str = "zenith"
+    horizontal: str = "clockwise"
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The ``measurements.file`` section of the configuration, as far as it speaks of columns.
+    """The ``measurements.file`` section of the configuration: all there is to know of a file.
 
-    ``columns`` maps our names (``q1``, ``x``, ``mA_x``, ``pose``, ...) to the file's own, which
-    then carry ``joint_unit``, ``length_unit`` and ``angle_unit``. ``orientation`` is none,
-    quaternion (``order`` of quat1..quat4), rotation_vector or euler (of ``convention``).
-    ``targets`` names those to read; None for all that are there. ``no_reading`` are numbers that
-    say that nothing was read; uncertainties are ``sigma`` standard deviations. ``pulses_per_deg``:
-    mapped joints are motor pulses. ``repeats_in_names``: P12_1 and P12-2 are readings of one pose.
+    ``delimiter`` may be ``blanks``, one or more of them; ``thousands`` the mark between thousands;
+    ``names`` the columns of a file that has no line of names; ``layout`` table, features (a row per
+    feature and axis) or spherical. ``columns`` maps our names (``q1``, ``x``, ``mA_x``, ``pose``)
+    to the file's own, which then carry ``joint_unit``, ``length_unit`` and ``angle_unit``.
+    ``orientation`` is none, quaternion (``order`` of quat1..quat4), rotation_vector or euler (of
+    ``convention``). ``targets`` names those to read; None for all that are there. ``no_reading``
+    are numbers that say that nothing was read; uncertainties are ``sigma`` standard deviations.
+    ``pulses_per_deg``: joints are motor pulses. ``repeats_in_names``: P12_1 and P12-2 are readings
+    of one pose.
     """
 
-    columns: Mapping[str, str]
-    joint_unit: str
-    length_unit: str
-    orientation: str
-    convention: str
-    angle_unit: str
-    order: str | None
-    targets: tuple[str, ...] | None
+    delimiter: str = ","
+    decimal: str = "."
+    thousands: str | None = None
+    skip_lines: int = 0
+    skip_under_names: int = 0
+    encoding: str = "utf-8"
+    sheet: str | None = None
+    names: tuple[str, ...] | None = None
+    layout: str = TABLE
+    directions: Directions = Directions()
+    columns: Mapping[str, str] = field(default_factory=dict)
+    joint_unit: str = "deg"
+    length_unit: str = "mm"
+    orientation: str = "none"
+    convention: str = "XYZ"
+    angle_unit: str = "deg"
+    order: str | None = None
+    targets: tuple[str, ...] | None = None
     no_reading: tuple[float, ...] = ()
     sigma: int = 1
     pulses_per_deg: tuple[float, ...] | None = None
@@ -84,22 +104,47 @@ class Layout:
 
     @classmethod
     def of(cls, section: Mapping) -> Layout:
-        """Layout from the configuration section ``measurements.file``."""
-        turn, targets = section["orientation"], section.get("targets")
-        return cls(
-            section["columns"],
-            section["joint_unit"],
-            section["length_unit"],
-            turn["kind"],
-            turn["convention"],
-            turn["unit"],
-            turn.get("order"),
-            None if targets is None else tuple(targets),
-            tuple(section.get("no_reading", ())),
-            section.get("sigma", 1),
-            tuple(section.get("pulses_per_deg") or ()) or None,
-            section.get("repeats_in_names", False),
-        )
+        """From the section; a key that is not there is at its default."""
+        turn = section.get("orientation", {})
+        given = {each.name: section[each.name] for each in fields(cls) if each.name in section}
+        given = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
+        given |= {"orientation": turn.get("kind", "none"), "order": turn.get("order")}
+        given |= {
+            "convention": turn.get("convention", "XYZ"),
+            "angle_unit": turn.get("unit", "deg"),
+        }
+        given["directions"] = Directions(**section.get("directions", {}))
+        return cls(**given)
+
+    def written(self) -> dict[str, object]:
+        """The keys of the section that say how the file is written, defaults included."""
+        names = [each.name for each in fields(self)]
+        keys = {name: getattr(self, name) for name in names[: names.index("columns")]}
+        return keys | {
+            "names": self.names and list(self.names),
+            "directions": vars(self.directions),
+        }
+
+
+@dataclass(frozen=True)
+class Join:
+    """How rows of points and of joints in a file of their own belong together.
+
+    ``by`` a name (of columns ``key`` of the joints and ``key_of_points``), by time (of these
+    columns: a point's clock shows ``clock_offset_s`` less than the joints') or by order. Joints
+    within ``within_s`` of a point are those of the point, if the arm stood still.
+    """
+
+    by: str
+    key: str | None = None
+    key_of_points: str | None = None
+    clock_offset_s: float = 0.0
+    within_s: float = 0.5
+
+    @classmethod
+    def of(cls, section: Mapping) -> Join:
+        """From the configuration section ``measurements.file.joints``."""
+        return cls(*(section[each.name] for each in fields(cls)))
 
 
 @dataclass(frozen=True)
@@ -125,10 +170,9 @@ class Target:
     std_turn: tuple[Place, ...] = ()
     covariance: tuple[Place, ...] = ()
 
-    def places(self) -> Iterator[Place]:
+    def places(self) -> tuple[Place, ...]:
         """Every column of the target."""
-        for group in (self.position, self.turn, self.std, self.std_turn, self.covariance):
-            yield from group
+        return (*self.position, *self.turn, *self.std, *self.std_turn, *self.covariance)
 
 
 @dataclass(frozen=True)
@@ -145,11 +189,14 @@ class FoundColumns:
     single: Mapping[str, Place]
     payload: tuple[Place, ...] = ()
 
+    def measured(self) -> list[Place]:
+        """Columns of all but the names of rows."""
+        every = [*self.joints, *self.commanded, *self.directions.values(), *self.payload]
+        return every + [place for target in self.targets for place in target.places()]
+
     def unused(self, table: RawTable) -> tuple[str, ...]:
         """Columns of the file that hold nothing that was recognised."""
-        used = {place.column for place in (*self.joints, *self.commanded, *self.payload)}
-        used |= {place.column for place in (*self.directions.values(), *self.single.values())}
-        used |= {place.column for target in self.targets for place in target.places()}
+        used = {place.column for place in (*self.measured(), *self.single.values())}
         return tuple(name for name in table.columns if name not in used)
 
 
@@ -160,96 +207,91 @@ def find(
 
     ``prismatic`` (k,) marks joints whose position is a length.
     """
-    finder = _Finder(table, layout, problems)
-    before = len(problems)
-    joints = finder.group([f"q{i + 1}" for i in range(len(prismatic))], prismatic, required=True)
-    commanded = finder.group([f"q{i + 1}_cmd" for i in range(len(prismatic))], prismatic)
-    finder.refuse_spare_joint(len(prismatic))
-    directions = {i: finder.any(f"s{i + 1}", PURE, "") for i in range(len(prismatic))}
-    single = {name: finder.any(name, PURE, "") for name in ("pose", "repeat", "target", "session")}
-    single["temperature"] = finder.any("temperature", CELSIUS, "C") or finder.any(
-        "temp", CELSIUS, "C"
-    )
-    payload = finder.payload()
+    finder = _Finder(table, layout, prismatic, problems)
+    before, numbers = len(problems), range(1, len(prismatic) + 1)
+    joints = finder.group([f"q{n}" for n in numbers], required=True)
+    commanded = finder.group([f"q{n}_cmd" for n in numbers])
+    if finder.any(spare := f"q{len(prismatic) + 1}"):
+        what = f"{spare} is there, the robot has {len(prismatic)} joints"
+        problems.append(Problem(f"{table.path}: columns", what))
+    directions = {n - 1: finder.any(f"s{n}") for n in numbers}
+    single = {name: finder.any(name) for name in ("pose", "repeat", "target", "session")}
+    single["temperature"] = finder.any("temperature") or finder.any("temp")
+    mass, centre = finder.group(PAYLOAD[:1]), finder.group(PAYLOAD[1:])
+    if centre and not mass:
+        finder.problem("payload_kg", "is missing beside the centre of the payload")
     names = finder.targets()
     targets = tuple(finder.target(name, alone=len(names) == 1) for name in names)
-    finder.refuse_unknown_columns()
-    if len(problems) > before:
-        return None
+    for name, foreign in layout.columns.items():
+        if foreign not in table.columns:
+            what = f"is not there, but measurements.file.columns maps {name} to it"
+            finder.problem(foreign, what, listed(table))
     found = FoundColumns(
-        joints,
-        commanded,
+        finder.in_pulses(joints),
+        finder.in_pulses(commanded),
         {joint: place for joint, place in directions.items() if place},
         targets,
         {name: place for name, place in single.items() if place},
-        payload,
+        (*mass, *centre) if mass else (),
     )
-    finder.refuse_shared_columns(found)
+    twice = Counter(place.column for place in found.measured())
+    for column in (each for each in twice if twice[each] > 1 and len(problems) == before):
+        mapped = ", ".join(name for name, own in layout.columns.items() if own == column)
+        what = f"is taken for {twice[column]} quantities, {mapped} among them"
+        finder.problem(column, what, "one", "correct measurements.file.columns")
     return found if len(problems) == before else None
 
 
 @dataclass(frozen=True)
 class _Finder:
+    """Columns of a table by our names; what is wrong is added to ``problems``."""
+
     table: RawTable
     layout: Layout
+    prismatic: np.ndarray
     problems: list[Problem]
 
-    def any(self, name: str, units: Mapping[str, float], mapped_unit: str) -> Place | None:
+    def any(self, name: str) -> Place | None:
         """The column of ``name``, if there is one; in two units it has to say the same twice."""
+        units, mapped_unit = _kind(name, self.layout, self.prismatic)[:2]
         if name in self.layout.columns:
             foreign = self.layout.columns[name]
-            # A mapped column that is not there is named once, by refuse_unknown_columns.
             return Place(foreign, units[mapped_unit]) if foreign in self.table.columns else None
         present = columns_of_quantity(self.table, name, units)
-        if len(present) > 1 and not self._alike(present, units):
-            names = " or ".join(each.column for each in present)
-            self._problem(names, "is given in two units that do not say the same")
+        if len(present) > 1:
+            first, *others = (self.table.values(p.column) * p.factor for p in present)
+            off = ROUNDED_RAD if units is ANGLE else ROUNDED_MM
+            if not all(np.allclose(first, each, 0.0, off, equal_nan=True) for each in others):
+                names = " or ".join(each.column for each in present)
+                self.problem(names, "is given in two units that do not say the same")
         return present[0] if present else None
 
-    def _alike(self, places: list[Place], units: Mapping[str, float]) -> bool:
-        """Whether columns of one quantity say the same, but for rounding."""
-        first, *others = (
-            numbers(self.table, each.column, [], gaps=True) * each.factor for each in places
-        )
-        rounded = ROUNDED_RAD if units is ANGLE else ROUNDED_MM if units is LENGTH else 0.0
-        return all(np.allclose(first, each, 0.0, rounded, equal_nan=True) for each in others)
+    def group(self, names: Sequence[str], required: bool = False) -> tuple[Place, ...]:
+        """Columns of quantities that come together, or none of them where not ``required``."""
+        places = {name: self.any(name) for name in names}
+        missing = [name for name, place in places.items() if place is None]
+        if missing and required:
+            for name in (each for each in missing if each not in self.layout.columns):
+                units = _kind(name, self.layout, self.prismatic)[0]
+                fix = f"or map {name} in measurements.file.columns"
+                told = " or ".join(list(names_of(name, units))[:2])
+                self.problem(told, "is missing", listed(self.table), fix)
+        elif missing and len(missing) < len(names):
+            there = ", ".join(name for name in names if name not in missing)
+            self.problem(", ".join(missing), f"is missing beside {there}")
+        return () if missing else tuple(places.values())
 
-    def required(self, name: str, units: Mapping[str, float], mapped_unit: str) -> Place | None:
-        place = self.any(name, units, mapped_unit)
-        if place is None and name not in self.layout.columns:
-            fix = f"or map {name} in measurements.file.columns"
-            self._problem(" or ".join(names_of(name, units)), "is missing", listed(self.table), fix)
-        return place
-
-    def group(self, names, prismatic, required: bool = False) -> tuple[Place, ...]:
-        """Columns of all joints, or none of them where they are not ``required``."""
-        places = []
-        for name, slides in zip(names, prismatic, strict=True):
-            units, unit = (
-                (LENGTH, self.layout.length_unit) if slides else (ANGLE, self.layout.joint_unit)
-            )
-            look = self.required if required else self.any
-            places.append(look(name, units, unit))
-        if None in places and any(places):
-            missing = [name for name, place in zip(names, places, strict=True) if place is None]
-            if not required:
-                self._problem(", ".join(missing), "is missing beside the other joints")
-        if None in places:
-            return ()
-        return self._in_pulses(places) if self.layout.pulses_per_deg else tuple(places)
-
-    def _in_pulses(self, places: list[Place]) -> tuple[Place, ...]:
-        """The joints as pulses of their motors, each with its own number of them in a degree."""
-        count = self.layout.pulses_per_deg or ()
+    def in_pulses(self, places: tuple[Place, ...]) -> tuple[Place, ...]:
+        """The joints; pulses of their motors have a number per degree each."""
+        count = self.layout.pulses_per_deg
+        if not places or not count:
+            return places
         if len(count) != len(places) or 0.0 in count:
-            what = f"{len(count)} numbers for {len(places)} joints" if 0.0 not in count else "a 0"
             allowed = "one number for each joint, none of them 0"
-            self.problems.append(Problem("measurements.file.pulses_per_deg", what, allowed))
-            return tuple(places)
-        return tuple(
-            Place(place.column, ANGLE["deg"] / each)
-            for place, each in zip(places, count, strict=True)
-        )
+            where = "measurements.file.pulses_per_deg"
+            self.problems.append(Problem(where, f"{list(count)}", allowed))
+            return places
+        return tuple(Place(p.column, ANGLE["deg"] / n) for p, n in zip(places, count, strict=True))
 
     def targets(self) -> list[str]:
         """Names of the targets to read, in order of their columns.
@@ -260,145 +302,109 @@ class _Finder:
             return list(self.layout.targets)
         mapped = [split(name) for name in self.layout.columns]
         named = [target or TOOL for target, quantity in mapped if quantity == "x"]
-        there = list(dict.fromkeys(self._points()))
-        says = {name: column_names.role(name_of(f"{name} x").words) for name in there}
-        letters = [n for n in there if len(n) == 1 and says[n] == column_names.PLAIN]
-        read = [n for n in there if says[n] in _READ or n in named or (letters and len(n) == 1)]
-        frames = [n for n in there if n not in read and column_names.is_frame(name_of(n).words)]
+        own = {c: c.rpartition("_") for c in map(str, self.table.columns)}
+        own = {c: split(name)[0] or TOOL for c, (name, _, unit) in own.items()
+               if unit in LENGTH and split(name)[1] == "x"}  # fmt: skip
+        says = {name: column_names.role(name_of(f"{name} x").words) for name in own.values()}
+        letters = [n for n in says if len(n) == 1 and says[n] == column_names.PLAIN]
+        read = [n for n in says if says[n] in _READ or n in named or (letters and len(n) == 1)]
+        frames = [n for n in says if n not in read and column_names.is_frame(name_of(n).words)]
         if not read and not named and len(frames) == 1:
             read = frames  # the tool centre point, under its usual name
-        unclear = [n for n in there if n not in read and says[n] == column_names.OPEN]
-        if unclear or (there and not read and not named):
-            self._unclear(unclear or there, read)
+        unclear = [n for n in says if n not in read and says[n] == column_names.OPEN]
+        if unclear or (says and not read and not named):
+            columns = [column for column, name in own.items() if name in (unclear or says)]
+            every = ", ".join(dict.fromkeys([*read, *(unclear or says)]))
+            fix = f"name those that were measured in measurements.file.targets (of: {every})"
+            what = "the name does not say that this was measured"
+            self.problem(", ".join(columns), what, "measured points", fix)
         return list(dict.fromkeys([*read, *named])) or [TOOL]
-
-    def _points(self) -> Iterator[str]:
-        """Names of the points whose columns have our names."""
-        for column in self.table.columns:
-            if column in ("x_mm", "x_m"):
-                yield TOOL
-            match = _POINT.fullmatch(column)
-            if match and split(match["name"])[1] == "x":
-                yield split(match["name"])[0]
-
-    def _unclear(self, names: list[str], read: list[str]) -> None:
-        columns = [c for c in self.table.columns for n in names if c in (f"{n}_x_mm", f"{n}_x_m")]
-        said = [column_names.role(name_of(column).words) for column in columns]
-        told = ", ".join("open" if each == column_names.OPEN else each for each in said)
-        named = ", ".join(dict.fromkeys([*read, *names]))
-        self._problem(
-            ", ".join(columns),
-            f"the name does not say that this was measured ({told})",
-            "measured points",
-            f"name those that were measured in measurements.file.targets (of: {named})",
-        )
 
     def target(self, name: str, alone: bool) -> Target:
         """Columns of a target; ``alone`` it must have an orientation, where there is a kind."""
-        bare = name == TOOL and ("x" in self.layout.columns or not self._has_prefix(TOOL))
-        prefix = "" if bare else f"{name}_"
-        length, angle = self.layout.length_unit, self.layout.angle_unit
-        position = [self.required(f"{prefix}{axis}", LENGTH, length) for axis in POSITION]
-        covariance = self._all(prefix, COVARIANCE, AREA, f"{length}2")
-        std = self._all(prefix, STD, LENGTH, length)
+        own = self.any(f"{TOOL}_x")
+        prefix = "" if name == TOOL and ("x" in self.layout.columns or not own) else f"{name}_"
+        position, std, std_turn, covariance = (
+            self.group([f"{prefix}{each}" for each in group], required=group is POSITION)
+            for group in (POSITION, STD, STD_TURN, COVARIANCE)
+        )
         if std and covariance:
             where = ", ".join(place.column for place in (*std, *covariance))
-            self._problem(where, "standard deviations and a covariance", "one of them")
-        return Target(
-            name,
-            tuple(place for place in position if place),
-            self._turn(prefix, alone),
-            std,
-            self._all(prefix, STD_TURN, ANGLE, angle),
-            covariance,
-        )
-
-    def _has_prefix(self, name: str) -> bool:
-        return any(f"{name}_x{unit}" in self.table.columns for unit in ("_mm", "_m")) or (
-            f"{name}_x" in self.layout.columns
-        )
+            self.problem(where, "standard deviations and a covariance", "one of them")
+        return Target(name, position, self._turn(prefix, alone), std, std_turn, covariance)
 
     def _turn(self, prefix: str, alone: bool) -> tuple[Place, ...]:
         kind = self.layout.orientation
         if kind == "none":
             return ()
-        unit = self.layout.angle_unit
-        if kind == "quaternion":
-            ordered = self._all(prefix, QUATERNION_IN_ORDER, PURE, "")
-            if ordered:
-                return tuple(ordered[self.layout.order.index(part)] for part in "wxyz")
-            names, units, unit = QUATERNION, PURE, ""
-        else:
-            names, units = ANGLES, ANGLE
-            ordered = self._all(prefix, ANGLES_IN_ORDER, ANGLE, unit) if kind == "euler" else ()
-            if ordered:
-                return ordered
-            if kind == "euler":
-                names = in_order_of(self.layout.convention)
-        # A single target must have its orientation; one of several may be a bare point.
-        look = self.required if alone else self.any
-        own = [f"{prefix}{name}" for name in names]
-        places = [self.any(name, units, unit) for name in own]
-        if look == self.required and not any(places) and not set(own) & set(self.layout.columns):
-            self._problem(", ".join(own), "are missing: the file states no orientation",
-                          listed(self.table), "set measurements.file.orientation.kind (none for "
-                          "positions alone), or map them in measurements.file.columns")  # fmt: skip
-            return ()
-        places = [look(name, units, unit) for name in own]
-        if None in places and any(places) and look == self.any:
-            missing = [f"{prefix}{n}" for n, p in zip(names, places, strict=True) if p is None]
-            self._problem(", ".join(missing), "is missing beside the rest of the orientation")
-        return () if None in places else tuple(places)
-
-    def _all(self, prefix: str, names, units, unit) -> tuple[Place, ...]:
-        """Columns of all ``names``; none where none is there, a problem where only some are."""
-        places = [self.any(f"{prefix}{name}", units, unit) for name in names]
-        missing = [f"{prefix}{n}" for n, p in zip(names, places, strict=True) if p is None]
-        if not missing:
-            return tuple(places)
-        if len(missing) < len(places):
-            self._problem(", ".join(missing), "is missing beside " + _with(names, missing, prefix))
+        usual = in_order_of(self.layout.convention) if kind == "euler" else ANGLES
+        usual = QUATERNION if kind == "quaternion" else usual
+        in_order = {"quaternion": QUATERNION_IN_ORDER, "euler": ANGLES_IN_ORDER}.get(kind, ())
+        ordered = self.group([f"{prefix}{each}" for each in in_order])
+        if ordered and kind == "quaternion":
+            return tuple(ordered[(self.layout.order or "wxyz").index(part)] for part in "wxyz")
+        names = [f"{prefix}{each}" for each in usual]
+        there = any(self.any(name) or name in self.layout.columns for name in names)
+        if ordered or there or not alone:  # one of several targets may be a bare point
+            return ordered or self.group(names, required=alone)
+        fix = "set measurements.file.orientation.kind (none for positions alone), or map them in "
+        fix += "measurements.file.columns"
+        what = "are missing: the file states no orientation"
+        self.problem(", ".join(names), what, listed(self.table), fix)
         return ()
 
-    def payload(self) -> tuple[Place, ...]:
-        """Columns of mass and centre of what is carried; none where the file does not say."""
-        mass = self.any(PAYLOAD[0], MASS, "kg")
-        centre = self._all("", PAYLOAD[1:], LENGTH, self.layout.length_unit)
-        if centre and not mass:
-            self._problem("payload_kg", "is missing beside the centre of the payload")
-        return (mass, *centre) if mass else ()
-
-    def refuse_spare_joint(self, joints: int) -> None:
-        spare = f"q{joints + 1}"
-        if spare in self.layout.columns or any(
-            f"{spare}_{unit}" in self.table.columns for unit in (*ANGLE, *LENGTH)
-        ):
-            self.problems.append(
-                Problem(
-                    f"{self.table.path}: columns",
-                    f"{spare} is there, the robot has {joints} joints",
-                )
-            )
-
-    def refuse_unknown_columns(self) -> None:
-        for name, foreign in self.layout.columns.items():
-            if foreign not in self.table.columns:
-                what = f"is not there, but measurements.file.columns maps {name} to it"
-                self._problem(foreign, what, listed(self.table))
-
-    def refuse_shared_columns(self, found: FoundColumns) -> None:
-        """A column that is taken for two measured quantities, as a slip in a mapping makes it."""
-        measured = [*found.joints, *found.commanded, *found.directions.values()]
-        measured += [place for target in found.targets for place in target.places()]
-        measured += found.payload
-        count = Counter(place.column for place in measured)
-        for column in (each for each in count if count[each] > 1):
-            mapped = [name for name, own in self.layout.columns.items() if own == column]
-            what = f"is taken for {count[column]} quantities, {', '.join(mapped)} among them"
-            self._problem(column, what, "one", "correct measurements.file.columns")
-
-    def _problem(self, column: str, what: str, allowed: str = "", fix: str = "") -> None:
+    def problem(self, column: str, what: str, allowed: str = "", fix: str = "") -> None:
+        """Add a problem with a column."""
         self.problems.append(Problem(f"{self.table.path}: column {column}", what, allowed, fix))
+
+
+def _kind(quantity: str, layout: Layout, prismatic: Sequence) -> tuple[dict, str, str]:
+    """Units of a quantity with factors, that of a mapped column, and the key that states it."""
+    joint, part = _JOINT.fullmatch(quantity), split(quantity)[1]
+    slides = joint and int(joint[1]) <= len(prismatic) and prismatic[int(joint[1]) - 1]
+    if slides or part in (*POSITION, *STD) or quantity in PAYLOAD[1:]:
+        return LENGTH, layout.length_unit, "length_unit"
+    if joint:
+        return ANGLE, layout.joint_unit, "" if layout.pulses_per_deg else "joint_unit"
+    if part in _TURNS:
+        return ANGLE, layout.angle_unit, "orientation.unit"
+    if part in COVARIANCE:
+        return AREA, f"{layout.length_unit}2", ""
+    return _SINGLE.get(quantity, (PURE, "", ""))
+
+
+def unit_problems(table: RawTable, layout: Layout, prismatic: np.ndarray) -> Iterator[Problem]:
+    """Keys that state another unit than the columns they are about.
+
+    A key that is the default may not be meant: of our names (q1_rad) the name is believed then.
+    ``prismatic`` (k,) marks joints whose position is a length.
+    """
+    said: dict[str, dict[str, str | None]] = {}
+    for quantity, column in layout.columns.items():
+        _, unit, key = _kind(quantity, layout, prismatic)
+        if key and column in table.columns:
+            said.setdefault(key, {})[column] = _stated_unit(table, column)
+    for column in map(str, table.columns):
+        ours, _, own = column.rpartition("_")
+        units, unit, key = _kind(ours, layout, prismatic)
+        # Where a mapped column states no unit, the key is about that one.
+        meant = key and unit != _DEFAULT[key] and None not in said.get(key, {}).values()
+        if meant and own in units and ours not in layout.columns:
+            said.setdefault(key, {})[column] = own
+    for key, stated in said.items():
+        unit = layout.angle_unit if key == "orientation.unit" else getattr(layout, key)
+        for other in {*stated.values()} - {None, unit}:
+            columns = ", ".join(column for column, each in stated.items() if each == other)
+            what = f"says {other}, but measurements.file.{key} says {unit}"
+            fix = "correct the key, or the name where it is the one that is wrong"
+            yield Problem(f"{table.path}: column {columns}", what, "the same in both places", fix)
+
+
+def _stated_unit(table: RawTable, column: str) -> str | None:
+    """The unit a column states in its name or under it, None for none that is known."""
+    under = table.units.get(column, "")
+    said = name_of(column, under if name_of("x", under).unit in KNOWN else "").unit
+    return said if said in KNOWN or " or " in said else None
 
 
 def in_order_of(convention: str) -> tuple[str, ...]:
@@ -412,20 +418,12 @@ def in_order_of(convention: str) -> tuple[str, ...]:
 
 def split(name: str) -> tuple[str, str]:
     """Target (may be empty) and quantity of a name such as std_x or mA_std_x; empty if neither."""
-    if name in _TARGET_QUANTITIES:
-        return "", name
     if name in PAYLOAD:
         return "", ""
     # The longest quantity counts: mA_std_x is no x of a target named mA_std.
-    ends = [each for each in _TARGET_QUANTITIES if name.endswith(f"_{each}")]
-    if not ends:
-        return "", ""
-    quantity = max(ends, key=len)
-    return name[: -len(quantity) - 1], quantity
-
-
-def _with(names, missing, prefix: str) -> str:
-    return ", ".join(f"{prefix}{name}" for name in names if f"{prefix}{name}" not in missing)
+    ends = [each for each in _OF_TARGETS if name == each or name.endswith(f"_{each}")]
+    quantity = max(ends, key=len, default="")
+    return name.removesuffix(quantity).removesuffix("_") if quantity else "", quantity
 
 
 def names_of(name: str, units: Mapping[str, float]) -> dict[str, float]:
@@ -441,4 +439,4 @@ def columns_of_quantity(table: RawTable, name: str, units: Mapping[str, float]) 
 
 def listed(table: RawTable) -> str:
     """The columns a file has, in words."""
-    return "the file has " + ", ".join(table.columns)
+    return "the file has " + ", ".join(map(str, table.columns))

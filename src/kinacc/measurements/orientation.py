@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from kinacc.geometry import (
-    exp_so3,
-    quaternion_from_rotation,
-    rotation_from_quaternion,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-    skew,
-)
+from kinacc.geometry import exp_so3, rotation_from_quaternion, skew
 from kinacc.measurements.layout import Layout
 
-_ABOUT = {"x": rotation_x, "y": rotation_y, "z": rotation_z}
 _SMALL_ANGLE_RAD = 1e-6
 
 
@@ -27,12 +19,12 @@ def quaternions(turns: np.ndarray, layout: Layout) -> np.ndarray:
     """
     result = np.full((len(turns), 4), np.nan)
     there = np.isfinite(turns).all(axis=1)
-    given = turns[there]
     if layout.orientation == "quaternion":
-        unit = given / np.linalg.norm(given, axis=1, keepdims=True)
+        unit = turns[there] / np.linalg.norm(turns[there], axis=1, keepdims=True)
         result[there] = np.where(unit[:, :1] < 0.0, -unit, unit)
-    else:
-        result[there] = quaternion_from_rotation(rotations(given, layout))
+    elif there.any():
+        turned = Rotation.from_matrix(rotations(turns[there], layout))
+        result[there] = turned.as_quat(canonical=True, scalar_first=True)
     return result
 
 
@@ -47,10 +39,7 @@ def rotations(turns: np.ndarray, layout: Layout) -> np.ndarray:
 
 def euler(angles_rad: np.ndarray, convention: str) -> np.ndarray:
     """Rotations (n, 3, 3) of angles (n, 3); capitals intrinsic, small letters extrinsic."""
-    product = np.broadcast_to(np.eye(3), (len(angles_rad), 3, 3))
-    for _, turn in _factors(angles_rad, convention):
-        product = product @ turn
-    return product
+    return Rotation.from_euler(convention, angles_rad).as_matrix().reshape(-1, 3, 3)
 
 
 def rotation_std(turns: np.ndarray, std: np.ndarray, layout: Layout) -> np.ndarray:
@@ -61,27 +50,16 @@ def rotation_std(turns: np.ndarray, std: np.ndarray, layout: Layout) -> np.ndarr
     if layout.orientation == "rotation_vector":
         jacobian = _left_jacobians(turns)
     else:
-        # The axis of an angle is turned by the factors before it.
+        # The axis of an angle is turned by the factors left of it in the product.
+        letters = layout.convention.upper()
+        order = range(3) if layout.convention.isupper() else range(2, -1, -1)
         jacobian = np.empty((len(turns), 3, 3))
-        product = np.broadcast_to(np.eye(3), (len(turns), 3, 3))
-        for (number, turn), axis in zip(
-            _factors(turns, layout.convention), _axes(layout.convention), strict=True
-        ):
-            jacobian[:, :, number] = product[:, :, axis]
-            product = product @ turn
+        product = Rotation.identity(len(turns))
+        for number in order:
+            axis = np.eye(3)["XYZ".index(letters[number])]
+            jacobian[:, :, number] = product.apply(axis)
+            product = product * Rotation.from_rotvec(turns[:, number, None] * axis)
     return np.sqrt(np.einsum("nij,nj->ni", jacobian**2, std**2))
-
-
-def _factors(angles_rad: np.ndarray, convention: str):
-    """Number of the angle and its rotation, factors of the product from left to right."""
-    order = range(3) if convention.isupper() else range(2, -1, -1)
-    for number in order:
-        yield number, _ABOUT[convention[number].lower()](angles_rad[:, number])
-
-
-def _axes(convention: str) -> list[int]:
-    letters = convention if convention.isupper() else convention[::-1]
-    return ["xyz".index(letter.lower()) for letter in letters]
 
 
 def _left_jacobians(vectors: np.ndarray) -> np.ndarray:

@@ -7,14 +7,14 @@ no measurement; its joint positions are those of a pose, which a tracker's file 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from kinacc.errors import InputError, Problem, first_few
-from kinacc.measurements.table import RawTable
+from kinacc.measurements.table import RawTable, frame
 
 _SUFFIXES = (".mod", ".sys", ".prg", ".dat", ".src", ".ls", ".jbi", ".txt", "")
 _MOST_BYTES = 20_000_000
@@ -27,25 +27,19 @@ _KUKA = re.compile(
 _FANUC = re.compile(r"^\s*P\[\s*(\d+)[^\]]*\]\s*\{(.*?)\}\s*;", re.DOTALL | re.MULTILINE)
 _YASKAWA = re.compile(r"^\s*(B?C\d+|P\d+)\s*=\s*([-+\d.,\s]+)$", re.MULTILINE)
 _KUKA_PARTS = re.compile(rf"\b([A-Z]\d?)\s+({_NUMBER})", re.IGNORECASE)
-_FANUC_JOINT = re.compile(rf"\bJ(\d)\s*=\s*({_NUMBER})\s*(deg|mm)?", re.IGNORECASE)
+_FANUC_JOINT = re.compile(rf"\bJ(\d)\s*=\s*({_NUMBER})\s*(?:deg|mm)?", re.IGNORECASE)
 _FLAT = re.compile(rf"p?\[\s*{_NUMBER}(?:\s*,\s*{_NUMBER})+\s*\]")
 _KIND = re.compile(r"\{\s*(\w+)\s*:")
 _LIST = re.compile(r"(?:p?\[.*\]|\{.*\})", re.DOTALL)
 _LISTED = re.compile(rf"(?<![\w.]){_NUMBER}(?![\w.])")
 _UNUSED = 9e8  # ABB writes 9E9 for an axis that is not there
-_FEWEST = 4
 _TARGETS = "cartesian positions, which say where the arm was sent: they are no joints, and not read"
 _HORIZONTAL = (
     "FANUC counts joint 3 from the horizontal: the arm's own is J3 plus J2, as joint_map of its "
     "robot file says; check-data holds that to the points"
 )
-
-
-@dataclass(frozen=True)
-class _Position:
-    name: str
-    place: int
-    joints: tuple[float, ...]
+_DEGREES = tuple(f"J{number} [deg]" for number in range(1, 8))
+Position = tuple[str, int, list[float]]  # name, place in the text, joints (none of a pose)
 
 
 def read(path: Path) -> RawTable | None:
@@ -57,75 +51,63 @@ def read(path: Path) -> RawTable | None:
         return None
     text = path.read_bytes().decode("utf-8", errors="replace")
     for maker in (_of_abb, _of_kuka, _of_fanuc, _of_yaskawa):
-        found, names, notes = maker(text)
-        joints = [each for each in found if each.joints]
-        cartesian = [each.name for each in found if not each.joints]
-        if not found:
-            continue
-        if not joints:
-            what = f"holds {len(cartesian)} {_TARGETS}"
-            allowed = "joint positions: jointtarget, E6AXIS, J1 .. J6 of P[n], pulses of a job"
-            fix = "record the joints at each pose, or give the points alone with a file of joints"
-            raise InputError(Problem(str(path), what, allowed, fix))
-        if cartesian:
-            notes = (*notes, f"{path}: {first_few(cartesian)}: {_TARGETS}")
-        return _table(path, text, joints, names, notes)
-    return None
-
-
-def _table(path: Path, text: str, found: list[_Position], names, notes) -> RawTable:
-    widths = {len(each.joints) for each in found}
-    lines = np.array([text.count("\n", 0, each.place) + 1 for each in found])
-    if len(widths) > 1 or not _FEWEST <= len(found[0].joints) <= len(names):
-        odd = [n for n, each in zip(lines, found, strict=True) if len(each.joints) != min(widths)]
+        if positions := maker(text):
+            break
+    else:
+        return None
+    found = [each for each in positions if each[2]]
+    cartesian = [name for name, _, joints in positions if not joints]
+    if not found:
+        what = f"holds {len(cartesian)} {_TARGETS}"
+        allowed = "joint positions: jointtarget, E6AXIS, J1 .. J6 of P[n], pulses of a job"
+        fix = "record the joints at each pose, or give the points alone with a file of joints"
+        raise InputError(Problem(str(path), what, allowed, fix))
+    names = _NAMES.get(maker, _DEGREES)
+    notes = (_HORIZONTAL,) if maker is _of_fanuc else ()
+    notes += (f"{path}: {first_few(cartesian)}: {_TARGETS}",) if cartesian else ()
+    lines = np.array([text.count("\n", 0, place) + 1 for _, place, _ in found])
+    widths = [len(joints) for _, _, joints in found]
+    if len({*widths}) > 1 or not 4 <= widths[0] <= 7:
+        odd = [line for line, width in zip(lines, widths, strict=True) if width != min(widths)]
         where = f"{path}: lines {first_few(odd or list(lines))}"
         raise InputError(Problem(where, "another number of joints than elsewhere", "4 to 7 joints"))
-    columns: dict[str, list] = {"name": [each.name for each in found]}
-    for number in range(len(found[0].joints)):
-        columns[names[number]] = [repr(each.joints[number]) for each in found]
-    return RawTable(str(path), columns, lines, ".", notes=notes)
+    columns = {"name": [name for name, _, _ in found]}
+    columns |= {names[n]: [repr(joints[n]) for _, _, joints in found] for n in range(widths[0])}
+    return RawTable.of(str(path), columns, lines, notes=notes)
 
 
-_DEGREES = tuple(f"J{number} [deg]" for number in range(1, 8))
-
-
-def _of_abb(text: str):
+def _of_abb(text: str) -> list[Position]:
     found = []
     for match in _ABB.finditer(text):
-        numbers = _floats(match[3])
-        joints = tuple(each for each in numbers if abs(each) < _UNUSED)
-        found.append(_Position(match[2], match.start(), joints if match[1][0] in "jJ" else ()))
-    return found, _DEGREES, ()
+        joints = [n for n in _floats(match[3]) if abs(n) < _UNUSED]
+        found.append((match[2], match.start(), joints if match[1][0] in "jJ" else []))
+    return found
 
 
-def _of_kuka(text: str):
-    found = []
+def _of_kuka(text: str) -> list[Position]:
+    found: list[Position] = []
     for match in _KUKA.finditer(text):
-        parts = _parts(match[2])
-        joints = tuple(parts[f"A{n}"] for n in range(1, 8) if f"A{n}" in parts)
-        name = (match[1] or f"P{len(found) + 1}").removeprefix("X").removeprefix("x")
-        if parts:
-            found.append(_Position(name, match.start(), joints))
-    return found, tuple(f"A{number} [deg]" for number in range(1, 8)), ()
+        if parts := _parts(match[2]):
+            name = re.sub("^[xX]", "", match[1] or f"P{len(found) + 1}")
+            joints = [parts[f"A{n}"] for n in range(1, 8) if f"A{n}" in parts]
+            found.append((name, match.start(), joints))
+    return found
 
 
-def _of_fanuc(text: str):
+def _of_fanuc(text: str) -> list[Position]:
     found = []
     for match in _FANUC.finditer(text):
         first_group = re.split(r"GP[2-9]\s*:", match[2])[0]
-        joints = {int(m[1]): float(m[2]) for m in _FANUC_JOINT.finditer(first_group)}
-        row = tuple(joints[number] for number in sorted(joints))
-        found.append(_Position(f"P[{match[1]}]", match.start(1), row))
-    joints = any(each.joints for each in found)
-    return found, _DEGREES, (_HORIZONTAL,) if joints else ()
+        joints = {int(number): float(value) for number, value in _FANUC_JOINT.findall(first_group)}
+        row = [joints[number] for number in sorted(joints)]
+        found.append((f"P[{match[1]}]", match.start(1), row))
+    return found
 
 
-def _of_yaskawa(text: str):
+def _of_yaskawa(text: str) -> list[Position]:
     if "/JOB" not in text or "///PULSE" not in text:
-        return [], (), ()
-    rows = _YASKAWA.finditer(text)
-    found = [_Position(each[1], each.start(1), tuple(_floats(each[2]))) for each in rows]
-    return found, tuple(f"{letter} [pulse]" for letter in "SLURBTE"), ()
+        return []
+    return [(each[1], each.start(1), _floats(each[2])) for each in _YASKAWA.finditer(text)]
 
 
 def _floats(text: str) -> list[float]:
@@ -138,13 +120,18 @@ def _parts(text: str) -> dict[str, float]:
 
 def expanded(table: RawTable) -> RawTable:
     """The table with cells such as {A1 10, A2 -90 ..} and [[10,-90,..],[9E9,..]] as columns."""
-    columns: dict[str, list] = {}
-    for name, cells in table.columns.items():
-        parts = list(_cells(cells))
-        columns |= {f"{name} {part}": values for part, values in parts} or {name: cells}
-    if columns.keys() == table.columns.keys():
+    columns: dict[str, Sequence] = {}
+    for name in table.columns:
+        texts = table.texts(name)
+        of = next((of for shape, of in _SHAPES.items() if re.match(shape, texts[0])), None)
+        rows = [of(each) for each in texts] if of and all(map(_LIST.fullmatch, texts)) else [{}]
+        if rows[0] and all(row.keys() == rows[0].keys() for row in rows):
+            columns |= {f"{name} {part}": [repr(row[part]) for row in rows] for part in rows[0]}
+        else:
+            columns[name] = table.columns[name]
+    if len(columns) == len(table.columns.columns):
         return table
-    return replace(table, columns=columns, under=())
+    return replace(table, columns=frame(columns))
 
 
 def numbers_within(cell: object) -> int:
@@ -153,42 +140,25 @@ def numbers_within(cell: object) -> int:
     return len(_LISTED.findall(text)) if _LIST.fullmatch(text) else 0
 
 
-def _cells(cells: list) -> Iterator[tuple[str, list]]:
-    """Columns within the cells of one, none where they are ordinary."""
-    texts = [str(cell).strip() for cell in cells]
-    if texts and all(each.startswith("{") and each.endswith("}") for each in texts):
-        rows = [_parts(each) for each in texts]
-    elif texts and all(each.startswith("[[") and each.endswith("]") for each in texts):
-        rows = [_of_target(each) for each in texts]
-    elif texts and all(_FLAT.fullmatch(each) for each in texts):
-        rows = [_of_list(each) for each in texts]
-    else:
-        return
-    if rows[0] and all(row.keys() == rows[0].keys() for row in rows):
-        for part in rows[0]:
-            yield part, [repr(row[part]) for row in rows]
-
-
-def _of_list(text: str) -> dict[str, float]:
-    """Numbers of [1.2, 0.3, ..] or p[..]: x, y, z where there are three, else by their place."""
-    values = _floats(text)
-    names = "xyz" if len(values) == 3 else [str(place) for place in range(1, len(values) + 1)]
-    return dict(zip(names, values, strict=True))
-
-
 def names_of_cells(cells: Sequence, word: str) -> str:
     """What a column of cells such as {E6AXIS: A1 10, ..} is called behind ``word``; may be empty.
 
     A frame that no word calls measured is one of the controller's.
     """
-    kinds = {
-        found[1].upper() if (found := _KIND.match(str(cell).strip())) else "" for cell in cells
-    }
+    found = [_KIND.match(str(cell).strip()) for cell in cells]
+    kinds = {each[1].upper() if each else "" for each in found}
     if not kinds <= {"E6AXIS", "AXIS", "E6POS", "POS", "FRAME"}:
         return ""
     if kinds <= {"E6AXIS", "AXIS"}:
         return f"{word} joints".strip()
     return f"{word} position" if word else "TCP position"
+
+
+def _of_list(text: str) -> dict[str, float]:
+    """Numbers of [1.2, 0.3, ..] or p[..]: x, y, z where there are three, else by their place."""
+    values = _floats(text) if _FLAT.fullmatch(text) else []
+    names = "xyz" if len(values) == 3 else [str(place + 1) for place in range(len(values))]
+    return dict(zip(names, values, strict=True))
 
 
 def _of_target(text: str) -> dict[str, float]:
@@ -198,3 +168,10 @@ def _of_target(text: str) -> dict[str, float]:
         names = ("trans x", "trans y", "trans z", "rot q1", "rot q2", "rot q3", "rot q4")
         return dict(zip(names, [*groups[0], *groups[1]], strict=True))
     return {f"rax_{n}": v for n, v in enumerate(groups[0] if groups else [], 1) if v < _UNUSED}
+
+
+_NAMES = {
+    _of_kuka: [f"A{number} [deg]" for number in range(1, 8)],
+    _of_yaskawa: [f"{letter} [pulse]" for letter in "SLURBTE"],
+}
+_SHAPES = {r"\{": _parts, r"\[\[": _of_target, r"p?\[": _of_list}

@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pandas as pd
 
 from kinacc.errors import Problem
 from kinacc.measurements.row_names import RowNames
+from kinacc.measurements.words import WORDS
 
 # What instruments, controllers and spreadsheets write where there is nothing.
-_NOTHING_TEXT = """
-nan|na|n/a|null|none|#n/a|n.a.|#nv|#value!|#wert!|#div/0!|#null!|#ref!|k.a.|k. a.|n.d.|-nan|?
-nan(ind)|-nan(ind)|no reading|no data|nodata|no value|invalid|missing|lost|beam broken|no signal
-fehlt|ungültig|keine messung|kein wert|nicht gemessen|non mesuré|no medido|non misurato|欠測
-"""
-_NOTHING = frozenset(word for line in _NOTHING_TEXT.split("\n") for word in line.split("|"))
-_DASHES = frozenset("-–—*./")  # --, ---.---, ****
-_DIGITS = tuple("123456789")
+_NOTHING = frozenset(WORDS["nothing"])
 _LONGEST_NOTHING = max(map(len, _NOTHING))
+_DASHES = frozenset("-–—*./")  # --, ---.---, ****
 _LARGEST_CELL = 1e75  # its fourth power is still a float
-_SHOWN = 5  # rows named per problem; the rest is counted
 _LARGEST = 1e12  # beyond all lengths and angles
+_SHOWN = 5  # rows named per problem; the rest is counted
 _BLANKS = re.compile(r"[\u00a0\u2007\u2009\u202f]")  # blanks that keep a number on one line
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}(?:[ T].*)?|\d{1,2}[.-]? ?[^\W\d_]{3,9}\.?")
 
@@ -41,23 +36,22 @@ SMALLER = "give the rows and columns of the measurements alone"
 
 @dataclass(frozen=True)
 class RawTable:
-    """Columns of a measurement file as read: text cells of a CSV, or values of a Parquet file.
+    """Cells of a measured file as read: text of a CSV, or values of a sheet or Parquet file.
 
-    ``path`` names the file, with the sheet where it has several. ``line`` (n,) is the line in the
-    file a row stands on (CSV), its row in the sheet (Excel) or its row number from 1 (Parquet).
-    ``under`` are the cells of the line left out under the names, such as a line of units.
-    ``notes`` say what of the file is no row, ``not_rows`` are the lines of that. ``letters`` are
-    the letters of the columns of a sheet. ``pose_name`` are the file's names of poses by line, as
-    far as they are known. Where joints stand in another file, ``points_file`` is the one of the
-    lines, ``key`` its column that says which joints are those of a point.
+    ``path`` names the file, with the sheet where it has several. ``line`` (n,) is the line of the
+    file a row stands on, its row in a sheet or its number from 1 in a Parquet file. ``units`` are
+    those stated under the names or behind the numbers, by column. ``notes`` say what of the file is
+    no row, ``not_rows`` are its lines. ``letters`` of the columns of a sheet. ``pose_name`` are
+    names of poses by line. Where joints stand in another file, ``points_file`` is that of the
+    lines, and ``key`` its column that says which joints are those of a point.
     """
 
     path: str
-    columns: dict[str, list]
+    columns: pd.DataFrame
     line: np.ndarray
-    decimal: str
-    under: tuple[str, ...] = ()
+    decimal: str = "."
     thousands: str | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     not_rows: tuple[int, ...] = ()
     letters: Mapping[str, str] = field(default_factory=dict)
@@ -65,46 +59,54 @@ class RawTable:
     points_file: str = ""
     key: str | None = None
 
+    @classmethod
+    def of(cls, path: str, columns: Mapping[str, Sequence], line, **more) -> RawTable:
+        """A table of columns of cells, which stay what they are."""
+        return cls(path, frame(columns), np.asarray(line), **more)
+
     def __len__(self) -> int:
         return len(self.line)
 
     @staticmethod
     def is_gap(cell: object) -> bool:
-        """Whether a cell is empty."""
-        return _is_gap(cell)
+        """Whether a cell is empty, or says so in one of the ways of programs and people."""
+        if isinstance(cell, str):
+            if "1" <= cell[:1] <= "9" or len(word := cell.strip()) > _LONGEST_NOTHING:
+                return False
+            return word.lower() in _NOTHING or _DASHES.issuperset(word)
+        return cell is None or cell is pd.NaT or cell != cell
 
     def gaps(self, name: str) -> np.ndarray:
         """True (n,) where the cell of column ``name`` is empty."""
-        return np.array([_is_gap(cell) for cell in self.columns[name]], dtype=bool)
+        return np.array([self.is_gap(cell) for cell in self.columns[name]], dtype=bool)
+
+    def texts(self, name: str) -> list[str]:
+        """Cells of a column as texts."""
+        return [str(cell).strip() for cell in self.columns[name]]
+
+    def values(self, name: str) -> np.ndarray:
+        """Numbers (n,) of a column, NaN where a cell is none."""
+        return _converted(self.columns[name].tolist(), self.decimal, self.thousands)
 
     def select(self, rows: np.ndarray) -> RawTable:
         """The table of the rows at indices ``rows``."""
-        columns = {name: [cells[row] for row in rows] for name, cells in self.columns.items()}
-        return replace(self, columns=columns, line=self.line[rows])
+        kept = self.columns.iloc[rows].reset_index(drop=True)
+        return replace(self, columns=kept, line=self.line[rows])
 
     @property
     def row_names(self) -> RowNames:
         """What its rows are called; a sheet has rows and no lines."""
-        word = "row" if self.letters else "line"
-        return RowNames(self.pose_name, self.points_file, word)
+        return RowNames(self.pose_name, self.points_file, "row" if self.letters else "line")
 
     def rows_in_words(self, rows: np.ndarray) -> str:
         """Lines of the rows at indices ``rows``, the first few by number."""
-        return self.lines_in_words(self.line[rows])
-
-    def lines_in_words(self, lines: Sequence) -> str:
-        """Lines, the first few by number; rows where the file is a sheet."""
-        return self.row_names.few(lines, _SHOWN)
+        return self.row_names.few(self.line[rows], _SHOWN)
 
     def with_pose_names(self, column: str) -> RawTable:
         """The table, with the names of poses in ``column``; mere numbers are none."""
-        cells = self.columns[column]
-        words = ~np.isfinite(_converted(cells, self.decimal, self.thousands))
-        named = {
-            int(self.line[row]): str(cells[row]).strip()
-            for row in np.flatnonzero(words)
-            if not _is_gap(cells[row])
-        }
+        cells, numbers_ = self.columns[column], self.values(column)
+        parts = zip(self.line.tolist(), cells, numbers_, strict=True)
+        named = {n: str(c).strip() for n, c, v in parts if v != v and not self.is_gap(c)}
         return replace(self, pose_name=named)
 
     def column_in_words(self, name: str) -> str:
@@ -112,47 +114,49 @@ class RawTable:
         letter = self.letters.get(name)
         return f"{name} ({letter})" if letter else name
 
+    def where(self, column: str, rows: np.ndarray | None = None) -> str:
+        """The place of a column, at the rows of these indices, for a problem."""
+        told = "" if rows is None else f", {self.rows_in_words(rows)}"
+        return f"{self.path}: column {self.column_in_words(column)}{told}"
+
+
+def frame(columns: Mapping[str, Sequence]) -> pd.DataFrame:
+    """Columns of cells as they are."""
+    return pd.DataFrame({n: pd.Series(list(c), dtype=object) for n, c in columns.items()})
+
 
 def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool = False):
     """Column ``name`` as floats (n,); cells that are no finite number are added to ``problems``.
 
     With ``gaps`` an empty cell is allowed and becomes NaN.
     """
-    cells = table.columns[name]
-    values = _converted(cells, table.decimal, table.thousands)
+    values = table.values(name)
     bad = np.flatnonzero(~(np.abs(values) < _LARGEST_CELL))
-    if gaps:
-        bad = np.array([row for row in bad if not _is_gap(cells[row])], dtype=int)
+    if gaps and bad.size:
+        bad = bad[[not table.is_gap(table.columns[name][row]) for row in bad]]
     if bad.size:
         problems.append(_no_numbers(table, name, bad))
     return values
 
 
 def _no_numbers(table: RawTable, name: str, bad: np.ndarray) -> Problem:
-    cells = [table.columns[name][row] for row in bad]
-    where = f"{table.path}: column {table.column_in_words(name)}, {table.rows_in_words(bad)}"
-    shown = ", ".join(_shortened(_as_seen(cell)) for cell in cells[:_SHOWN])
+    cells = table.columns[name][bad].tolist()
+    dates = all(map(_is_date, cells))
+    shown = ", ".join(text if len(text) <= 60 else f"{text[:57]}..." for text in
+                      (str(c) if dates else repr(c) for c in cells[:_SHOWN]))  # fmt: skip
     other = "," if table.decimal == "." else "."
-    fix = "correct the cells"
-    if all(map(_is_date, cells)):
+    what, fix = f"not a finite number: {shown}", "correct the cells"
+    if dates:
         what = f"a date where a number is expected: {shown}"
         fix = "a spreadsheet may have made it of a number: export the file anew, columns as text"
-        return Problem(where, what, f"numbers with decimal mark {table.decimal!r}", fix)
-    if np.isfinite(_converted(cells, other, None)).any():
-        fix = f"correct the cells, or set measurements.file.decimal to {other!r}"
+    elif np.isfinite(_converted(cells, other, None)).any():
+        fix += f", or set measurements.file.decimal to {other!r}"
         fix += f" or measurements.file.thousands to {other!r}" if table.thousands is None else ""
-    elif all(map(_is_gap, cells)):
+    elif all(map(table.is_gap, cells)):
         fix = "fill the cells in"
     return Problem(
-        where,
-        f"not a finite number: {shown}",
-        f"numbers with decimal mark {table.decimal!r}",
-        fix,
+        table.where(name, bad), what, f"numbers with decimal mark {table.decimal!r}", fix
     )
-
-
-def _as_seen(cell: object) -> str:
-    return str(cell) if isinstance(cell, (datetime.date, datetime.time)) else repr(cell)
 
 
 def _is_date(cell: object) -> bool:
@@ -175,67 +179,33 @@ def numbers_of(text: str) -> np.ndarray:
     return values if (np.abs(values) <= _LARGEST).all() else np.zeros(0)
 
 
-def _shortened(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
 def _converted(cells: list, decimal: str, thousands: str | None) -> np.ndarray:
     """Cells as floats (n,), NaN where one is none."""
     try:
-        text = "\n".join(cells) if thousands is None else None
-    except TypeError:
-        text = None  # values of a Parquet file or of a sheet
-    try:
-        if text is not None and "_" not in text and not (decimal == "," and "." in text):
+        text = "\n".join(cells) if thousands is None else "_"
+        if "_" not in text and not (decimal == "," and "." in text):
             words = text.replace("\u2212", "-").replace(decimal, ".").split("\n")
             if len(words) == len(cells):
                 return np.array([float(word) for word in words])
-        return np.array([_number(cell, decimal, thousands) for cell in cells])
-    except (OverflowError, TypeError, ValueError):
-        return np.array([_number_or_nan(cell, decimal, thousands) for cell in cells])
+    except (TypeError, ValueError):  # values of a Parquet file or of a sheet; a word
+        pass
+    return np.array([_number(cell, decimal, thousands) for cell in cells], dtype=float)
 
 
 def _number(cell: object, decimal: str, thousands: str | None) -> float:
-    if not isinstance(cell, str):
-        return float(cell)
-    if "_" in cell:  # which Python takes
-        raise ValueError(cell)
-    cell = cell.replace("\u2212", "-")
-    if thousands is not None:
-        blank = thousands == " "
-        cell = _BLANKS.sub(" ", cell.strip()) if blank else cell.replace("\u2019", "'")
-        if thousands in cell:
-            whole = rf"[+-]?\d{{1,3}}(?:{re.escape(thousands)}\d{{3}})+(?:{re.escape(decimal)}\d*)?"
-            if not re.fullmatch(whole, cell.strip()):
-                raise ValueError(cell)
-            cell = cell.replace(thousands, "")
-    if decimal != ".":
-        # A point would be a thousands mark there: refuse it instead of guessing.
-        if "." in cell:
-            raise ValueError(cell)
-        cell = cell.replace(decimal, ".")
-    return float(cell)
-
-
-def _number_or_nan(cell: object, decimal: str, thousands: str | None) -> float:
     try:
-        return _number(cell, decimal, thousands)
+        if not isinstance(cell, str):
+            return float(cell)
+        cell = cell.strip().replace("\u2212", "-")
+        if thousands is not None:
+            cell = _BLANKS.sub(" ", cell) if thousands == " " else cell.replace("\u2019", "'")
+            mark = re.escape(thousands)
+            whole = rf"[+-]?\d{{1,3}}(?:{mark}\d{{3}})+(?:{re.escape(decimal)}\d*)?"
+            if thousands in cell and not re.fullmatch(whole, cell):
+                return np.nan
+            cell = cell.replace(thousands, "")
+        # A point would be a thousands mark beside decimal commas; Python takes 1_000.
+        wrong = "_" in cell or (decimal != "." and "." in cell)
+        return np.nan if wrong else float(cell.replace(decimal, "."))
     except (OverflowError, TypeError, ValueError):
-        return float("nan")
-
-
-def _is_gap(cell: object) -> bool:
-    """Empty, or not a number in one of the ways programs and people write it."""
-    if isinstance(cell, str):
-        if cell[:1] in _DIGITS:
-            return False
-        word = cell.strip()
-        if len(word) > _LONGEST_NOTHING:
-            return False
-        return word.lower() in _NOTHING or _DASHES.issuperset(word)
-    return cell is None or cell != cell
-
-
-def doubled_in(names: Sequence[str]) -> str:
-    """Names that are there more than once, in words."""
-    return ", ".join(sorted(name for name, count in Counter(names).items() if count > 1))
+        return np.nan

@@ -33,10 +33,7 @@ class Undecided(InputError):
         problems = []
         for each in self.choices:
             meant = "; ".join(f"{value}: {words}" for value, words in each.answers.items())
-            ways = " or ".join(f"{each.option} {_word(value)}" for value in each.answers)
+            told = [value if value.isalnum() else f'"{value}"' for value in each.answers]
+            ways = " or ".join(f"{each.option} {value}" for value in told)
             problems.append(Problem(path, f"{each.about}: {meant}", fix=f"give {ways}"))
         super().__init__(problems, f"{path} leaves open how it is to be read")
-
-
-def _word(value: str) -> str:
-    return value if value.isalnum() else f'"{value}"'

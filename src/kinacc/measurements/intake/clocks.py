@@ -31,54 +31,48 @@ class Offset:
 
 def offset(points_s: np.ndarray, joints_s: np.ndarray, q_rad: np.ndarray) -> Offset | None:
     """The offset of points (n,) to joints (m,) and (m, k); None where no offset explains them."""
-    stands, within = _standstills(joints_s, q_rad)
+    stands, within = standstills(joints_s, q_rad)
     points_s = points_s[np.isfinite(points_s)]
-    if len(points_s) < _FEWEST or len(stands) < _FEWEST or len(points_s) * len(stands) > _MOST:
+    if min(len(points_s), len(stands)) < _FEWEST or len(points_s) * len(stands) > _MOST:
         return None
-    low = (stands[None, :, 0] - points_s[:, None]).ravel()
-    high = (stands[None, :, 1] - points_s[:, None]).ravel()
-    edges = np.concatenate([low, high])
-    step = np.repeat([1, -1], len(low))
+    # Every point at every standstill is an interval of offsets; they are counted at its ends.
+    ends = (stands[None, :, :] - points_s[:, None, None]).reshape(-1, 2)
+    edges, step = ends.T.ravel(), np.repeat([1, -1], len(ends))
     order = np.lexsort((-step, edges))
     edges, count = edges[order], np.cumsum(step[order])
+    widths = np.append(np.diff(edges), 0.0)
     best = int(count.max())
     if best < max(_FEWEST, _SHARE * len(points_s)):
         return None
-    widths = np.append(np.diff(edges), 0.0)
-    top = np.flatnonzero(count == best)
-    chosen = top[np.argmax(widths[top])]
-    shift = float(edges[chosen] + 0.5 * widths[chosen])
+    chosen = max(np.flatnonzero(count == best), key=lambda place: widths[place])
+    middles = edges + 0.5 * widths
+    shift, residual = float(middles[chosen]), float(0.5 * widths[chosen])
     own = _stand_of(points_s + shift, stands)
     rivals: list[float] = []
-    for place in np.flatnonzero((count >= _RIVAL * best) & (widths > 0.0)):
-        other = float(edges[place] + 0.5 * widths[place])
+    for other in middles[(count >= _RIVAL * best) & (widths > 0.0)].tolist():
         theirs = _stand_of(points_s + other, stands)
         both = (own >= 0) & (theirs >= 0)
         differs = np.sum(own[both] != theirs[both]) > 0.2 * max(both.sum(), 1)
         if differs and all(abs(other - each) > 2 * within for each in rivals):
             rivals.append(other)
-    middle = stands.mean(axis=1)
     if np.ptp(stands, axis=1).max() <= 2.0 * within * (1 + 1e-9):  # a row for every pose
-        apart = middle[own[own >= 0]] - points_s[own >= 0]
-        shift, residual = float(np.median(apart)), float(np.std(apart - np.median(apart)))
-    else:
-        residual = float(0.5 * widths[chosen])
+        apart = stands.mean(axis=1)[own[own >= 0]] - points_s[own >= 0]
+        shift, residual = float(np.median(apart)), float(np.std(apart))
     return Offset(round(shift, 3), within, residual, best, tuple(rivals))
 
 
-def _standstills(time_s: np.ndarray, q_rad: np.ndarray) -> tuple[np.ndarray, float]:
+def standstills(time_s: np.ndarray, q_rad: np.ndarray) -> tuple[np.ndarray, float]:
     """Begin and end (m, 2) of every standstill, and how near in time joints belong to a point."""
     order = np.argsort(time_s, kind="stable")
     time, q = time_s[order], q_rad[order]
-    moved = np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) > 0.5 * STILL_RAD
-    starts = np.concatenate([[0], np.flatnonzero(moved) + 1])
-    ends = np.concatenate([np.flatnonzero(moved), [len(time) - 1]])
-    runs = ends - starts + 1
-    if np.sum(runs >= 3) >= 0.5 * np.sum(runs > 0) or np.sum(runs[runs >= 3]) > 0.3 * len(time):
-        long = (time[ends] - time[starts] >= _SHORTEST_S) & (runs >= 3)
-        period = float(np.median(np.diff(time)))
-        return np.stack([time[starts[long]], time[ends[long]]], axis=1), max(2.0 * period, 0.05)
-    gaps = np.diff(time)
+    moved = np.flatnonzero(np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) > 0.5 * STILL_RAD)
+    starts, ends = np.append(0, moved + 1), np.append(moved, len(time) - 1)
+    runs, gaps = ends - starts + 1, np.diff(time)
+    long = runs >= 3
+    if 2 * long.sum() >= len(runs) or runs[long].sum() > 0.3 * len(time):
+        long &= time[ends] - time[starts] >= _SHORTEST_S
+        stands = np.stack([time[starts[long]], time[ends[long]]], axis=1)
+        return stands, max(2.0 * float(np.median(gaps)), 0.05)
     within = 0.25 * float(np.min(gaps[gaps > 0.0], initial=np.inf))
     return np.stack([time - within, time + within], axis=1), within
 
@@ -88,8 +82,3 @@ def _stand_of(times: np.ndarray, stands: np.ndarray) -> np.ndarray:
     place = np.searchsorted(stands[:, 0], times, side="right") - 1
     inside = (place >= 0) & (times <= stands[np.maximum(place, 0), 1])
     return np.where(inside, place, -1)
-
-
-def nearness(time_s: np.ndarray, q_rad: np.ndarray) -> float:
-    """How near in time joints belong to a point."""
-    return _standstills(time_s, q_rad)[1]

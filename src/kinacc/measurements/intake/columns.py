@@ -7,7 +7,7 @@ commanded. Where the names leave two readings open nothing is chosen in silence:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from kinacc.measurements.column_names import (
     CALCULATED,
@@ -21,45 +21,20 @@ from kinacc.measurements.column_names import (
     SPREAD,
     Name,
     is_own_pose,
+    name_of,
     role,
 )
 from kinacc.measurements.intake import groups
-from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, TURN, Group, Values
-from kinacc.measurements.layout import TOOL
+from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, RADIUS, TURN, Group, Values
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
+from kinacc.measurements.table import RawTable
+from kinacc.measurements.words import WORDS
 
-_LENGTHS, _ANGLES = {"mm", "m"}, {"deg", "rad"}
-_NOT_MEASURED = (NOMINAL, CALCULATED, DEVIATION, SPREAD, OTHER)
-_MAY_BE_MEASURED = (MEASURED, REPORTED, PLAIN, OPEN)
-# Words of records of measurement; a controller writes target, command or set point.
-_OF_PROTOCOLS = frozenset(("nominal", "nom", "nominell", "nominale", "nenn", "nennwert"))
-_POSE = (
-    "a pose in numbered columns, which are not read",
-    "the controller's own forward kinematics, never a measurement",
-)
+_WRONG = (DEVIATION, SPREAD, OTHER)
+_NOT_MEASURED = (NOMINAL, CALCULATED, *_WRONG)
+_OWN_POSE = "the controller's own forward kinematics, never a measurement"
 NO_SIGMA = f"{SPREAD}, of which nothing says that it is one sigma; --sigma 1 or 2 reads it"
-_UNCERTAINTY_TEXT = """
-uncertainty uncertainties unc uncert u σ sigma unsicherheit messunsicherheit incertitude
-incertidumbre incertezza incerteza u95 std
-"""
-_UNCERTAINTIES = frozenset(_UNCERTAINTY_TEXT.split())
-_RADIUS = "a radius: positions are read as those of the reflectors' centres"
-_SINGLE = {
-    "pose": {
-        *("pose", "config", "configuration", "point", "pt", "no", "nr", "index"),
-        *("messung", "messpunkt", "punkt", "konfiguration", "stellung", "mesure", "punto", "pos"),
-    },
-    "repeat": {
-        *("repeat", "repetition", "rep", "reading", "wiederholung", "wdh", "répétition"),
-        *("repetición", "repeticion", "ripetizione"),
-    },
-    "session": {"session", "setup", "station", "series", "campaign"},
-    "target": {"target", "marker", "reflector", "smr"},
-    "temperature": {"temp", "temperature"},
-}
-# Payload, as people write it; a mass has to state kg, which a charge of a battery does not.
-_PAYLOAD = {"payload", "nutzlast", "traglast", "zuladung", "charge", "carga", "carico"}
-_WEIGHT = {"mass", "masse", "masa", "massa", "weight", "gewicht", "poids", "peso", "utile", "util"}
-_CENTRE = {"cog", "cg", "com", "centre", "center", "schwerpunkt", "of", "gravity", "mass", "pos"}
+_WHICH = "the names do not say which of them an instrument measured"
 
 
 @dataclass(frozen=True)
@@ -101,6 +76,16 @@ class NamedColumns:
         return {name.column for name in every}
 
 
+def names_in(table: RawTable) -> list[Name]:
+    """The names of a table's columns, with the units stated beside them."""
+    return [name_of(column, table.units.get(column, "")) for column in table.columns]
+
+
+def of_table(table: RawTable, take: Sequence[str] = (), turned: bool = True, sigma: str = ""):
+    """What the columns of a table hold; see ``recognise``."""
+    return recognise(names_in(table), lambda n: table.values(n.column), take, turned, sigma)
+
+
 def recognise(
     names: Sequence[Name],
     values: Values | None = None,
@@ -114,9 +99,7 @@ def recognise(
     are read whatever their names say. ``turned``: orientations are wanted. ``sigma``: how many
     standard deviations an uncertainty is, as answered; "none" for none that is read.
     """
-    no_load = [name for name in names if not _of_payload(name)]
-    choice = _Choice(groups.found(no_load, values), values, frozenset(take), sigma)
-    choice.off = any(groups.is_deviation(name) for name in names)
+    choice = _Choice([name for name in names if not _of_payload(name)], values, take, sigma)
     joints = choice.joints()
     points = choice.points(joints)
     turns = choice.turns(points) if turned else {}
@@ -125,76 +108,60 @@ def recognise(
         targets[target] |= turn.columns
     for target, spread in choice.spreads(points, turns).items():
         targets[target] |= spread
-    kinds = [each.turn for each in turns.values()]
     commanded = choice.commanded(joints)
-    used = {name.column for target in targets.values() for name in target.values()}
-    used |= {name.column for group in (joints, commanded) if group for name in _all(group)}
-    single = _singles(name for name in names if name.column not in used)
-    return NamedColumns(
-        _all(joints),
-        _all(commanded),
+    both = [tuple(group.columns.values()) if group else () for group in (joints, commanded)]
+    found = NamedColumns(
+        both[0],
+        both[1],
         targets,
-        kinds[0] if kinds else ("none", "XYZ"),
-        single,
-        tuple((group, why) for group, why in choice.aside if not used & {*group.names}),
-        tuple(choice.questions),
+        next((each.turn for each in turns.values()), ("none", "XYZ")),
+        questions=tuple(choice.questions),
     )
-
-
-def _all(group: Group | None) -> tuple[Name, ...]:
-    return tuple(group.columns.values()) if group else ()
+    used = found.read()
+    aside = tuple((g, why) for g, why in choice.aside if not used & {*g.names})
+    return replace(found, single=_singles(n for n in names if n.column not in used), aside=aside)
 
 
 class _Choice:
     """One look at the groups of a file: ``aside`` and ``questions`` grow as it goes."""
 
-    off = False  # whether a column by itself says how far off the points were
-
-    def __init__(
-        self,
-        found: Sequence[Group],
-        values: Values | None,
-        take: frozenset[str],
-        sigma: str = "",
-    ) -> None:
-        self.values = values
-        self.sigma = sigma
-        self.take = take
+    def __init__(self, names: Sequence[Name], values, take: Sequence[str], sigma: str) -> None:
+        self.values, self.take, self.sigma = values, {*take}, sigma
+        # Whether a column by itself says how far off the points were.
+        self.off = any(map(groups.is_deviation, names))
         self.aside: list[tuple[Group, str]] = []
         self.questions: list[Question] = []
-        self.groups = [each for each in found if self._can_be(each)]
+        self.groups = [each for each in groups.found(names, values) if self._can_be(each)]
 
     def _can_be(self, group: Group) -> bool:
-        """Whether its units fit what the group would be."""
-        units = {*group.units} - {""}
-        fit = {JOINTS: _ANGLES | _LENGTHS, POINT: _LENGTHS, TURN: _ANGLES, POSE: set()}
-        allowed = fit.get(group.kind, _ANGLES | _LENGTHS)
-        wrong = sorted(units - allowed)
-        if group.kind == JOINTS and units and all(map(groups.is_pulse, units)):
-            return True
-        if group.kind == JOINTS and units and not units & _ANGLES:
-            wrong = sorted(units)
-        if wrong and group.role not in (DEVIATION, SPREAD, OTHER):
-            what = {JOINTS: "joints", POINT: "a position", TURN: "an orientation"}
-            self.aside.append((group, f"{what.get(group.kind, 'a pose')} in {' and '.join(wrong)}"))
-            return False
-        if group.kind == groups.RADIUS and group.role == OTHER:
-            self.aside.append((group, _RADIUS))
-            return False
-        if group.kind == POSE:
-            self.aside.append((group, _POSE[group.role == CALCULATED]))
-            return False
-        return True
+        """Whether it may be read, and its units fit what it would be."""
+        units, joints = {*group.units} - {""}, group.kind == JOINTS
+        if group.kind == RADIUS and group.role == OTHER:
+            why = "a radius: positions are read as those of the reflectors' centres"
+        elif group.kind == POSE:
+            numbered = "a pose in numbered columns, which are not read"
+            why = _OWN_POSE if group.role == CALCULATED else numbered
+        else:
+            fit = {POINT: LENGTH, TURN: ANGLE}.get(group.kind, {**ANGLE, **LENGTH})
+            wrong = {unit for unit in units if unit not in fit}
+            if joints and units and not units & ANGLE.keys():
+                wrong = {unit for unit in units if not groups.is_pulse(unit)}
+            if not wrong or group.role in _WRONG or (joints and all(map(groups.is_pulse, units))):
+                return True
+            what = {POINT: "a position", TURN: "an orientation"}.get(group.kind, group.kind)
+            why = f"{what} in {' and '.join(sorted(wrong))}"
+        self.aside.append((group, why))
+        return False
 
     def _of(self, kind: str, *said: str) -> list[Group]:
-        return [
-            each for each in self.groups if each.kind == kind and (each.role in said or not said)
-        ]
+        return [g for g in self.groups if g.kind == kind and (not said or g.role in said)]
 
     def _taken(self, kind: str) -> list[Group]:
-        wrong = (DEVIATION, SPREAD, OTHER, CALCULATED)
-        every = [each for each in self._of(kind) if each.role not in wrong]
-        return [each for each in every if self.take & {*each.names}]
+        """Groups that ``take`` names; the others of the kind are left then."""
+        every = self._of(kind)
+        taken = [g for g in every if g.role not in (*_WRONG, CALCULATED) and self.take & {*g.names}]
+        self._leave([g for g in every if taken and g not in taken], "others are taken")
+        return taken
 
     def _leave(self, left: Sequence[Group], why: str = "") -> None:
         self.aside += [(each, why or each.role) for each in left]
@@ -209,103 +176,94 @@ class _Choice:
                 kept.append(each)
         return [each for each in candidates if each in kept]
 
+    def _ask(self, about: str, readings: Sequence[Group], why: str, without=False) -> Group:
+        self.questions.append(Question(about, tuple(readings), why, without))
+        return readings[0]
+
     def joints(self) -> Group | None:
         """The joints as reported, else as the file calls them without a word."""
         if taken := self._taken(JOINTS):
-            self._leave([e for e in self._of(JOINTS) if e not in taken], "others are taken")
             return taken[0]
-        strong = [each for each in self._of(JOINTS) if not each.weak]
-        weak = [each for each in self._of(JOINTS, PLAIN, REPORTED, NOMINAL, OPEN) if each.weak]
-        self._leave([each for each in strong if each.role in (DEVIATION, SPREAD, OTHER)])
-        reported = self._distinct([each for each in strong if each.role == REPORTED])
-        plain = self._distinct([each for each in strong if each.role == PLAIN])
-        unclear = [each for each in strong if each.role == OPEN]
-        wanted = [each for each in strong if each.role == NOMINAL]
-        best = reported or plain
+        strong = {said: [g for g in self._of(JOINTS, said) if not g.weak] for said in
+                  (REPORTED, PLAIN, OPEN, NOMINAL, *_WRONG)}  # fmt: skip
+        weak = [g for g in self._of(JOINTS, PLAIN, REPORTED, NOMINAL, OPEN) if g.weak]
+        for said in _WRONG:
+            self._leave(strong[said])
+        reported, plain = self._distinct(strong[REPORTED]), self._distinct(strong[PLAIN])
+        unclear, why = strong[OPEN], "several columns may hold them"
         if reported:
             self._leave([*plain, *unclear, *weak], "beside joints that were read back")
-        elif best and unclear:
-            best = [*best, *unclear]
-        elif best:
-            self._leave(weak, "nothing says that they are joints")
-        if len(best) == 1:
-            return best[0]
-        if best:
-            return self._ask("the joints", best, "several columns may hold them")
-        if unclear or weak:
+            best = reported
+        elif plain:
+            self._leave([] if unclear else weak, "nothing says that they are joints")
+            best = [*plain, *unclear]
+        else:
+            best = [*unclear, *weak]
             why = "nothing says that these are the joints of the arm, as they were"
-            return self._ask("the joints", [*unclear, *weak], why)
-        if wanted:
-            why = "the only joints of the file are commanded ones, not those read back"
-            return self._ask("the joints", wanted, why)
-        return None
+            if not best:
+                best = strong[NOMINAL]
+                why = "the only joints of the file are commanded ones, not those read back"
+        if len(best) == 1 and (reported or plain):
+            return best[0]
+        return self._ask("the joints", best, why) if best else None
 
     def commanded(self, joints: Group | None) -> Group | None:
         """The joints as commanded beside ``joints``, where there is one such group."""
         wanted = [each for each in self._of(JOINTS, NOMINAL) if each is not joints]
-        fit = [
-            each
-            for each in wanted
-            if joints and len(each.columns) == len(joints.columns) and each.units == joints.units
-        ]
-        strict = [each for each in fit if not {"target", "ref"} & {*_all(each)[0].words}] or fit
-        chosen = strict[0] if len(strict) == 1 else None
+        fit = [g for g in wanted if joints and len(g.columns) == len(joints.columns)
+               and g.units == joints.units]  # fmt: skip
+        fit = [g for g in fit if not {"target", "ref"} & {*g.words}] or fit
+        chosen = fit[0] if len(fit) == 1 else None
         self._leave([each for each in wanted if each is not chosen], "commanded")
         return chosen
 
     def points(self, joints: Group | None) -> list[Group]:
         """The points that were measured, one of each target."""
         if taken := self._taken(POINT):
-            self._leave([each for each in self._of(POINT) if each not in taken], "others are taken")
-            return self._named_apart(taken)
+            return _named_apart(taken)
         for each in self._of(POINT, *_NOT_MEASURED):
-            self._leave([each], _POSE[1] if is_own_pose(each.columns["x"].words) else each.role)
-        if (radii := self._of(groups.RADIUS)) and (every := self._of(POINT, *_MAY_BE_MEASURED)):
+            self._leave([each], _OWN_POSE if is_own_pose(each.columns["x"].words) else each.role)
+        measured, reported, plain, unclear = (
+            self._of(POINT, said) for said in (MEASURED, REPORTED, PLAIN, OPEN)
+        )
+        every = [*measured, *reported, *plain, *unclear]
+        if (radii := self._of(RADIUS)) and every:
             names = ", ".join(each.in_words() for each in radii)
             why = f"{names}: the radius was not corrected for, so they may not be the centres"
             return self._chosen(every, why)
-        measured, reported = self._of(POINT, MEASURED), self._of(POINT, REPORTED)
-        plain, unclear = self._of(POINT, PLAIN), self._of(POINT, OPEN)
         if measured:
             self._leave([*reported, *plain, *unclear], "beside a point that was measured")
             return self._one_each(measured)
+        nominal = self._of(POINT, NOMINAL)
         if reported:
             wanted = [each for each in unclear if "target" in each.columns["x"].words]
+            records = any({*each.columns["x"].words} & WORDS["records"] for each in nominal)
             if plain or len(wanted) < len(unclear):
-                why = "the names do not say which of them an instrument measured"
-                return self._chosen([*reported, *plain, *unclear], why)
+                return self._chosen([*reported, *plain, *unclear], _WHICH)
             if joints is not None and joints.role == REPORTED:
                 why = "beside joints read back it may be what the controller calculated from them"
                 return self._chosen(reported, why)
-            if not self._protocol():
-                why = "nothing says that an instrument measured it, and no controller calculated it"
+            # A record of measurement: nominal, actual, deviation.
+            if not records and not (nominal and self._of(POINT, DEVIATION)):
+                why = "cannot tell whether it was measured or computed by the controller"
                 return self._chosen(reported, why)
             self._leave(wanted, NOMINAL)
             return self._one_each(reported)
         if plain and unclear:
-            why = "the names do not say which of them an instrument measured"
-            return self._chosen([*plain, *unclear], why)
-        off = self.off or self._of(POINT, DEVIATION)
-        if plain and off and not self._of(POINT, NOMINAL):
+            return self._chosen([*plain, *unclear], _WHICH)
+        if plain and (self.off or self._of(POINT, DEVIATION)) and not nominal:
             why = "beside a deviation it may be the nominal point as well as the measured one"
             return self._chosen(plain, why)
         if plain:
             return self._one_each(plain)
-        if unclear:
-            return self._chosen(unclear, "nothing says that an instrument measured it")
-        return []
-
-    def _protocol(self) -> bool:
-        """Whether actual points stand in a record of measurement: nominal, actual, deviation."""
-        nominal = self._of(POINT, NOMINAL)
-        named = any({*each.columns["x"].words} & _OF_PROTOCOLS for each in nominal)
-        return named or bool(nominal and self._of(POINT, DEVIATION))
+        return (
+            self._chosen(unclear, "nothing says that an instrument measured it") if unclear else []
+        )
 
     def _one_each(self, candidates: list[Group]) -> list[Group]:
         """The candidates, unless two of them may be the same point."""
         distinct = self._distinct(candidates)
-        targets = [each.target for each in distinct]
-        if len(targets) > len(set(targets)):
+        if len({each.target for each in distinct}) < len(distinct):
             return self._chosen(distinct, "several columns may hold it")
         if not groups.rigid(distinct, self.values):
             why = "they do not keep their distance as targets on one flange do"
@@ -313,113 +271,89 @@ class _Choice:
         return distinct
 
     def _chosen(self, candidates: list[Group], why: str) -> list[Group]:
-        first = self._ask("the measured point", candidates, why)
-        return self._named_apart(candidates if first else [])
-
-    def _named_apart(self, taken: list[Group]) -> list[Group]:
-        """The groups under names of which no two are equal."""
-        named: dict[str, Group] = {}
-        for each in taken:
-            name, number = each.target, 1
-            while name in named:
-                number += 1
-                name = f"{each.target}{number}"
-            named[name] = groups.renamed(each, name)
-        return list(named.values())
-
-    def _ask(self, about: str, readings: Sequence[Group], why: str, without=False) -> Group:
-        self.questions.append(Question(about, tuple(readings), why, without))
-        return readings[0]
+        self._ask("the measured point", candidates, why)
+        return _named_apart(candidates)
 
     def turns(self, points: Sequence[Group]) -> dict[str, Group]:
         """Orientations by target, all of the kind of the first."""
         taken = self._taken(TURN)
-        every = taken or self._of(TURN)
-        if taken:
-            self._leave([each for each in self._of(TURN) if each not in taken], "others are taken")
-        else:
-            self._leave([each for each in every if each.role in _NOT_MEASURED])
-            every = [each for each in every if each.role not in _NOT_MEASURED]
+        every = taken or [g for g in self._of(TURN) if g.role not in _NOT_MEASURED]
+        self._leave([] if taken else self._of(TURN, *_NOT_MEASURED))
         found: dict[str, Group] = {}
         rest = list(every)
         for point in points:
-            own = self._own(point, every, alone=len(points) == 1, taken=bool(taken))
-            for each in own:
-                rest.remove(each) if each in rest else None
-            if own and (chosen := self._turn(point, own, bool(taken))):
+            own = [each for each in every if each.target == point.target]
+            own = own or (list(every) if len(points) == 1 else [])
+            rest = [each for each in rest if each not in own]
+            if own and (chosen := own[0] if taken else self._turn(point, own)):
                 found[point.target] = chosen
         self._leave(rest, "belongs to no point that is read")
-        kinds = list(dict.fromkeys(each.turn[0] for each in found.values()))
+        kinds = {each.turn[0] for each in found.values()}
         units = {unit for each in found.values() for unit in each.units}
         if len(kinds) > 1 or len(units) > 1:
             self._ask("the orientation", list(found.values()), "they are not alike", without=True)
         return found
 
-    def _own(self, point: Group, every: Sequence[Group], alone: bool, taken: bool) -> list[Group]:
-        named = [each for each in every if each.target == point.target]
-        return named or (list(every) if alone else [])
-
-    def _turn(self, point: Group, own: Sequence[Group], taken: bool) -> Group | None:
-        if taken:
-            return own[0]
+    def _turn(self, point: Group, own: Sequence[Group]) -> Group | None:
         named = [each for each in own if each.target == point.target]
         certain = self._distinct([each for each in named if each.role == MEASURED])
         one = certain or self._distinct(list(own))
-        aside = self._other_points(point)
         if len(one) == 1 and one[0] in named:
-            plain = one[0].role == PLAIN and not aside
-            if plain or one[0].role in (MEASURED, point.role):
+            # Points of other roles, whose orientation one without a word may be.
+            others = [g for g in self._of(POINT) if g.role not in (SPREAD, OTHER, point.role)]
+            alone = all(groups.same(each, point, self.values) for each in others)
+            if one[0].role in (MEASURED, point.role) or (one[0].role == PLAIN and alone):
                 self._leave([e for e in own if e is not one[0]], "beside the one that is read")
                 return one[0]
         why = "the names do not say which was measured with the point"
         return self._ask(f"the orientation of {point.target}", one, why, without=True)
 
-    def _other_points(self, point: Group) -> list[Group]:
-        """Points of other roles, whose orientation one without a word may be."""
-        every = [each for each in self._of(POINT) if each.role not in (SPREAD, OTHER, point.role)]
-        return [e for e in every if not groups.same(e, point, self.values)]
-
     def spreads(self, points: Sequence[Group], turns: dict[str, Group]) -> dict[str, dict]:
         """Standard deviations by target, in the unit of what they are of."""
         found: dict[str, dict[str, Name]] = {}
-        for each in sorted(self._of(groups.SPREAD), key=lambda each: each.weak):
+        for each in sorted(self._of(groups.SPREADS), key=lambda each: each.weak):
             point = next((p for p in points if p.target == each.target), None)
             point = point or (points[0] if len(points) == 1 and each.target == TOOL else None)
-            turned = "std_rx" in each.columns
-            of = turns.get(point.target) if point and turned else point
+            of = turns.get(point.target) if point and "std_rx" in each.columns else point
             words = {word for name in each.columns.values() for word in name.words}
-            covered = all(name.coverage for name in each.columns.values())
-            known = self.sigma != "none" and bool(
-                (self.sigma or covered) and words & _UNCERTAINTIES
-            )
-            if each.weak and not words & _UNCERTAINTIES:
+            uncertain = bool(words & WORDS["uncertainties"])
+            covered = self.sigma or all(name.coverage for name in each.columns.values())
+            why = role([w for w in words if role([w]) not in (SPREAD, DEVIATION)])
+            if each.weak and not uncertain:
                 self._leave([each], SPREAD)
-            elif of is None or of.turn[0] == "quaternion" or _wanted(words):
+            elif of is None or of.turn[0] == "quaternion" or why in _NOT_MEASURED:
                 self._leave([each], f"{SPREAD} of nothing that is read")
             elif each.units != of.units:
                 self._leave([each], f"{SPREAD} whose unit is not stated as that of its values")
-            elif set(each.columns) & set(found.get(point.target, {})):
+            elif {*each.columns} & {*found.get(point.target, {})}:
                 self._leave([each], f"{SPREAD}, there twice")
-            elif each.weak and not known:
+            elif each.weak and (self.sigma == "none" or not covered):
                 self._leave([each], NO_SIGMA)
             else:
-                found[point.target] = found.get(point.target, {}) | each.columns
+                found.setdefault(point.target, {}).update(each.columns)
         return found
 
 
-def _wanted(words: set[str]) -> bool:
-    """Whether the words of a spread say that it is of something wanted, or of no point."""
-    return role([w for w in words if role([w]) not in (SPREAD, DEVIATION)]) in _NOT_MEASURED
+def _named_apart(taken: list[Group]) -> list[Group]:
+    """The groups under names of which no two are equal."""
+    named: dict[str, Group] = {}
+    for each in taken:
+        name, number = each.target, 1
+        while name in named:
+            number += 1
+            name = f"{each.target}{number}"
+        named[name] = replace(each, target=name)
+    return list(named.values())
 
 
 def _singles(names) -> dict[str, Name]:
     found: dict[str, Name] = {}
     for each in names:
         words = [word for word in each.words if word not in ("measurement", "c", "id", "number")]
-        for quantity, known in _SINGLE.items():
-            if len(words) == 1 and words[0] in known:
-                if quantity == "temperature" and each.unit not in ("", "C"):
-                    continue
+        for quantity, known in WORDS["single"].items():
+            if len(words) == 1 and words[0] in known and (
+                quantity != "temperature" or each.unit in ("", "C")
+            ):  # fmt: skip
                 found.setdefault(quantity, each)
         if quantity := _of_payload(each):
             found.setdefault(quantity, each)
@@ -429,10 +363,10 @@ def _singles(names) -> dict[str, Name]:
 def _of_payload(name: Name) -> str:
     """payload or payload_x .. where the name says so and states its unit; else nothing."""
     words = {*name.words}
-    rest = words - _PAYLOAD - _WEIGHT
-    if words & _PAYLOAD and not rest and name.unit == "kg":
+    if not words & WORDS["payload"]:
+        return ""
+    rest = words - WORDS["payload"] - WORDS["weight"]
+    if not rest and name.unit == "kg":  # a charge of a battery states none
         return "payload"
-    axis = "".join(rest - _CENTRE)
-    if words & _PAYLOAD and axis in ("x", "y", "z") and name.unit in _LENGTHS:
-        return f"payload_{axis}"
-    return ""
+    axis = "".join(rest - WORDS["centre"])
+    return f"payload_{axis}" if axis in ("x", "y", "z") and name.unit in LENGTH else ""

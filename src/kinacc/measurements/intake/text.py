@@ -2,33 +2,48 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import StringIO
-from itertools import islice
 from pathlib import Path
+
+import numpy as np
 
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.measurements import robot_programs
 from kinacc.measurements.column_names import name_of
 from kinacc.measurements.features import report_of
-from kinacc.measurements.files import EXCEL, GROUPS, PARQUET, POINT, load, refuse_other_files
-from kinacc.measurements.grid import BLANKS, Row, decoder, refuse_large, rows_of_lines
-from kinacc.measurements.intake import decimals, heads, spherical_files
+from kinacc.measurements.files import (
+    BLANKS,
+    EXCEL,
+    GROUPS,
+    PARQUET,
+    POINT,
+    Workbook,
+    load,
+    opened,
+    refuse_large,
+    refuse_other_files,
+    rows_of_lines,
+)
+from kinacc.measurements.grid import Row, filled
+from kinacc.measurements.intake import decimals, heads
 from kinacc.measurements.intake.choices import Choice, Undecided
-from kinacc.measurements.intake.encoding import encoding_of
+from kinacc.measurements.intake.columns import names_in
 from kinacc.measurements.intake.heads import Head
-from kinacc.measurements.spherical import readings_of
+from kinacc.measurements.layout import FEATURES, LENGTH, SPHERICAL, Directions, Layout
+from kinacc.measurements.spherical import PER_UNIT, Reading, readings_of
 from kinacc.measurements.table import RawTable
-from kinacc.measurements.written import FEATURES, SPHERICAL, Written
 
 DELIMITERS = (";", "\t", ",", BLANKS)
 _LINES, _CHARACTERS = 400, 1_000_000  # looked at
 _NEAR = 0.6  # of the most numbers: so many there are if names are parted by the right mark
 _SEP = re.compile(r'"?sep=(.|\\t)"?\s*', re.IGNORECASE)
-_POINT_NAMES = (*GROUPS, POINT)
 _FEWEST_ROWS, _FEWEST_COLUMNS = 3, 4  # of a sheet that may be meant
+_TURN = {unit: 2.0 * np.pi / size for unit, size in PER_UNIT.items()}
+_SLACK = 1.002
 
 
 @dataclass(frozen=True)
@@ -39,7 +54,7 @@ class Looked:
     units of lengths and angles that stand outside of the names, and the frame.
     """
 
-    written: Written
+    written: Layout
     table: RawTable
     told: tuple[str, ...] = ()
     assumed: Mapping[str, str] = field(default_factory=dict)
@@ -56,67 +71,56 @@ def look(path: str | Path, answers: Mapping[str, str] | None = None) -> Looked:
     refuse_other_files(path)
     kind = path.suffix.lower()
     if kind in PARQUET:
-        return Looked(Written(), load(path))
+        return Looked(Layout(), load(path))
     if kind not in EXCEL and (program := robot_programs.read(path)) is not None:
-        return Looked(Written(), program)
-    if kind in EXCEL:
-        written, head, rows, told = _workbook(path, answers)
-    else:
-        written, head, rows, told = _text(path, answers)
-    stated = _stated(rows, head)
+        return Looked(Layout(), program)
+    written, head, rows, told = (_workbook if kind in EXCEL else _text)(path, answers)
+    around = [
+        " ".join(str(cell) for cell in cells if cell is not None)
+        for number, (line, cells) in enumerate(rows)
+        if (line < head.line if head.line else number < head.first)
+        or str(next(iter(cells), "")).lstrip()[:1] in ("#", "/", ";", "%")
+    ]
+    stated = heads.stated_above([each for each in around if each])
     written = _named(path, written, head, rows, stated, answers)
-    table = load(path, replace(written, decimal=".", thousands=None))
-    marks = decimals.marks_of(table.columns, answers, written.delimiter == BLANKS)
-    if marks.choices:
-        raise Undecided(str(path), marks.choices)
-    written = replace(written, decimal=marks.decimal, thousands=marks.thousands)
-    table = replace(table, decimal=marks.decimal, thousands=marks.thousands)
-    told += _in_words(written, rows, head, stated, bool(table.letters))
-    return _laid_out(path, Looked(written, table, tuple(told), {}, stated), answers)
-
-
-def _laid_out(path: Path, found: Looked, answers: Mapping[str, str]) -> Looked:
-    """With the layout, where a row of the file is not a row of readings."""
-    table, written = found.table, found.written
+    table = load(path, written)
+    decimal, thousands, choice = decimals.marks_of(
+        table.columns, answers, written.delimiter == BLANKS
+    )
+    if choice:
+        raise Undecided(str(path), [choice])
+    written = replace(written, decimal=decimal, thousands=thousands)
+    table = replace(table, decimal=decimal, thousands=thousands)
+    told += _in_words(written, rows, head, stated)
+    assumed: dict[str, str] = {}
+    count = len(table)
     if report_of(table):
         written = replace(written, layout=FEATURES)
         table = load(path, written)
-        rows = len(found.table)
-        told = f"a row per feature and axis: {rows} rows are {len(table)} features"
-        return replace(found, written=written, table=table, told=(*found.told, told))
-    units = table.under if len(table.under) == len(table.columns) else ("",) * len(table.columns)
-    names = [name_of(column, unit) for column, unit in zip(table.columns, units, strict=True)]
-    if readings := readings_of(names):
-        stated = found.stated.get("angle", "")
-        way = spherical_files.directions_of(table, readings, stated, answers)
-        written = replace(written, layout=SPHERICAL, directions=way.directions)
-        return replace(
-            found,
-            written=written,
-            table=load(path, written),
-            told=(*found.told, *way.told),
-            assumed={**found.assumed, **way.assumed},
-        )
-    return found
+        told.append(f"a row per feature and axis: {count} rows are {len(table)} features")
+    elif readings := readings_of(names_in(table)):
+        way = _directions(table, readings, stated.get("angle", ""), answers, told, assumed)
+        written = replace(written, layout=SPHERICAL, directions=way)
+        table = load(path, written)
+    return Looked(written, table, tuple(told), assumed, stated)
 
 
-def _text(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, list[Row], list[str]]:
+def _text(path: Path, answers: Mapping[str, str]) -> tuple[Layout, Head, list[Row], list[str]]:
     refuse_large(path)
     encoding = answers.get("encoding") or encoding_of(path)
-    codec, otherwise = decoder(encoding)
-    with open(path, newline="", encoding=codec, errors=otherwise) as stream:
+    with opened(path, encoding) as stream:
         text = stream.read(_CHARACTERS).removeprefix("\ufeff")
     lines = list(StringIO(text, newline=""))
-    if lines and len(text) == _CHARACTERS:
+    if len(text) == _CHARACTERS:
         lines = lines[:-1] or lines  # the last one may have been cut
     lines = lines[:_LINES]
-    told = [f"read as {encoding}"] if encoding != "utf-8" else []
-    marks: Sequence[str] = DELIMITERS
-    if lines and (said := _SEP.fullmatch(lines[0])):
-        mark = "\t" if said[1] in ("\t", "\\t") else said[1]
-        marks = (mark,) if mark in DELIMITERS else DELIMITERS
-    split = {mark: _rows(lines, mark, path) for mark in marks}
-    if len(split) > 1 and _ends_in_marks(split[BLANKS]):
+    said = _SEP.fullmatch(lines[0]) if lines else None
+    mark = said[1].replace("\\t", "\t") if said else ""
+    marks = (mark,) if mark in DELIMITERS else DELIMITERS
+    split = {mark: list(rows_of_lines(lines, mark, str(path))) for mark in marks}
+    # Words that end in a mark are parted by it: "P1, 2.5, 3".
+    words = [cells for _, cells in split.get(BLANKS, ()) if cells]
+    if len(split) > 1 and 2 * sum(any(c[-1] in ",;" for c in w[:-1]) for w in words) > len(words):
         del split[BLANKS]
     best = _best(split)
     rows = split[best]
@@ -124,236 +128,197 @@ def _text(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, list[R
     if head is None or head.width < 2:
         what = "no line of column names above rows of numbers was found"
         raise InputError(Problem(str(path), what, "columns parted by ; , tab or blanks"))
-    if best == BLANKS and _single(lines, rows, head):
-        best = " "
-        rows = _rows(lines, best, path)
-    written = Written(best, encoding=encoding)
-    return written, head, rows, told
-
-
-def _rows(lines: Sequence[str], mark: str, path: Path) -> list[Row]:
-    return list(rows_of_lines(lines, Written(mark), str(path)))
+    if best == BLANKS and head.line:
+        used = [lines[line - 1].rstrip("\r\n") for line, _ in rows if line >= head.line]
+        if all(line.split(" ") == line.split() for line in used):  # single ones, in the names too
+            best, rows = " ", list(rows_of_lines(lines, " ", str(path)))
+    told = [f"read as {encoding}"] if encoding != "utf-8" else []
+    return Layout(best, encoding=encoding), head, rows, told
 
 
 def _best(split: Mapping[str, Sequence[Row]]) -> str:
     """What parts the columns: most cells are numbers then, and the names fit to them."""
-    scores = {mark: _score(rows) for mark, rows in split.items()}
+    scores = {}
+    for mark, rows in split.items():
+        counted: dict[int, int] = {}  # cells that are numbers, by the width of the row
+        for _, cells in rows:
+            count = heads.numbers_in(cells)
+            counted[len(cells)] = counted.get(len(cells), 0) + (count if count > 1 else 0)
+        width = max(counted, key=lambda each: (counted[each], each), default=0)
+        scores[mark] = counted.get(width, 0), width
     most = max(numbers for numbers, _ in scores.values())
 
     def rank(mark: str) -> tuple:
-        near = scores[mark][0] > _NEAR * most
-        head = heads.head_of(split[mark], mark) if near else None
+        head = heads.head_of(split[mark], mark) if scores[mark][0] > _NEAR * most else None
         return head is not None and head.line > 0, *scores[mark], -DELIMITERS.index(mark)
 
     return max(split, key=rank)
 
 
-def _ends_in_marks(rows: Sequence[Row]) -> bool:
-    """Whether most rows of words hold one that ends in a mark, which parts them: "P1, 2.5, 3"."""
-    filled = [cells for _, cells in rows if cells]
-    parted = [any(cell[-1] in ",;" for cell in cells[:-1]) for cells in filled]
-    return 2 * sum(parted) > len(filled)
+def encoding_of(path: Path) -> str:
+    """In which characters a text file is written: by what decodes, then by what makes sense."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+        for mark, name in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
+            if head.startswith(mark):
+                return name
+        even, odd = head[0::2].count(0), head[1::2].count(0)
+        if max(even, odd) > 0.35 * len(head) and min(even, odd) < 0.05 * len(head):
+            return "utf-16-le" if odd > even else "utf-16-be"  # without saying so
+        file.seek(0)
+        try:
+            for _ in codecs.iterdecode(file, "utf-8"):
+                pass
+            return "utf-8"
+        except UnicodeDecodeError:
+            file.seek(0)
+            sample = b"".join(line[:1000] for line, _ in zip(file, range(200_000), strict=False)
+                              if not line.isascii())[:200_000]  # fmt: skip
+    try:
+        sample.decode("cp932")
+    except UnicodeDecodeError as error:
+        if error.start < len(sample) - 2:
+            return "latin-1"
+    # Japanese where the bytes are pairs that begin as its usual characters do, else Western.
+    usual = pairs = place = 0
+    while place < len(sample):
+        single = sample[place] < 0x80 or 0xA0 <= sample[place] <= 0xDF
+        pairs += not single
+        usual += not single and sample[place] < 0xA0
+        place += 1 if single else 2
+    return "cp932" if pairs and 2 * usual >= pairs else "latin-1"
 
 
-def _score(rows: Sequence[Row]) -> tuple[int, int]:
-    """Cells that are numbers in rows of the commonest width, and that width."""
-    counted: dict[int, int] = {}
-    for _, cells in rows:
-        if (count := heads.numbers_in(cells)) > 1:
-            counted[len(cells)] = counted.get(len(cells), 0) + count
-    width = max(counted, key=lambda each: (counted[each], each), default=0)
-    return counted.get(width, 0), width
-
-
-def _single(lines: Sequence[str], rows: Sequence[Row], head: Head) -> bool:
-    """Whether single blanks part the columns, in the names too."""
-    named = [line for line, _ in rows[: head.first + 1] if line >= head.line > 0]
-    every = [
-        lines[line - 1].rstrip("\r\n") for line in (*named, *[r[0] for r in rows[head.first :]])
-    ]
-    return bool(named) and all(line.split(" ") == line.split() for line in every if line)
-
-
-def _workbook(path: Path, answers: Mapping[str, str]) -> tuple[Written, Head, list[Row], list[str]]:
+def _workbook(path: Path, answers: Mapping[str, str]) -> tuple[Layout, Head, list[Row], list[str]]:
     sheets, found = _tables_of(path, answers.get("sheet"))
     if not found:
         what = "no sheet has rows of numbers under names"
         raise InputError(Problem(str(path), what, "a sheet with columns of joints and points"))
-    likely = _likely(found)
+    # Those that may be meant have several columns and rows, those of points x, y, z.
+    likely = [
+        sheet
+        for sheet, (head, rows) in found.items()
+        if head.width >= _FEWEST_COLUMNS and len(rows) - head.first >= _FEWEST_ROWS
+    ]
+    likely = [s for s in likely if _name_points(_names(*found[s]))] or likely or list(found)
     if len(likely) > 1:
-        meant = {sheet: _shown(*found[sheet]) for sheet in likely}
+        meant = {sheet: first_few(_names(*found[sheet]), 12) for sheet in likely}
         raise Undecided(str(path), [Choice("--sheet", "several sheets hold tables", meant)])
     sheet = likely[0]
     others = [each for each in sheets if each != sheet and "sheet" not in answers]
     told = [f"sheet {sheet!r}" + (f"; not read: {first_few(others)}" if others else "")]
-    return Written(sheet=sheet if len(sheets) > 1 else None), *found[sheet], told
+    return Layout(sheet=sheet if len(sheets) > 1 else None), *found[sheet], told
+
+
+def _names(head: Head, rows: Sequence[Row]) -> list[str]:
+    cells = next((cells for line, cells in rows if line == head.line), [])
+    return list(head.names or [str(each) for each in cells if each is not None])
+
+
+def _name_points(names: Sequence[str]) -> bool:
+    named = list(map(name_of, names))
+    return {*"xyz"} <= {word for name in named for word in name.words} or bool(readings_of(named))
 
 
 def names_of_sheets(path: Path) -> dict[str, list[str]]:
     """Names of the columns of every sheet of a workbook that holds rows of numbers."""
-    named = {}
-    for sheet, (head, rows) in _tables_of(path)[1].items():
-        cells = next((cells for line, cells in rows if line == head.line), [])
-        named[sheet] = list(head.names or [str(each) for each in cells if each is not None])
-    return named
+    return {sheet: _names(head, rows) for sheet, (head, rows) in _tables_of(path)[1].items()}
 
 
 def _tables_of(
     path: Path, wanted: str | None = None
 ) -> tuple[list[str], dict[str, tuple[Head, list[Row]]]]:
     """The sheets of a workbook; where the names are, and the first rows, of those with numbers."""
-    from kinacc.measurements.workbook import Workbook
-
     found: dict[str, tuple[Head, list[Row]]] = {}
     with Workbook(path) as book:
-        sheets = book.sheets
-        if wanted is not None and wanted not in sheets:
-            raise InputError(Problem(f"--sheet {wanted}", "is not there", ", ".join(sheets)))
-        for sheet in [wanted] if wanted else sheets:
-            rows = list(islice(book.rows(sheet, _LINES), _LINES))
-            width = max((len(cells) for _, cells in rows), default=0)
-            rows = [(line, cells + [None] * (width - len(cells))) for line, cells in rows]
+        if wanted is not None and wanted not in book.sheets:
+            raise InputError(Problem(f"--sheet {wanted}", "is not there", ", ".join(book.sheets)))
+        for sheet in [wanted] if wanted else book.sheets:
+            rows = book.rows(sheet, _LINES)
             head = heads.head_of(rows, "", sheet=True)
             if head is not None and head.width > 1:
                 found[sheet] = head, rows
-    return sheets, found
-
-
-def _likely(found: Mapping[str, tuple[Head, list[Row]]]) -> list[str]:
-    """The sheets that may be meant: those of several columns and rows, those with x, y, z."""
-    large = [
-        sheet
-        for sheet, (head, rows) in found.items()
-        if head.width >= _FEWEST_COLUMNS and len(rows) - head.first >= _FEWEST_ROWS
-    ]
-    points = [sheet for sheet in large if _names_points(*found[sheet])]
-    return points or large or list(found)
-
-
-def _names_points(head: Head, rows: list[Row]) -> bool:
-    names = next((cells for line, cells in rows if line == head.line), [])
-    words = {word for name in names if isinstance(name, str) for word in name_of(name).words}
-    return set("xyz") <= words or bool(readings_of([name_of(str(n)) for n in names if n]))
-
-
-def _shown(head: Head, rows: list[Row]) -> str:
-    names = next((cells for line, cells in rows if line == head.line), [])
-    return first_few([str(name) for name in names if name is not None], 12)
-
-
-def _stated(rows: Sequence[Row], head: Head) -> dict[str, str]:
-    texts = [
-        " ".join(str(cell) for cell in cells if cell is not None)
-        for line, cells in rows
-        if (line < head.line if head.line else line < rows[head.first][0]) or _remark(cells)
-    ]
-    return heads.stated_above(texts)
-
-
-def _remark(cells: Sequence) -> bool:
-    return (
-        bool(cells) and isinstance(cells[0], str) and cells[0].lstrip()[:1] in ("#", "/", ";", "%")
-    )
+        return book.sheets, found
 
 
 def _named(
     path: Path,
-    written: Written,
+    written: Layout,
     head: Head,
     rows: Sequence[Row],
     stated: Mapping[str, str],
     answers: Mapping[str, str],
-) -> Written:
+) -> Layout:
     """With the lines around the names; or with the names, where the file has no line of them."""
-    given = answers.get("names")
-    if given:
+    above = rows[head.first][0] - 1
+    if given := answers.get("names"):
         names = tuple(name.strip() for name in given.split(","))
         if len(names) != head.width:
             what = f"{len(names)} names for {head.width} columns"
             raise InputError(Problem(f"--names {given}", what, f"{head.width} names"))
-        return replace(written, names=names, skip_lines=rows[head.first][0] - 1)
-    if head.names is not None and not head.line:
-        return replace(written, names=head.names, skip_lines=rows[head.first][0] - 1)
-    if head.names is not None:
-        above = head.line
-        return replace(written, names=head.names, skip_lines=above, skip_under_names=head.under)
+        return replace(written, names=names, skip_lines=above)
     if head.line:
-        return replace(written, skip_lines=head.line - 1, skip_under_names=head.under)
-    names = _point_names(rows, head, stated) or _names_within(rows, head)
-    if not names:
-        _refuse_other_width(path, written, head, rows)
-        what = "the columns have no names"
-        fix = "write a line of names above the numbers, such as q1_deg,..,x_mm,y_mm,z_mm, or give "
-        fix += f"--names with {head.width} names parted by commas"
-        raise InputError(Problem(str(path), what, "one line of names", fix))
-    return replace(written, names=names, skip_lines=rows[head.first][0] - 1)
-
-
-def _refuse_other_width(path: Path, written: Written, head: Head, rows: Sequence[Row]) -> None:
-    """Raise where a line looks like names, and the rows have another number of cells."""
+        skipped = head.line if head.names else head.line - 1
+        written = replace(written, names=head.names, skip_lines=skipped)
+        return replace(written, skip_under_names=head.under)
+    cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
+    names = head.names or _point_names(cells, stated) or _names_within(cells)
+    if names:
+        return replace(written, names=names, skip_lines=above)
     for line, cells in rows[: head.first]:
-        few = len(cells) > 3 and len(cells) != head.width and not heads.numbers_in(cells)
-        if few and all(str(cell).strip() for cell in cells):
+        if len(cells) > 3 and len(filled(cells)) == len(cells) and not heads.numbers_in(cells):
             what = f"{len(cells)} names above rows of {head.width} cells"
             fix = "export it with ; or tab between the columns"
             if written.delimiter == "," and head.width > len(cells):
                 fix = f"decimal commas between commas cannot be told apart: {fix}"
             raise InputError(Problem(f"{path}: line {line}", what, "a name for every cell", fix))
+    fix = "write a line of names above the numbers, such as q1_deg,..,x_mm,y_mm,z_mm, or give "
+    fix += f"--names with {head.width} names parted by commas"
+    raise InputError(Problem(str(path), "the columns have no names", "one line of names", fix))
 
 
-def _point_names(rows: Sequence[Row], head: Head, stated: Mapping[str, str]) -> tuple[str, ...]:
+def _point_names(rows: Sequence[Sequence], stated: Mapping[str, str]) -> tuple[str, ...]:
     """Names of a list of points without any: collection, group, point, x, y, z."""
-    cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
-    columns = list(zip(*cells, strict=True)) if cells else []
+    columns = list(zip(*rows, strict=True))
     texts = [not any(map(heads.is_number, column)) for column in columns]
     before = texts.index(False) if False in texts else 0
-    if before and len(texts) == before + 4 and _counted(columns[before]):
-        before += 1  # points that are called 1, 2, 3
+    if before and len(texts) == before + 4 and len({*columns[before]}) == len(rows):
+        # Points that are called 1, 2, 3.
+        before += all(str(cell).strip().isdigit() for cell in columns[before])
     if not 1 <= before <= 3 or len(texts) != before + 3 or any(texts[before:]):
         return ()
     unit = f"_{stated['length']}" if "length" in stated else ""
-    return (*_POINT_NAMES[3 - before :], *(f"{axis}{unit}" for axis in "XYZ"))
+    return (*(*GROUPS, POINT)[3 - before :], *(f"{axis}{unit}" for axis in "XYZ"))
 
 
-def _names_within(rows: Sequence[Row], head: Head) -> tuple[str, ...]:
+def _names_within(rows: Sequence[Sequence]) -> tuple[str, ...]:
     """Names of columns whose cells name their parts, as {E6AXIS: A1 10, ..}: by the word before.
 
     A first column of other texts names the poses. Nothing where a column of numbers has no name.
     """
-    cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
     names: list[str] = []
     word = ""
-    for place, column in enumerate(zip(*cells, strict=True)):
+    for place, column in enumerate(zip(*rows, strict=True)):
         own = robot_programs.names_of_cells(column, word)
-        if not own and any(map(heads.numbers_in, [[each] for each in column])):
+        if not own and heads.numbers_in(column):
             return ()
         names.append(own or (POINT if place == 0 else f"word {place + 1}"))
-        word = "" if own or len(set(column)) > 1 else str(column[0])
-    within = any(map(robot_programs.numbers_within, cells[0])) if cells else False
-    return tuple(names) if within and len(set(names)) == len(names) else ()
-
-
-def _counted(column: Sequence) -> bool:
-    return all(str(cell).strip().isdigit() for cell in column) and len(set(column)) == len(column)
+        word = "" if own or len({*column}) > 1 else str(column[0])
+    return tuple(names) if len({*names}) == len(names) else ()
 
 
 def _in_words(
-    written: Written, rows: Sequence[Row], head: Head, stated: Mapping[str, str], sheet: bool
+    written: Layout, rows: Sequence[Row], head: Head, stated: Mapping[str, str]
 ) -> list[str]:
     """What was found of how the file is written, as far as it is not as usual."""
     told = []
-    last = written.skip_lines
     above = [
-        " ".join(str(cell) for cell in cells if cell is not None).strip()
-        for line, cells in rows
-        if line <= last
+        " ".join(map(str, filled(cells))) for line, cells in rows if line <= written.skip_lines
     ]
-    above = [text for text in above if text and not text.lower().startswith(("sep=", '"sep='))]
+    above = [text.strip() for text in above if text and not _SEP.fullmatch(text)]
     if above and head.names is None:
-        what = "the names" if head.line else "the rows"
-        kind = "row" if sheet else "line"
-        count = f"{last} {kind}{'s' if last > 1 else ''}"  # blank ones too, as skip_lines has it
-        told.append(f"{count} above {what}, not read ({_shortened(above[0])})")
+        text = above[0] if len(above[0]) <= 50 else f"{above[0][:47]}..."
+        told.append(f"{written.skip_lines} rows above the names, not read ({text})")
     if written.names is not None:
         told.append(f"columns are called {', '.join(written.names)}")
     if written.decimal == ",":
@@ -365,5 +330,61 @@ def _in_words(
     return told
 
 
-def _shortened(text: str) -> str:
-    return text if len(text) <= 50 else text[:47] + "..."
+def _directions(
+    table: RawTable, readings: Sequence[Reading], stated: str, answers: Mapping, told, assumed
+) -> Directions:
+    """How the angles of spherical readings are counted; ``stated``: their unit, above the rows.
+
+    Raises Undecided where it is open, InputError where they state units that are not read.
+    """
+    for each in readings:
+        if (wrong := each.angle_units - {*PER_UNIT}) or each.distance.unit not in ("", *LENGTH):
+            what = f"are in {' and '.join(sorted(wrong | {each.distance.unit}))}"
+            where = f"{table.path}: columns {', '.join(each.names)}"
+            raise InputError(Problem(where, what, ", ".join((*PER_UNIT, *LENGTH))))
+    one, values = readings[0], []
+    for part in ("horizontal", "vertical"):
+        own = np.concatenate([table.values(getattr(each, part).column) for each in readings])
+        values.append(own[np.isfinite(own)] if np.isfinite(own).any() else np.zeros(1))
+    (horizontal, vertical), choices = values, []
+    units = {unit for each in readings for unit in each.angle_units}
+    if any(
+        re.search(r"\bgra(d|de|ds|des)\b", n, re.IGNORECASE)
+        for each in readings
+        for n in each.names
+    ):
+        units = set()  # grad is gon in one language and degrees in another
+    unit = answers.get("direction_unit") or (units.pop() if len(units) == 1 else stated)
+    size = float(np.abs(values[0]).max())
+    if unit not in PER_UNIT and _TURN["deg"] * _SLACK < size <= _TURN["gon"] * _SLACK:
+        unit = "gon"
+        told.append(f"{one.horizontal.column} is in gon: it goes to {size:.4g}")
+    elif unit not in PER_UNIT:
+        size = max(size, float(np.abs(vertical).max()))
+        ways = ["deg", "gon"] if size > _TURN["rad"] * _SLACK else ["rad", "deg", "gon"]
+        meant = {u: f"{horizontal[0]:g} is {np.rad2deg(horizontal[0] * PER_UNIT[u]):.4g} degrees"
+                 for u in ways}  # fmt: skip
+        about = f"{one.horizontal.column} and {one.vertical.column} state no unit of their angles"
+        choices.append(Choice("--direction-unit", about, meant))
+        unit = ""
+    quarter = _TURN[unit or "deg"] / 4.0
+    counted = answers.get("vertical") or one.vertical_from
+    if not counted and (vertical > quarter * _SLACK).any() and (vertical > 0.0).all():
+        counted = "zenith"
+    elif not counted and (vertical < 0.0).any() and (np.abs(vertical) <= quarter).all():
+        counted = "horizon"
+    if not counted and unit:
+        meant = {"zenith": f"{vertical[0]:g} is counted from straight up",
+                 "horizon": f"{vertical[0]:g} is up from level"}  # fmt: skip
+        about = f"{one.vertical.column} does not tell what it is counted from"
+        choices.append(Choice("--vertical", about, meant))
+    if choices:
+        raise Undecided(table.path, choices)
+    told.append(f"{one.vertical.column} is counted from the {counted}")
+    turning = answers.get("horizontal") or ("clockwise" if one.is_geodetic else "counterclockwise")
+    words = f"{one.horizontal.column} counts {turning}, seen from above"
+    if "horizontal" in answers:
+        told.append(words)
+    else:
+        assumed["horizontal"] = words
+    return Directions(unit, counted, turning)

@@ -13,9 +13,9 @@ from kinacc.config.names import LONGEST
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake.guess import Guess
-from kinacc.measurements.written import Written
+from kinacc.measurements.layout import Layout
 
-_AS_USUAL = {**Written().section(), "no_reading": [], "sigma": 1}
+_AS_USUAL = {**Layout().written(), "no_reading": [], "sigma": 1}
 _FEW_POSES = 60  # below, every configuration is held out once
 _PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./ -]*")
 _WORDS_OF_YAML = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
