@@ -1,9 +1,9 @@
 """How often `kinacc verify` fails an arm that did not change: python tools/verify_level.py [ARMS]
 
 The physical synthetic arm (mh180) is measured at 2,000 poses; a calibration is fitted to 80 of them
-drawn at random, held out in five shares, and held to handfuls of the others, as the command does
+drawn at random, held out in five shares, and held to samples of the others, as the command does
 it: base kept, or moved elsewhere and fitted, or base and tool. Where the arm is to have changed, an
-offset of a joint is added to the reported joints of the handful.
+offset of a joint is added to the reported joints of the sample.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from kinacc.calibration.residuals import Errors, cross_validated, errors
 from kinacc.calibration.tables import frames_columns
 from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.config.schema import defaults
-from kinacc.deployment import handful, verify
-from kinacc.deployment.handful import BASE, TOOL, HeldOut
+from kinacc.deployment import verify
+from kinacc.deployment.permutation import LEVEL, Columns, held_to
+from kinacc.deployment.verify import BASE, TOOL
 from kinacc.geometry import exp_so3
 from kinacc.kinematics import robot
 from kinacc.measurements import folds
@@ -55,18 +56,15 @@ def fitted(seen: Observations, arm: robot.Robot) -> tuple[Fit, Errors]:
     return own["dh"], cross_validated(seen, fit, range(5), own)[0][MODEL]
 
 
-def with_places(fit: Fit, off: Errors, seen: Observations, moved: tuple[str, ...]) -> HeldOut:
-    """Errors at what was ``seen``, where ``moved`` is fitted to handfuls of it."""
-    vectors, weight = off.position_mm[:, None], WEIGHT if moved else None
-    if moved:
-        vectors = np.concatenate([vectors, WEIGHT * off.rotation_rad[:, None]], axis=2)
-    return HeldOut(vectors, verify._places(fit.model, seen, fit.frames.targets, moved, weight))
+def with_columns(fit: Fit, off: Errors, seen: Observations, moved: tuple[str, ...]) -> Columns:
+    """Errors at what was ``seen``, where ``moved`` is fitted to samples of it."""
+    return verify._columns(fit.model, seen, fit.frames.targets, moved, off.position_mm[:, None])
 
 
 def probabilities(
-    fit: Fit, held: HeldOut, rest: Observations, moved: tuple[str, ...], arm, rng, joint, offset
+    fit: Fit, held: Columns, rest: Observations, moved: tuple[str, ...], arm, rng, joint, offset
 ) -> Iterator[tuple[int, float]]:
-    """Of handfuls of every size, elsewhere where they were moved."""
+    """Of samples of every size, elsewhere where they were moved."""
     for size in SIZES:
         few = rest.select(rng.permutation(len(rest))[:size])
         turn, shift = exp_so3(rng.normal(0.0, 0.5, 3)), rng.normal(0.0, 500.0, 3)
@@ -74,7 +72,7 @@ def probabilities(
             few = replace(
                 few,
                 position_mm=few.position_mm @ turn.T + shift,
-                rotation=turn @ few.rotation,
+                rotation=np.full_like(few.rotation, np.nan),
             )
         offsets = np.zeros(few.joints)
         offsets[joint] = 1e-3 * offset
@@ -84,12 +82,12 @@ def probabilities(
             kept = {"frames": frames_columns({"dh": fit.frames}, ("tool",))}
             frames = verify.frames_at(kept, "dh", fit.model, few, arm, moved, WEIGHT)
         there = Fit(fit.model, frames)
-        new = with_places(there, errors({"dh": there}, few)[MODEL], few, moved)
-        yield size, handful.held_to(held, new).probability
+        new = with_columns(there, errors({"dh": there}, few)[MODEL], few, moved)
+        yield size, held_to(held, new).probability
 
 
 def main(arms: int, joint: int = 0, offset: float = 0.0) -> None:
-    """Print the share of handfuls that fail, by size and by what was moved."""
+    """Print the share of samples that fail, by size and by what was moved."""
     arm = robot.load("mh180")
     seen, rng = everything(arm), np.random.default_rng(1)
     found: dict[tuple, list[float]] = {}
@@ -100,18 +98,18 @@ def main(arms: int, joint: int = 0, offset: float = 0.0) -> None:
         fit, off = fitted(own, arm)
         rest = seen.select(order[FITTED:])
         for moved in SETUPS:
-            held = with_places(fit, off, own, moved)
+            held = with_columns(fit, off, own, moved)
             for _ in range(3):
                 told = probabilities(fit, held, rest, moved, arm, rng, joint, offset)
                 for size, probability in told:
                     found.setdefault((moved, size), []).append(probability)
-    print(f"{arms} calibrations of {FITTED} poses; share that fails at {100 * handful.LEVEL:g} %")
+    print(f"{arms} calibrations of {FITTED} poses; share that fails at {100 * LEVEL:g} %")
     for (moved, size), told in found.items():
-        share = 100.0 * np.mean(np.array(told) <= handful.LEVEL)
+        share = 100.0 * np.mean(np.array(told) <= LEVEL)
         what = " and ".join(moved) or "nothing"
         print(f"{what} moved, {size} poses: {share:.2f} % of {len(told)}")
     every = np.concatenate([*found.values()])
-    print(f"all: {100.0 * np.mean(every <= handful.LEVEL):.2f} % of {len(every)}")
+    print(f"all: {100.0 * np.mean(every <= LEVEL):.2f} % of {len(every)}")
 
 
 if __name__ == "__main__":

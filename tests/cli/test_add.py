@@ -132,21 +132,6 @@ def test_the_same_readings_twice_are_no_new_line(cell):
     assert Path("tracker.yaml").read_text() == HERE
 
 
-def exported_again() -> None:
-    """The tracker's export of June, which goes on where that of March ended."""
-    names, *new = Path("june.csv").read_text().splitlines()
-    old = Path("data/march.csv").read_text().splitlines()[1:]
-    Path("june.csv").write_text("\n".join([names, *new[:40], *old[:20]]) + "\n")
-
-
-def test_old_readings_among_new_ones_are_no_new_line(cell):
-    exported_again()
-    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
-    assert done.exit_code == 2
-    assert "20 of its 60 readings are those of data/march.csv" in done.output
-    assert Path("tracker.yaml").read_text() == HERE
-
-
 def test_a_file_that_cannot_be_read_so_is_refused_with_all_other_problems(cell):
     text = Path("june.csv").read_text().replace("q6_deg", "wrist")
     Path("june.csv").write_text(text)

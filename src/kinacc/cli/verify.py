@@ -13,13 +13,9 @@ from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import answers
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from kinacc.calibration.observations import Observations
     from kinacc.cli.sheet import Sheet
-    from kinacc.deployment.verify import Seen, Trial, Verdict
+    from kinacc.deployment.verify import Verification
 
-_FAR_MM = 10.0
 _SETUP = click.Choice(["same", "moved"])
 _DESCRIPTIONS = (".yaml", ".yml")
 
@@ -35,17 +31,15 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     """Hold a calibration to a few poses that it was not fitted to: does it still hold?
 
     NEW is a file of readings in the form of those of the calibration, whose configuration is looked
-    for beside the results; or a .yaml that `kinacc init` wrote of readings in another form. 5 to 15
-    poses, spread as those of the calibration are, tell large changes; what they tell is said, and
-    what more would.
+    for beside the results; or a .yaml that `kinacc init` wrote of readings in another form. Measure
+    5 to 15 configurations, spread as those of the calibration are.
 
     What was moved is fitted anew to the readings (base 6 numbers, tool 3 or 6), for every model its
-    own, and so it is to the held-out poses that they are compared with. The arm is not touched. The
-    verdict is on the selected model where the calibration was measured: it fails where errors are
-    as large, or look as much like offsets of joints, as in 1 % of such handfuls where nothing has
-    changed; passes otherwise; and cannot be told where fewer poses than show errors doubled are no
-    worse. It goes by positions; where base or tool was moved, by measured orientations too. It is
-    no bound on the largest error. Exit code 1: it fails, or cannot be told.
+    own. The verdict is on the selected model, by positions where the calibration was measured: it
+    fails where a permutation test finds the errors larger than held-out ones, or more like offsets
+    of joints, at the 1 % level; it passes otherwise; it cannot be told where so few poses would not
+    show errors doubled. It is no bound on the largest error. Exit code 1: it fails, or cannot be
+    told.
 
     \b
     Example:
@@ -54,13 +48,9 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     """
     import warnings
 
-    import numpy as np
-
-    from kinacc.calibration.observations import from_columns
     from kinacc.deployment import folder as results
-    from kinacc.deployment import shared_readings
-    from kinacc.deployment.applicability import is_measured_there
-    from kinacc.deployment.verify import BASE, OPEN, PASSES, TOOL, Verdict, trials, verdict
+    from kinacc.deployment.verify import BASE, PASSES, TOOL
+    from kinacc.deployment.verify import verify as verified
     from kinacc.progress import reporting
     from kinacc.synthetic import source
 
@@ -73,51 +63,35 @@ def verify(readings, folder, base, tool, dataset, out) -> None:
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         columns = source.run({}, config)["measurements"]
-        seen = from_columns(columns, arm)
-        tried = trials(tables, arm, seen, moved, weight)
-        selected = results.selected_model(tables)
-        known = results.calibration(tables, arm, selected)
-        point = next((each for each in seen.target_names if each in known.targets), None)
-        there = is_measured_there(known, seen.at, point)
-        shared = 0
-        if "measurements" in tables:
-            shared = shared_readings.shared(tables["measurements"], columns, False).count
-        if shared:
-            found = Verdict(OPEN, _FITTED)
-        elif not moved and _far_off(tried):
-            found = Verdict(OPEN, _ELSEWHERE)
-        else:
-            found = verdict(tables, arm, selected, seen, there, moved, weight)
+        found = verified(tables, arm, columns, moved, weight)
     for each in dict.fromkeys(str(warning.message) for warning in said):
         click.echo(f"{name}: {each}", err=True)
+    step, command = _next(found, readings, folder, dataset, moved)
+    units = ["mm" if slides else "mrad" for slides in arm.dh.prismatic]
     facts = {
         "calibration": str(folder),
         "readings_of": name,
-        "readings": len(seen),
+        "readings": found.readings,
         "base": base,
         "tool": tool,
-        "numbers_fitted": _numbers(seen, moved),
-        "selected": selected,
-        "shared_readings": shared,
-        "like_measured": int(np.sum(there)),
-    }
-    step, command = _next(found, readings, folder, dataset, moved)
-    facts |= _of_verdict(found) | {
-        "worse_than_nominal": [
-            {"model": kind, "readings": count, "mean_mm": mean, "nominal_mean_mm": plain}
-            for kind, count, mean, plain in _worse_than_nominal(tried)
-        ],
+        "selected": found.model,
+        "shared_readings": found.known,
+        "like_measured": found.near,
+        "verdict": found.verdict,
+        "verdict_reason": found.reason,
+        "here": found.here and found.here._asdict(),
+        "held_out": found.held_out and found.held_out._asdict(),
+        "test": found.held and found.held._asdict(),
+        "smallest_factor": found.smallest_factor,
+        "smallest_offsets": None if found.smallest_offsets is None else [*found.smallest_offsets],
         "next_step": step,
         "next": command,
     }
-    units = ["mm" if slides else "mrad" for slides in arm.dh.prismatic]
-    out.deliver(_sheet(facts, tried), _in_words(facts, tried, found, moved, units))
-    if found.says != PASSES:
+    out.deliver(
+        _sheet(facts, found), "\n".join([*_lines(found, units), f"next: {step}", f"  {command}"])
+    )
+    if found.verdict != PASSES:
         raise SystemExit(AGAINST)
-
-
-_FITTED = "some are among those it was fitted to"
-_ELSEWHERE = "instrument or tool stands elsewhere"
 
 
 def _require_choices(folder: str | None, base: str | None, tool: str | None) -> None:
@@ -149,66 +123,28 @@ def _settings(readings: str, folder: str, dataset: str | None) -> tuple[str, Map
     return path.stem, like_those_of(Path(folder), path)
 
 
-def _of_verdict(found: Verdict) -> dict[str, object]:
-    """The verdict as facts."""
-    from kinacc.deployment.handful import LEVEL, POWER
-
-    held = found.held
-    return {
-        "verdict": found.says,
-        "verdict_reason": found.reason,
-        "level": LEVEL,
-        "power": POWER,
-        "here": found.here and found.here._asdict(),
-        "held_out": found.held_out and found.held_out._asdict(),
-        "expected_mean_mm": held and held.expected_mm,
-        "limit_mm": held and held.limit_mm,
-        "offsets_mm": held and held.offsets_mm,
-        "offsets_limit_mm": held and held.offsets_limit_mm,
-        "most_like_offset_of_joint": held and held.joint,
-        "most_like_offset": held and held.offset,
-        "probability": held and held.probability,
-        "least_configurations": found.least,
-        "seen": found.seen and _of_seen(found.seen),
-        "seen_with": [_of_seen(each) for each in found.table],
-    }
-
-
-def _of_seen(seen: Seen) -> dict[str, object]:
-    """What poses show, as facts: null what they do not."""
-    return {
-        "poses": seen.poses,
-        "errors_times": seen.factor,
-        "offsets_of_joints": [float(each) for each in seen.joints],
-    }
-
-
 def _next(
-    found: Verdict, readings: str, folder: str, dataset: str | None, moved: Sequence[str]
+    found: Verification, readings: str, folder: str, dataset: str | None, moved: Sequence[str]
 ) -> tuple[str, str]:
     """What to do after a verdict, and the command for it."""
-    from kinacc.deployment.verify import FEW_HELD_OUT, OPEN, PASSES
+    from kinacc.deployment.verify import ELSEWHERE, FEW_HELD_OUT, OPEN, PASSES
 
     words = ["kinacc", "verify", readings, "--calibration", folder]
     words += [] if dataset is None else ["--dataset", dataset]
     anew = shlex.join([*words, "--base", "moved", "--tool", "moved"])
     fitted = shlex.join(["kinacc", "summary", folder])
     poses = shlex.join(["kinacc", "show", f"{folder}/measurements", "--columns", "pose,q*"])
-    if found.says == PASSES:
-        return "the calibration can be used on", fitted
-    if found.says != OPEN:
-        if not moved:
-            step = "see whether the arm has changed, or only instrument or tool was moved"
-            return step, anew
-        return "measure as many poses as those of the calibration anew, and calibrate", poses
-    if found.reason == _ELSEWHERE:
+    if found.verdict == PASSES:
+        return "keep using the calibration", fitted
+    if found.reason == ELSEWHERE:
         return "fit base and tool to these readings", anew
     if found.reason == FEW_HELD_OUT:
-        step = "calibrate with folds (measurements.folds) and enough poses to hold some out"
-        return step, fitted
-    some = "more" if found.least is None else f"{found.least} or more"
-    step = f"measure {some} new configurations near those of the calibration, and verify again"
-    return f"{step}; this lists those", poses
+        return "calibrate with folds (measurements.folds) and more poses", fitted
+    if found.verdict == OPEN:
+        return "measure more new configurations near those of the calibration, listed here", poses
+    if not moved:
+        return "see whether the arm has changed, or only instrument or tool was moved", anew
+    return "measure as many poses as those of the calibration anew, and calibrate", poses
 
 
 def _section(files: Sequence[str], dataset: str | None) -> tuple[str, Mapping]:
@@ -226,151 +162,70 @@ def _section(files: Sequence[str], dataset: str | None) -> tuple[str, Mapping]:
     return name, full[name]
 
 
-def _numbers(seen: Observations, moved: Sequence[str]) -> int:
-    """How many numbers what was moved is, of a single model."""
-    import numpy as np
-
-    from kinacc.deployment.verify import BASE, TOOL
-
-    turned = np.unique(seen.target[seen.has_rotation])
-    base = 6 * len(seen.session_names) if BASE in moved else 0
-    return base + (3 * len(seen.target_names) + 3 * len(turned) if TOOL in moved else 0)
-
-
-def _sheet(facts: Mapping, trials: Sequence[Trial]) -> Sheet:
+def _sheet(facts: Mapping, found: Verification) -> Sheet:
     """One row for each model and set of readings."""
-    import numpy as np
-
-    from kinacc.calibration.summary import LARGE_SHARE
     from kinacc.cli.sheet import Field, Sheet
-    from kinacc.config.error_models import ERROR_MODELS, NOMINAL, model_name
+    from kinacc.config.error_models import model_name
 
-    order = (NOMINAL, *ERROR_MODELS)
-    rows = []
-    for trial in trials:
-        for kind in sorted(trial.errors, key=order.index):
-            found = trial.errors[kind]
-            position = _sizes(found.position_mm)
-            turn = 1e3 * _sizes(found.rotation_rad)
-            rows.append(
-                (
-                    model_name(kind),
-                    "all readings" if trial.rows.all() else "covered by all models",
-                    len(position),
-                    *_statistics(position, LARGE_SHARE),
-                    *_statistics(turn, LARGE_SHARE),
-                )
-            )
-    columns = [np.array(each, dtype=object) for each in zip(*rows, strict=True)] or [[]] * 11
-    mm, mrad = "of position errors", "of orientation errors"
-    meanings = [
-        ("model", "", "what was held to the readings"),
-        ("at", "", "which readings: all, or those where every model says something"),
-        ("readings", "1", "that it was held to"),
-        ("mean_mm", "mm", mm),
-        ("quantile_99_mm", "mm", f"{mm}: 99 % are no larger"),
-        ("largest_mm", "mm", mm),
-        ("rms_mm", "mm", mm),
-        ("mean_mrad", "mrad", mrad),
-        ("quantile_99_mrad", "mrad", f"{mrad}: 99 % are no larger"),
-        ("largest_mrad", "mrad", mrad),
-        ("rms_mrad", "mrad", mrad),
-    ]
-    turned = bool(len(rows)) and any(np.isfinite(row[7]) for row in rows)
-    fields = [
-        Field(label, values, unit, meaning, unit != "mrad" or turned)
-        for (label, unit, meaning), values in zip(meanings, columns, strict=True)
-    ]
+    table = found.errors.assign(model=found.errors["model"].map(model_name))
+    turned = bool(table["mean_mrad"].notna().any())
+    meanings = {
+        "model": ("", "what was held to the readings"),
+        "at": ("", "which readings: all, or those that all models cover"),
+        "readings": ("1", "that it was held to"),
+    }
+    fields = []
+    for name in table.columns:
+        unit = name.rpartition("_")[2]
+        unit, meaning = meanings.get(name, (unit, f"errors of the model, {name}"))
+        values = table[name].to_numpy()
+        fields.append(Field(name, values, unit, meaning, unit != "mrad" or turned))
     title = f"{facts['calibration']} at readings of {facts['readings_of']}"
     return Sheet(title, facts, fields)
 
 
-def _far_off(trials: Sequence[Trial]) -> bool:
-    """Whether no model comes near: what differs is no error of an arm."""
-    means = [_sizes(found.position_mm).mean() for each in trials for found in each.errors.values()]
-    return bool(means) and min(means) > _FAR_MM
-
-
-def _sizes(vectors: np.ndarray) -> np.ndarray:
-    """Magnitudes of the finite ones of ``vectors`` (n, 3)."""
+def _lines(found: Verification, units: Sequence[str]) -> Iterator[str]:
+    """The verdict first, what it rests on, and what else the readings show."""
     import numpy as np
 
-    sizes = np.linalg.norm(vectors, axis=1)
-    return sizes[np.isfinite(sizes)]
-
-
-def _statistics(sizes: np.ndarray, share: float) -> tuple[float, float, float, float]:
-    """Mean, quantile, largest and rms; NaN of none."""
-    import numpy as np
-
-    if not len(sizes):
-        return (np.nan,) * 4
-    rms = float(np.sqrt(np.mean(sizes**2)))
-    return float(sizes.mean()), float(np.quantile(sizes, share)), float(sizes.max()), rms
-
-
-def _worse_than_nominal(trials: Sequence[Trial]) -> Iterator[tuple[str, int, float, float]]:
-    """Models that are off by more than the nominal arm, in the largest trial they are part of.
-
-    Name, number of readings, its mean and that of the nominal arm in mm.
-    """
     from kinacc.config.error_models import NOMINAL, model_name
+    from kinacc.deployment.permutation import LEVEL
+    from kinacc.deployment.verify import FAILS, PASSES
 
-    largest = {kind: each for each in trials for kind in each.errors}
-    for kind, trial in largest.items():
-        mean, plain = (_sizes(trial.errors[of].position_mm) for of in (kind, NOMINAL))
-        if len(mean) and mean.mean() > plain.mean():
-            yield model_name(kind), len(mean), float(mean.mean()), float(plain.mean())
-
-
-def _in_words(
-    facts: Mapping,
-    tried: Sequence[Trial],
-    found: Verdict,
-    moved: Sequence[str],
-    units: Sequence[str],
-) -> str:
-    """Where the readings lie, whether the calibration holds there, and what to do next."""
-    from kinacc.config.error_models import model_name
-    from kinacc.deployment.verify_words import of_verdict
-
-    count, selected = facts["readings"], facts["selected"]
-    lines = [
-        f"{facts['like_measured']} of {count} readings lie where the calibration was measured; "
-        "errors elsewhere may be larger than those held out"
-    ]
-    if moved:
-        lines.append(
-            f"{' and '.join(moved)} fitted to these readings: {facts['numbers_fitted']} numbers "
-            "for each model, which take up a part of its errors; the arm was not touched"
-        )
+    held, selected = found.held, model_name(found.model)
+    if held is None or found.verdict not in (PASSES, FAILS):
+        yield f"CANNOT BE TOLD: {found.reason}"
+    elif found.verdict == PASSES:
+        yield f"PASSES: no change detected at the {LEVEL:.0%} level (p = {held.probability:.2g})"
     else:
-        lines.append(
-            "base and tool are those of the calibration; nothing was fitted to these readings"
+        yield (
+            f"FAILS: a change is detected at the {LEVEL:.0%} level (p = {held.probability:.2g}); "
+            f"the errors look most like joint {held.joint} off by {held.offset:+.2g} "
+            f"{units[held.joint - 1]}"
         )
-    said = max((int(each.rows.sum()) for each in tried if selected in each.errors), default=0)
-    if said < count:
-        lines.append(
-            f"{model_name(selected)}, the selected model, says nothing at {count - said} of "
-            f"{count} readings: their joints lie outside the range it was fitted in"
+    if held is not None:
+        yield (
+            f"{selected}, rms position error of {found.here.configurations} configurations: "
+            f"{held.rms_mm:.3g} mm; held out {held.expected_mm:.3g} mm, 99 % of random samples at "
+            f"most {held.limit_mm:.3g} mm"
         )
-    else:
-        lines.append(f"{model_name(selected)} is the selected model")
-    for name, number, mean, plain in _worse_than_nominal(tried):
-        lines.append(
-            f"{name} is worse than the nominal arm at {number} readings: mean {mean:.4g} mm, "
-            f"nominal {plain:.4g} mm"
+        offsets = found.smallest_offsets
+        hidden = ", ".join(str(joint) for joint in np.flatnonzero(np.isinf(offsets)) + 1)
+        worst = int(np.argmax(np.where(np.isinf(offsets), -1.0, offsets)))
+        yield (
+            f"found in at least 80 % of cases: errors {found.smallest_factor:.2g} times as large; "
+            f"joint {worst + 1} off by {offsets[worst]:.2g} {units[worst]}, the others by less"
+            f"{hidden and f' (not joint {hidden})'}"
         )
-    if found.reason == _ELSEWHERE:
-        lines.append(
-            "every model is off by centimetres or more: the instrument or the tool stands "
-            "elsewhere than it did; --base moved --tool moved fits both anew"
-        )
-    if facts["shared_readings"]:
-        lines.append(
-            f"{facts['shared_readings']} of these readings are among those it was fitted to: they "
-            "say nothing of new ones"
-        )
-    lines += of_verdict(found, selected, moved, units)
-    lines += [f"next: {facts['next_step']}", f"  {facts['next']}"]
-    return "\n".join(lines)
+    if found.known:
+        yield f"{found.known} of {found.readings} readings are known to the calibration: left out"
+    yield f"{found.near} of {found.readings} readings lie where the calibration was measured"
+    largest = found.errors.groupby("model")["readings"].max()
+    for _, row in found.errors.iterrows():
+        own = found.errors[(found.errors["at"] == row["at"]) & (found.errors["model"] == NOMINAL)]
+        plain = float(own["mean_mm"].iloc[0])
+        if row["mean_mm"] > plain and row["readings"] == largest[row["model"]]:
+            yield (
+                f"{model_name(row['model'])} is worse than the nominal arm at {row['readings']} "
+                f"readings: mean {row['mean_mm']:.3g} mm, nominal {plain:.3g} mm"
+            )

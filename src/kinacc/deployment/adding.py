@@ -15,7 +15,7 @@ from kinacc.checks.contradictions import load
 from kinacc.config.reading import read
 from kinacc.config.series import FLAGS, MOVED, SAME
 from kinacc.config.series_text import as_text, with_line
-from kinacc.deployment.shared_readings import repeated_problems
+from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem, first_few, gathered, refuse
 from kinacc.kinematics import robot
 from kinacc.measurements import times
@@ -109,7 +109,9 @@ def misfits(path: str, arm: Arm, tool: str | None) -> list[Problem]:
         for member in arm.members:
             with suppress(InputError):
                 other = _measured(member.path, arm)
-                problems += repeated_problems(path, own, member.path, other)
+                if known_rows(own, other).all():
+                    what = f"holds the readings of {member.path}, which is a line already"
+                    problems.append(Problem(path, what, "new readings"))
         if other is not None:
             problems += _of_targets(path, own, other, arm, tool)
     return problems

@@ -24,9 +24,9 @@ from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.deployment import drift_chance, drift_pairs, folder
 from kinacc.deployment.drift_joint import joint_of
 from kinacc.deployment.drift_pairs import Setup
-from kinacc.deployment.handful import LEAST_HELD_OUT
 from kinacc.deployment.record import Calibration
-from kinacc.deployment.verify import frames_under, says_there
+from kinacc.deployment.shared_readings import known_readings
+from kinacc.deployment.verify import LEAST_HELD_OUT, frames_under, says_there
 from kinacc.errors import FitError, InputError
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
@@ -143,6 +143,9 @@ class _Comparison:
     def row(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
         """What a row says of ``session`` while the calibration of ``force`` was in force."""
         row: dict[str, Any] = {}
+        series = (session.observations, force.observations)
+        known = known_readings(*([each.q_rad, each.position_mm] for each in series))
+        session = replace(session, observations=session.observations.select(~known))
         try:
             row |= _sizes("in_force", self.errors_mm(force, session, setup))
             few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]

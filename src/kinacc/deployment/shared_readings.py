@@ -1,19 +1,18 @@
-"""Readings that two calibrations were both fitted to, which say nothing of a change."""
+"""Readings that a table holds already: they show no change and are not compared with themselves."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from kinacc.deployment.record import Calibration
-from kinacc.errors import Problem
 from kinacc.tables.allowed import SUBSETS
 
-_COINCIDENCE = 0.01  # of the smaller set: equal digits of so few readings may be chance
+_COINCIDENCE = 0.01  # of the smaller table: equal digits of so few readings may be chance
 _DIGITS = 6  # of mm; angles are held to as many and three more
 
 
@@ -33,30 +32,49 @@ class SharedReadings(NamedTuple):
 NONE_SHARED = SharedReadings(0, 0, 0)
 
 
+def known_rows(table: Mapping, earlier: Mapping) -> np.ndarray:
+    """True (n,) for rows of a table ``measurements`` that an ``earlier`` one holds as well.
+
+    Joints and position agree to the last digits; nowhere where so few do that it may be chance.
+    """
+    if not len(earlier):
+        return np.zeros(len(table["x_mm"]), dtype=bool)
+    joints = [name for name in table if name[0] == "q" and name[1:].isdecimal()]
+    names = (joints, ["x_mm", "y_mm", "z_mm"])
+    own, other = (
+        [np.stack([np.asarray(each[name], dtype=float) for name in part], axis=1) for part in names]
+        for each in (table, earlier)
+    )
+    return known_readings(own, other)
+
+
+def known_readings(own: Sequence[np.ndarray], earlier: Sequence[np.ndarray]) -> np.ndarray:
+    """The same (n,) of joints (n, k) and positions (n, 3) mm, and those of an earlier series."""
+    one, other = (
+        pd.MultiIndex.from_arrays(
+            np.hstack([joints.round(_DIGITS + 3), position_mm.round(_DIGITS)]).T + 0.0
+        )
+        for joints, position_mm in (own, earlier)
+    )
+    found = one.isin(other)
+    return found & (found.sum() >= _COINCIDENCE * min(len(one), len(other)))
+
+
 def shared(first: Mapping, second: Mapping, same_file: bool) -> SharedReadings:
     """Readings in both of two ``measurements`` tables, as far as they are fitted to.
 
-    Readings are one where joints and reading agree to the last digits, or where they stand on the
+    Readings are one where joints and position agree to the last digits, or where they stand on the
     same line of ``same_file``, however that was read.
     """
-    fitted = [np.asarray(each["subset"]) == SUBSETS[0] for each in (first, second)]
-    tables = [_readings(each, rows) for each, rows in zip((first, second), fitted, strict=True)]
-    counts = [len(each.values) for each in tables]
-    common = _common(*(each.values for each in tables))
-    if same_file:
-        common = max(common, _common(*(each.places for each in tables)))
-    common = 0 if common < _COINCIDENCE * min(counts) else common
-    return SharedReadings(common, *counts)
-
-
-def repeated(first: Mapping, second: Mapping) -> int:
-    """How many readings of ``second`` the table ``first`` holds as well, whatever they are for.
-
-    0 where so few agree to the last digits that it may be chance.
-    """
-    tables = [_readings(each, np.ones(len(each["subset"]), dtype=bool)) for each in (first, second)]
-    common = _common(*(each.values for each in tables))
-    return 0 if common < _COINCIDENCE * min(len(each.values) for each in tables) else common
+    fitted = []
+    for each in (first, second):
+        rows = np.asarray(each["subset"]) == SUBSETS[0]
+        fitted.append({name: np.asarray(values)[rows] for name, values in each.items()})
+    count = int(known_rows(*fitted).sum())
+    if same_file and all("row" in each for each in fitted):
+        lines = [pd.DataFrame({name: each[name] for name in ("row", "target")}) for each in fitted]
+        count = max(count, len(lines[0].dropna().merge(lines[1].dropna())))
+    return SharedReadings(count, *(len(each["subset"]) for each in fitted))
 
 
 def counted_once(
@@ -67,54 +85,12 @@ def counted_once(
     Estimates from common readings err together. With s of n1 and n2 readings in both, of equal
     information each, the difference has covariance (1 - s / n2) C1 + (1 - s / n1) C2.
     """
-    if not readings.count:
-        return first, second
-    shares = 1.0 - readings.count / readings.second, 1.0 - readings.count / readings.first
-    return _scaled(first, shares[0]), _scaled(second, shares[1])
 
+    def scaled(calibration: Calibration, fitted: int) -> Calibration:
+        known = calibration.known
+        if known is None or not readings.count:
+            return calibration
+        covariance = known.covariance * (1.0 - readings.count / fitted)
+        return replace(calibration, known=replace(known, covariance=covariance))
 
-def _scaled(calibration: Calibration, share: float) -> Calibration:
-    if calibration.known is None:
-        return calibration
-    covariance = calibration.known.covariance * share
-    return replace(calibration, known=replace(calibration.known, covariance=covariance))
-
-
-class _Readings(NamedTuple):
-    """Readings by their numbers, and by where they stand in their file."""
-
-    values: list[tuple]
-    places: list[tuple]
-
-
-def _readings(table: Mapping, rows: np.ndarray) -> _Readings:
-    joints = sum(name[0] == "q" and name[1:].isdecimal() for name in table)
-    angles = [f"q{i + 1}" for i in range(joints)] + [f"q{part}" for part in "wxyz"]
-    columns = [np.round(np.asarray(table[name], dtype=float), _DIGITS + 3) for name in angles]
-    columns += [np.round(np.asarray(table[f"{axis}_mm"], dtype=float), _DIGITS) for axis in "xyz"]
-    values = np.nan_to_num(np.stack(columns, axis=1)[rows], nan=np.inf)
-    line = np.asarray(table.get("row", np.full(len(rows), np.nan)), dtype=float)[rows]
-    pairs = zip(line.tolist(), np.asarray(table["target"])[rows].tolist(), strict=True)
-    places = [(int(number), str(target)) for number, target in pairs if number == number]
-    return _Readings([tuple(row) for row in values.tolist()], places)
-
-
-def _common(first: list[tuple], second: list[tuple]) -> int:
-    return (Counter(first) & Counter(second)).total()
-
-
-def repeated_problems(path: str, own: Mapping, before: str, other: Mapping) -> list[Problem]:
-    """That a file of a series holds readings of an earlier line: it says nothing new by them.
-
-    A tracker's export that goes on holds the old readings among the new ones; the history would
-    hold them against themselves.
-    """
-    count, rows = repeated(other, own), len(own["subset"])
-    if not count:
-        return []
-    if count == rows:
-        return [Problem(path, f"holds the readings of {before}, which is a line already",
-                        "new readings")]  # fmt: skip
-    what = f"{count} of its {rows} readings are those of {before}, which is a line already"
-    fix = "leave those rows out of the file: a change would be held against readings before it"
-    return [Problem(path, what, "new readings alone", fix)]
+    return scaled(first, readings.second), scaled(second, readings.first)

@@ -1,8 +1,8 @@
 """A calibration held to readings that it was not fitted to: later ones, or of another set-up.
 
 The arm is taken as it was fitted. Base and tool are kept where they did not move, and fitted anew
-where they did, for every model alike. Their errors after that are compared: among models, and with
-those that handfuls of held-out poses leave after the same fit.
+where they did, for every model alike. Errors are compared among models, and those of the selected
+model with its held-out errors by a permutation test.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from kinacc.calibration import dh_fit, robust
 from kinacc.calibration.constrained import FrameTerms
@@ -20,40 +21,40 @@ from kinacc.calibration.constraints import frame_terms
 from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, known, stacked
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
-from kinacc.calibration.residuals import Errors, errors
+from kinacc.calibration.residuals import errors
 from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.calibration.system import FlangeModel
 from kinacc.calibration.tables import frames_of
-from kinacc.config.error_models import MEASURED, Comparison
-from kinacc.deployment import handful
-from kinacc.deployment.handful import BASE, TOOL, Held, HeldOut, Places, Seen
+from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
+from kinacc.deployment import folder
+from kinacc.deployment.applicability import is_measured_there
+from kinacc.deployment.permutation import LEVEL, Columns, Held, held_to, smallest_changes
+from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose
+from kinacc.geometry import Pose, skew
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.kinematics.tables import frame, models
 from kinacc.measurements.folds import configurations
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
+BASE, TOOL = "base", "tool"
 PASSES, FAILS, OPEN = "passes", "fails", "cannot be told"
-FEW_HELD_OUT, FEW = "too few held-out poses", "too few configurations where it was measured"
-NOWHERE = "no configuration where it was measured"
+KNOWN = "the calibration was fitted to all of these readings"
+ELSEWHERE = "instrument or tool stands elsewhere"
+FEW_HELD_OUT = "too few held-out configurations"
 SEVERAL = "several sessions, each with a base of its own"
+NOWHERE = "no configuration where it was measured"
 TAKEN_UP = "base and tool take up all that these poses show"
-TABLE = (5, 8, 12, 20, 40)  # numbers of poses that it is said what they would show of
+FEW = "too few configurations where it was measured"
+LEAST_HELD_OUT = 20  # configurations: fewer do not say how large errors are
+DOUBLED = 2.0  # poses that would not show errors this many times as large pass nothing
+_FAR_MM = 10.0
 _SLACK = 1e-9  # rad and mm beyond the fitted range that are rounding
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Errors (m, 3) of models by name, all at the m readings that ``rows`` (n,) marks."""
-
-    rows: np.ndarray
-    errors: dict[str, Errors]
-
-
 class Level(NamedTuple):
-    """Position errors of a model at readings: how many, of how many configurations, how large."""
+    """Position errors of a model: how many readings, of how many configurations, how large."""
 
     readings: int
     configurations: int
@@ -62,84 +63,137 @@ class Level(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """Whether new poses pass a model: PASSES, FAILS or OPEN, and why it cannot be told.
+class Verification:
+    """Whether new readings pass ``model``: PASSES, FAILS or OPEN, and why it cannot be told.
 
-    ``here`` are the errors that count, ``held_out`` those held out; ``held`` compares them with
-    ``handful.LEVEL``; ``least`` is the number of configurations that a pass needs, None where no
-    number would do; ``seen`` what these show and ``table`` what other numbers would.
+    ``known`` of the ``readings`` are those that it was fitted to, and left out; ``near`` of the
+    others lie where it was measured, and count. ``errors``: a row for each model, at all readings
+    and, where these differ, at those that every model covers. ``here`` are the errors that count,
+    ``held_out`` those held out, ``held`` the test of both. ``smallest_factor`` on all errors and
+    ``smallest_offsets`` (k,) of single joints (mrad or mm) are found in four of five cases; inf
+    where none is, or base and tool take it up.
     """
 
-    says: str
+    verdict: str
     reason: str
-    here: Level | None = None
+    model: str
+    readings: int
+    known: int
+    near: int
+    errors: pd.DataFrame
     held_out: Level | None = None
+    here: Level | None = None
     held: Held | None = None
-    least: int | None = None
-    seen: Seen | None = None
-    table: tuple[Seen, ...] = ()
+    smallest_factor: float = np.inf
+    smallest_offsets: np.ndarray | None = None
 
 
-def verdict(
+def verify(
     tables: Tables,
     robot: Robot,
-    model: str,
-    observations: Observations,
-    there: np.ndarray,
+    columns: Mapping[str, np.ndarray],
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
-) -> Verdict:
-    """Hold ``model`` to the readings where it was measured, ``there`` (n,).
+) -> Verification:
+    """Hold the selected model of a results folder to the table ``measurements`` of new readings.
 
-    The first reading of every target of a configuration counts. ``moved``: what of base and tool is
-    fitted to these anew. Raises InputError where a frame that is kept is not there, and FitError.
+    ``moved``: what of BASE and TOOL is fitted to these anew; what they do not show of it stays as
+    ``robot`` has it. The test goes by positions; of a configuration the first reading of every
+    target counts. Raises InputError where a frame that is kept is not there, and FitError.
     """
-    kinds = len(observations.target_names)
-    held = _held_out(tables, robot, model, observations, moved, rotation_weight_mm_per_rad)
-    if held is None or len(held) < handful.LEAST_HELD_OUT:
-        return Verdict(OPEN, FEW_HELD_OUT, held_out=held and _level(held.errors))
-    held_out, own = _level(held.errors), models(tables, robot.dh)[model]
-    rows = _first(observations, there & says_there(own, observations.q_rad).all(axis=1))
-    several = BASE in moved and len(observations.session_names) > 1
-    if several or not len(rows):
-        return Verdict(OPEN, SEVERAL if several else NOWHERE, held_out=held_out)
-    new, turned = observations.select(rows.ravel()), held.errors.shape[2] > 3
-    if not turned:
-        new = replace(new, rotation=np.full_like(new.rotation, np.nan))
-    frames = frames_at(tables, model, own, new, robot, moved, rotation_weight_mm_per_rad)
-    off = errors({model: Fit(own, frames)}, new)[Comparison(MEASURED, model).name]
-    here = _level(off.position_mm.reshape(*rows.shape, 3))
-    at = _places(
-        own,
-        new.select(slice(None, None, kinds)),
-        frames.targets,
-        moved,
-        rotation_weight_mm_per_rad if turned else None,
+    calibration = folder.calibration(tables, robot)
+    kind, model = calibration.choice, calibration.model
+    is_known = known_rows(columns, tables.get("measurements", {}))
+    seen = from_columns(columns, robot).select(~is_known)
+    point = next((each for each in seen.target_names if each in calibration.targets), None)
+    near = is_measured_there(calibration, seen.at, point) if len(seen) else is_known[:0]
+    table = model_errors(tables, robot, seen, moved, rotation_weight_mm_per_rad)
+    told = Verification(OPEN, "", kind, len(is_known), int(is_known.sum()), int(near.sum()), table)
+    held_out = _held_out(tables, kind, model, robot, seen, moved) if len(seen) else None
+    told = replace(told, held_out=held_out and _level(held_out))
+    rows = _whole_configurations(seen, near & says_there(model, seen.q_rad).all(axis=1))
+    obstacles = {
+        KNOWN: not len(seen),
+        ELSEWHERE: not moved and table["mean_mm"].min() > _FAR_MM,
+        FEW_HELD_OUT: held_out is None or len(held_out.columns) < LEAST_HELD_OUT,
+        SEVERAL: BASE in moved and len(seen.session_names) > 1,
+        NOWHERE: not len(rows),
+    }
+    if any(obstacles.values()):
+        return replace(told, reason=next(each for each, there in obstacles.items() if there))
+    new = seen.select(rows.ravel())
+    new = replace(new, rotation=np.full_like(new.rotation, np.nan))
+    frames = frames_at(tables, kind, model, new, robot, moved, rotation_weight_mm_per_rad)
+    off = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
+    at = new.select(slice(None, None, rows.shape[1]))
+    fresh = _columns(model, at, frames.targets, moved, off.reshape(*rows.shape, 3))
+    told = replace(told, here=_level(fresh))
+    if fresh.columns[..., -1].size <= fresh.rank:
+        return replace(told, reason=TAKEN_UP)
+    found, (factor, offsets) = held_to(held_out, fresh), smallest_changes(held_out, len(rows))
+    verdict = FAILS if found.probability <= LEVEL else PASSES if factor <= DOUBLED else OPEN
+    return replace(
+        told,
+        verdict=verdict,
+        reason=FEW if verdict == OPEN else "",
+        held=found,
+        smallest_factor=factor,
+        smallest_offsets=offsets,
     )
-    least, table = handful.least(held), _table(held)
-    if len(rows) * held.numbers <= at.unknowns:
-        return Verdict(OPEN, TAKEN_UP, here, held_out, least=least, table=table)
-    left = np.zeros((*rows.shape, held.errors.shape[2]))
-    left[..., :3] = off.position_mm.reshape(*rows.shape, 3)
-    if turned:
-        left[..., 3:] = rotation_weight_mm_per_rad * off.rotation_rad.reshape(*rows.shape, 3)
-    found = handful.held_to(held, HeldOut(left, at))
-    says = PASSES if least is not None and len(rows) >= least else OPEN
-    says = FAILS if found.probability <= handful.LEVEL else says
-    seen = handful.seen(held, len(rows), at)
-    return Verdict(says, FEW if says == OPEN else "", here, held_out, found, least, seen, table)
 
 
-def _table(held: HeldOut) -> tuple[Seen, ...]:
-    """What other numbers of poses would show."""
-    told = [each for each in TABLE if each * held.numbers > held.places.unknowns]
-    return tuple(handful.seen(held, each) for each in told if 2 * each <= len(held))
+def model_errors(
+    tables: Tables,
+    robot: Robot,
+    observations: Observations,
+    moved: Sequence[str],
+    rotation_weight_mm_per_rad: float,
+) -> pd.DataFrame:
+    """Statistics of the errors of every model, ``moved`` frames fitted to ``observations`` anew.
+
+    First at the readings that all models cover, then, where these are not all, at all readings
+    for the models that cover them. Raises InputError where a target or a session that is kept is
+    another, or there are too few readings, and FitError.
+    """
+    if BASE not in moved:
+        _require_sessions(tables, observations.session_names)
+    made = models(tables, robot.dh)
+    covered = {
+        kind: says_there(each, observations.q_rad).all(axis=1) for kind, each in made.items()
+    }
+    common, everywhere = np.all([*covered.values()], axis=0), np.ones(len(observations), bool)
+    parts = [("covered by all models", common)] * (not common.all()) + [
+        ("all readings", everywhere)
+    ]
+    order = (NOMINAL, *ERROR_MODELS)
+    rows = []
+    for at, there in parts:
+        for kind in sorted(made, key=order.index) if there.any() else ():
+            if not covered[kind][there].all():
+                continue
+            part, own = observations.select(there), made[kind]
+            frames = frames_at(tables, kind, own, part, robot, moved, rotation_weight_mm_per_rad)
+            off = errors({kind: Fit(own, frames)}, part)[Comparison(MEASURED, kind).name]
+            row = {"model": kind, "at": at, "readings": len(part)}
+            for vectors, unit in ((off.position_mm, "mm"), (1e3 * off.rotation_rad, "mrad")):
+                sizes = np.linalg.norm(vectors[np.isfinite(vectors).all(axis=1)], axis=1)
+                sizes = sizes if len(sizes) else np.array([np.nan])
+                row |= {
+                    f"mean_{unit}": sizes.mean(),
+                    f"quantile_99_{unit}": np.quantile(sizes, LARGE_SHARE),
+                    f"largest_{unit}": sizes.max(),
+                    f"rms_{unit}": np.sqrt(np.mean(sizes**2)),
+                }
+            rows.append(row)
+    names = ("mean", "quantile_99", "largest", "rms")
+    columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in names]
+    return pd.DataFrame(rows, columns=["model", "at", "readings", *columns])
 
 
-def _first(observations: Observations, said: np.ndarray) -> np.ndarray:
-    """Rows (m, K) of configurations with all K targets: the first of each where it is ``said``."""
-    own = np.flatnonzero(said)
-    part, kinds = observations.select(own), len(observations.target_names)
+def _whole_configurations(seen: Observations, counted: np.ndarray) -> np.ndarray:
+    """Rows (m, K) of configurations with all K targets: the first of each where it is counted."""
+    own, kinds = np.flatnonzero(counted), len(seen.target_names)
+    part = seen.select(own)
     of = configurations(part.pose, part.q_rad)
     _, first = np.unique(of * kinds + part.target, return_index=True)
     number, count = np.unique(of[first], return_counts=True)
@@ -149,114 +203,71 @@ def _first(observations: Observations, said: np.ndarray) -> np.ndarray:
 
 def _held_out(
     tables: Tables,
+    kind: str,
+    model: ErrorModel,
     robot: Robot,
-    model: str,
     seen: Observations,
     moved: Sequence[str],
-    rotation_weight_mm_per_rad: float,
-) -> HeldOut | None:
+) -> Columns | None:
     """Held-out errors of configurations with as many targets as ``seen``; None where none are.
 
-    At poses where every model was held out, as ``kinacc summary`` states them. Orientations take
-    part where they were measured there and are ``seen``, and something is fitted to them.
+    At poses where every model was held out, as ``kinacc summary`` states them.
     """
     if not {"pose_errors", "measurements"} <= set(tables):
         return None
     measured, names = from_columns(tables["measurements"], robot), seen.target_names
     if TOOL in moved:
         names = measured.target_names[: len(names)]
-    if len(names) < len(seen.target_names):
-        return None
-    vectors = _held_out_vectors(tables["pose_errors"], model, len(measured))
-    numbers = [measured.target_names.index(name) for name in names]
-    place = np.full(len(measured.target_names), -1)
-    place[numbers] = np.arange(len(numbers))
-    named = replace(measured, target=place[measured.target], target_names=names)
-    rows = _first(named, np.isfinite(vectors[:, :3]).all(axis=1) & (named.target >= 0))
+    place = {name: number for number, name in enumerate(names)}
+    target = np.array([place.get(each, -1) for each in measured.target_names])[measured.target]
+    vectors = held_out_vectors(tables["pose_errors"], kind, len(measured))
+    named = replace(measured, target=target, target_names=names)
+    counted = np.isfinite(vectors).all(axis=1) & (target >= 0)
+    rows = _whole_configurations(named, counted)
     if not len(rows):
         return None
-    errors_there = vectors[rows]
-    turned = bool(moved) and np.isfinite(errors_there).all() and seen.has_rotation.all()
-    weight = rotation_weight_mm_per_rad if turned else None
-    frames = frames_of(tables["frames"], model, names, measured.session_names)
-    own = models(tables, robot.dh)[model]
-    at = _places(own, measured.select(rows[:, 0]), frames.targets, moved, weight)
-    errors_there[..., 3:] *= 1e-3 * rotation_weight_mm_per_rad
-    return HeldOut(errors_there[..., : 6 if turned else 3], at)
+    targets = frames_of(tables["frames"], kind, names, measured.session_names).targets
+    return _columns(model, measured.select(rows[:, 0]), targets, moved, vectors[rows])
 
 
-def _held_out_vectors(errors: Mapping[str, np.ndarray], model: str, count: int) -> np.ndarray:
-    """Held-out errors (count, 6) of measured rows, mm and mrad; NaN where a model has none."""
-    held = np.asarray(errors["estimate"]) == "cross_validated"
-    kind, row = np.asarray(errors["comparison"])[held], np.asarray(errors["row"])[held]
-    tried = [row[kind == each] for each in dict.fromkeys(kind)]
+def held_out_vectors(pose_errors: Mapping[str, np.ndarray], kind: str, count: int) -> np.ndarray:
+    """Held-out position errors (count, 3) of measured rows, mm; NaN where any model has none."""
+    held = np.asarray(pose_errors["estimate"]) == "cross_validated"
+    comparison, row = (np.asarray(pose_errors[each])[held] for each in ("comparison", "row"))
+    tried = [row[comparison == each] for each in dict.fromkeys(comparison)]
     common = reduce(np.intersect1d, tried) if tried else row
-    ours = (kind == Comparison(MEASURED, model).name) & np.isin(row, common)
-    names = [f"e{axis}_mm" for axis in "xyz"] + [f"r{axis}_mrad" for axis in "xyz"]
-    found = np.full((count, 6), np.nan)
-    found[row[ours]] = np.stack([np.asarray(errors[name])[held] for name in names], axis=1)[ours]
+    ours = (comparison == Comparison(MEASURED, kind).name) & np.isin(row, common)
+    found = np.full((count, 3), np.nan)
+    vectors = np.stack([np.asarray(pose_errors[f"e{axis}_mm"])[held] for axis in "xyz"], axis=1)
+    found[row[ours]] = vectors[ours]
     return found
 
 
-def _places(
-    model: ErrorModel,
-    seen: Observations,
-    targets: Pose,
-    moved: Sequence[str],
-    weight: float | None,
-) -> Places:
-    steps = np.where(model.dh.prismatic, 1.0, ANGLE_UNIT_RAD)  # mm and mrad
-    jacobian = steps * model.joint_jacobian(seen.at)
-    return handful.places(model.pose(seen.at), targets, jacobian, tuple(moved), weight)
+def _columns(
+    model: ErrorModel, at: Observations, targets: Pose, moved: Sequence[str], off_mm: np.ndarray
+) -> Columns:
+    """Motions of what moved, offsets of the joints and errors ``off_mm`` (n, K, 3) in the base."""
+    flange = model.pose(at.at)
+    slopes = np.where(model.dh.prismatic, 1.0, ANGLE_UNIT_RAD) * model.joint_jacobian(at.at)
+    count, kinds, parts = *off_mm.shape[:2], []
+    turned = np.repeat(flange.rotation, kinds, axis=0)
+    arm = (turned @ np.tile(targets.position_mm, (count, 1))[..., None])[..., 0]
+    if BASE in moved:
+        place = np.repeat(flange.position_mm, kinds, axis=0) + arm
+        parts += [np.broadcast_to(np.eye(3), turned.shape), -ANGLE_UNIT_RAD * skew(place)]
+    if TOOL in moved:
+        own = np.tile(np.eye(kinds), (count, 1))
+        parts.append(np.einsum("nij,nk->nikj", turned, own).reshape(len(own), 3, -1))
+    fitted = sum(part.shape[2] for part in parts)
+    slopes = np.repeat(slopes, kinds, axis=0)
+    parts += [slopes[:, :3] - skew(arm) @ slopes[:, 3:], off_mm.reshape(-1, 3, 1)]
+    return Columns(np.concatenate(parts, axis=2).reshape(count, 3 * kinds, -1), fitted)
 
 
-def _level(vectors: np.ndarray) -> Level | None:
-    """Of errors (n, K, c) of n configurations, mm."""
-    sizes = np.linalg.norm(vectors[..., :3], axis=-1)
-    if not sizes.size:
-        return None
-    return Level(
-        sizes.size, len(sizes), float(sizes.mean()), float(np.quantile(sizes, LARGE_SHARE))
-    )
-
-
-def trials(
-    tables: Tables,
-    robot: Robot,
-    observations: Observations,
-    moved: Sequence[str],
-    rotation_weight_mm_per_rad: float,
-) -> list[Trial]:
-    """Every model of a results folder at ``observations``, ``moved`` frames fitted to these anew.
-
-    First at the readings where all models say something, then, where these are not all, of the
-    models that do so everywhere. What poses do not show of base and tool stays as ``robot`` has it.
-    Raises InputError where a target or a session that is kept is another, or there are too few
-    readings, and FitError.
-    """
-    if BASE not in moved:
-        _require_sessions(tables, observations.session_names)
-    own = models(tables, robot.dh)
-    said = {kind: says_there(each, observations.q_rad).all(axis=1) for kind, each in own.items()}
-    everywhere = [kind for kind, rows in said.items() if rows.all()]
-    parts: list[tuple[np.ndarray, Sequence[str]]] = [(np.all([*said.values()], axis=0), [*own])]
-    if len(everywhere) < len(own):
-        parts.append((np.ones(len(observations), dtype=bool), everywhere))
-    found = []
-    for rows, kinds in parts:
-        if not rows.any():
-            continue
-        there = observations.select(rows)
-        at = {
-            kind: frames_at(
-                tables, kind, own[kind], there, robot, moved, rotation_weight_mm_per_rad
-            )
-            for kind in kinds
-        }
-        of = errors({kind: Fit(own[kind], at[kind]) for kind in kinds}, there)
-        by_kind = {kind: of[Comparison(MEASURED, kind).name] for kind in kinds}
-        found.append(Trial(rows, by_kind))
-    return found
+def _level(of: Columns) -> Level:
+    sizes = np.linalg.norm(of.columns[..., -1].reshape(-1, 3), axis=1)
+    quantile = float(np.quantile(sizes, LARGE_SHARE))
+    return Level(len(sizes), len(of.columns), float(sizes.mean()), quantile)
 
 
 def _require_sessions(tables: Tables, sessions: Sequence[str | None]) -> None:
