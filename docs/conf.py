@@ -1,15 +1,20 @@
 """The site of the pages, as Sphinx builds it: ``make docs``, from the folder of the repository.
 
-The pages stay plain Markdown. Two things are made of what they hold anyway: the contents of the
-site from the lists of links in index.md, and the entries of the reference of
-the API from the names in api.md.
+The pages stay plain Markdown. What is known anyway is put in: the contents of the site from the
+lists of links in index.md, entries of the API from the names in api.md, keys of the configuration
+and columns of tables from their models and schemas (reference.py).
 """
 
 import inspect
 import re
+import sys
 from importlib import import_module
+from pathlib import Path
 
 from kinacc import __version__ as release  # noqa: F401
+
+sys.path.insert(0, str(Path(__file__).parent))
+import reference
 
 project = "kinacc"
 copyright = "the kinacc developers"
@@ -45,6 +50,10 @@ def _made_of_the_page(app: object, page: str, source: list[str]) -> None:
         source[0] = "".join(map(_with_contents, re.split(r"^(?=## )", source[0], flags=re.M)))
     if page == "docs/api":
         source[0] = _NAME.sub(_entry, source[0])
+    if page == "docs/configuration":
+        source[0] += reference.settings()
+    if page == "docs/artifacts":
+        source[0] += reference.tables()
 
 
 def _with_contents(section: str) -> str:

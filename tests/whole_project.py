@@ -115,7 +115,7 @@ class Project:
 def _merged(below: dict, text: str) -> dict:
     import yaml
 
-    from kinacc.config.validate import overlay
+    from kinacc.config.load import overlay
 
     return overlay(below, yaml.safe_load(text))
 

@@ -37,7 +37,7 @@ def test_registry_names_each_assessor_as_its_tables_do():
         assert ASSESSORS[name] is cls
         for switch, choices in cls.switches.items():
             assert getattr(paper.assessor(name), switch) in choices
-            assert set(choices) == set(schema.key(f"study.{switch}").choices)
+            assert set(choices) == set(schema.key(f"study.{switch}")["enum"])
 
 
 def test_readings_of_an_assessor_are_all_combinations_and_keep_its_other_settings():

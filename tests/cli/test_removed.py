@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from kinacc import removed
 from kinacc.campaign.plan import _kept_assessor
 from kinacc.cli.group import main
-from kinacc.config.schema import settings
+from kinacc.config.settings import Settings
 from kinacc.config.validate import check_section
 from kinacc.errors import InputError
 
@@ -34,7 +34,7 @@ def test_an_option(command, option):
 
 @pytest.mark.parametrize("key", removed.KEYS)
 def test_a_key(key):
-    _, problems = check_section(settings(), {key: {}}, (), ".".join)
+    _, problems = check_section(Settings, {key: {}}, (), ".".join)
     assert [each.fix for each in problems] == [removed.KEYS[key]]
 
 

@@ -82,10 +82,10 @@ def test_files_are_sought_beside_the_configuration(written, tmp_path, monkeypatc
         ("{path: may.csv, date: 2026-03-01, base: same, tool: same}", "the date of two lines"),
         ("{path: march.csv, date: 2026-05-04, base: same, tool: same}", "stands in two lines"),
         ("{path: gone.csv, date: 2026-05-04, base: same, tool: same}", "does not exist"),
-        ("{path: may.csv, date: 2026-05-04, base: shifted, tool: same}", "'shifted' is neither"),
+        ("{path: may.csv, date: 2026-05-04, base: shifted, tool: same}", "'shifted' is not known"),
         ("{path: may.csv, date: 2026-05-04, bas: same, tool: same, base: same}", "mean base?"),
-        ("{date: 2026-05-04, base: same, tool: same}", "names no file"),
-        ("may.csv", "is not a line of a series"),
+        ("{date: 2026-05-04, base: same, tool: same}", "has no path"),
+        ("may.csv", "is not a section"),
     ],
 )
 def test_what_a_line_leaves_open_or_says_wrongly_is_told_with_its_place(written, line, told):

@@ -19,7 +19,7 @@ from kinacc.kinematics import dh, robot
 
 
 def compare(first, second, q_rad, shared=NONE_SHARED):
-    weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+    weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
     return comparison.compare(first, second, q_rad, weight, shared)
 
 

@@ -43,7 +43,7 @@ def arm(name="March", fitted=True, robot="ur10", **changes):
 
 def paged(first, second, shared=NONE_SHARED, poses=40):
     q_rad = spread(first.robot, poses)
-    weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+    weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
     found = compare(first, second, q_rad, weight, shared)
     measured = measured_by_all((first, second), q_rad)
     return comparison_page(found, (first, second), q_rad, measured)
@@ -103,7 +103,7 @@ def test_terminal_page_and_json_call_no_arm_changed_that_was_measured_elsewhere(
     q_rad = spread(first.robot, 40)
     middle = np.median(q_rad[:, 0])
     few = (np.array([q_rad[:, 0].min(), *[-9.0] * 5]), np.array([middle - 1e-6, *[9.0] * 5]))
-    weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+    weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
     for ranges, said in ((None, "changed"), (few, "change in doubt")):
         second = replace(near, fitted_range_rad=ranges)
         both, found = (first, second), compare(first, second, q_rad, weight)

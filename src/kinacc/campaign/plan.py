@@ -16,8 +16,9 @@ from kinacc.assess.registry import ADAPTIVE, IN_RESEARCH, RECOMMENDED
 from kinacc.assess.statement import CANDIDATES, TARGETS
 from kinacc.campaign.instrument import BASE, INSTRUMENT, Instrument
 from kinacc.campaign.laser_tracker import LaserTracker
-from kinacc.config import json_files, schema
-from kinacc.config.values import check
+from kinacc.config import json_files
+from kinacc.config.settings import Study
+from kinacc.config.validate import check_section
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 
@@ -147,20 +148,18 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
     known = {field.name: field for field in fields(ADAPTIVE[name])}
     # A campaign's budget is its own: it may be larger than that of a simulation.
     own = {*known} - {"measurements"}
-    keys = schema.walk(schema.settings())
-    shared = {path[-1]: key for path, key in keys if path[0] == "study" and path[-1] in own}
-    problems: list[Problem] = []
+    shared = own & {*Study.model_fields}
+    asked = {each: value for each, value in settings.items() if each in shared}
+    problems = check_section(Study, asked, (), lambda path: f"setting {path[0]} of {name}")[1]
     for each, value in settings.items():
         where = f"setting {each} of {name}"
         if each not in known:
             problems.append(Problem(where, "is not there", ", ".join(known)))
-        elif each in shared:
-            problems += check(shared[each], value, (where,), "".join)[1]
-        elif not _is_like(value, known[each].default):
+        elif each not in shared and not _is_like(value, known[each].default):
             allowed = {str: "a word", bool: "true or false"}.get(type(known[each].default))
             problems.append(Problem(where, f"{value!r}"[:60], allowed or "a number"))
     refuse(problems)
-    defaults = {each: key.default for each, key in shared.items()}
+    defaults = {each: getattr(Study(), each) for each in shared}
     return ADAPTIVE[name](**{**defaults, **settings})
 
 

@@ -41,11 +41,14 @@ MODEL = click.Choice([*SELECTABLE, "nominal"])
 def values_of(path: str) -> click.ParamType:
     """What an option takes that stands for a key of the configuration, such as study.alpha."""
     key = schema.key(path)
-    if key.kind == "text":
-        return click.Choice(key.choices)
-    if key.kind == "int":
-        return click.IntRange(key.low, key.high)
-    return click.FloatRange(key.low, key.high, min_open=key.open_ends, max_open=key.open_ends)
+    if "enum" in key:
+        return click.Choice(key["enum"])
+    if key["type"] == "integer":
+        return click.IntRange(key["minimum"], key["maximum"])
+    if "exclusiveMinimum" in key:
+        ends = key["exclusiveMinimum"], key["exclusiveMaximum"]
+        return click.FloatRange(*ends, min_open=True, max_open=True)
+    return click.FloatRange(key["minimum"], key["maximum"])
 
 
 ROBOT = option("--robot", help="Robot of the results: a shipped name or file. [as the results say]")

@@ -46,7 +46,7 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
             comparison_report.source(each, model, robot, config) for each in (first, second)
         ]
         q_rad = comparison_report.joints(calibrations, (first, second), joints, count)
-        weight = schema.key("calibration.rotation_weight_mm_per_rad").default
+        weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
         measured = measured_by_all(calibrations, q_rad)
         found = compared(*calibrations, q_rad, weight, comparison_report.shared((first, second)))
     answer = comparison_report.answer(found, calibrations, measured)

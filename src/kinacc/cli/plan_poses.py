@@ -28,7 +28,7 @@ TRUNCATION = "calibration.dh.truncation"
 @option("--position-only", is_flag=True, help="Orientations are not measured.")
 @option("--frames-known", is_flag=True, help="Base and tool are not estimated.")
 @option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
-@option("--threshold", default=schema.key(TRUNCATION).default, type=choice.values_of(TRUNCATION),
+@option("--threshold", default=schema.key(TRUNCATION)["default"], type=choice.values_of(TRUNCATION),
         help="Directions seen less than this share of the best are left out.")  # fmt: skip
 @option("--from-deg", help="Joints the arm starts at. [zero]")
 @answers(table=True, picture="Draw index against poses: .svg, .png, .pdf.")

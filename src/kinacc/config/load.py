@@ -4,26 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kinacc.config import gate_rules
+from kinacc.config import gate_rules, series
 from kinacc.config.reading import Document, KeyPath, dotted, read
-from kinacc.config.schema import Section, plain, settings
-from kinacc.config.series import contradicted, expanded, taken
-from kinacc.config.validate import (
-    ROBOT,
-    ROBOTS,
-    SERIES,
-    check_dataset_name,
-    check_robot,
-    check_section,
-    complete,
-    overlay,
-)
+from kinacc.config.schema import plain
+from kinacc.config.settings import Configuration, DataSet, Settings
+from kinacc.config.validate import ROBOTS, check_dataset_name, check_robot, check_section
 from kinacc.config.values import shown
 from kinacc.errors import InputError, Problem
 
@@ -33,26 +23,18 @@ _MOST_DATASETS = 5_000
 _MOST_PROBLEMS = 1_000  # more are not sought: each takes a search for what was meant
 # What makes a data set the one it is: given in two files, two different data sets share a name.
 _IDENTITY = (("measurements", "source"), ("measurements", "file", "path"), ("series",))
-# Values that name files: in every data set, and of the top level.
-_FILES = (
-    ("robot",),
-    ("measurements", "file", "path"),
-    ("measurements", "file", "joints", "path"),
-)
-# The same in lists of mappings: the list, and the key.
+# Values that name files: in every data set, and of the top level; and in lists of mappings.
+_FILES: tuple[KeyPath, ...] = (("robot",), _IDENTITY[1], ("measurements", "file", "joints", "path"))
 _LISTED_FILES = (("series", "path"), ("gates", "campaign"))
-
-
-def _none(*given: Any) -> tuple[Problem, ...]:
-    """Settings that are each fine are all well together."""
-    return ()
+# One value each, not a section: a data set's own replaces that of the top level.
+_MAPPINGS = ("columns", "parameters", "frames", "accept")
 
 
 def load(
     paths: Sequence[Path | str],
     overrides: Mapping[str, Any] | None = None,
     folder: Path | str = ".",
-    contradictions: Contradictions = _none,
+    contradictions: Contradictions = lambda *_: (),
 ) -> dict[str, dict[str, Any]]:
     """Full settings of every data set, by name.
 
@@ -61,16 +43,16 @@ def load(
     are relative to the file they stand in, those of ``overrides`` to the current ``folder``, and so
     are those returned. ``contradictions`` (name, robot, full settings, place, folder) yields what
     is wrong with settings that are each fine. Every data set has ``robot``, ``seed`` and all
-    sections of schema.yaml, numbers in the units their names carry.
+    sections of :class:`Settings`, numbers in the units their names carry.
 
     Raises InputError listing every problem in all files.
     """
-    documents, problems = [], []
+    documents: list[Document] = []
+    problems: list[Problem] = []
     for path in paths:
         document, found = read(path)
-        document, moved = _from_here(document, Path(folder))
-        documents.append(document)
-        problems += found + moved
+        documents.append(_from_here(document, Path(folder)))
+        problems += found
     if overrides:
         documents.append(Document(COMMAND_LINE, plain(overrides)))
     if not documents:
@@ -79,85 +61,74 @@ def load(
     merged: dict[str, Any] = {}
     for document in documents:
         merged = overlay(merged, document.data)
+    resolved: dict[str, dict[str, Any]] = {}
     if merged or not problems:
         resolved, found = _resolve(merged, documents, Path(folder), contradictions)
         problems += found
     if problems:
-        problems.sort(key=_reading_order([document.name for document in documents]))
+        problems = sorted(dict.fromkeys(problems), key=_reading_order(documents))
         count = len(problems)
         title = f"{count} problem{'s' if count > 1 else ''} in the configuration"
         raise InputError(problems, title)
     return resolved
 
 
-def _from_here(document: Document, folder: Path) -> tuple[Document, list[Problem]]:
+def overlay(
+    below: Mapping[str, Any], above: Mapping[str, Any], whole: Sequence[str] = ()
+) -> dict[str, Any]:
+    """``below`` with the values of ``above`` laid over it, section by section.
+
+    Mappings named in ``whole`` are replaced as other values are.
+    """
+    merged = dict(below)
+    for name, value in above.items():
+        old = merged.get(name)
+        both = isinstance(old, Mapping) and isinstance(value, Mapping) and name not in whole
+        merged[name] = overlay(old, value, whole) if both else value  # type: ignore[arg-type]
+    return merged
+
+
+def _from_here(document: Document, folder: Path) -> Document:
     """The document with the paths in it, which start where it stands, as seen from ``folder``."""
     beside = Path(document.name).absolute().parent
-    if not document.data or os.path.realpath(beside) == os.path.realpath(folder):
-        return document, []
-    data, problems = document.data, []
-    for path in _places_of_files(data):
-        value = _value(data, path)
-        if not isinstance(value, str) or not value or os.path.isabs(value):
-            continue
-        near = os.path.relpath(beside / value, folder).replace(os.sep, "/")
-        there, here = os.path.exists(folder / near), os.path.exists(folder / value)
-        if path[-1] == "robot" and ((ROBOTS / f"{value}.yaml").is_file() or not (there or here)):
-            continue  # a robot's name
-        if here and not there:
-            fix = f"write {os.path.relpath(folder / value, beside)}"
-            what = f"{shown(value)} is not there, seen from the folder of {document.name}"
-            problems.append(Problem(document.place(path), what, "a path from there", fix))
-        elif here and there and not os.path.samefile(folder / near, folder / value):
-            warnings.warn(
-                f"{document.place(path)}: {near} is read, beside the configuration file, and "
-                f"not {value} of the current folder",
-                stacklevel=2,
-            )
-        data = _with(data, path, value if here and not there else near)
-    return replace(document, data=data), problems
-
-
-def _places_of_files(data: Mapping[str, Any]) -> Iterator[KeyPath]:
-    """Paths of the keys whose values name files, of the top level and of every data set."""
+    if os.path.realpath(beside) == os.path.realpath(folder):
+        return document
+    data = plain(document.data)
     datasets = data.get("datasets")
-    names = datasets if isinstance(datasets, Mapping) else ()
-    for start in [(), *(("datasets", name) for name in names)]:
-        yield from ((*start, *keys) for keys in _FILES)
-        for listed, key in _LISTED_FILES:
-            items = _value(data, (*start, listed))
-            for number in range(len(items) if isinstance(items, list) else 0):
-                yield (*start, listed, number, key)
+    for own in [data, *(datasets.values() if isinstance(datasets, dict) else ())]:
+        for holder, key in _holders_of_files(own):
+            value = holder.get(key)
+            if not isinstance(value, str) or not value:
+                continue
+            near = os.path.relpath(beside / value, folder).replace(os.sep, "/")
+            is_name = (ROBOTS / f"{value}.yaml").is_file() or not os.path.exists(folder / near)
+            if not os.path.isabs(value) and not (key == "robot" and is_name):
+                holder[key] = near
+    return replace(document, data=data)
 
 
-def _value(data: Any, path: KeyPath) -> Any:
-    """The value at a path of keys and places in lists; None where there is none."""
-    for key in path:
-        if isinstance(data, list) and isinstance(key, int):
-            data = data[key]
-        else:
-            data = data.get(key) if isinstance(data, Mapping) else None
-    return data
+def _holders_of_files(own: Any) -> Iterator[tuple[dict[str, Any], str]]:
+    """Mappings, and the keys in them, whose values name files."""
+    for *sections, key in _FILES:
+        found = own
+        for section in sections:
+            found = found.get(section) if isinstance(found, dict) else None
+        if isinstance(found, dict):
+            yield found, key
+    for listed, key in _LISTED_FILES:
+        items = own.get(listed) if isinstance(own, dict) else None
+        yield from ((item, key) for item in (items or ()) if isinstance(item, dict))
 
 
-def _with(data: Any, path: KeyPath, value: Any) -> Any:
-    """A copy of ``data`` with another value at a path at which it has one."""
-    if not path:
-        return value
-    copy = list(data) if isinstance(data, list) else dict(data)
-    copy[path[0]] = _with(data[path[0]], path[1:], value)
-    return copy
-
-
-def _reading_order(names: Sequence[str]) -> Callable[[Problem], tuple[int, int]]:
+def _reading_order(documents: Sequence[Document]) -> Callable[[Problem], tuple[int, int]]:
     """Sort key of problems: file by file as given, then line by line."""
 
     def key(problem: Problem) -> tuple[int, int]:
-        for number, name in enumerate(names):
-            found = re.match(re.escape(name) + r"(?::(\d+))?(?:, |$)", problem.where)
+        for number, document in enumerate(documents):
+            found = re.match(re.escape(document.name) + r"(?::(\d+))?(?:, |$)", problem.where)
             if found:
                 return number, int(found.group(1) or 0)
-        return len(names), 0
+        return len(documents), 0
 
     return key
 
@@ -169,18 +140,20 @@ def _resolve(
     contradictions: Contradictions,
 ) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
     def place(path: KeyPath) -> str:
-        return _place(documents, path)
+        """Where a key was given last, else the section it would stand in, else a default."""
+        for length in range(len(path), 0, -1):
+            for document in reversed(documents):
+                if document.gives(path[:length]):
+                    return document.place(path)
+        return f"default, {dotted(path)}" if path else documents[-1].name
 
-    names = ("datasets", *settings().names)
-    top = Section("", "", (*settings().entries, Section("datasets", "", ())))
-    shared, problems = check_section(
-        top, {name: value for name, value in merged.items() if name != "datasets"}, (), place
-    )
+    top = {name: value for name, value in merged.items() if name != "datasets"}
+    shared, problems = check_section(Configuration, top, (), place)
     datasets = merged.get("datasets")
     if not isinstance(datasets, Mapping) or not datasets:
         what = "no data set is given" if not datasets else f"{shown(datasets)} is not a section"
         where = place(("datasets",)) if "datasets" in merged else documents[0].place(())
-        fix = f"known at the top level: {', '.join(names)}"
+        fix = f"known at the top level: {', '.join(Configuration.model_fields)}"
         problems.append(Problem(where, what, "datasets: with a section for each data set", fix))
         return {}, problems
     if len(datasets) > _MOST_DATASETS:
@@ -188,7 +161,7 @@ def _resolve(
         allowed = f"at most {_MOST_DATASETS} in one run"
         return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
     problems += gate_rules.wrong_datasets(
-        shared.get("gates", ()), list(datasets), lambda *at: place(at)
+        shared.get("gates") or (), [*datasets], lambda *at: place(at)
     )
     resolved: dict[str, dict[str, Any]] = {}
     for name, content in datasets.items():
@@ -198,9 +171,9 @@ def _resolve(
             break
         problems += check_dataset_name(name, place)
         found, wrong = _dataset(name, content, shared, place, folder, contradictions)
-        problems += [*wrong, *taken(name, found, datasets, place)]
+        problems += [*wrong, *series.taken(name, found, datasets, place)]
         resolved |= found
-    return resolved, list(dict.fromkeys(problems))
+    return resolved, problems
 
 
 def _dataset(
@@ -213,19 +186,20 @@ def _dataset(
 ) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
     """Full settings of a data set, and of those its series stands for, by name."""
     path: KeyPath = ("datasets", name)
-    problems: list[Problem] = []
-    known = Section("", "", (ROBOT, SERIES, *settings().entries))
-    own, found = check_section(known, content, path, place)
-    robot, lines = own.pop("robot", None), own.pop("series", ())
+    own, problems = check_section(DataSet, content, path, place)
+    robot, has_series = own.pop("robot", None), "series" in own
+    lines = series.by_date(own.pop("series", None) or ())
+    problems += series.of_each_other(lines, (*path, "series"), place)
     known_robot = None
     if robot is not None:
-        unknown = check_robot(robot, (*path, "robot"), place, folder)
+        unknown = check_robot(robot, place((*path, "robot")), folder)
         known_robot = None if unknown else robot
         problems += unknown
     elif content is None or (isinstance(content, Mapping) and "robot" not in content):
         allowed = "robot: a shipped robot's name or the path of a robot file"
         problems.append(Problem(place(path), "names no robot", allowed))
-    full = {"robot": robot, **complete(shared, own)}
+    settings = Settings.model_validate(overlay(shared, own, _MAPPINGS))
+    full = {"robot": robot, **settings.model_dump(by_alias=True)}
 
     def origin(*keys: str | int) -> str:
         given: Any = own
@@ -235,54 +209,37 @@ def _dataset(
             given = given.get(key, {}) if isinstance(given, Mapping) else {}
         return place((*path, *keys)) if given != {} else f"{place(keys)} (data set {name})"
 
-    def origin_of_line(number: int) -> Callable[..., str]:
-        def of_file(*keys: str) -> str:
-            is_path = keys == ("measurements", "file", "path")
-            return place((*path, "series", number, "path")) if is_path else origin(*keys)
-
-        return of_file
-
-    problems += [*found, *(contradicted(full, origin) if lines else ())]
-    problems += gate_rules.wrong_datasets(own.get("gates", ()), None, origin)
+    problems += series.contradicted(full, origin) if lines else ()
+    problems += gate_rules.wrong_datasets(own.get("gates") or (), None, origin)
     problems += gate_rules.without_limit(full["gates"], name, full["tolerance"], origin)
     full["gates"] = gate_rules.about(full["gates"], name)
     if not lines:
-        has_series = isinstance(content, Mapping) and "series" in content
+        has_series = has_series or any("series" in each.where for each in problems)
         given = () if has_series else contradictions(name, known_robot, full, origin, folder)
         return {name: full}, [*problems, *given]
-    resolved = expanded(name, full, lines)
-    for line in lines:
-        own_settings = resolved[line.dataset(name)]
-        where = origin_of_line(line.number)
-        problems += contradictions(name, known_robot, own_settings, where, folder)
+    resolved = series.expanded(name, full, [line for _, line in lines])
+    for number, line in lines:
+
+        def of_file(*keys: str, number: int = number) -> str:
+            is_path = keys == ("measurements", "file", "path")
+            return place((*path, "series", number, "path")) if is_path else origin(*keys)
+
+        settings_of_line = resolved[f"{name}-{line.date}"]
+        problems += contradictions(name, known_robot, settings_of_line, of_file, folder)
     return resolved, problems
 
 
-def _place(documents: Sequence[Document], path: KeyPath) -> str:
-    """Where a key was given last, else the section it would stand in, else that it is a default."""
-    for length in range(len(path), 0, -1):
-        for document in reversed(documents):
-            if document.gives(path[:length]):
-                return document.place(path)
-    return f"default, {dotted(path)}" if path else documents[-1].name
-
-
-def _defined_twice(documents: Sequence[Document]) -> list[Problem]:
-    problems = []
+def _defined_twice(documents: Sequence[Document]) -> Iterator[Problem]:
     first: dict[KeyPath, Document] = {}
     for document in documents:
-        if document.name == COMMAND_LINE:
-            continue  # replaces values on purpose
         datasets = document.data.get("datasets")
-        for name in datasets if isinstance(datasets, Mapping) else ():
-            for keys in _IDENTITY:
-                path = ("datasets", name, *keys)
-                if not document.gives(path):
-                    continue
-                if path in first:
-                    what = f"data set {name!r} has its measurements given in two files"
-                    allowed = f"once; first in {first[path].place(path)}"
-                    fix = "give the second data set a name of its own"
-                    problems.append(Problem(document.place(path), what, allowed, fix))
-                first.setdefault(path, document)
-    return problems
+        if document.name == COMMAND_LINE or not isinstance(datasets, Mapping):
+            continue  # replaces values on purpose
+        paths = [("datasets", name, *keys) for name in datasets for keys in _IDENTITY]
+        for path in filter(document.gives, paths):
+            if path in first:
+                what = f"data set {path[1]!r} has its measurements given in two files"
+                allowed = f"once; first in {first[path].place(path)}"
+                fix = "give the second data set a name of its own"
+                yield Problem(document.place(path), what, allowed, fix)
+            first.setdefault(path, document)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -24,17 +25,11 @@ _LONGEST_NUMBER = 100
 _READINGS = (".csv", ".tsv", ".xlsx", ".xls")
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_CONSTRUCTOR = yaml.constructor.SafeConstructor()
-_MAKERS = {
-    tag: yaml.constructor.SafeConstructor.yaml_constructors[tag]
-    for tag in (
-        f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "timestamp")
-    )
-}
 
+_SCALARS = (str, int, float, date, type(None))
 # YAML 1.1 reads 1e-6 (no point, no sign) as text; nobody who writes it means a text.
 _FLOAT = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+")
-_LIKE_A_NUMBER = re.compile(r"[-+]?(0[xb][\da-fA-F_]+|[\d.][\d._:]*([eE][-+]?\d*)?)")
+_NUMBER = re.compile(r"[-+]?(0[xb][\da-fA-F_]+|[\d.][\d._:]*([eE][-+]?\d*)?)")
 
 
 @dataclass(frozen=True)
@@ -76,35 +71,28 @@ def dotted(path: KeyPath) -> str:
 
 def read(path: Path | str) -> tuple[Document, list[Problem]]:
     """One YAML file; problems instead of exceptions for all that is wrong with it as YAML."""
-    name = str(path)
+    name, what, allowed, fix = str(path), "", "a YAML file", ""
     try:
         # No more is read than is needed to see that it is too much: the file may be a device.
         with open(path, "rb") as stream:
             content = stream.read(_MOST_BYTES + 1)
         if Path(path).suffix.lower() in _READINGS:
-            return Document(name, {}), [_readings(name)]
-        text = content.decode("utf-8-sig") if len(content) <= _MOST_BYTES else ""
+            what, allowed = "holds readings", "the .yaml file that describes them"
+            fix = f"{shlex.join(['kinacc', 'init', name])} writes it: give that"
+        elif len(content) > _MOST_BYTES:
+            what = "is too large for a description"
+            allowed = f"a YAML file of at most {_MOST_BYTES // 1000} kB"
+        else:
+            return parsed(content.decode("utf-8-sig"), name)
     except FileNotFoundError:
-        fix = "give the path of a configuration file, e.g. config.yaml"
-        return Document(name, {}), [Problem(name, "no such file", fix=fix)]
+        what, fix = "no such file", "give the path of a configuration file, e.g. config.yaml"
     except IsADirectoryError:
-        return Document(name, {}), [Problem(name, "is a folder", "a YAML file")]
+        what = "is a folder"
     except UnicodeDecodeError as error:
         what = f"is not text in UTF-8 (byte {error.start})"
-        return Document(name, {}), [Problem(name, what, "a YAML file")]
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        return Document(name, {}), [Problem(name, f"cannot be read: {reason}")]
-    if len(content) > _MOST_BYTES:
-        allowed = f"a YAML file of at most {_MOST_BYTES // 1000} kB"
-        return Document(name, {}), [Problem(name, "is too large for a description", allowed)]
-    return parsed(text, name)
-
-
-def _readings(name: str) -> Problem:
-    """What to say of a file of readings, given where the file that describes it is meant."""
-    fix = f"{shlex.join(['kinacc', 'init', name])} writes it: give that"
-    return Problem(name, "holds readings", "the .yaml file that describes them", fix)
+        what = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+    return Document(name, {}), [Problem(name, what, allowed, fix)]
 
 
 def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
@@ -116,17 +104,10 @@ def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
         node = yaml.compose(text, Loader=_LOADER)
     except yaml.YAMLError as error:
         return Document(name, {}), [_yaml_problem(name, error)]
-    if node is None:
-        return Document(name, {}), [Problem(name, "is empty", "at least one key")]
     if not isinstance(node, yaml.MappingNode):
-        return Document(name, {}), [Problem(name, "holds no keys", "a mapping such as seed: 1")]
-    walk = _Walk(name)
-    data = walk.plain(node, ())
-    if walk.left < 0:
-        what = "its aliases (*name) stand for too many values, or for themselves"
-        allowed = f"at most {_MOST_VALUES} values, aliases counted as what they stand for"
-        return Document(name, {}), [Problem(name, what, allowed, "write the values out")]
-    return Document(name, data, walk.lines), walk.problems
+        what = "is empty" if node is None else "holds no keys"
+        return Document(name, {}), [Problem(name, what, "a mapping such as seed: 1")]
+    return _plain(node, name)
 
 
 def unreadable(text: str, name: str) -> Problem | None:
@@ -139,14 +120,16 @@ def unreadable(text: str, name: str) -> Problem | None:
     try:
         for event in yaml.parse(text, Loader=_LOADER):
             what = allowed = ""
-            if isinstance(event, yaml.CollectionStartEvent):
-                depth, values = depth + 1, values + 1
-            elif isinstance(event, yaml.CollectionEndEvent):
-                depth -= 1
-            elif isinstance(event, yaml.ScalarEvent):
-                values += 1
-                what, allowed = _too_long(event)
-            if depth > _DEEPEST:
+            scalar = event.value if isinstance(event, yaml.ScalarEvent) else None
+            opens = isinstance(event, yaml.CollectionStartEvent)
+            depth += opens - isinstance(event, yaml.CollectionEndEvent)
+            values += opens or scalar is not None
+            length = len(scalar or "")
+            if length > _LONGEST_NUMBER and _NUMBER.fullmatch(scalar or ""):
+                what, allowed = f"a number of {length} characters", f"at most {_LONGEST_NUMBER}"
+            elif length > _LONGEST_TEXT:
+                what, allowed = f"a text of {length} characters", f"at most {_LONGEST_TEXT}"
+            elif depth > _DEEPEST:
                 what, allowed = "is nested without end", f"at most {_DEEPEST} levels"
             elif values > _MOST_VALUES:
                 what, allowed = "holds too many values", f"at most {_MOST_VALUES} in a file"
@@ -158,88 +141,67 @@ def unreadable(text: str, name: str) -> Problem | None:
     return None
 
 
-def _too_long(event: yaml.ScalarEvent) -> tuple[str, str]:
-    """What is wrong with the length of a text or number, and what is allowed; empty if nothing."""
-    length = len(event.value)
-    if length > _LONGEST_NUMBER and event.implicit[0] and _LIKE_A_NUMBER.fullmatch(event.value):
-        return f"a number of {length} characters", f"numbers of at most {_LONGEST_NUMBER}"
-    if length > _LONGEST_TEXT:
-        return f"a text of {length} characters", f"texts of at most {_LONGEST_TEXT}"
-    return "", ""
-
-
 def _yaml_problem(name: str, error: Exception) -> Problem:
     mark = getattr(error, "problem_mark", None)
     line = f":{mark.line + 1}" if mark is not None else ""
-    said = [getattr(error, "context", None), getattr(error, "problem", None)]
-    reason = ", ".join(part for part in said if part) or str(error).splitlines()[0]
+    told = [getattr(error, "context", None), getattr(error, "problem", None)]
+    reason = ", ".join(part for part in told if part) or str(error).splitlines()[0]
     fix = "use blanks, not tabs, to indent" if "\\t" in reason or "tab" in reason else ""
     return Problem(f"{name}{line}", f"is not YAML: {reason}", fix=fix)
 
 
-class _Walk:
-    """From nodes to plain values; notes lines and repeated keys on the way.
+def _plain(node: yaml.MappingNode, name: str) -> tuple[Document, list[Problem]]:
+    """A document of plain values with the lines of its keys, and keys that are repeated."""
+    lines: dict[KeyPath, int] = {}
+    problems: list[Problem] = []
+    constructor = yaml.constructor.SafeConstructor()
+    left = _MOST_VALUES  # aliases may stand for many values, or for themselves
 
-    ``left`` counts down the values that may still come; below zero, no more are made.
-    """
+    def scalar(node: yaml.Node) -> Any:
+        if not isinstance(node, yaml.ScalarNode):
+            return "<sequence>" if isinstance(node, yaml.SequenceNode) else "<mapping>"
+        if not node.style and _FLOAT.fullmatch(node.value):
+            return float(node.value)
+        if len(node.value) > _LONGEST_NUMBER:  # a tag (!!int) may stand before any text
+            return node.value
+        try:
+            value = constructor.construct_object(node)
+        except (ArithmeticError, AttributeError, LookupError, ValueError, yaml.YAMLError):
+            return node.value
+        return value if isinstance(value, _SCALARS) else node.value
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.lines: dict[KeyPath, int] = {}
-        self.problems: list[Problem] = []
-        self.left = _MOST_VALUES
-
-    def plain(self, node: yaml.Node, path: KeyPath) -> Any:
-        """Plain value of a YAML node."""
-        self.left -= 1
-        if self.left < 0:
-            return None
-        if len(path) > _DEEPEST:  # only aliases lead so deep
-            self.left = -1
-            return None
-        if isinstance(node, yaml.MappingNode):
-            return self._mapping(node, path)
-        if not isinstance(node, yaml.SequenceNode):
-            return _scalar(node)
-        items = []
-        for number, item in enumerate(node.value):
-            here = (*path, number)
-            self.lines[here] = item.start_mark.line + 1
-            items.append(self.plain(item, here))
-            if self.left < 0:
-                break
-        return items
-
-    def _mapping(self, node: yaml.MappingNode, path: KeyPath) -> dict[Any, Any]:
+    def plain(node: yaml.Node, path: KeyPath) -> Any:
+        nonlocal left
+        left = -1 if len(path) > _DEEPEST else left - 1  # only aliases lead so deep
+        if left < 0 or isinstance(node, yaml.ScalarNode):
+            return None if left < 0 else scalar(node)
+        if isinstance(node, yaml.SequenceNode):
+            items = []
+            for number, item in enumerate(node.value):
+                lines[(*path, number)] = item.start_mark.line + 1
+                items.append(plain(item, (*path, number)))
+                if left < 0:
+                    break
+            return items
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
-            key, line = _scalar(key_node), key_node.start_mark.line + 1
+            key, line = scalar(key_node), key_node.start_mark.line + 1
             here = (*path, key)
             if key in mapping:
-                what = f"{key!r} is given twice, first in line {self.lines[here]}"
-                if path == ("datasets",):
-                    what = f"data set {what}"
-                place = f"{self.name}:{line}, {dotted(here)}"
-                self.problems.append(Problem(place, what, "every name once", "keep one of the two"))
+                what = f"{key!r} is given twice, first in line {lines[here]}"
+                what = f"data set {what}" if path == ("datasets",) else what
+                place = f"{name}:{line}, {dotted(here)}"
+                problems.append(Problem(place, what, "every name once", "keep one of the two"))
                 continue
-            self.lines[here] = line
-            mapping[key] = self.plain(value_node, here)
-            if self.left < 0:
+            lines[here] = line
+            mapping[key] = plain(value_node, here)
+            if left < 0:
                 break
         return mapping
 
-
-def _scalar(node: yaml.Node) -> Any:
-    """Value of a scalar node as YAML's safe loader would give it; anything else as its text."""
-    if not isinstance(node, yaml.ScalarNode):
-        return "<sequence>" if isinstance(node, yaml.SequenceNode) else "<mapping>"
-    if not node.style and _FLOAT.fullmatch(node.value):
-        return float(node.value)
-    make = _MAKERS.get(node.tag)
-    # A tag (!!int) may stand before any text, and the constructors trust it.
-    if make is None or len(node.value) > _LONGEST_NUMBER:
-        return node.value
-    try:
-        return make(_CONSTRUCTOR, node)
-    except (ArithmeticError, AttributeError, LookupError, ValueError):
-        return node.value
+    data = plain(node, ())
+    if left < 0:
+        what = "its aliases (*name) stand for too many values, or for themselves"
+        allowed = f"at most {_MOST_VALUES} values, aliases counted as what they stand for"
+        return Document(name, {}), [Problem(name, what, allowed, "write the values out")]
+    return Document(name, data, lines), problems

@@ -180,7 +180,7 @@ def content_of(table: pa.Table) -> bytes:
 
 
 def read(path: Path | str, any_type: bool = False) -> Columns:
-    """Columns of a table as arrays: see :func:`columns_in`; errors as of :func:`read_table`.
+    """Columns of a table as arrays, see :func:`columns_in`. Raises InputError as `read_table`.
 
     Columns of other types than numbers and text are object arrays where ``any_type`` allows them.
     """

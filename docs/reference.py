@@ -1,0 +1,57 @@
+"""The parts of configuration.md and artifacts.md that the site makes of models and schemas."""
+
+from kinacc.config.schema import allowed, json_schema
+from kinacc.config.settings import Configuration
+from kinacc.tables.contract import ARTEFACTS
+
+
+def settings():
+    """A table of keys for each section of the configuration."""
+    schema = json_schema(Configuration)
+    parts = []
+
+    def section(node, path):
+        node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
+        keys = {name: each for name, each in node["properties"].items() if "$ref" not in each}
+        parts.append(f"## {f'`{path}`' if path else 'Top level'}\n\n{node['description']}\n")
+        needed = node.get("required", ())
+        parts.append(
+            _table(
+                ("key", "default", "unit", "allowed", "meaning"),
+                (
+                    (f"`{name}`", "to be given" if name in needed else f"`{key.get('default')}`",
+                     key.get("unit", "-"), allowed(key), key["description"])
+                    for name, key in keys.items()
+                ),
+            )
+        )  # fmt: skip
+        for name, each in node["properties"].items():
+            if "$ref" in each:
+                section(each, f"{path}.{name}".lstrip("."))
+
+    section(schema, "")
+    for kind in schema["properties"]["gates"]["items"]["oneOf"]:
+        section(kind, f"gates, {kind['$ref'].rpartition('/')[2].lower()}")
+    return "\n".join(parts)
+
+
+def tables():
+    """A table of columns for each artefact."""
+    parts = []
+    for each in ARTEFACTS.values():
+        key = ", ".join(f"`{name}`" for name in each.key)
+        parts.append(f"## {each.file_name}\n\n{each.meaning} Key: {key}.\n")
+        rows = (
+            (f"`{column.name}`", column.kind, column.unit or "-", column.limits or "any",
+             str(column.same_within or "equal"), column.meaning)
+            for column in each.columns
+        )  # fmt: skip
+        head = ("column", "type", "unit", "allowed", "same within", "meaning")
+        parts.append(_table(head, rows))
+    return "\n".join(parts)
+
+
+def _table(head, rows):
+    lines = [head, ["---"] * len(head), *rows]
+    cells = ([cell.replace("|", "\\|") for cell in row] for row in lines)
+    return "".join(f"| {' | '.join(row)} |\n" for row in cells)

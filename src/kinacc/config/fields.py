@@ -1,0 +1,99 @@
+"""What settings are made of: sections, keys with unit and range, and kinds of values."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError, core_schema
+
+from kinacc.errors import first_few
+
+
+class Section(BaseModel):
+    """A named group of keys and further sections; its docstring is its line of text."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _empty(cls, value: Any) -> Any:
+        return {} if value is None else value
+
+
+def setting(
+    default: Any,
+    about: str,
+    unit: str = "",
+    execution: bool = False,
+    allowed: str = "",
+    **more: Any,
+) -> Any:
+    """A key of a section: its default (``...`` where it has to be given), one line of text, unit.
+
+    ``execution`` marks what changes only how a run is carried out or judged, and no hash.
+    ``allowed`` says in words what is taken where its type does not; ``more`` is for
+    ``pydantic.Field``: ``ge``, ``le``, ``gt``, ``lt``, ``min_length``, ``max_length``, ``alias``.
+    """
+    told = {"unit": unit, "execution": execution, "allowed": allowed}
+    extra: dict[str, Any] = {name: value for name, value in told.items() if value}
+    return Field(default, description=about, json_schema_extra=extra, **more)
+
+
+def refused(what: str, fix: str = "") -> PydanticCustomError:
+    """An error of a validator: what is wrong with the value, and what to do."""
+    return PydanticCustomError("refused", "{what}", {"what": what, "fix": fix})
+
+
+def _distinct(items: list[Any]) -> list[Any]:
+    repeated = sorted(str(each) for each, count in Counter(items).items() if count > 1)
+    if repeated:
+        raise refused(f"names {first_few(repeated)} more than once")
+    return items
+
+
+def _rising(pair: list[float]) -> list[float]:
+    if not pair[0] < pair[1]:
+        raise refused(f"{pair} is reversed or empty", "put the smaller number first")
+    return pair
+
+
+@dataclass(frozen=True)
+class Or:
+    """Beside what a key takes otherwise: one of these words."""
+
+    words: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_wrap_validator_function(
+            lambda value, inner: value if value in self.words else inner(value),
+            handler(source),
+            serialization=core_schema.plain_serializer_function_ser_schema(lambda value: value),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [{"enum": [*self.words]}, handler(schema)]}
+
+
+Text = Annotated[str, Field(min_length=1)]
+Distinct = AfterValidator(_distinct)
+Pair = Annotated[
+    list[Annotated[float, Field(ge=-720, le=720)]],
+    Field(min_length=2, max_length=2, json_schema_extra={"pair": True}),
+    AfterValidator(_rising),
+]
+AUTO = Or(("auto",))
