@@ -8,10 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
-from kinacc.assess.coverage import companions
+from kinacc.assess.adaptive import (
+    FIRST_SHARE,
+    AdaptiveAssessor,
+    Candidates,
+    LedgerCampaign,
+    check_budget,
+    first_points,
+)
+from kinacc.assess.counts import companions
 from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
-from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
 from research.kinematic_model import (
     Basis,

@@ -8,11 +8,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
+from kinacc.assess.adaptive import (
+    FIRST_SHARE,
+    AdaptiveAssessor,
+    Candidates,
+    Ledger,
+    about_all_if_all_measured,
+    check_budget,
+    first_points,
+)
 from kinacc.assess.confirming import ConfirmingCampaign
-from kinacc.assess.coverage import about_all_if_all_measured
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
-from kinacc.assess.visits import FIRST_SHARE, first_points
 from kinacc.errors import Problem, refuse
 
 

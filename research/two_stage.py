@@ -9,8 +9,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, LedgerCampaign, check_budget
-from kinacc.assess.coverage import about_all_if_all_measured
+from kinacc.assess.adaptive import (
+    AdaptiveAssessor,
+    Candidates,
+    LedgerCampaign,
+    about_all_if_all_measured,
+    check_budget,
+)
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.errors import Problem, refuse

@@ -11,9 +11,9 @@ import paper_settings as paper
 import pytest
 
 from kinacc.assess.adaptive import Candidates, Ledger
-from kinacc.assess.coverage import companions, excepted, hardly_missed
+from kinacc.assess.counts import excepted
 from kinacc.assess.error_effects import joint_errors
-from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, share
+from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
 from kinacc.assess.population import largest_size
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
@@ -196,22 +196,6 @@ def test_unequal_noise_is_weighted_as_least_squares_would():
     weighted = sum(each @ reading for each, reading in zip(inverses, readings, strict=True))
     assert ledger.mean_mm[1] == pytest.approx(total @ weighted)
     assert ledger.noise(1) == pytest.approx(total)
-
-
-def test_looks_share_out_the_whole_error():
-    assert sum(share(look) for look in range(60)) == pytest.approx(1.0)
-    assert all(share(look) >= share(look + 1) > 0.0 for look in range(50))
-
-
-def test_companions_against_counting():
-    rng = np.random.default_rng(7)
-    orders = rng.permuted(np.tile(np.arange(20), (20_000, 1)), axis=1)
-    count = companions(20, 8, 0.1)
-    missed = [np.mean(orders[:, :8].max(axis=1) < 20 - c) for c in (count - 1, count)]
-    assert missed[0] > 0.1 > missed[1]
-    assert companions(20, 20, 0.1) == 1
-    assert hardly_missed(20, 0.1) == 18
-    assert [companions(20, seen, 0.1) for seen in (17, 18)] == [2, 1]
 
 
 def coverage(assessor, errors, sigma, draws, target=MEASURED):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.attainable import attainable_excess_mm
-from kinacc.assess.boundary import crossing, look_counts
 from kinacc.assess.lower_average import LowerAverage, direction_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import CANDIDATES
@@ -87,20 +85,3 @@ def test_a_lower_bound_holds_however_wilfully_its_readings_were_chosen():
             count[row] += 1
         missed += average.bound_mm(np.ones(6)) > 1.0
     assert missed / draws <= 0.05 + 3.5 * math.sqrt(0.05 * 0.95 / draws)
-
-
-def test_looks_stand_so_near_that_few_readings_are_ever_left_over():
-    for extra in range(8, 400):
-        counts = look_counts(extra)
-        assert counts[:2] == (1, 3)
-        assert counts[-1] == extra + 1
-        assert all(after - before >= 2 for before, after in pairwise(counts[:-1]))
-        assert all(after <= 1.7 * before for before, after in pairwise(counts[1:]))
-
-
-def test_one_look_crosses_as_a_normal_reading_does():
-    assert crossing((1,), np.array([NORMAL])) == pytest.approx(0.05, abs=1e-6)
-    # Looks that see the same walk over and over cross no more often than one.
-    assert crossing((1000, 1001), np.full(2, NORMAL)) < 0.06
-    # Two looks that share hardly a reading cross nearly as often as two walks.
-    assert crossing((1, 100_000), np.full(2, NORMAL)) == pytest.approx(1 - 0.95**2, abs=2e-4)

@@ -11,11 +11,11 @@ from scipy.stats import binom, gamma
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
-from kinacc.assess.ellipsoid import BallDistances
 from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.gamma_quantile import GammaQuantile
-from kinacc.assess.invalidation_calibrated import InvalidationCalibrated, boundary
+from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
 from kinacc.assess.invalidation_full import ModelInvalidationFull
+from kinacc.assess.limits import BallDistances
 from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
@@ -146,18 +146,6 @@ def rejected_at_the_truth(eq21: bool) -> float:
 def test_the_nearest_point_keeps_the_error_rate_that_eq_21_breaks():
     assert rejected_at_the_truth(eq21=False) <= 0.06
     assert rejected_at_the_truth(eq21=True) > 0.15
-
-
-def test_the_calibrated_boundary_against_an_independent_walk():
-    width = boundary(6, 0.05)
-    rng = np.random.default_rng(8)
-    steps = np.cumsum(rng.normal(size=(100_000, 32)), axis=1)
-    counts = 2 ** np.arange(6)
-    lowest = (steps[:, counts - 1] / np.sqrt(counts)).min(axis=1)
-    missed = np.mean(lowest < -width)
-    assert missed == pytest.approx(0.05, abs=4 * math.sqrt(0.05 * 0.95 / 100_000))
-    assert width < boundary(6, 0.05, is_even=False)
-    assert boundary(1, 0.05) == pytest.approx(1.6448536)
 
 
 def test_a_reading_with_a_covariance_of_its_own_widens_the_calibrated_bound():

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binom, chi2, f, kstest, ncx2, norm, t
 
 from kinacc.assess.adaptive import Candidates, Ledger
-from kinacc.assess.future_visit import visit_mm
+from kinacc.assess.limits import visit_mm
 from kinacc.assess.noise_alarms import (
     BESIDE_REFERENCES,
     SCATTER,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kinacc.assess.adaptive import Candidates
-from kinacc.assess.future_visit import visit_mm
+from kinacc.assess.limits import visit_mm
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import carry_on
 from kinacc.errors import InputError

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from kinacc.assess.adaptive import Candidates
-from kinacc.assess.boundary import boundary, look_counts
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import MEASURED
 
@@ -33,17 +32,3 @@ def test_noise_that_few_readings_cannot_check_is_taken_larger_in_both_bounds(str
     more = said_at_the_end(SearchAndConfirm(POINTS, noise_margin=1.0), readings, 1.44 * stated)
     assert margin.lower_mm == pytest.approx(more.lower_mm, rel=1e-9)
     assert margin.upper_mm == pytest.approx(more.upper_mm, rel=1e-9)
-
-
-@pytest.mark.parametrize("freedom", [np.inf, 60.0])
-def test_the_looks_of_a_point_miss_together_as_often_as_allowed(freedom):
-    chance, draws = np.random.default_rng(22), 200_000
-    counts = look_counts(40)
-    found = boundary(counts, 0.05, freedom)
-    scale = 1.0 if np.isinf(freedom) else np.sqrt(chance.chisquare(freedom, draws) / freedom)
-    walk, missed, before = np.zeros(draws), np.zeros(draws, dtype=bool), 0
-    for count, z in zip(counts, found.z, strict=True):
-        walk += np.sqrt(count - before) * chance.normal(size=draws)
-        missed |= walk < -z * scale * np.sqrt(count)
-        before = count
-    assert missed.mean() == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / draws))

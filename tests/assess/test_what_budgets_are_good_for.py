@@ -8,48 +8,12 @@ from math import comb
 import numpy as np
 import paper_settings as paper
 import pytest
-from scipy.stats import binom, hypergeom
 
-from kinacc.assess.adaptive import Candidates
-from kinacc.assess.binomial import binomial_interval
-from kinacc.assess.coverage import at_most, companions, hardly_missed
+from kinacc.assess.adaptive import Candidates, first_points
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import noisy, truth_mm
 from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
-from kinacc.assess.visits import first_points
-
-
-@pytest.mark.parametrize(("hits", "trials"), [(0, 20), (1, 20), (7, 20), (19, 20), (20, 20)])
-def test_limits_on_a_probability_are_where_the_count_becomes_improbable(hits, trials):
-    low, high = binomial_interval(hits, trials)
-    assert 0.0 <= low <= hits / trials <= high <= 1.0
-    assert (low == 0.0) == (hits == 0)
-    assert (high == 1.0) == (hits == trials)
-    if hits:
-        assert binom.sf(hits - 1, trials, low) == pytest.approx(0.025, rel=1e-6)
-    if hits < trials:
-        assert binom.cdf(hits, trials, high) == pytest.approx(0.025, rel=1e-6)
-
-
-@pytest.mark.parametrize(("points", "seen", "marked"), [(30, 10, 4), (30, 29, 2), (12, 3, 12)])
-def test_the_chance_of_having_read_few_of_the_marked_points_is_hypergeometric(points, seen, marked):
-    for found in range(marked + 1):
-        wanted = hypergeom.cdf(found, points, marked, seen)
-        assert at_most(found, marked, points, seen) == pytest.approx(wanted, abs=1e-12)
-
-
-def test_companions_are_the_fewest_that_are_hardly_all_missed():
-    for points, seen, error in ((100, 40, 0.02), (100, 90, 0.02), (50, 1, 0.5), (20, 19, 0.05)):
-        missed = [Fraction(comb(points - k, seen), comb(points, seen)) for k in range(points + 1)]
-        wanted = next(k for k in range(1, points + 1) if missed[k] <= Fraction(error))
-        assert companions(points, seen, error) == wanted
-
-
-def test_the_largest_of_all_is_hardly_missed_by_nearly_all():
-    assert hardly_missed(100, 0.02) == 98
-    assert hardly_missed(100, 0.025) == 98
-    assert hardly_missed(10, 0.02) == 10
 
 
 @pytest.mark.parametrize(

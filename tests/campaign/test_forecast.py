@@ -7,7 +7,7 @@ import copy
 import numpy as np
 import pytest
 
-from kinacc.assess.binomial import binomial_interval
+from kinacc.assess.counts import binomial_interval
 from kinacc.assess.simulate import carry_on, conduct, noisy
 from kinacc.assess.statement import CANDIDATES
 from kinacc.campaign import folder

@@ -12,7 +12,7 @@ from command_line import call
 from scipy.stats import ncx2
 
 from kinacc.assess.attainable import width_limits
-from kinacc.assess.binomial import binomial_interval
+from kinacc.assess.counts import binomial_interval
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct

@@ -19,7 +19,7 @@ from oracles import fifty_tables as ft
 from oracles import inverse, kinematics, maps, small_study, tables
 
 from kinacc import distributions
-from kinacc.assess import binomial, ellipsoid, limits
+from kinacc.assess import counts, limits
 from kinacc.kinematics import dh
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.dh import DHModel
@@ -543,7 +543,7 @@ def test_nearest_points_of_balls_where_noise_differs_by_direction():
         covariance = root @ root.T + np.eye(3) * 1e-3
         mean_mm, radius = rng.normal(size=3), 0.4
         _, distance = ft.nearest_in_ball(fd.exact(mean_mm), fd.exact(covariance), Decimal(radius))
-        ours = ellipsoid.BallDistances(mean_mm[None], covariance[None]).beyond(radius)
+        ours = limits.BallDistances(mean_mm[None], covariance[None]).beyond(radius)
         distances += shares(ours, [distance])
     held("distance to a ball", distances)
 
@@ -560,7 +560,7 @@ def test_limits_on_a_size_from_one_averaged_reading():
 def test_limits_on_a_probability_from_counts():
     found = []
     for hits, trials in ((3, 40), (17, 20), (1, 9)):
-        low, high = binomial.binomial_interval(hits, trials)
+        low, high = counts.binomial_interval(hits, trials)
         expected = [
             ft.binomial_end(hits, trials, 0.5 * (1.0 - 0.95), low),
             ft.binomial_end(hits + 1, trials, 1.0 - 0.5 * (1.0 - 0.95), high),

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import Reason, Statement, Suspicious
+from kinacc.assess.statement import CANDIDATES, Reason, Statement, Suspicious
 from kinacc.errors import InputError, Problem, refuse
 
 if TYPE_CHECKING:
@@ -245,6 +245,13 @@ class Ledger:
         """Whether all readings of a point came with the covariance planned for it."""
         return point not in self._unplanned
 
+    def readings_of(self, point: int, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """The first readings of a point (number, 3) and their covariances (number, 3, 3)."""
+        planned = self.candidates.covariance_mm2[point]
+        own = [each for each in self.readings if each[0] == point][:number]
+        spread = [planned if covariance is None else covariance for _, _, covariance in own]
+        return np.array([reading for _, reading, _ in own]), np.array(spread, dtype=float)
+
     def sizes_mm(self) -> np.ndarray:
         """Sizes of the mean readings of the visited points, in visiting order."""
         return np.sqrt(np.sum(self.mean_mm[self.visited] ** 2, axis=1))
@@ -337,6 +344,37 @@ class LedgerCampaign:
             mean, noise = ledger.mean_mm[row], ledger.noise(row)
             found[row] = lower_limit_mm(mean, noise, lower), upper_limit_mm(mean, noise, upper)
         return found
+
+
+FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
+
+
+def first_points(measurements: int, points: int, share: float) -> int:
+    """How many points are visited before anything is known: all if the budget is 1.5 times them."""
+    if measurements >= 1.5 * points:
+        return points
+    return max(math.ceil(share * min(measurements, points)), 1)
+
+
+class OnceCampaign(LedgerCampaign):
+    """One reading each of the first points; what is stated is left to the assessor."""
+
+    def __init__(self, settings, candidates: Candidates) -> None:
+        super().__init__(settings, candidates)
+        self.first = min(settings.measurements, candidates.points)
+
+    def next(self) -> int | None:
+        """The next point in order."""
+        return self.ledger.taken if self.ledger.taken < self.first else None
+
+
+def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statement, ...]:
+    """A statement on the measured points, and the same on all candidates where they are all."""
+    points, seen = ledger.candidates.points, len(ledger.visited)
+    if seen == points:
+        return said, replace(said, target=CANDIDATES)
+    withheld = Reason("unmeasured", {"left": points - seen, "points": points})
+    return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)
 
 
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from kinacc.assess.adaptive import Candidates, LedgerCampaign
-from kinacc.assess.boundary import EARLY, boundary, look_counts
+from kinacc.assess.looks import EARLY, Looks, boundary, look_counts
 from kinacc.assess.lower_average import SHARE, LowerAverage, direction_of
 from kinacc.assess.noise_taken import AS_STATED, NoisePlan
 from kinacc.assess.reference_poses import schedule
-from kinacc.assess.sequential_limits import Looks
+from kinacc.assess.wrong_readings import at_most_wrong
 
 _VISIT_PART = 0.05  # of the lower bound's error, for single points until the average speaks
 _ONCE = 0.6  # of the upper bound's error for the visit, where hardly any reading comes after it
@@ -54,19 +54,13 @@ class ConfirmingCampaign(LedgerCampaign):
         single = self.single_error * (1.0 if math.isinf(noise.freedom) else 0.5)
         each = single / max(min(first, candidates.points), 1)
         shares = _first_most(np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0))
-        if not wrong_rate:
-            self.average = LowerAverage(wanted, self.lower_error, noise.freedom)
-            self.looks = Looks(self.ledger, upper, each, shares, self.factor)
-        else:
-            from kinacc.assess.guarded_looks import GuardedAverage, GuardedLooks
-            from kinacc.assess.wrong_readings import at_most_wrong
-
+        wrong = 0
+        if wrong_rate:
             # Half of the error of single points is for more wrong readings than are counted on.
+            each *= 0.5
             wrong = at_most_wrong(settings.measurements, wrong_rate, 0.5 * self.single_error)
-            self.average = GuardedAverage(wanted, self.lower_error, wrong_rate)
-            self.looks = GuardedLooks(
-                self.ledger, upper, 0.5 * each, shares, self.factor, wrong_rate, wrong
-            )
+        self.average = LowerAverage(wanted, self.lower_error, noise.freedom, wrong_rate)
+        self.looks = Looks(self.ledger, upper, each, shares, self.factor, wrong_rate, wrong)
         self._row, self._left, self._counted = -1, 0, False
         self.blocks: list[int] = []  # of every reading in order the number of its block
         self._block, self._begins = 0, True
@@ -78,11 +72,7 @@ class ConfirmingCampaign(LedgerCampaign):
         """The boundary of the looks of this campaign for an error of the upper limits."""
         few = max(1.0 - self.extra / (_FEW * max(self.first, 1)), 0.0)
         early = EARLY + (_ONCE - EARLY) * few
-        if self.wrong_rate:
-            from kinacc.assess.guarded_looks import guarded_by_spending
-
-            return guarded_by_spending(self.counts, error, early, self.wrong_rate)
-        return boundary(self.counts, error, freedom, early)
+        return boundary(self.counts, error, freedom, early, rate=self.wrong_rate)
 
     def visit(self) -> tuple[int, ...]:
         """The first rows, with the reference poses in their places."""

@@ -8,9 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, OnceCampaign, check_budget
 from kinacc.assess.statement import CONFIDENCE, REGION, Reason, Statement
-from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import Problem, refuse
 
 _FEWEST = 10  # different sizes that make a distribution

@@ -8,10 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_budget
+from kinacc.assess.adaptive import FIRST_SHARE, AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.confirming import ConfirmingCampaign
-from kinacc.assess.coverage import excepted, hardly_missed
-from kinacc.assess.future_visit import of_future_visits
+from kinacc.assess.counts import excepted, hardly_missed
 from kinacc.assess.noise_taken import (
     ESTIMATED,
     KNOWN,
@@ -37,7 +36,6 @@ from kinacc.assess.statement import (
     Statement,
     Suspicious,
 )
-from kinacc.assess.visits import FIRST_SHARE
 from kinacc.errors import Problem, refuse
 
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
@@ -217,7 +215,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
         said = replace(said, noise=noise.said)
         if self.settings.error_of == MEAN:
             return said
-        return of_future_visits(said, self.noise.arms_mm(noise))
+        return said.of_future_visits(self.noise.arms_mm(noise))
 
     def _limits_mm(self, error: float) -> np.ndarray:
         """Upper limits (m,) of single points for an allowed error."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
-from kinacc.assess.future_visit import SHARE
+from kinacc.assess.limits import visit_mm
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.statement import CANDIDATES, MEASURED, VISIT, Statement
 from kinacc.assess.world import World, drawn_world
@@ -67,19 +67,9 @@ def truth_mm(
     ``arm_mm``: standard deviation of a visit per axis, of each candidate or of all.
     """
     if said.error_of == VISIT:
-        size_mm = _visits_mm(size_mm, arm_mm)
+        size_mm = visit_mm(size_mm, arm_mm)
     if said.target == CANDIDATES:
         return float(np.sort(size_mm)[-1 - said.excepted])
     if said.target == MEASURED and visited:
         return float(size_mm[visited].max())
     return math.nan
-
-
-def _visits_mm(size_mm: np.ndarray, arm_mm: float | np.ndarray) -> np.ndarray:
-    """Sizes (m,) that 95 % of the visits to each candidate keep."""
-    from scipy.special import chndtrix
-
-    arm = np.broadcast_to(arm_mm, size_mm.shape)
-    safe = np.where(arm > 0.0, arm, 1.0)
-    found = safe * np.sqrt(chndtrix(SHARE, 3.0, (size_mm / safe) ** 2))
-    return np.where(arm > 0.0, found, size_mm)

@@ -7,11 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, Ledger, check_budget
-from kinacc.assess.coverage import about_all_if_all_measured
+from kinacc.assess.adaptive import (
+    AdaptiveAssessor,
+    Candidates,
+    Ledger,
+    OnceCampaign,
+    about_all_if_all_measured,
+    check_budget,
+)
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
-from kinacc.assess.visits import OnceCampaign
 from kinacc.errors import refuse
 
 

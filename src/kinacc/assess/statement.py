@@ -9,8 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
+
+import numpy as np
+
+from kinacc.assess.limits import visit_mm
 
 MEASURED = "measured"
 CANDIDATES = "candidates"
@@ -63,3 +67,12 @@ class Statement:
     excepted: int = 0
     error_of: str = MEAN
     noise: Reason | None = None
+
+    def of_future_visits(self, arms_mm: tuple[float, float, float]) -> Statement:
+        """This statement on mean errors as one on future visits.
+
+        arms_mm: standard deviation of a visit per axis, for lower bound, value and upper bound.
+        """
+        sizes = self.lower_mm, self.value_mm, self.upper_mm
+        lower, value, upper = visit_mm(np.array(sizes), np.array(arms_mm)).tolist()
+        return replace(self, lower_mm=lower, value_mm=value, upper_mm=upper, error_of=VISIT)

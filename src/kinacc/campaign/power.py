@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.assess.binomial import binomial_interval
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.counts import binomial_interval
 from kinacc.campaign.simulate import Outcome, quantiles
 
 VERDICTS = (ACCEPT, REJECT, UNDECIDED)

@@ -10,7 +10,7 @@ import numpy as np
 from kinacc import __version__
 from kinacc.assess.adaptive import Campaign
 from kinacc.assess.conformity import decide
-from kinacc.assess.future_visit import SHARE as FUTURE
+from kinacc.assess.limits import VISITS as FUTURE
 from kinacc.assess.statement import MEAN, REGION
 from kinacc.campaign import consistency, nearness, words
 from kinacc.campaign.folder import Opened

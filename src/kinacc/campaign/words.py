@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.assess.future_visit import SHARE as FUTURE
+from kinacc.assess.limits import VISITS as FUTURE
 from kinacc.assess.noise_taken import KNOWN, noise_plan
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.assess.statement import CANDIDATES, MEAN, MEASURED, REGION, Reason, Statement

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor
-from kinacc.assess.binomial import binomial_interval
+from kinacc.assess.counts import binomial_interval
 from kinacc.campaign import known_noise, power, simulate, slips, words
 from kinacc.campaign.power import Aim, Row
 from kinacc.cli import campaign_options, rows

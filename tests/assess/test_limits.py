@@ -1,0 +1,192 @@
+"""Limits on sizes and counts against closed forms, 50 digits and slow searches."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from itertools import combinations
+from math import comb
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.special import chndtr, ndtri
+from scipy.stats import binom, ncx2
+
+from kinacc.assess.counts import binomial_interval, companions, excepted, hardly_missed
+from kinacc.assess.limits import (
+    BallDistances,
+    largest_size,
+    lower_limit_mm,
+    reading_below,
+    size_at,
+    upper_limit_mm,
+    visit_mm,
+)
+
+
+@pytest.mark.parametrize("a", [0.0, 1e-5, 1e-3, 0.1, 1.0, 4.0, 30.0])
+def test_size_of_a_reading_is_noncentral_chi(a):
+    x = np.linspace(0.05, a + 6.0, 60)
+    ours = [reading_below(each, a) for each in x]
+    assert ours == pytest.approx(chndtr(x**2, 3, a**2).tolist(), abs=1e-9)
+
+
+def test_size_of_a_reading_against_an_integral_of_fifty_digits():
+    mpmath.mp.dps = 50
+    for x, a in [(0.5, 2.0), (3.0, 3.5), (6.0, 9.0), (0.2, 1e-3)]:
+
+        def density(r, a=a):
+            near, far = (mpmath.exp(-((r + side * a) ** 2) / 2) for side in (-1, 1))
+            return r * (near - far) / (mpmath.mpf(a) * mpmath.sqrt(2 * mpmath.pi))
+
+        exact = float(mpmath.quad(density, [0, x]))
+        assert reading_below(x, a) == pytest.approx(exact, rel=1e-9, abs=2e-12)
+
+
+@pytest.mark.parametrize("probability", [0.95, 0.5, 0.05, 1e-4])
+def test_size_at_inverts_the_probability_and_is_zero_where_no_size_is_as_likely(probability):
+    for x in np.linspace(0.01, 12.0, 40):
+        a = size_at(x, probability)
+        if a > 0.0:
+            assert reading_below(x, a) == pytest.approx(probability, abs=1e-9)
+        else:
+            assert reading_below(x, 0.0) <= probability
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 30.0])
+def test_limits_miss_as_seldom_as_they_say_whatever_the_direction(ratio):
+    rng = np.random.default_rng(5)
+    covariance = 0.01 * np.diag([1.0, 1.0 / ratio, 1.0 / ratio**2])
+    noise = 0.1 if ratio == 1.0 else covariance
+    draws, allowed = 1000, 0.05
+    missed = []
+    for direction in ([1, 0, 0], [0, 0, 1], [0.6, 0.0, 0.8]):
+        for size in (0.05, 0.3):
+            error = size * np.array(direction, dtype=float)
+            means = error + rng.multivariate_normal(np.zeros(3), covariance, draws)
+            missed.append(sum(upper_limit_mm(m, noise, allowed) < size for m in means))
+            missed.append(sum(lower_limit_mm(m, noise, allowed) > size for m in means))
+    assert max(missed) < allowed * draws + 4 * math.sqrt(allowed * draws)
+
+
+def test_far_from_zero_the_upper_limit_is_the_one_of_a_normal_reading():
+    mean = np.array([100.0, 0.0, 0.0])
+    wanted = 100 - 0.2 * float(ndtri(0.05))
+    assert upper_limit_mm(mean, 0.2, 0.05) == pytest.approx(wanted, abs=1e-3)
+    unequal = np.diag([0.04, 0.01, 0.09])
+    assert upper_limit_mm(mean, unequal, 0.05) == pytest.approx(wanted, abs=2e-3)
+
+
+def turned(variances, seed=1):
+    axes = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    return axes @ np.diag(variances) @ axes.T
+
+
+CASES = [
+    ([0.3, -0.2, 0.5], [0.01, 0.01, 0.01]),
+    ([0.3, -0.2, 0.5], [0.01, 0.04, 0.09]),
+    ([3.0, 2.0, 1.0], [1e-4, 1e-2, 1.0]),
+    ([1e-6, 2e-6, -1e-6], [0.01, 0.04, 0.09]),
+    ([40.0, -10.0, 5.0], [1e-6, 1e-6, 1e-2]),
+    ([0.02, 0.0, 0.01], [0.5, 0.5, 0.01]),
+]
+
+
+@pytest.mark.parametrize(("mean", "variances"), CASES)
+@pytest.mark.parametrize("deviations", [0.5, 1.645, 4.0])
+def test_the_largest_size_is_that_of_the_farthest_point(mean, variances, deviations):
+    covariance, mean = turned(variances), np.array(mean)
+    root = np.linalg.cholesky(covariance)
+
+    def size(u):
+        return -np.linalg.norm(mean + deviations * root @ (u / np.linalg.norm(u)))
+
+    starts = np.random.default_rng(2).normal(size=(12, 3))
+    searched = max(-minimize(size, start, tol=1e-14).fun for start in starts)
+    assert largest_size(mean, covariance, deviations) == pytest.approx(searched, rel=1e-6)
+
+
+def test_the_largest_size_about_hardly_a_reading_is_along_the_widest_axis():
+    covariance = turned([0.04, 0.09, 0.25])
+    assert largest_size(np.full(3, 1e-9), covariance, 2.0) == pytest.approx(1.0, rel=1e-7)
+    # A reading across the widest axis: (y s2 / (s2 - s1))^2 + what is left of the deviations there.
+    mean, variance = np.array([0.1, 0.0, 0.0]), np.diag([0.01, 0.02, 0.25])
+    step = 0.01 * 0.1 / 0.24
+    along = np.sqrt((4.0 - step**2 / 0.01) * 0.25)
+    wanted = np.hypot(0.1 + step, along)
+    assert largest_size(mean, variance, 2.0) == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize(("mean", "variances"), CASES)
+@pytest.mark.parametrize("share", [0.2, 0.9, 1.1])
+def test_the_distance_to_a_ball_is_that_of_its_nearest_point(mean, variances, share):
+    reading, covariance = np.array(mean), turned(variances, 3)
+    radius, weight = share * np.linalg.norm(reading), np.linalg.inv(covariance)
+    distances = BallDistances(np.stack([reading, 2 * reading]), np.stack([covariance] * 2))
+    found, farther = distances.beyond(radius)
+    assert farther > found
+    if share > 1.0:
+        assert found == 0.0
+        return
+
+    def distance(u):
+        gap = reading - radius * u / np.linalg.norm(u)
+        return np.sqrt(gap @ weight @ gap)
+
+    starts = [reading, *np.random.default_rng(4).normal(size=(12, 3))]
+    nearest = min(minimize(distance, start, tol=1e-12).fun for start in starts)
+    assert found == pytest.approx(nearest, rel=1e-6)
+
+
+def test_with_equal_noise_the_nearest_point_is_the_candidate_of_eq_21():
+    distances = BallDistances(np.array([[0.3, -0.4, 1.2]]), 0.04 * np.eye(3)[None])
+    assert distances.beyond(0.65) == pytest.approx(0.65 / 0.2)
+
+
+def test_what_95_percent_of_visits_keep_is_noncentral_chi_and_far_off_normal():
+    size = np.array([0.0, 0.3, 0.8, 59.9, 60.1, 1e6, np.nan])
+    found = visit_mm(size, 0.2)
+    wanted = 0.2 * np.sqrt(ncx2.ppf(0.95, 3, (size[1:3] / 0.2) ** 2))
+    assert found[1:3] == pytest.approx(wanted, rel=1e-9)
+    assert found[3:6] - size[3:6] == pytest.approx(0.2 * ndtri(0.95), rel=3e-3)
+    assert np.isnan(found[6])
+    assert visit_mm(0.8, 0.0) == 0.8
+
+
+@pytest.mark.parametrize(("hits", "trials"), [(0, 20), (1, 20), (7, 20), (19, 20), (20, 20)])
+def test_limits_on_a_probability_are_where_the_count_becomes_improbable(hits, trials):
+    low, high = binomial_interval(hits, trials)
+    assert 0.0 <= low <= hits / trials <= high <= 1.0
+    assert (low == 0.0) == (hits == 0)
+    assert (high == 1.0) == (hits == trials)
+    if hits:
+        assert binom.sf(hits - 1, trials, low) == pytest.approx(0.025, rel=1e-6)
+    if hits < trials:
+        assert binom.cdf(hits, trials, high) == pytest.approx(0.025, rel=1e-6)
+
+
+def test_companions_are_the_fewest_that_are_hardly_all_missed():
+    for points, seen, error in ((100, 40, 0.02), (100, 90, 0.02), (50, 1, 0.5), (20, 19, 0.05)):
+        missed = [Fraction(comb(points - k, seen), comb(points, seen)) for k in range(points + 1)]
+        wanted = next(k for k in range(1, points + 1) if missed[k] <= Fraction(error))
+        assert companions(points, seen, error) == wanted
+    assert [hardly_missed(*each) for each in ((100, 0.02), (100, 0.025), (10, 0.02))] == [
+        98,
+        98,
+        10,
+    ]
+
+
+@pytest.mark.parametrize(("points", "seen"), [(9, 4), (10, 8), (11, 5), (12, 11)])
+@pytest.mark.parametrize("error", [0.025, 0.2])
+def test_all_but_so_many_points_is_right_over_all_subsets_that_can_be_read(points, seen, error):
+    def missed(largest):
+        """Share of all subsets that hold none of the largest points."""
+        subsets = [set(each) for each in combinations(range(points), seen)]
+        return np.mean([not each & set(range(largest)) for each in subsets])
+
+    left = excepted(points, seen, error)
+    assert missed(left + 1) <= error
+    assert left == 0 or missed(left) > error

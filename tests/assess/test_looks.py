@@ -1,0 +1,149 @@
+"""The boundary of the looks and what rests on it: random walks, adversaries, few digits."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm
+
+from kinacc.assess.looks import boundary, look_counts
+from kinacc.assess.lower_average import LowerAverage
+from kinacc.assess.wrong_readings import clip_of
+
+ERROR, WALKS = 0.05, 200_000
+CLOSE = 4.0 * np.sqrt(ERROR * (1.0 - ERROR) / WALKS)  # four standard deviations of a share
+
+
+def crossed(counts, z, rng, rate=0.0, scale=1.0):
+    """Share of walks below -z s sqrt(k) at any look, drawn reading by reading.
+
+    Wrong readings are as low as can be; of a point's own readings the first is not clipped, and
+    one that is wrong is paid for by itself.
+    """
+    at, below, counted = np.zeros(WALKS), np.zeros(WALKS, dtype=bool), np.ones(WALKS, dtype=bool)
+    limits, clip = dict(zip(counts, z, strict=True)), clip_of(rate) if rate else math.inf
+    for number in range(1, counts[-1] + 1):
+        drawn, wrong = rng.normal(size=WALKS), rng.random(WALKS) < rate
+        at += np.clip(np.where(wrong, -math.inf if rate else 0.0, drawn), -clip, clip)
+        if number == 1 and counts[0] == 1:
+            counted = ~wrong
+            below |= drawn < -limits[1] * scale
+        elif number in limits:
+            below |= at < -limits[number] * scale * math.sqrt(number)
+    return np.mean(below & counted)
+
+
+@pytest.mark.parametrize(
+    ("extra", "freedom", "rate"),
+    [(0, math.inf, 0.0), (7, math.inf, 0.0), (100, math.inf, 0.0), (40, 30, 0.0), (40, 60, 0.0),
+     (40, math.inf, 0.01), (40, math.inf, 0.05)],
+)  # fmt: skip
+def test_walks_drawn_at_random_cross_the_boundary_as_often_as_is_allowed(extra, freedom, rate):
+    looks, rng = boundary(look_counts(extra), ERROR, freedom, rate=rate), np.random.default_rng(1)
+    scale = np.sqrt(rng.chisquare(freedom, WALKS) / freedom) if freedom < math.inf else 1.0
+    share = crossed(looks.counts.tolist(), looks.z, rng, rate, scale)
+    assert share == pytest.approx(ERROR, abs=3e-3 if rate else CLOSE + 5e-4)
+    assert crossed(looks.counts.tolist(), 0.95 * looks.z, rng, rate, scale) > ERROR + CLOSE
+
+
+def test_scores_of_which_the_first_may_be_wrong_cross_as_often_as_is_allowed():
+    counts = (8, 15, 30, 60)
+    z = boundary(counts, ERROR, early=0.0, late=3.0, rate=0.01).z
+    assert crossed(counts, z, np.random.default_rng(2), 0.01) == pytest.approx(ERROR, abs=3e-3)
+
+
+@pytest.mark.parametrize("error", [0.01, 0.05, 0.2])
+def test_the_boundary_of_two_looks_is_that_of_a_normal_pair(error):
+    """The mean of two readings and the first of them are correlated by the root of a half."""
+    at = boundary((1, 2), error, late=None).z[0]
+    both = multivariate_normal([0.0, 0.0], [[1.0, np.sqrt(0.5)], [np.sqrt(0.5), 1.0]])
+    assert 0.9 * error < 2.0 * norm.sf(at) - both.cdf([-at, -at]) < error
+    assert boundary((1,), error, late=None).z == pytest.approx(norm.isf(error), abs=0.02)
+    assert boundary((1, 2), error, late=None).alone == pytest.approx(norm.isf(error / 2))
+
+
+def test_looks_stand_so_near_that_few_readings_are_ever_left_over():
+    for extra in range(8, 400):
+        counts = look_counts(extra)
+        assert counts[:2] == (1, 3)
+        assert counts[-1] == extra + 1
+        assert all(after - before >= 2 for before, after in pairwise(counts[:-1]))
+        assert all(after <= 1.7 * before for before, after in pairwise(counts[1:]))
+
+
+def share_false(size, z, counts, choose, campaigns, rng):
+    """Share of campaigns in which the largest of the limits |mean| + z_k / sqrt(k) is below.
+
+    size (m,): true sizes, noise 1. ``choose(sums, count, limits)``: the point (c,) that each
+    campaign reads up to its next look, -1 to stop. Own code: m points, their sums in three axes.
+    """
+    points, extra = len(size), counts[-1] - 1
+    errors = size[:, None] * np.eye(3)[0]
+    sums = errors + rng.normal(size=(campaigns, points, 3))
+    count = np.ones((campaigns, points), dtype=int)
+    limits = np.linalg.norm(sums, axis=2) + z[0]
+    left, rows = np.full(campaigns, extra), np.arange(campaigns)
+    while True:
+        point = choose(sums, count, limits)
+        place = np.searchsorted(counts, count[rows, point], side="right")
+        end = counts[np.minimum(place, len(counts) - 1)]
+        more = np.where(point >= 0, end - count[rows, point], 0)
+        more = np.where(more > left, 0, more)
+        if not more.any():
+            return np.mean(limits.max(axis=1) < size.max())
+        noise = np.sqrt(more)[:, None] * rng.normal(size=(campaigns, 3))
+        sums[rows, point] += more[:, None] * errors[point] + noise
+        count[rows, point] += more
+        left -= more
+        k = count[rows, point]
+        here = np.linalg.norm(sums[rows, point], axis=1) / k
+        here += z[np.searchsorted(counts, k)] / np.sqrt(k)
+        limits[rows, point] = np.minimum(limits[rows, point], here)
+
+
+ADVERSARIES = {
+    "smallest mean": lambda sums, count, limits: np.argmin(
+        np.linalg.norm(sums, axis=2) / count, axis=1
+    ),
+    "largest limit": lambda sums, count, limits: np.argmax(limits, axis=1),
+    "one point until it is too low": lambda sums, count, limits: np.where(
+        limits[:, 0] < 20.0, -1, 0
+    ),
+    "the largest while it is high": lambda sums, count, limits: np.where(limits[:, 0] < 20.0, 1, 0),
+}
+
+
+@pytest.mark.parametrize("choose", ADVERSARIES.values(), ids=ADVERSARIES)
+def test_no_choice_of_what_is_read_makes_the_upper_bound_false_more_often(choose):
+    looks, campaigns = boundary(look_counts(40), ERROR), 20_000
+    size, rng = np.array([20.0, 19.0, 1.0]), np.random.default_rng(1)
+    false = share_false(size, looks.z, looks.counts, choose, campaigns, rng)
+    assert false <= ERROR + 3.5 * np.sqrt(ERROR * 0.95 / campaigns)
+
+
+def lower_bounds(wanted, campaigns, rng, factor=1.0):
+    """Lower bounds of campaigns that choose by what was read: largest error 1, noise as it likes.
+
+    A reading that was high is followed by one with little noise, a low one by one with much; the
+    direction of each is that of the last reading, where the error is always 1 along it.
+    """
+    found = np.empty(campaigns)
+    for campaign in range(campaigns):
+        average, sigma, noise = LowerAverage(wanted, ERROR), 1.0, rng.normal(size=wanted)
+        for number in range(wanted):
+            along = 1.0 + sigma * noise.item(number)
+            average.record(number % 7, [0.0, 0.6, 0.8], [9.0, 0.6 * along, 0.8 * along], sigma)
+            sigma = 0.3 if along > 1.0 else 2.0
+        found[campaign] = average.bound_mm(np.full(7, factor))
+    return found
+
+
+def test_the_lower_bound_is_false_exactly_as_often_as_allowed_whatever_is_chosen():
+    bounds = lower_bounds(24, 5000, np.random.default_rng(3))
+    near = 4.0 * np.sqrt(ERROR * 0.95 / len(bounds))
+    assert np.mean(bounds > 1.0) == pytest.approx(ERROR, abs=near)
+    less = lower_bounds(24, 5000, np.random.default_rng(3), factor=0.9)
+    assert np.mean(less > 1.0) > ERROR + near

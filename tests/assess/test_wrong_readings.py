@@ -1,0 +1,234 @@
+"""Limits and campaigns in which some readings go wrong: what holds, what is named and withheld."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq, minimize
+from scipy.stats import binom, chi2, norm
+
+from kinacc.assess.adaptive import Candidates
+from kinacc.assess.looks import boundary
+from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.wrong_readings import (
+    at_most_wrong,
+    clip_of,
+    guarded_lower_mm,
+    guarded_upper_mm,
+)
+from kinacc.errors import InputError
+
+POINTS, BUDGET, LARGEST = 60, 120, 6.0
+RATE = 0.02
+
+
+@pytest.mark.parametrize("rate", [0.001, 0.01, 0.05])
+def test_the_clip_is_the_one_by_which_a_wrong_reading_harms_least(rate):
+    # Huber's minimax asymptotic variance over all symmetric wrong readings.
+    def variance(clip):
+        inside = norm.cdf(clip) - norm.cdf(-clip)
+        second = quad(lambda x: x * x * norm.pdf(x), -clip, clip)[0] + clip**2 * (1.0 - inside)
+        return ((1.0 - rate) * second + rate * clip**2) / ((1.0 - rate) * inside) ** 2
+
+    best = clip_of(rate)
+    assert variance(best) < min(variance(0.9 * best), variance(1.1 * best))
+
+
+@pytest.mark.parametrize("count", [3, 5, 20])
+@pytest.mark.parametrize("even", [True, False])
+def test_the_limit_is_the_largest_over_all_directions(count, even):
+    rng, clip, wanted = np.random.default_rng([count, even]), clip_of(0.01), -2.6 * math.sqrt(count)
+    readings = np.array([4.0, 0.0, 0.0]) + rng.normal(size=(count, 3))
+    readings[-1] += (0.0, 9.0, 0.0)
+    root = np.eye(3) + (0.0 if even else 0.4) * rng.normal(size=(count, 3, 3))
+    covariances = root @ np.swapaxes(root, 1, 2)
+
+    def limit(direction):
+        unit = direction / np.linalg.norm(direction)
+        along = readings @ unit
+        sigma = np.sqrt([unit @ each @ unit for each in covariances])
+
+        def excess(size):
+            return np.clip((along - size) / sigma, -clip, clip).sum() - wanted
+
+        return brentq(excess, along.min() - 20 * sigma.max(), along.max() + 20 * sigma.max())
+
+    begins = sorted(rng.normal(size=(400, 3)), key=limit)[-3:]
+    climbed = [minimize(lambda x: -limit(x), each, method="Nelder-Mead").fun for each in begins]
+    found = guarded_upper_mm(readings, covariances, 2.6, 0.01)
+    assert found == pytest.approx(-min(climbed), rel=1e-3)
+    assert guarded_upper_mm(readings[:2], covariances[:2], 9.0, 0.01) == math.inf
+
+
+@pytest.mark.parametrize("wrong", [(), (0,), (3, 7)])
+def test_a_limit_hardly_follows_readings_that_are_far_off(wrong):
+    rng = np.random.default_rng(5)
+    readings = np.array([6.0, 0.0, 0.0]) + rng.normal(size=(30, 3))
+    even = np.repeat(np.eye(3)[None], 30, 0)
+    plain = guarded_upper_mm(readings, even, 2.5, 0.01)
+    for to in itertools.product((-1e3, 1e3), repeat=len(wrong)):
+        moved = readings.copy()
+        moved[list(wrong), 0] = to
+        # A mean would move by 33 mm for each, from a limit of about 6.5 mm.
+        assert abs(guarded_upper_mm(moved, even, 2.5, 0.01) - plain) < 0.25 * len(wrong) + 1e-9
+
+
+def test_the_lower_limit_holds_whatever_wrong_readings_say():
+    rng = np.random.default_rng(2)
+    z = boundary((40,), 0.05, late=None, rate=0.05).z[0]
+    above = 0
+    for _ in range(2000):
+        # All at the point with the largest error, 3 mm: nothing is given away.
+        along = 3.0 + 0.5 * rng.normal(size=40)
+        along[rng.random(40) < 0.05] = 1e6
+        above += guarded_lower_mm(along, np.full(40, 0.5), z, 0.05) > 3.0
+    assert 0.03 < above / 2000 < 0.05 + 3.0 * math.sqrt(0.05 * 0.95 / 2000)
+
+
+@pytest.mark.parametrize("readings", [1, 50, 200])
+def test_so_many_wrong_readings_are_exceeded_seldom(readings):
+    found = at_most_wrong(readings, 0.01, 0.005)
+    assert binom.sf(found, readings, 0.01) <= 0.005
+    assert found == 0 or binom.sf(found - 1, readings, 0.01) > 0.005
+
+
+def run(seed, wrong, measurements=BUDGET, tied=6, tested=1.0, **settings):
+    """A campaign whose largest error is 6; ``wrong(number, rng, error)``: a shift (3,) or None.
+
+    ``tied`` points have that error. ``tested``: what the noise, 1, is taken for.
+    """
+    rng = np.random.default_rng(seed)
+    way = rng.normal(size=(POINTS, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    sizes = np.r_[np.full(tied, LARGEST), rng.uniform(0, 2, POINTS - tied)]
+    error, number = rng.permutation(way * sizes[:, None]), 0
+    even = np.tile(tested**2 * np.eye(3), (POINTS, 1, 1))
+    campaign = SearchAndConfirm(measurements, **settings).begin(Candidates(even))
+    while (row := campaign.next()) is not None:
+        number += 1
+        shift = wrong(number, rng, error[row])
+        campaign.record(row, error[row] + rng.normal(size=3) + (0.0 if shift is None else shift))
+    return campaign
+
+
+def at_random(rate):
+    def shift(number, rng, error):
+        way = rng.normal(size=3)
+        return 10.0 * way / np.linalg.norm(way) if rng.random() < rate else None
+
+    return shift
+
+
+def along(rate, size):
+    """Large errors look smaller, the worst for the upper bound, or larger, for the lower one."""
+
+    def shift(number, rng, error):
+        return size * error / np.linalg.norm(error) if rng.random() < rate else None
+
+    return shift
+
+
+def slipped(*numbers):
+    return lambda number, *_: np.array([0.0, 0.0, 14.0]) if number in numbers else None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "rate", "tied"),
+    [(at_random(0.02), 0.02, 6), (along(0.1, -10.0), 0.1, 1), (along(0.02, 10.0), 0.02, 6)],
+    ids=["at random", "inwards", "outwards"],
+)
+def test_bounds_hold_as_stated_where_some_readings_go_wrong(wrong, rate, tied):
+    campaigns, too_low, too_high = 12, 0, 0
+    for seed in range(campaigns):
+        said = run(seed, wrong, tied=tied, wrong_rate=rate).statements()[1]
+        assert said.withheld is None
+        assert said.confidence == pytest.approx(0.95 - rate)
+        too_low += said.upper_mm < LARGEST
+        too_high += said.lower_mm > LARGEST
+    most = campaigns * (0.05 + rate) + 3.0 * math.sqrt(campaigns * (0.05 + rate) * (0.95 - rate))
+    assert max(too_low, too_high) <= most
+
+
+@pytest.mark.parametrize("low", [0.02, 0.5])
+def test_a_guard_takes_the_upper_limit_of_a_noise_that_was_tested_before(low):
+    """The test of 60 degrees of freedom found less noise than there is, by chance."""
+    tested = math.sqrt(chi2.ppf(low, 60) / 60)
+    most = math.sqrt(60 / chi2.ppf(0.01, 60))
+    assert tested * most > 1.0
+    settings = {"noise": "estimated", "noise_freedom": 60, "wrong_rate": RATE, "tied": 1}
+    missed = 0
+    for seed in range(12):
+        said = run(seed, at_random(RATE), tested=tested, **settings).statements()[1]
+        assert said.noise.code == "noise_limited"
+        assert said.noise.numbers == {"factor": pytest.approx(most), "freedom": 60}
+        assert said.confidence == pytest.approx(0.95 - RATE)
+        missed += not said.lower_mm <= LARGEST <= said.upper_mm
+    assert missed <= 3
+
+
+def test_the_guard_is_no_excuse_for_a_wide_bound():
+    def widths(**settings):
+        said = [run(seed, lambda *_: None, **settings).statements()[1] for seed in range(6)]
+        return np.mean([(s.upper_mm - LARGEST, LARGEST - s.lower_mm) for s in said], axis=0)
+
+    upper, lower = widths(wrong_rate=RATE) / widths()
+    assert upper < 1.35
+    assert lower < 1.5
+
+
+@pytest.mark.parametrize("guard", [{}, {"wrong_rate": RATE}], ids=["plain", "guarded"])
+def test_a_target_that_slipped_once_is_named_and_without_a_guard_no_bound_is_stated(guard):
+    campaign = run(4, slipped(90), **guard)
+    (named,) = campaign.suspicious()
+    assert (named.number, named.row) == (90, campaign.ledger.readings[89][0])
+    codes = [each.code for each in campaign.alarms()]
+    assert codes == ["wrong_readings"] if guard else codes[0] == "wrong_readings"
+    for said in campaign.statements():
+        assert said.value_mm > 0.0
+        if guard:
+            assert said.lower_mm <= LARGEST <= said.upper_mm
+            continue
+        assert said.withheld.code == "wrong_readings"
+        assert said.withheld.numbers == {"readings": 1, "number": 90}
+        assert math.isnan(said.upper_mm)
+        assert math.isnan(said.lower_mm)
+
+
+@pytest.mark.parametrize("rate", [0.0, RATE])
+def test_a_single_reading_far_off_bounds_nothing_from_below_where_it_may_be_wrong(rate):
+    far = {7: np.array([40.0, 0.0, 0.0])}
+    campaign = run(2, lambda number, *_: far.get(number), POINTS, wrong_rate=rate)
+    said = campaign.statements()[0]
+    assert (said.lower_mm > LARGEST) == (rate == 0.0)
+    assert said.upper_mm > LARGEST
+    assert rate == 0.0 or {lower for lower, _ in campaign.point_limits().values()} == {0.0}
+
+
+def test_a_reference_pose_read_wrong_once_is_no_moved_tripod_and_a_moved_tripod_is_one():
+    settings = {"wrong_rate": RATE, "references": 20}
+    number = sorted(run(5, slipped(), **settings).plan.row_at)[12] + 1
+    assert run(5, slipped(number), **settings).statements()[1].withheld is None
+    moved = run(5, slipped(*range(81, BUDGET + 1)), **settings)
+    assert moved.statements()[1].withheld.code == "step"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"wrong_rate": 0.3}, {"wrong_rate": -0.1}, {"wrong_rate": 0.01, "noise": "estimated"}],
+)
+def test_a_guard_that_cannot_be_kept_is_refused(settings):
+    with pytest.raises(InputError, match="wrong_rate"):
+        SearchAndConfirm(BUDGET, **settings)
+
+
+def test_noise_twice_as_large_as_stated_is_said_and_no_reading_is_blamed():
+    def twice(number, rng, error):
+        return math.sqrt(3.0) * rng.normal(size=3)  # with the noise stated, twice that
+
+    codes = [{each.code for each in run(seed, twice).alarms()} for seed in range(6)]
+    assert all("scatter" in each for each in codes)
+    assert sum("wrong_readings" in each for each in codes) == 0
