@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -64,6 +64,8 @@ class ModelInvalidationFull(AdaptiveAssessor):
 
 class ChallengeCampaign(LedgerCampaign):
     """New points first, then the worst point at the bound under test."""
+
+    settings: Any
 
     def __init__(self, settings, candidates: Candidates, bound_mm: float | None = None) -> None:
         super().__init__(settings, candidates)
