@@ -36,10 +36,9 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
     """
     from kinacc.cli import comparison_report
     from kinacc.config import schema
-    from kinacc.deployment.applicability import measured_by_all
     from kinacc.deployment.compare import compare as compared
-    from kinacc.deployment.compare_words import in_words, short_names
     from kinacc.progress import reporting
+    from kinacc.report.comparison_lines import lines
 
     with reporting("compare", bar=True):
         calibrations = [
@@ -47,15 +46,13 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
         ]
         q_rad = comparison_report.joints(calibrations, (first, second), joints, count)
         weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
-        measured = measured_by_all(calibrations, q_rad)
         found = compared(*calibrations, q_rad, weight, comparison_report.shared((first, second)))
-    answer = comparison_report.answer(found, calibrations, measured)
     if out.picture is not None:
         from kinacc.figures.comparison import draw
 
-        out.draw(draw(found, *short_names(calibrations)))
+        out.draw(draw(found))
     if out.page is not None:
         from kinacc.report.comparison import comparison_page
 
-        out.write_page(comparison_page(found, calibrations, q_rad, measured))
-    out.deliver(answer, in_words(found, calibrations, measured))
+        out.write_page(comparison_page(found, calibrations[0], q_rad))
+    out.deliver(comparison_report.answer(found), "\n".join(lines(found)))

@@ -11,8 +11,7 @@ import numpy as np
 from kinacc.cli import choice, rows
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.deployment import shared_readings
-from kinacc.deployment.compare import Difference, require_alike
-from kinacc.deployment.compare_words import remarks, short_names, shown_in, verdict
+from kinacc.deployment.compare import UNKNOWN, Difference, require_alike
 from kinacc.deployment.folder import misfit_of
 from kinacc.deployment.record import Calibration, nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
@@ -78,29 +77,24 @@ def _measured(place: str) -> Columns | None:
     return store.read(_file(place)) if _file(place).is_file() else None
 
 
-def answer(found: Difference, calibrations: Sequence[Calibration], measured: np.ndarray) -> Sheet:
-    """The sheet of ``kinacc compare``: one row per parameter, and what poses did as facts.
-
-    ``measured`` (n,): the poses given where both were measured.
-    """
+def answer(found: Difference) -> Sheet:
+    """The sheet of ``kinacc compare``: one row per parameter, and what poses did as facts."""
     facts = {
-        "first": calibrations[0].name,
-        "second": calibrations[1].name,
-        "model": calibrations[0].choice,
+        "first": found.names[0],
+        "second": found.names[1],
+        "model": found.model,
         "same_robot": found.same_robot,
-        "verdict": verdict(found, calibrations, measured),
+        "verdict": None if found.verdict == UNKNOWN else found.verdict,
         "poses": int(found.covered.sum()),
         "poses_given": len(found.covered),
-        "poses_measured_by_both": int(measured[found.covered].sum()),
+        "poses_measured_by_both": int(found.measured.sum()),
         "shared_readings": found.shared.count,
         "first_fitted_to": found.shared.first,
         "second_fitted_to": found.shared.second,
         "statistic": found.statistic,
         "directions": found.directions,
         "probability": found.probability,
-        "standard_deviations": [
-            None if each.misfit is None else each.misfit.as_facts() for each in calibrations
-        ],
+        "standard_deviations": [each and each.as_facts() for each in found.misfits],
     }
     for name, shift in (("", found.as_they_stand), ("_apart_from_frames", found.apart_from_frames)):
         facts |= {
@@ -110,19 +104,22 @@ def answer(found: Difference, calibrations: Sequence[Calibration], measured: np.
             f"turned_rms{name}_mrad": 1e3 * shift.rms_rad,
             f"by_chance{name}_mrad": 1e3 * shift.chance_rad,
         }
-    each = found.parameters
     fields = []
-    if each is not None:
-        names, unit, scale = shown_in(each)
+    if found.parameters is not None:
+        meanings = {
+            "name": ("", "joint and parameter"),
+            "unit": ("", "unit of the row"),
+            "first": ("see unit", found.names[0]),
+            "second": ("see unit", found.names[1]),
+            "difference": ("see unit", "second minus first"),
+            "std": ("see unit", "of the difference"),
+            "sigmas": ("1", "difference in standard deviations"),
+            "undetermined": ("", "calibration whose poses do not determine it"),
+        }
         fields = [
-            Field("parameter", names, "", "joint and parameter"),
-            Field("unit", unit, "", "unit of the row"),
-            Field("first", each.first * scale, "see unit", calibrations[0].name),
-            Field("second", each.second * scale, "see unit", calibrations[1].name),
-            Field("difference", each.difference * scale, "see unit", "second minus first"),
-            Field("std", each.std * scale, "see unit", "of the difference"),
-            Field("sigmas", each.sigmas, "1", "difference in standard deviations"),
-            Field("remark", remarks(each), "", "where the poses do not determine it"),
+            Field(
+                {"name": "parameter"}.get(name, name), found.parameters[name].to_numpy(), *meaning
+            )
+            for name, meaning in meanings.items()
         ]
-    first, second = short_names(calibrations)
-    return Sheet(f"{second} against {first}", facts, fields, shown_rows=100)
+    return Sheet("{1} against {0}".format(*found.names), facts, fields, shown_rows=100)

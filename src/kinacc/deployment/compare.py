@@ -8,13 +8,16 @@ base and tool changes that bring them closest together.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import scipy
 
-from kinacc.calibration.uncertainty import scale_of
+from kinacc.calibration.misfit import Misfit
+from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
 from kinacc.config.error_models import model_name
+from kinacc.deployment.applicability import measured_by_all
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
@@ -22,37 +25,28 @@ from kinacc.deployment.verify import says_there
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import robot as robots
-from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 
+OTHER_ROBOT, SAME_READINGS, NOT_COMPARABLE = (
+    "different robots",
+    "same readings",
+    "not comparable here",
+)
+UNPROVEN, IN_DOUBT, CHANGED, UNKNOWN = "no change proven", "change in doubt", "changed", "unknown"
 _SPAN = 1e-3  # directions closer than this are one
 _TOUCHED = 1e-4  # as in the fits: 1 % of a parameter in a direction nobody sees
 _STEPS = 8
 _ANOTHER = 0.005  # of the length of an arm; a calibration changes far less
 ROUNDING = 1e-9  # mm and mrad
 _FEWEST = 5  # poses: three would let base and tool take up nearly all
+_UNLIKELY = 0.001
+_ENOUGH = 0.5  # of the poses measured by both
 
 
-class Parameters(NamedTuple):
-    """DH parameters of both (P,), in mm and rad, and their difference second minus first.
-
-    ``std`` is that of the difference and ``sigmas`` their ratio, NaN where either calibration does
-    not determine the parameter (``undetermined_in``: "", "first", "second" or "both") or knows no
-    deviation.
-    """
-
-    names: tuple[str, ...]
-    first: np.ndarray
-    second: np.ndarray
-    difference: np.ndarray
-    std: np.ndarray
-    sigmas: np.ndarray
-    undetermined_in: tuple[str, ...]
-
-
-class Shift(NamedTuple):
+@dataclass(frozen=True)
+class Shift:
     """How poses moved: position (n,) mm and orientation (n,) rad, root mean squares, and the rms
-    that would be expected of two calibrations of an arm that did not change (NaN where unknown)."""
+    that is expected of two calibrations of an arm that did not change (NaN where unknown)."""
 
     position_mm: np.ndarray
     orientation_rad: np.ndarray
@@ -64,21 +58,27 @@ class Shift(NamedTuple):
 
 @dataclass(frozen=True)
 class Difference:
-    """Two calibrations side by side.
+    """Two calibrations side by side, of ``names`` and ``robots``, by their models ``model``.
 
-    ``parameters`` is None unless both are DH tables. ``statistic`` is the squared distance in the
-    ``directions`` both determine, in units of their covariances, and ``probability`` that of one at
-    least as large where nothing changed; NaN where not both know their covariance.
-    ``covered`` (n,) are the poses compared, of all given: a VEC model says nothing outside the
-    joint range it was fitted in. ``as_they_stand`` are shifts of the flange in the base at these,
-    ``apart_from_frames`` after the best base and tool. ``robots_apart_mm`` is the rms by which the
-    arms they were calibrated from differ after the best base and tool, and ``same_robot`` whether
-    that is no more than calibrations do. ``shared`` are readings that both were fitted to,
-    which are counted once.
+    ``verdict`` is one of the words above; UNKNOWN where chance is not known. ``covered`` (n,) are
+    the poses compared, of all given: a VEC model covers its own joint range alone. ``measured``:
+    those of them that lie where both were measured. ``parameters``: None unless both are DH tables,
+    else a row for each that was fitted or differs, in mm and mrad: name, unit, first, second,
+    difference, its std and sigmas (NaN where either calibration does not determine it: undetermined
+    is "", "first", "second" or "both"). ``statistic`` is the squared distance in the ``directions``
+    both determine, in units of their covariances, ``probability`` that of one at least as large
+    where nothing changed. Shifts are those of the flange in the base, ``apart_from_frames`` after
+    the best base and tool; ``robots_apart_mm`` is the rms by which the arms differ before any
+    calibration, after the best base and tool. ``shared`` readings are counted once.
     """
 
+    names: tuple[str, str]
+    robots: tuple[str, str]
+    model: str
+    verdict: str
     covered: np.ndarray
-    parameters: Parameters | None
+    measured: np.ndarray
+    parameters: pd.DataFrame | None
     statistic: float
     directions: int
     probability: float
@@ -86,7 +86,8 @@ class Difference:
     apart_from_frames: Shift
     robots_apart_mm: float
     same_robot: bool
-    shared: SharedReadings = NONE_SHARED
+    shared: SharedReadings
+    misfits: tuple[Misfit | None, Misfit | None]
 
 
 def compare(
@@ -99,39 +100,53 @@ def compare(
     """What moved from ``first`` to ``second``, over reported joints ``q_rad`` (n, k), rad and mm.
 
     ``shared``: readings that both were fitted to; without it they count as apart.
-    Raises InputError where the two are of different kinds of arm, or both say something at hardly
-    any of the joints.
+    Raises InputError where the two are of different kinds of arm, or both cover hardly any joints.
     """
     require_alike(first, second)
     covered = _covered(first, second, q_rad)
     q_rad = q_rad[covered]
-    first, second = counted_once(first, second, shared)
-    parameters, test = None, (np.nan, 0, np.nan)
-    if first.model.comparable is not None and second.model.comparable is not None:
-        parameters = _parameters(first, second)
-        test = _test(first, second)
+    measured = measured_by_all((first, second), q_rad)
+    names = (Path(first.name).name, Path(second.name).name)
+    names = names if names[0] != names[1] else (first.name, second.name)
+    first, second = both = counted_once(first, second, shared)
+    parametric = first.model.comparable is not None and second.model.comparable is not None
+    test = _test(first, second) if parametric else (np.nan, 0, np.nan)
     before, after = (
-        each.pose(JointState(each.robot.dh_joints(q_rad)), "base", FLANGE)
-        for each in (first, second)
+        each.pose(JointState(each.robot.dh_joints(q_rad)), "base", FLANGE) for each in both
     )
-    plain = _difference(before, after)
-    slopes = _frame_slopes(before)
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
-    aligned = _aligned(before, after, weights)
-    chance = [_scatter(calibration, q_rad) for calibration in (first, second)]
-    known = all(each is not None for each in chance)
-    scatter = np.concatenate(chance, axis=2) if known else None
-    left = None if scatter is None else _without_frames(scatter, slopes, weights)
-    apart_mm = _robots_apart(first, second, q_rad, weights)
+    scatter = None
+    if first.known is not None and second.known is not None:
+        scatter = np.concatenate([_scatter(each, q_rad) for each in both], axis=2)
+    nominal = (robots.forward(each.robot, q_rad) for each in both)
+    apart = np.linalg.norm(_aligned(*nominal, weights)[:, :3], axis=1)
+    apart_mm = float(np.sqrt(np.mean(apart**2)))
+    length_mm = float(np.hypot(first.robot.dh.a_mm, first.robot.dh.d_mm).sum())
+    same_robot, enough = apart_mm <= _ANOTHER * length_mm, float(np.mean(measured)) >= _ENOUGH
+    verdicts = {
+        OTHER_ROBOT: not same_robot,
+        SAME_READINGS: shared.all_of_both,
+        NOT_COMPARABLE: not parametric and not enough,
+        UNKNOWN: not np.isfinite(test[2]),
+        UNPROVEN: not test[2] < _UNLIKELY,
+        CHANGED: enough,
+        IN_DOUBT: True,
+    }
     return Difference(
+        names,
+        (first.robot.name, second.robot.name),
+        first.choice,
+        next(each for each, holds in verdicts.items() if holds),
         covered,
-        parameters,
+        measured,
+        _parameters(first, second) if parametric else None,
         *test,
-        _shift(plain, scatter),
-        _shift(aligned, left),
+        _shift(_difference(before, after), scatter),
+        _shift(_aligned(before, after, weights), _without_frames(scatter, before, weights)),
         apart_mm,
-        apart_mm <= _ANOTHER * _length(first.robot.dh),
+        same_robot,
         shared,
+        (first.misfit, second.misfit),
     )
 
 
@@ -152,84 +167,57 @@ def require_alike(first: Calibration, second: Calibration) -> None:
 def _covered(first: Calibration, second: Calibration, q_rad: np.ndarray) -> np.ndarray:
     """True (n,) where both models say something. InputError where they do at hardly any joints."""
     both = (first, second)
-    said = [says_there(each.model, each.robot.dh_joints(q_rad)) for each in both]
-    covered = np.all(said, axis=(0, 2))
+    there = np.all([says_there(each.model, each.robot.dh_joints(q_rad)) for each in both], axis=0)
+    covered = there.all(axis=1)
     count, given = int(covered.sum()), len(covered)
     if count < min(_FEWEST, given):
-        outside = np.sum(~np.all(said, axis=0), axis=0)
+        outside = np.sum(~there, axis=0)
         joint = int(np.argmax(outside))
         model = model_name(next(each for each in both if each.model.domain is not None).choice)
-        raise InputError(
-            Problem(
-                f"{first.name} and {second.name}",
-                f"{f'only {count}' if count else 'none'} of the {given} poses to compare lie in "
-                f"the joint range in which the {model} models were fitted; joint {joint + 1} is "
-                f"outside in {outside[joint]}",
-                f"{_FEWEST} or more, for a {model} model says nothing elsewhere",
-                "compare at poses measured by both (--joints FILE), or the DH models (--model dh)",
-            )
+        what = (
+            f"{f'only {count}' if count else 'none'} of the {given} poses to compare lie in the "
+            f"joint range of the {model} models; joint {joint + 1} is outside in {outside[joint]}"
         )
+        fix = "compare at poses measured by both (--joints FILE), or the DH models (--model dh)"
+        place = f"{first.name} and {second.name}"
+        raise InputError(Problem(place, what, f"{_FEWEST} or more", fix))
     return covered
 
 
-def _robots_apart(
-    first: Calibration, second: Calibration, q_rad: np.ndarray, weights: np.ndarray
-) -> float:
-    """Rms distance (mm) of the arms before calibration, after the best base and tool."""
-    before, after = (robots.forward(calibration.robot, q_rad) for calibration in (first, second))
-    return _rms(np.linalg.norm(_aligned(before, after, weights)[:, :3], axis=1))
-
-
-def _length(model: DHModel) -> float:
-    """Length of the arm along its links, mm."""
-    return float(np.hypot(model.a_mm, model.d_mm).sum())
-
-
-def _parameters(first: Calibration, second: Calibration) -> Parameters:
-    names = first.model.parameter_names
-    values = [calibration.model.comparable for calibration in (first, second)]
-    free = [_free(calibration) for calibration in (first, second)]
-    units = np.array([scale_of(name) for name in names])
-    differ = np.abs(values[1] - values[0]) > ROUNDING * units
-    shown = [
-        number
-        for number, name in enumerate(names)
-        if any(name in each for each in free) or differ[number]
-    ]
-    variance, blind = np.zeros((2, len(names))), np.zeros((2, len(names)), dtype=bool)
-    for row, calibration in enumerate((first, second)):
-        variance[row], blind[row] = _deviations(calibration, names)
+def _parameters(first: Calibration, second: Calibration) -> pd.DataFrame:
+    names = np.array(first.model.parameter_names)
+    unit = np.array([scale_of(name) for name in names])
+    values = [each.model.comparable / unit for each in (first, second)]
+    fitted, variance, blind = [], [], []
+    for known in (first.known, second.known):
+        own = [] if known is None else [*known.names]
+        place = pd.Index(own).get_indexer(names)
+        fitted.append(place >= 0)
+        missing = np.full(len(names), np.nan if known is None else 0.0)
+        diagonal = np.append(np.diag(known.covariance) if own else [], 0.0)
+        variance.append(np.where(place >= 0, diagonal[place] / unit**2, missing))
+        length = np.linalg.norm(known.undetermined, axis=1, keepdims=True) if own else 1.0
+        touched = np.append(np.sum((known.undetermined / length) ** 2, axis=0) if own else [], 0.0)
+        blind.append((place >= 0) & (touched[place] > _TOUCHED))
+    std = np.sqrt(np.sum(variance, axis=0))
+    std[np.any(blind, axis=0)] = np.nan
     difference = values[1] - values[0]
-    std = np.sqrt(variance.sum(axis=0))
-    std[blind.any(axis=0)] = np.nan
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sigmas = np.where(std > 0.0, difference / std, np.nan)
-    words = {(False, False): "", (True, False): "first", (False, True): "second"}
-    where = tuple(words.get((bool(blind[0, i]), bool(blind[1, i])), "both") for i in shown)
-    columns = (column[shown] for column in (*values, difference, std, sigmas))
-    return Parameters(tuple(names[i] for i in shown), *columns, where)
-
-
-def _free(calibration: Calibration) -> set[str]:
-    return set(calibration.known.names) if calibration.known else set()
-
-
-def _deviations(calibration: Calibration, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Variances (P,), NaN without a covariance and 0 where held, and which are undetermined."""
-    if calibration.known is None:
-        return np.full(len(names), np.nan), np.zeros(len(names), dtype=bool)
-    place = {name: number for number, name in enumerate(calibration.known.names)}
-    touched = np.sum(_unit(calibration) ** 2, axis=0) > _TOUCHED
-    diagonal = np.diag(calibration.known.covariance)
-    chosen = [place.get(name) for name in names]
-    variance = np.array([0.0 if i is None else diagonal[i] for i in chosen])
-    return variance, np.array([i is not None and bool(touched[i]) for i in chosen])
-
-
-def _unit(calibration: Calibration) -> np.ndarray:
-    """Undetermined directions (m, P) of unit length in mm and mrad."""
-    directions = calibration.known.undetermined
-    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    words = np.array(["", "first", "second", "both"], dtype=object)
+    units = [unit_of(name) for name in names]
+    table = pd.DataFrame({
+        "name": [
+            name.rpartition("_")[0] if of in ("rad", "mm") else name
+            for name, of in zip(names, units, strict=True)
+        ],
+        "unit": [scaled_unit(name) for name in names],
+        "first": values[0],
+        "second": values[1],
+        "difference": difference,
+        "std": std,
+        "sigmas": np.divide(difference, std, out=np.full(len(names), np.nan), where=std > 0.0),
+        "undetermined": words[blind[0] + 2 * blind[1]],
+    })  # fmt: skip
+    return table[np.any(fitted, axis=0) | (np.abs(difference) > ROUNDING)].reset_index(drop=True)
 
 
 def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
@@ -240,28 +228,19 @@ def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
     units = np.array([scale_of(name) for name in names])
     difference = (second.model.comparable - first.model.comparable) / units
     total, blind = np.zeros((len(names), len(names))), []
-    for calibration in (first, second):
-        pick = np.zeros((len(names), len(calibration.known.names)))
-        place = {name: number for number, name in enumerate(calibration.known.names)}
-        for row, name in enumerate(names):
-            if name in place:
-                pick[row, place[name]] = 1.0
-        total += pick @ calibration.known.covariance @ pick.T / np.outer(units, units)
-        blind.append(calibration.known.undetermined @ pick.T)
+    for known in (first.known, second.known):
+        pick = (np.array(names)[:, None] == np.array(known.names)).astype(float)
+        total += pick @ known.covariance @ pick.T / np.outer(units, units)
+        blind.append(known.undetermined @ pick.T)
     held = np.eye(len(names))[np.diag(total) == 0.0]
     _, values, right = np.linalg.svd(np.concatenate([*blind, held]))
-    lost = int(np.sum(values > _SPAN * max(1.0, values.max(initial=0.0))))
-    kept = right[lost:]
+    kept = right[int(np.sum(values > _SPAN * max(1.0, values.max(initial=0.0)))) :]
     seen, vectors = np.linalg.eigh(kept @ total @ kept.T)
     good = seen > 1e-12 * seen.max(initial=0.0)
     along = (kept @ difference) @ vectors[:, good]
-    statistic = float(np.sum(along**2 / seen[good]))
-    directions = int(good.sum())
-    return (
-        statistic,
-        directions,
-        float(scipy.special.chdtrc(directions, statistic)) if directions else np.nan,
-    )
+    statistic, directions = float(np.sum(along**2 / seen[good])), int(good.sum())
+    probability = float(scipy.special.chdtrc(directions, statistic)) if directions else np.nan
+    return statistic, directions, probability
 
 
 def _difference(before: Pose, after: Pose) -> np.ndarray:
@@ -270,62 +249,52 @@ def _difference(before: Pose, after: Pose) -> np.ndarray:
     return np.concatenate([after.position_mm - before.position_mm, turn], axis=1)
 
 
-def _frame_slopes(pose: Pose) -> np.ndarray:
-    """Movement (n, 6, 12) of poses by small motions of the base (6) and of the end frame (6)."""
-    count = len(pose.position_mm)
-    slopes = np.zeros((count, 6, 12))
+def _frame_slopes(pose: Pose, weights: np.ndarray) -> np.ndarray:
+    """Weighted movement (6n, 12) of poses by small motions of the base (6) and of the end frame."""
+    slopes = np.zeros((len(pose.position_mm), 6, 12))
     slopes[:, :3, :3] = np.eye(3)
     slopes[:, :3, 3:6] = -skew(pose.position_mm)
     slopes[:, 3:, 3:6] = np.eye(3)
-    slopes[:, :3, 6:9] = pose.rotation
-    slopes[:, 3:, 9:12] = pose.rotation
-    return slopes
+    slopes[:, :3, 6:9] = slopes[:, 3:, 9:12] = pose.rotation
+    return (slopes * weights[:, None]).reshape(-1, 12)
 
 
 def _aligned(before: Pose, after: Pose, weights: np.ndarray) -> np.ndarray:
     """Movement (n, 6) that no change of base and end frame explains, least squares."""
     moved = after
     for _ in range(_STEPS):
-        left = _difference(before, moved)
-        slopes = _frame_slopes(moved) * weights[:, None]
-        step = np.linalg.lstsq(slopes.reshape(-1, 12), -(left * weights).ravel(), rcond=1e-9)[0]
-        base = Pose(exp_so3(step[3:6]), step[:3])
-        end = Pose(exp_so3(step[9:12]), step[6:9])
+        left = (_difference(before, moved) * weights).ravel()
+        step = np.linalg.lstsq(_frame_slopes(moved, weights), -left, rcond=1e-9)[0]
+        base, end = Pose(exp_so3(step[3:6]), step[:3]), Pose(exp_so3(step[9:12]), step[6:9])
         moved = compose(base, compose(moved, end))
         if np.abs(step * np.tile([1.0, 1.0, 1.0, 1e3, 1e3, 1e3], 2)).max() < 1e-10:
             break
     return _difference(before, moved)
 
 
-def _scatter(calibration: Calibration, q_rad: np.ndarray) -> np.ndarray | None:
+def _scatter(calibration: Calibration, q_rad: np.ndarray) -> np.ndarray:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fit."""
-    if calibration.known is None:
-        return None
     at = JointState(calibration.robot.dh_joints(q_rad))
     return sensitivity(calibration, at, "base", FLANGE) @ calibration.root
 
 
-def _without_frames(scatter: np.ndarray, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _without_frames(
+    scatter: np.ndarray | None, pose: Pose, weights: np.ndarray
+) -> np.ndarray | None:
     """``scatter`` (n, 6, r) less what base and end frame would take up."""
-    flat = (slopes * weights[:, None]).reshape(-1, 12)
-    left, values, _ = np.linalg.svd(flat, full_matrices=False)
+    if scatter is None:
+        return None
+    left, values, _ = np.linalg.svd(_frame_slopes(pose, weights), full_matrices=False)
     left = left[:, values > 1e-9 * values[0]]
-    moved = (scatter * weights[:, None]).reshape(len(flat), -1)
-    moved = moved - left @ (left.T @ moved)
-    return moved.reshape(scatter.shape) / weights[:, None]
+    moved = (scatter * weights[:, None]).reshape(len(left), -1)
+    return (moved - left @ (left.T @ moved)).reshape(scatter.shape) / weights[:, None]
 
 
 def _shift(moved: np.ndarray, scatter: np.ndarray | None) -> Shift:
-    position, turn = (np.linalg.norm(part, axis=1) for part in (moved[:, :3], moved[:, 3:]))
-    chance = np.full(2, np.nan)
+    sizes = [np.linalg.norm(part, axis=1) for part in (moved[:, :3], moved[:, 3:])]
+    rms = [float(np.sqrt(np.mean(size**2))) for size in sizes]
+    chance = [np.nan, np.nan]
     if scatter is not None:
-        squares = scatter**2
-        chance = [float(np.sqrt(squares[:, rows].sum() / len(moved))) for rows in _ROWS]
-    return Shift(position, turn, _rms(position), _rms(turn), *map(float, chance))
-
-
-_ROWS = (slice(0, 3), slice(3, 6))
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+        parts = (scatter[:, :3], scatter[:, 3:])
+        chance = [float(np.sqrt(np.sum(part**2) / len(moved))) for part in parts]
+    return Shift(sizes[0], sizes[1], rms[0], rms[1], chance[0], chance[1])

@@ -3,53 +3,55 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.calibration.uncertainty import is_angle
-from kinacc.deployment.compare import ROUNDING, Difference, Parameters, Shift
+from kinacc.deployment.compare import ROUNDING, Difference, Shift
 from kinacc.figures import style
 
 _FAR = 3.0  # standard deviations
 _SYMBOLS = {
-    "theta_offset_rad": "θ", "d_mm": "d", "a_mm": "a", "alpha_rad": "α", "beta_rad": "β",
+    "theta_offset": "θ", "d": "d", "a": "a", "alpha": "α", "beta": "β",
 }  # fmt: skip
 
 
-def draw(found: Difference, first: str, second: str) -> Figure:
-    """Draw a comparison; ``first`` and ``second`` name the calibrations."""
+def draw(found: Difference) -> Figure:
+    """Draw a comparison."""
     parameters = found.parameters
-    rows = len(parameters.names) if parameters else 0
+    rows = 0 if parameters is None else len(parameters)
     with style.house():
         height = max(2.6, 0.13 * rows + 0.9)
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, height)
-        if parameters and rows:
+        if parameters is not None and rows:
             left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
             _parameters(left, parameters)
         else:
             right = figure.subplots()
         _shifts(right, found)
-        style.name_dataset(figure, f"{second} against {first}")
+        style.name_dataset(figure, "{1} against {0}".format(*found.names))
     return figure
 
 
-def _parameters(ax: Axes, parameters: Parameters) -> None:
+def _parameters(ax: Axes, parameters: pd.DataFrame) -> None:
     """Changes in standard deviations; in mm and mrad where none has a standard deviation."""
-    places = np.arange(len(parameters.names))
-    known = np.isfinite(parameters.sigmas)
+    places = np.arange(len(parameters))
+    known = np.isfinite(parameters["sigmas"].to_numpy())
     if known.any():
         _in_deviations(ax, parameters, places, known)
     else:
         _in_units(ax, parameters, places)
     ax.axvline(0.0, color=style.MUTED, lw=0.6)
-    ax.set_yticks(places, [_label(name) for name in parameters.names])
+    ax.set_yticks(places, [_label(name) for name in parameters["name"]])
     ax.tick_params(axis="y", length=0)
     ax.grid(visible=False, axis="y")
     ax.set(ylim=(len(places) - 0.4, -0.6))
 
 
-def _in_deviations(ax: Axes, parameters: Parameters, places: np.ndarray, known: np.ndarray) -> None:
-    sigmas = parameters.sigmas
+def _in_deviations(
+    ax: Axes, parameters: pd.DataFrame, places: np.ndarray, known: np.ndarray
+) -> None:
+    sigmas = parameters["sigmas"].to_numpy()
     far = known & (np.abs(sigmas) > _FAR)
     near = known & ~far
     limit = max(_FAR * 1.5, float(np.max(np.abs(sigmas[known]), initial=0.0)) * 1.1)
@@ -59,7 +61,7 @@ def _in_deviations(ax: Axes, parameters: Parameters, places: np.ndarray, known: 
     ax.plot(np.zeros(int((~known).sum())), places[~known], "x", color=style.MUTED, ms=4)
     # What has no standard deviation has no place on this axis: its change is written beside it.
     for place in places[~known & (_change(parameters) != 0.0)]:
-        words = f"{_change(parameters)[place]:+.3g} {_unit(parameters.names[place])}"
+        words = f"{_change(parameters)[place]:+.3g} {parameters['unit'][place]}"
         ax.annotate(
             words,
             (0.0, place),
@@ -73,15 +75,15 @@ def _in_deviations(ax: Axes, parameters: Parameters, places: np.ndarray, known: 
     ax.set_xlabel("Change (standard deviations)\n×: without one; the change, if any, beside it")
 
 
-def _in_units(ax: Axes, parameters: Parameters, places: np.ndarray) -> None:
+def _in_units(ax: Axes, parameters: pd.DataFrame, places: np.ndarray) -> None:
     change = _change(parameters)
-    turns = np.array([is_angle(name) for name in parameters.names], dtype=bool)
+    turns = (parameters["unit"] == "mrad").to_numpy()
     angles = {"color": style.ORANGE, "hatch": "////", "ec": "white", "lw": 0}
     kinds = ((~turns, "mm", {"color": style.BLUE}), (turns, "mrad", angles))
     for which, unit, look in kinds:
         if which.any():
             ax.barh(places[which], change[which], 0.62, label=unit, **look)
-    blind = np.array([where != "" for where in parameters.undetermined_in], dtype=bool)
+    blind = (parameters["undetermined"] != "").to_numpy()
     ax.plot(change[blind], places[blind], "x", color=style.MUTED, ms=4)
     limit = 1.1 * float(np.max(np.abs(change), initial=0.0)) or 1.0
     units = ", ".join(unit for which, unit, _ in kinds if which.any())
@@ -90,15 +92,10 @@ def _in_units(ax: Axes, parameters: Parameters, places: np.ndarray) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
 
 
-def _change(parameters: Parameters) -> np.ndarray:
+def _change(parameters: pd.DataFrame) -> np.ndarray:
     """Differences (P,) in mm and mrad; what is no more than rounding is 0."""
-    unit = np.where([is_angle(name) for name in parameters.names], 1e3, 1.0)
-    change = parameters.difference * unit
+    change = parameters["difference"].to_numpy()
     return np.where(np.abs(change) > ROUNDING, change, 0.0)
-
-
-def _unit(name: str) -> str:
-    return "mrad" if is_angle(name) else "mm"
 
 
 def _shifts(ax: Axes, found: Difference) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from bokeh.models import CDSView, IndexFilter
 from bokeh.models.annotations import BoxAnnotation, Span
 
-from kinacc.deployment.compare import Difference, Parameters, Shift
-from kinacc.deployment.compare_words import remarks, shown_in
+from kinacc.deployment.compare import Difference, Shift
 from kinacc.report import pictures
 from kinacc.report.page import Control, Option, Part, Picture
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
@@ -20,6 +20,12 @@ _WORST = 10
 _STEPS = 200  # of the distribution
 _QUANTILES = {"50%": 0.5, "90%": 0.9, "99%": 0.99, "all": 1.0}
 FAR = 3.0  # standard deviations
+REMARKS = pd.Series({
+    "": "",
+    "first": "undetermined in the first",
+    "second": "undetermined in the second",
+    "both": "undetermined in both",
+})  # fmt: skip
 SHIFTS = {  # label, colour, marker and dash
     "plain": ("as they stand", ORANGE, "triangle", "solid"),
     "apart": ("after the best base and tool", GREEN, "circle", "dashed"),
@@ -30,17 +36,14 @@ SHIFTS = {  # label, colour, marker and dash
 class Case:
     """A comparison at poses: joints (n, k) as shown, positions (n, 3) by the first calibration.
 
-    ``number`` (n,) are those of the poses among all given; ``measured`` (n,): where both
-    calibrations were measured.
+    ``number`` (n,) are those of the poses among all given.
     """
 
     found: Difference
-    names: tuple[str, str]
     number: np.ndarray
     joints: np.ndarray
     slides: np.ndarray
     position_mm: np.ndarray
-    measured: np.ndarray
 
     @property
     def shifts(self) -> Mapping[str, Shift]:
@@ -110,7 +113,7 @@ def where(case: Case) -> Part:
     joints = {f"q{n + 1}": joint for n, joint in enumerate(case.joints.T)}
     sizes = {f"{key}_mm": shift.position_mm for key, shift in case.shifts.items()}
     sizes |= {f"{key}_mrad": 1e3 * shift.orientation_rad for key, shift in case.shifts.items()}
-    words = np.where(case.measured, "both were measured there", "not measured by both there")
+    words = np.where(case.found.measured, "both were measured there", "not measured by both there")
     columns = {
         **{"number": case.number, **sizes, **joints},
         **dict(zip("xyz", case.position_mm.T, strict=True)),
@@ -149,7 +152,7 @@ def where(case: Case) -> Part:
         "drawn": len(drawn),
         "largest": rows,
         "slides": case.slides.tolist(),
-        "first": case.names[0],
+        "first": case.found.names[0],
     }
     return Part(
         "where",
@@ -161,15 +164,16 @@ def where(case: Case) -> Part:
     )
 
 
-def parameters(case: Case, each: Parameters) -> Part:
+def parameters(found: Difference, table: pd.DataFrame) -> Part:
     """The parameters of both, in standard deviations of their difference."""
-    names, unit, scale = shown_in(each)
-    numbers = ("first", "second", "difference", "std")
-    columns = {"called": names, "unit": unit, "sigmas": each.sigmas, "remarks": remarks(each)}
-    columns |= {name: getattr(each, name) * scale for name in numbers}
+    columns = {name: table[name].to_numpy() for name in table}
+    columns |= {
+        "called": columns["name"],
+        "remarks": REMARKS.loc[columns["undetermined"]].to_numpy(),
+    }
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    known = bool(np.isfinite(each.sigmas).any())
-    values = {"rows": rows, "names": case.names, "known": known, "far": FAR}
+    known = bool(np.isfinite(columns["sigmas"]).any())
+    values = {"rows": rows, "names": found.names, "known": known, "far": FAR}
     return Part("changes", values, (_bars(columns),) if known else ())
 
 
